@@ -1,0 +1,1 @@
+"""Numerical kernels of Bentray: arrays in, arrays out; no cluster, no server, no files."""

@@ -1,0 +1,64 @@
+"""What a reconstruction gives: the images, how it got there, and what is needed to repeat it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .settings import Settings
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One pass over all emitters of one slice.
+
+    Attributes:
+        slice: axial index, from 0.
+        sweep: number of the pass, from 1.
+        residual_rms_s: root mean square of measured minus predicted differential travel time, s; read as
+            the pass met each emitter, before that emitter's own update.
+        emitters: how many emitters had data.
+    """
+
+    slice: int
+    sweep: int
+    residual_rms_s: float
+    emitters: int
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a reconstruction is: ``done`` of ``total`` emitter passes, over all slices and sweeps."""
+
+    done: int
+    total: int
+    history: tuple[Sweep, ...] = ()
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """A reconstructed scan.
+
+    Attributes:
+        speed: (nx, ny), or (nx, ny, nz) for several slices, m/s.
+        coverage: as ``speed``: metres of ray seen by each node in the last sweep.
+        attenuation: as ``speed``, Np/m, or None.
+        spacing_m: node spacing (x, y[, z]), m; z is NaN when the slices are not evenly spaced.
+        origin_m: position of node 0 (x, y[, z]), m.
+        water_speed_mps: speed of the coupling water, m/s.
+        history: a record per slice and sweep, in order of sweep then slice.
+        settings: the settings that were used.
+        provenance: versions of what computed it.
+    """
+
+    speed: NDArray[np.float64]
+    coverage: NDArray[np.float64]
+    spacing_m: tuple[float, ...]
+    origin_m: tuple[float, ...]
+    water_speed_mps: float
+    settings: Settings
+    history: tuple[Sweep, ...] = ()
+    attenuation: NDArray[np.float64] | None = None
+    provenance: dict[str, str] = field(default_factory=dict)

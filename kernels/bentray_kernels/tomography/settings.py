@@ -1,0 +1,96 @@
+"""The settings of a reconstruction: one frozen record that a job stores and a result repeats."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar, Literal
+
+from ..eikonal import methods
+from ..errors import InvalidInput
+
+RAYS = ("curved", "straight")
+SPEED_UPDATES = ("fixed", "data-driven")
+PICKERS = ("aic", "threshold")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to reconstruct the speed image.
+
+    Attributes:
+        rays: ``curved`` traces down the travel time of the current image; ``straight`` ignores refraction.
+        eikonal: the wave-front method for curved rays; see ``bentray_kernels.eikonal.methods()``.
+        speed_update: ``fixed`` propagates in the reconstructed speed as it is (chapter 6, equation 5);
+            ``data-driven`` stretches it to ``speed_range_mps`` first (equation 6).
+        speed_range_mps: (lowest, highest) speed known to be in the object, m/s; for ``data-driven``.
+        speed_bounds_mps: (lowest, highest) speed a node may take, m/s.
+        nodes: nodes along each side of the square image.
+        side_m: side of the image, m; None: the array with a margin.
+        sweeps: how often every emitter is used.
+        relaxation: the λ of SART (chapter 6, equation 1), in (0, 2).
+        smoothing_nodes: standard deviation, in nodes, of the Gaussian applied to each emitter's update; 0: none.
+        stop_rms_s: stop once the rms of the receiver misfit is below this, s.
+        reciprocity: use a missing pair's reverse (emitter and receiver exchanged) in its place.
+        picker: how travel times are read where only traces were uploaded.
+        seed: seed of the random emitter order.
+
+    Raises:
+        InvalidInput: naming the setting, its value and what is accepted.
+    """
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    rays: Literal["curved", "straight"] = "curved"
+    eikonal: str = "accurate"
+    speed_update: Literal["fixed", "data-driven"] = "fixed"
+    speed_range_mps: tuple[float, float] | None = None
+    speed_bounds_mps: tuple[float, float] = (1300.0, 1800.0)
+    nodes: int = 128
+    side_m: float | None = None
+    sweeps: int = 4
+    relaxation: float = 0.5
+    smoothing_nodes: float = 0.0
+    stop_rms_s: float = 0.0
+    reciprocity: bool = True
+    picker: Literal["aic", "threshold"] = "aic"
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        _one_of("rays", self.rays, RAYS)
+        _one_of("eikonal", self.eikonal, methods())
+        _one_of("speed_update", self.speed_update, SPEED_UPDATES)
+        _one_of("picker", self.picker, PICKERS)
+        _speeds("speed_bounds_mps", self.speed_bounds_mps)
+        if self.speed_range_mps is not None:
+            _speeds("speed_range_mps", self.speed_range_mps)
+        elif self.speed_update == "data-driven":
+            raise InvalidInput("speed_range_mps", None, "(lowest, highest) in m/s, since speed_update is data-driven")
+        _within("nodes", self.nodes, 16, 2048)
+        _within("sweeps", self.sweeps, 1, 1000)
+        if self.side_m is not None:
+            _within("side_m", self.side_m, 1e-4, 100.0)
+        if not 0.0 < self.relaxation < 2.0:
+            raise InvalidInput("relaxation", self.relaxation, "a number between 0 and 2")
+        _within("smoothing_nodes", self.smoothing_nodes, 0.0, 32.0)
+        _within("stop_rms_s", self.stop_rms_s, 0.0, 1.0)
+        _within("seed", self.seed, 0, 2**63 - 1)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON; ``Settings(**settings.to_dict())`` gives the same settings."""
+        return asdict(self)
+
+
+def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise InvalidInput(name, repr(value), "one of " + ", ".join(known))
+
+
+def _within(name: str, value: float, low: float, high: float) -> None:
+    if not (math.isfinite(value) and low <= value <= high):
+        raise InvalidInput(name, value, f"a number from {low:g} to {high:g}")
+
+
+def _speeds(name: str, pair: tuple[float, float]) -> None:
+    if len(pair) != 2 or not 0.0 < pair[0] < pair[1] < math.inf:
+        raise InvalidInput(name, tuple(pair), "(lowest, highest) in m/s, 0 < lowest < highest")

@@ -1,0 +1,1 @@
+"""Dask tasks of Bentray: files and slices in, checkpoints, volumes and images out."""
