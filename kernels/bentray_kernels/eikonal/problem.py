@@ -1,0 +1,120 @@
+"""A point-source Eikonal problem, checked once and laid out with a border for the kernels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InvalidInput
+
+Floats = NDArray[np.float64]
+
+# A source closer to a node than this, in nodes, is taken to sit on it.
+ON_NODE = 1e-9
+
+
+@dataclass(frozen=True)
+class PointSource:
+    """|∇T| = slowness on a regular grid, T = 0 at ``source``.
+
+    Attributes:
+        slowness: (nx, ny[, nz]), s/m, float64, C order.
+        spacing: node spacing, m.
+        source: (ndim,), m, node 0 at 0.
+    """
+
+    slowness: Floats
+    spacing: float
+    source: Floats
+
+    @classmethod
+    def checked(cls, speed: ArrayLike, spacing: float, source: ArrayLike | Sequence[float]) -> PointSource:
+        """The problem of ``solve``, refused with the first bad value's place.
+
+        Raises:
+            InvalidInput: see ``bentray_kernels.eikonal.solve``.
+        """
+        speeds = np.asarray(speed, dtype=np.float64)
+        if speeds.ndim not in (2, 3) or speeds.size == 0:
+            raise InvalidInput("speed", f"shape {speeds.shape}", "a non-empty 2-D or 3-D array")
+        bad = ~(np.isfinite(speeds) & (speeds > 0.0))
+        if bad.any():
+            place = tuple(int(i) for i in np.argwhere(bad)[0])
+            raise InvalidInput("speed", f"{speeds[place]:g} at node {place}", "finite speeds > 0 m/s")
+        step = float(spacing)
+        if not (math.isfinite(step) and step > 0.0):
+            raise InvalidInput("spacing", spacing, "a finite node spacing > 0 m")
+        position = np.asarray(source, dtype=np.float64)
+        if position.shape != (speeds.ndim,):
+            raise InvalidInput("source", f"shape {position.shape}", f"{speeds.ndim} coordinates in metres")
+        extent = step * (np.array(speeds.shape) - 1)
+        slack = ON_NODE * step
+        if not np.all((position >= -slack) & (position <= extent + slack)):
+            raise InvalidInput("source", position.tolist(), f"a point in the grid, 0 to {extent.tolist()} m")
+        return cls(1.0 / speeds, step, np.clip(position, 0.0, extent))
+
+    @cached_property
+    def padded_slowness(self) -> Floats:
+        """Flat slowness with a border of one node, whose value is never used."""
+        return np.pad(self.slowness, 1, constant_values=1.0).ravel()
+
+    @property
+    def padded_shape(self) -> tuple[int, ...]:
+        return tuple(n + 2 for n in self.slowness.shape)
+
+    @property
+    def strides(self) -> tuple[int, ...]:
+        """Flat distance of neighbours along each axis of the padded grid."""
+        shape = self.padded_shape
+        return tuple(math.prod(shape[axis + 1 :]) for axis in range(len(shape)))
+
+    def interior(self, padded: Floats) -> Floats:
+        """The grid without its border, as a fresh C-ordered array."""
+        inside = (slice(1, -1),) * self.slowness.ndim
+        return np.ascontiguousarray(padded.reshape(self.padded_shape)[inside])
+
+    def distance(self) -> Floats:
+        """Padded flat distance of every node from the source, m."""
+        squared: Floats = np.zeros(self.padded_shape)
+        for axis, n in enumerate(self.padded_shape):
+            offset = (np.arange(n) - 1.0) * self.spacing - self.source[axis]
+            shape = [1] * len(self.padded_shape)
+            shape[axis] = n
+            squared += (offset**2).reshape(shape)
+        return np.asarray(np.sqrt(squared)).ravel()
+
+    def source_slowness(self) -> float:
+        """Slowness at the source, multilinear between its cell's nodes, s/m."""
+        return float(sum(weight * self.slowness[node] for node, weight in self._cell()))
+
+    def seeds(self) -> tuple[NDArray[np.int64], Floats]:
+        """Nodes of the source's cell: flat padded indices and travel times along straight lines, s.
+
+        A source on a node gives that node alone, at time 0.
+        """
+        at_source = self.source_slowness()
+        nodes, times = [], []
+        for node, _ in self._cell():
+            offset = np.array(node) * self.spacing - self.source
+            nodes.append(sum((i + 1) * stride for i, stride in zip(node, self.strides, strict=True)))
+            times.append(float(np.linalg.norm(offset)) * 0.5 * (at_source + self.slowness[node]))
+        return np.array(nodes, dtype=np.int64), np.array(times)
+
+    def _cell(self) -> list[tuple[tuple[int, ...], float]]:
+        """The nodes around the source with their multilinear weights, those of weight 0 left out."""
+        corners: list[tuple[tuple[int, ...], float]] = [((), 1.0)]
+        for axis, n in enumerate(self.slowness.shape):
+            place = self.source[axis] / self.spacing
+            low = min(int(place), n - 1)
+            part = place - low
+            if part < ON_NODE or part > 1.0 - ON_NODE or low + 1 >= n:
+                ends = [(min(round(place), n - 1), 1.0)]
+            else:
+                ends = [(low, 1.0 - part), (low + 1, part)]
+            corners = [((*node, i), weight * w) for node, weight in corners for i, w in ends]
+        return corners

@@ -1,0 +1,151 @@
+"""The methods by name, and the two calls that run them."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InvalidInput
+from .accurate import accurate
+from .fast_marching import fast_marching, high_accuracy_fast_marching
+from .fast_sweeping import fast_sweeping
+from .problem import Floats, PointSource
+
+
+@dataclass(frozen=True)
+class Method:
+    """A solver and what a user should know of it.
+
+    Attributes:
+        name: how it is asked for.
+        run: takes a ``PointSource`` and keyword options, gives the travel time in the grid's shape.
+        order: order of accuracy away from shocks.
+        factored: whether the source's singularity is factored out.
+        summary: one line for help texts.
+    """
+
+    name: str
+    run: Callable[..., Floats]
+    order: int
+    factored: bool
+    summary: str
+
+    def options(self) -> tuple[str, ...]:
+        """Names of the keyword options that ``run`` takes."""
+        kinds = inspect.signature(self.run).parameters.values()
+        return tuple(p.name for p in kinds if p.kind is inspect.Parameter.KEYWORD_ONLY)
+
+
+@dataclass(frozen=True)
+class Registry:
+    """A frozen set of methods; ``register`` gives a larger one and leaves this one as it is."""
+
+    by_name: Mapping[str, Method] = field(default_factory=lambda: MappingProxyType({}))
+
+    def register(self, method: Method) -> Registry:
+        """This registry and one more method.
+
+        Raises:
+            InvalidInput: when the name is taken.
+        """
+        if method.name in self.by_name:
+            raise InvalidInput("method", repr(method.name), "a name not yet registered")
+        return Registry(MappingProxyType({**self.by_name, method.name: method}))
+
+    def get(self, name: str) -> Method:
+        """The method of that name.
+
+        Raises:
+            InvalidInput: listing the known names.
+        """
+        try:
+            return self.by_name[name]
+        except KeyError:
+            raise InvalidInput("method", repr(name), "one of " + ", ".join(self.by_name)) from None
+
+
+METHODS = (
+    Registry()
+    .register(
+        Method("accurate", accurate, 2, True, "factored second order in the order of a first-order sweep (default)")
+    )
+    .register(Method("fmm", fast_marching, 2, False, "fast marching, binary heap; option order=1 or 2"))
+    .register(Method("hafmm", high_accuracy_fast_marching, 2, True, "fast marching, factored second order"))
+    .register(Method("fsm", fast_sweeping, 1, False, "fast sweeping, first order; option tolerance"))
+)
+
+
+def methods() -> tuple[str, ...]:
+    """Names that ``solve`` accepts, the default first."""
+    return tuple(METHODS.by_name)
+
+
+def solve(speed: ArrayLike, spacing: float, source: ArrayLike, method: str = "accurate", **options: Any) -> Floats:
+    """Travel time from a point source to every node: |∇T| = 1/speed (chapter 6, equation 2).
+
+    Args:
+        speed: (nx, ny[, nz]), m/s, finite and > 0.
+        spacing: node spacing, m, the same along every axis.
+        source: (ndim,), m, anywhere in the grid; node 0 lies at 0.
+        method: one of ``methods()``.
+        options: keyword options of that method.
+
+    Returns:
+        (nx, ny[, nz]), s, float64.
+
+    Raises:
+        InvalidInput: naming the argument: a speed that is not finite or not positive (with the place of
+            the first), a source outside the grid, an unknown method or option.
+    """
+    chosen = _with_options(method, options)
+    return chosen.run(PointSource.checked(speed, spacing, source), **options)
+
+
+def solve_many(
+    speeds: ArrayLike, spacing: float, sources: ArrayLike, method: str = "accurate", **options: Any
+) -> Floats:
+    """Travel times of several problems in one call.
+
+    Args:
+        speeds: (batch, nx, ny[, nz]), m/s; a batch of 1 serves every source.
+        spacing: node spacing, m.
+        sources: (batch, ndim), m; a batch of 1 serves every speed.
+        method: one of ``methods()``.
+        options: keyword options of that method.
+
+    Returns:
+        (batch, nx, ny[, nz]), s; each equal to ``solve`` of its own speed and source.
+
+    Raises:
+        InvalidInput: as ``solve``, and for batches that do not match.
+    """
+    chosen = _with_options(method, options)
+    fields = np.asarray(speeds, dtype=np.float64)
+    points = np.asarray(sources, dtype=np.float64)
+    if fields.ndim not in (3, 4):
+        raise InvalidInput("speeds", f"shape {fields.shape}", "(batch, nx, ny) or (batch, nx, ny, nz)")
+    if points.ndim != 2:
+        raise InvalidInput("sources", f"shape {points.shape}", "(batch, ndim)")
+    if len(fields) != len(points) and 1 not in (len(fields), len(points)):
+        raise InvalidInput("sources", f"a batch of {len(points)}", f"1 or as many as speeds, {len(fields)}")
+    batch = max(len(fields), len(points)) if len(fields) and len(points) else 0
+    times = np.empty((batch, *fields.shape[1:]))
+    for k in range(batch):
+        problem = PointSource.checked(fields[k % len(fields)], spacing, points[k % len(points)])
+        times[k] = chosen.run(problem, **options)
+    return times
+
+
+def _with_options(name: str, options: Mapping[str, Any]) -> Method:
+    method = METHODS.get(name)
+    for option in options:
+        if option not in method.options():
+            known = ", ".join(method.options()) or "none"
+            raise InvalidInput("options", repr(option), f"options of {name}: {known}")
+    return method

@@ -1,0 +1,74 @@
+"""Sensitivities of travel times to the slowness of the nodes: metres of ray, as a sparse matrix."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
+
+from .descent import curved_ray, straight_ray, walk
+from .fan import Fan, Kind
+
+
+def sensitivities(
+    tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, *, kind: Kind = "curved"
+) -> csr_array:
+    """Metres of each ray that each node answers for, the w of SART (chapter 6, equation 1).
+
+    By Fermat's principle the first-order change of a travel time is Σ w·δslowness along the unperturbed
+    ray, and Σ w·slowness is the travel time itself, read as the integral of the slowness along the ray.
+
+    Args:
+        tof, spacing, receivers, source, kind: as ``trace``.
+
+    Returns:
+        (receivers, nodes), m; columns are nodes in C order. Rows sum to the length of the ray.
+
+    Raises:
+        InvalidInput: as ``trace``.
+    """
+    fan = Fan.checked(tof, spacing, receivers, source, kind)
+    pointers, columns, lengths = _rows(
+        fan.receivers, fan.source, fan.tof, fan.gradient, fan.shape, fan.strides, fan.curved, fan.room
+    )
+    return csr_array((lengths * spacing, columns, pointers), shape=(len(fan.receivers), fan.tof.size))
+
+
+@njit(cache=True, nogil=True)
+def _rows(receivers, source, tof, gradient, shape, strides, curved, room):
+    axes = len(shape)
+    path = np.empty((room, axes))
+    nodes = np.empty(room << axes, np.int64)
+    lengths = np.empty(room << axes)
+    total = np.zeros(tof.size)
+    touched = np.empty(room << axes, np.int64)
+    pointers = np.zeros(len(receivers) + 1, np.int64)
+    capacity = max(16, len(receivers) * 4 * sum(shape))
+    columns = np.empty(capacity, np.int64)
+    values = np.empty(capacity)
+    filled = 0
+    for row in range(len(receivers)):
+        if curved:
+            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, path)
+        else:
+            count = straight_ray(receivers[row], source, axes, path)
+        entries = walk(path, count, shape, strides, nodes, lengths)
+        distinct = 0
+        for k in range(entries):
+            if total[nodes[k]] == 0.0 and lengths[k] > 0.0:
+                touched[distinct] = nodes[k]
+                distinct += 1
+            total[nodes[k]] += lengths[k]
+        while filled + distinct > capacity:
+            columns = np.concatenate((columns, np.empty(capacity, np.int64)))
+            values = np.concatenate((values, np.empty(capacity)))
+            capacity *= 2
+        ordered = np.sort(touched[:distinct])
+        for node in ordered:
+            columns[filled] = node
+            values[filled] = total[node]
+            total[node] = 0.0
+            filled += 1
+        pointers[row + 1] = filled
+    return pointers, columns[:filled], values[:filled]

@@ -1,0 +1,98 @@
+"""One slice's inverse problem on a grid: transducers in grid coordinates, data per emitter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..acquisition import Dataset
+from ..errors import InvalidInput
+from .settings import Settings
+
+Floats = NDArray[np.float64]
+
+# Water kept around the outermost transducer, nodes, so that wave front and gradient have room.
+MARGIN_NODES = 3
+
+# Nodes nearer to the array than this are water and stay so.
+RIM_NODES = 2
+
+
+@dataclass(frozen=True)
+class SliceProblem:
+    """What SART needs of a slice, once.
+
+    Attributes:
+        emitters: (ntx, 2), m, node 0 at 0; receivers: (nrx, 2), as well.
+        delta_tof: (ntx, nrx), s, object minus water; NaN where there is none.
+        region: (nodes, nodes), nodes that may change.
+        spacing: node spacing, m.
+        origin: position of node 0 in the dataset's coordinates, m.
+        water_speed: m/s.
+    """
+
+    emitters: Floats
+    receivers: Floats
+    delta_tof: Floats
+    region: NDArray[np.bool_]
+    spacing: float
+    origin: tuple[float, float]
+    water_speed: float
+
+    @classmethod
+    def of(cls, dataset: Dataset, settings: Settings) -> SliceProblem:
+        """The problem of a one-slice dataset.
+
+        Raises:
+            InvalidInput: several slices, three-dimensional positions, no travel times, elements outside
+                the image.
+        """
+        if dataset.slices != 1 or dataset.element_position_m.shape[1] != 2:
+            raise InvalidInput("dataset", f"{dataset.slices} slices, positions {dataset.element_position_m.shape}", "one 2-D slice")
+        delta = dataset.differential_tof()
+        if delta.ndim == 3:
+            delta = delta[0]
+        emitters, receivers = dataset.tx, dataset.rx
+        if settings.reciprocity:
+            emitters, receivers, delta = _with_reverses(emitters, receivers, delta)
+        if not np.isfinite(delta).any():
+            raise InvalidInput("traveltime", "no valid pair", "at least one finite travel time between two elements")
+        position = dataset.element_position_m
+        centre = 0.5 * (position.min(axis=0) + position.max(axis=0))
+        reach = float(np.abs(position - centre).max())
+        side = settings.side_m
+        if side is None:
+            side = 2.0 * reach * (settings.nodes - 1) / (settings.nodes - 1 - 2 * MARGIN_NODES)
+        if side < 2.0 * reach:
+            raise InvalidInput("side_m", side, f"at least {2.0 * reach:g} m, to hold the array")
+        origin = centre - 0.5 * side
+        spacing = side / (settings.nodes - 1)
+        axis = np.arange(settings.nodes) * spacing
+        nearest = float(np.linalg.norm(position - centre, axis=1).min()) - RIM_NODES * spacing
+        off_centre = np.hypot(axis[:, None] - 0.5 * side, axis[None, :] - 0.5 * side)
+        return cls(
+            emitters=position[emitters] - origin,
+            receivers=position[receivers] - origin,
+            delta_tof=delta,
+            region=off_centre <= nearest,
+            spacing=spacing,
+            origin=(float(origin[0]), float(origin[1])),
+            water_speed=dataset.water_speed_mps,
+        )
+
+
+def _with_reverses(
+    tx: NDArray[np.int64], rx: NDArray[np.int64], delta: Floats
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+    """All elements as both emitters and receivers, missing pairs filled by their reverse.
+
+    Travel times are the same both ways, so a half matrix is as good as a whole one, and every
+    emitter then sees the object from all sides.
+    """
+    elements = np.union1d(tx, rx)
+    full = np.full((len(elements), len(elements)), np.nan)
+    # Duplicate entries of tx or rx keep their last value, as a dictionary would.
+    full[np.searchsorted(elements, tx)[:, None], np.searchsorted(elements, rx)[None, :]] = delta
+    return elements, elements, np.where(np.isfinite(full), full, full.T)
