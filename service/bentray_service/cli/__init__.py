@@ -1,0 +1,53 @@
+"""The `bentray` command: one file a command, each loading what it needs only when it runs."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from .bench import bench
+from .demo import demo
+from .endings import Commands
+from .reconstruct import reconstruct
+from .serve import serve
+from .simulate import simulate
+from .submit import submit
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="bentray",
+    cls=Commands,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Refraction-corrected ultrasound computed tomography: a scan in, an image of sound speed out.",
+    epilog="Begin with: bentray demo. Exit codes: 0 done, 1 the work failed, 2 the input was bad.",
+)
+
+for command in (demo, serve, submit, reconstruct, simulate, bench):
+    app.command()(command)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from bentray_service import __version__
+
+        typer.echo(f"bentray {__version__}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _start(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+def main() -> None:
+    """Run the command line of this process."""
+    app()

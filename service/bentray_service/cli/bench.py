@@ -1,0 +1,81 @@
+"""`bentray bench`: run one file of `benchmarks/` and write its rows."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bentray_kernels.errors import InvalidInput
+
+from .endings import WorkFailed
+from .paths import replace_file
+from .row import Row
+from .terminal import Step, print_lines, print_table, progress_bar, without_nan
+
+Rows = Callable[[bool, Step], Iterable[Row]]
+
+
+def bench(
+    name: Annotated[str, typer.Argument(help="Name of a file in benchmarks/, without .py.")],
+    json_file: Annotated[Path, typer.Option("--json", help="File to write the rows to.")],
+    quick: Annotated[bool, typer.Option("--quick", help="Smaller problems, for trying it out.")] = False,
+) -> None:
+    """Measure the rows of one table of targets, in this run and on this machine.
+
+    A row that misses its goal is a result, not an error: the exit code is 0 once every row is measured.
+
+    Example:  bentray bench reconstruction --json rows.json
+    """
+    if not json_file.parent.is_dir():
+        raise InvalidInput("--json", f"{json_file} (its folder is absent)", "a path in a folder that exists")
+    measure = load(name, benchmark_folder())
+    with progress_bar(f"Measuring {name}") as step:
+        rows = list(measure(quick, step))
+    text = json.dumps(without_nan([row.to_dict() for row in rows]), indent=2, allow_nan=False)
+    replace_file(json_file, (text + "\n").encode())
+    columns = ("target", "value", "", "goal", "unit", "met", "detail")
+    print_table(f"{name}, quick" if quick else name, columns, [_cells(row) for row in rows])
+    print_lines([str(json_file)])
+
+
+def benchmark_folder() -> Path:
+    """The folder of the benchmarks: beside the packages in a source checkout, which no wheel contains.
+
+    Raises:
+        InvalidInput: when Bentray does not run from a checkout.
+    """
+    folder = Path(__file__).resolve().parents[3] / "benchmarks"
+    if not folder.is_dir():
+        raise InvalidInput("benchmarks", f"no folder {folder}", "a source checkout with `make install`")
+    return folder
+
+
+def load(name: str, folder: Path) -> Rows:
+    """The function ``rows(quick, progress)`` of one benchmark.
+
+    Raises:
+        InvalidInput: for a name that is no benchmark; lists those that are.
+        WorkFailed: when the file does not define ``rows``.
+    """
+    known = sorted(path.stem for path in folder.glob("*.py") if not path.stem.startswith("_"))
+    if name not in known:
+        raise InvalidInput("name", repr(name), "one of " + ", ".join(known))
+    spec = importlib.util.spec_from_file_location(f"bentray_benchmark_{name}", folder / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    measure: Rows | None = getattr(module, "rows", None)
+    if measure is None:
+        raise WorkFailed(f"benchmarks/{name}.py defines no rows(quick, progress)")
+    return measure
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    value = "none" if row.value is None else f"{row.value:.4g}"
+    return row.target, value, row.op, f"{row.goal:.4g}", row.unit, "yes" if row.met else "no", row.detail

@@ -1,0 +1,111 @@
+"""`bentray demo`: the whole path once, a phantom scan through a real service, straight against bent rays."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .endings import WorkFailed, service_answers
+from .paths import output_folder, replace_file
+from .service_process import running_service
+from .submit import show_job
+from .terminal import AsJson, print_json, print_lines, print_table, progress_bar, remark
+
+if TYPE_CHECKING:
+    from bentray_kernels.tomography import Reconstruction
+
+    from ..client import Client
+
+# The two jobs by the names of the closing table; what is not named here is the service's default.
+JOBS: dict[str, dict[str, Any]] = {"straight": {"rays": "straight"}, "bent": {"rays": "curved"}}
+
+
+def demo(
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Folder for the scan and the picture.")
+    ] = Path("demo-output"),
+    nodes: Annotated[int, typer.Option(help="Nodes along a side of the image.")] = 128,
+    elements: Annotated[int, typer.Option(help="Transducers of the ring.")] = 256,
+    coupling: Annotated[float, typer.Option(help="Speed of the water, m/s.")] = 1375.0,
+    as_json: AsJson = False,
+) -> None:
+    """Start a service, send it a simulated scan and compare what straight and bent rays make of it.
+
+    Needs no data and leaves nothing running. Fails if bent rays do not beat straight ones.
+
+    Example:  bentray demo --coupling 1375 -o demo-output
+    """
+    folder = output_folder(output)
+
+    from bentray_workers.dataset_file import write_dataset
+    from bentray_workers.images import comparison_png
+
+    from bentray_workers.simulation import SimulationSettings, simulate
+
+    from ..client import Client
+    from .figures import figures
+
+    settings = SimulationSettings(nodes=nodes, elements=elements, coupling_mps=coupling)
+    started = time.perf_counter()
+    with (
+        tempfile.TemporaryDirectory(prefix="bentray-demo-") as data,
+        running_service(Path(data), folder / "service.log") as url,
+        service_answers(),
+        Client(url) as client,
+    ):
+        remark(f"A service is at {url}. Simulating a scan: {elements} transducers, {nodes}² nodes.")
+        with progress_bar("Simulating") as step:
+            dataset = simulate(
+                None, settings, lambda progress: step(progress.done, progress.total, "emitters")
+            )
+        scan = folder / "phantom.h5"
+        write_dataset(scan, dataset)
+        with progress_bar("Uploading") as step:
+            sent = client.upload(scan, step)
+        results, seconds = {}, {}
+        for name, asked in JOBS.items():
+            results[name], seconds[name] = _reconstruct(
+                client, sent["id"], name, {**asked, "nodes": nodes}, folder
+            )
+    assert dataset.truth is not None
+    found = {name: figures(result, dataset, seconds[name]) for name, result in results.items()}
+    picture = folder / "comparison.png"
+    replace_file(picture, comparison_png(dataset.truth, results))
+    _show(found, picture, time.perf_counter() - started, as_json)
+    straight, bent = (found[name]["truth"]["mean_absolute_error_of_range"] for name in JOBS)
+    if not bent < straight:
+        raise WorkFailed(f"bent rays ({100 * bent:.1f} %) do not beat straight ones ({100 * straight:.1f} %)")
+
+
+def _reconstruct(
+    client: Client, dataset: str, name: str, asked: dict[str, Any], folder: Path
+) -> tuple[Reconstruction, float]:
+    from bentray_workers.reconstruction_file import read_reconstruction
+
+    with progress_bar(f"Reconstructing, {name} rays") as step:
+        job = client.wait(client.submit(dataset, asked)["id"], lambda record: show_job(record, step))
+    path = client.download(job["volume"], "hdf5", folder / f"{name}.h5")
+    return read_reconstruction(path), job["seconds"]
+
+
+def _show(found: dict[str, dict[str, Any]], picture: Path, seconds: float, as_json: bool) -> None:
+    if as_json:
+        print_json({"jobs": found, "picture": str(picture), "seconds": round(seconds, 3)})
+        return
+    rows = [
+        (
+            name,
+            f"{100 * figures['truth']['mean_absolute_error_of_range']:.1f} %",
+            f"{figures['truth']['rmse_mps']:.1f} m/s",
+            f"{figures['residual_rms_s'] * 1e9:.0f} ns",
+            f"{figures['seconds']:.1f} s",
+        )
+        for name, figures in found.items()
+    ]
+    columns = ("rays", "mean abs. error of range", "rms error", "residual", "time")
+    print_table("Table 6 phantom, inside the breast", columns, rows)
+    print_lines([f"The whole took {seconds:.0f} s. The picture:", str(picture)])

@@ -1,0 +1,60 @@
+"""The files a command is given and leaves: checked before the work starts, replaced whole when it is done."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from bentray_kernels.errors import InvalidInput
+
+
+def input_file(path: Path) -> Path:
+    """``path`` if it is a file.
+
+    Raises:
+        InvalidInput: saying what was found there.
+    """
+    if not path.is_file():
+        found = "a folder" if path.is_dir() else "no such file"
+        raise InvalidInput("file", f"{path} ({found})", "the path of a dataset in HDF5")
+    return path
+
+
+def output_folder(path: Path) -> Path:
+    """``path`` as a folder, made if it is absent.
+
+    Raises:
+        InvalidInput: where a file is in the way.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        raise InvalidInput(
+            "output", f"{path} (a file is in the way)", "a folder, or where one can be made"
+        ) from error
+    return path
+
+
+def output_file(path: Path, *, force: bool) -> Path:
+    """``path`` if it may be written: absent, or a file that ``force`` gives up.
+
+    Raises:
+        InvalidInput: where something is in the way, or the folder is absent.
+    """
+    if path.is_dir():
+        raise InvalidInput("output", f"{path} (a folder)", "the path of a file")
+    if path.exists() and not force:
+        raise InvalidInput("output", f"{path} (exists)", "a new file, or --force to replace this one")
+    if not path.parent.is_dir():
+        raise InvalidInput("output", f"{path} (its folder is absent)", "a path in a folder that exists")
+    return path
+
+
+def replace_file(path: Path, content: bytes) -> None:
+    """Write ``content`` so that a reader sees the old file or the new one, never a part."""
+    partial = path.with_name(path.name + ".partial")
+    with partial.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    partial.replace(path)

@@ -1,0 +1,46 @@
+"""The three files of a result: `reconstruction.h5`, `.png` and `.json` in one folder."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .paths import replace_file
+from .terminal import print_json, print_lines, print_table, without_nan
+
+if TYPE_CHECKING:
+    from bentray_kernels.acquisition import Dataset
+    from bentray_kernels.tomography import Reconstruction
+
+
+def write_results(
+    folder: Path, result: Reconstruction, dataset: Dataset, seconds: float, **more: object
+) -> dict[str, Any]:
+    """Write the three files, each whole or not at all, and return the figures, ``more`` first among them."""
+    from bentray_workers.images import report_png
+    from bentray_workers.reconstruction_file import write_reconstruction
+
+    from .figures import figures
+
+    paths = {kind: folder / f"reconstruction.{kind}" for kind in ("h5", "png", "json")}
+    found = {
+        **more,
+        **figures(result, dataset, seconds),
+        "outputs": {kind: str(path) for kind, path in paths.items()},
+    }
+    write_reconstruction(paths["h5"], result)
+    replace_file(paths["png"], report_png(result, dataset.truth))
+    replace_file(paths["json"], (json.dumps(without_nan(found), indent=2, allow_nan=False) + "\n").encode())
+    return found
+
+
+def show_results(title: str, found: dict[str, Any], *, as_json: bool) -> None:
+    """The figures as a table and the three paths, or as JSON."""
+    from .figures import summary
+
+    if as_json:
+        print_json(found)
+        return
+    print_table(title, ("figure", "value"), summary(found))
+    print_lines(found["outputs"].values())

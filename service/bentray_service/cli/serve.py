@@ -1,0 +1,149 @@
+"""`bentray serve`: the service on this machine, with its own workers or those of a given scheduler."""
+
+from __future__ import annotations
+
+import ipaddress
+import json
+import os
+import socket
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from bentray_kernels.errors import InvalidInput
+
+from .endings import WorkFailed
+from .terminal import print_lines, remark
+
+if TYPE_CHECKING:
+    from ..settings import ServiceSettings
+
+OPTIONS = {
+    "host": "--host",
+    "port": "--port",
+    "data_dir": "--data",
+    "dask_scheduler_address": "--scheduler",
+    "workers": "--workers",
+}
+
+
+def serve(
+    host: Annotated[str | None, typer.Option(help="Address to listen on.", show_default="127.0.0.1")] = None,
+    port: Annotated[int | None, typer.Option(help="Port; 0 picks a free one.", show_default="8000")] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the datasets, volumes and the database.", show_default="./bentray-data"),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Dask scheduler to use instead of own workers, as tcp://head:8786."),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Worker processes to start.", show_default="one a core")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print {url, pid, data} as one JSON object.")
+    ] = False,
+) -> None:
+    """Start the service and keep it running until Ctrl-C.
+
+    An option that is not given is read from its environment variable (BENTRAY_PORT and so on).
+
+    Example:  bentray serve --port 8000 --data /srv/bentray
+    """
+    from ..settings import ServiceSettings
+
+    options = {
+        "host": host,
+        "port": port,
+        "data_dir": data,
+        "dask_scheduler_address": scheduler,
+        "workers": workers,
+    }
+    given = {name: value for name, value in options.items() if value is not None}
+    try:
+        settings = ServiceSettings.load(**given)
+    except InvalidInput as error:
+        # The settings speak of environment variables; the user may have typed an option.
+        name = error.field.removeprefix("BENTRAY_").lower()
+        field = OPTIONS[name] if name in given else error.field
+        raise InvalidInput(field, error.value, error.accepted) from error
+    listening = _listen(settings.host, settings.port)
+    try:
+        _run(settings, listening, as_json)
+    finally:
+        listening.close()
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    # The socket is bound here and handed on, so that a busy port is found before any worker starts
+    # and port 0 is known by its real number.
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    except socket.gaierror as error:
+        raise InvalidInput("host", repr(host), "an address of this machine, as 127.0.0.1") from error
+    listening = socket.socket(family, kind, protocol)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind(address)
+    except OSError as error:
+        listening.close()
+        raise InvalidInput(
+            "port", f"{port} on {host} ({error.strerror})", "a free port of this machine; 0 picks one"
+        ) from error
+    return listening
+
+
+def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> None:
+    import uvicorn
+
+    from ..app import create_app
+
+    host, port = listening.getsockname()[:2]
+    url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
+
+    class Announcing(uvicorn.Server):
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            if self.started and as_json:
+                here = {"url": url, "pid": os.getpid(), "data": str(settings.data_dir.resolve())}
+                print_lines([json.dumps(here)])
+            if self.started:
+                remark(f"Bentray is at {url} (data in {settings.data_dir}); Ctrl-C stops it.")
+                remark(_reach(host))
+
+    app = _Starting(create_app(settings))
+    server = Announcing(uvicorn.Config(app, log_level="warning", lifespan="on"))
+    server.run(sockets=[listening])
+    if app.failure is not None:
+        raise app.failure
+    if not server.started:
+        raise WorkFailed("the service could not start")
+
+
+class _Starting:
+    """Keeps what stopped the application from starting, for one clear line instead of a logged traceback."""
+
+    def __init__(self, app: Any) -> None:
+        self._app = app
+        self.failure: Exception | None = None
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        if scope["type"] != "lifespan":
+            await self._app(scope, receive, send)
+            return
+
+        async def quiet(message: dict[str, Any]) -> None:
+            await send({"type": message["type"]})
+
+        try:
+            await self._app(scope, receive, quiet)
+        except Exception as error:
+            self.failure = error
+
+
+def _reach(host: str) -> str:
+    if ipaddress.ip_address(host).is_loopback:
+        return "It is open on loopback only: nothing but this machine can reach it."
+    return "Whoever can reach this address can use it: it asks for no key. Put a proxy that does before it."

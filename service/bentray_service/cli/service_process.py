@@ -1,0 +1,86 @@
+"""A service of one's own: `bentray serve` in a child process that ends with the block it was started for."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from .endings import WorkFailed
+
+START_S = 120.0
+STOP_S = 20.0
+
+
+@contextmanager
+def running_service(data: Path, log: Path) -> Iterator[str]:
+    """Start a service on a free port and yield its URL; it is stopped however the block is left.
+
+    Args:
+        data: folder for its data.
+        log: file for what it prints, to look at when it fails.
+
+    Raises:
+        WorkFailed: when it ends or stays silent instead of starting.
+    """
+    command = [sys.executable, "-m", "bentray_service.cli", "serve", "--host", "127.0.0.1", "--port", "0"]
+    command += ["--json", "--data", str(data)]
+    # Its own process group, so that its workers can be ended with it, and Ctrl-C reaches it through us only.
+    with log.open("wb") as errors:
+        process = subprocess.Popen(  # noqa: S603 - our own command, no shell
+            command, stdout=subprocess.PIPE, stderr=errors, start_new_session=True
+        )
+    try:
+        with _terminable():
+            yield _url(process, log)
+    finally:
+        _stop(process)
+
+
+def _url(process: subprocess.Popen[bytes], log: Path) -> str:
+    assert process.stdout is not None
+    deadline = time.monotonic() + START_S
+    while not select.select([process.stdout], [], [], 0.2)[0]:
+        if time.monotonic() > deadline:
+            raise WorkFailed(f"the service did not start within {START_S:g} s; its log is {log}")
+    line = process.stdout.readline()
+    if not line:
+        said = log.read_text(errors="replace").strip().splitlines()
+        raise WorkFailed(f"the service ended at once: {said[-1] if said else 'it said nothing'} (log: {log})")
+    return str(json.loads(line)["url"])
+
+
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(STOP_S)
+    finally:
+        # What is left of its group; usually nothing.
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
+
+
+@contextmanager
+def _terminable() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP leave the block like Ctrl-C does, so that what it started is stopped."""
+
+    def leave(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, leave) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
