@@ -37,14 +37,14 @@ def table6(coupling_mps: float = 1500.0) -> EllipsePhantom:
     return EllipsePhantom(
         coupling_mps,
         (
-            Ellipse((0.0, 0.0), (0.074, 0.066), FAT_MPS, FAT_NP_M, "fat"),
-            Ellipse((0.003, 0.0), (0.056, 0.048), TISSUE_MPS, TISSUE_NP_M, "tissue"),
-            spot(-0.022, 0.014, 8, large=True, flat=0.7),
-            spot(0.026, -0.016, 8, large=True, faint=True, flat=0.75),
-            spot(0.006, 0.028, 6, large=True, faint=True),
-            spot(-0.012, -0.022, 5, large=False),
-            spot(0.030, 0.014, 4, large=False),
-            spot(0.004, -0.004, 3, large=False),
-            spot(-0.034, -0.006, 2, large=False),
+            Ellipse((0.0, 0.0), (0.082, 0.076), FAT_MPS, FAT_NP_M, "fat"),
+            Ellipse((0.003, 0.0), (0.064, 0.058), TISSUE_MPS, TISSUE_NP_M, "tissue"),
+            spot(-0.025, 0.016, 8, large=True, flat=0.7),
+            spot(0.030, -0.018, 8, large=True, faint=True, flat=0.75),
+            spot(0.007, 0.032, 6, large=True, faint=True),
+            spot(-0.014, -0.025, 5, large=False),
+            spot(0.035, 0.016, 4, large=False),
+            spot(0.005, -0.005, 3, large=False),
+            spot(-0.039, -0.007, 2, large=False),
         ),
     )

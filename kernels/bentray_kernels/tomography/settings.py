@@ -48,9 +48,9 @@ class Settings:
     speed_bounds_mps: tuple[float, float] = (1300.0, 1800.0)
     nodes: int = 128
     side_m: float | None = None
-    sweeps: int = 4
-    relaxation: float = 0.5
-    smoothing_nodes: float = 0.0
+    sweeps: int = 5
+    relaxation: float = 0.1
+    smoothing_nodes: float = 1.0
     stop_rms_s: float = 0.0
     reciprocity: bool = True
     picker: Literal["aic", "threshold"] = "aic"
