@@ -6,13 +6,8 @@ from typing import Annotated
 
 import typer
 
-from .bench import bench
-from .demo import demo
+from . import bench, demo, reconstruct, serve, simulate, submit
 from .endings import Commands
-from .reconstruct import reconstruct
-from .serve import serve
-from .simulate import simulate
-from .submit import submit
 
 __all__ = ["app", "main"]
 
@@ -25,7 +20,14 @@ app = typer.Typer(
     epilog="Begin with: bentray demo. Exit codes: 0 done, 1 the work failed, 2 the input was bad.",
 )
 
-for command in (demo, serve, submit, reconstruct, simulate, bench):
+for command in (
+    demo.demo,
+    serve.serve,
+    submit.submit,
+    reconstruct.reconstruct,
+    simulate.simulate,
+    bench.bench,
+):
     app.command()(command)
 
 

@@ -39,7 +39,9 @@ def bench(
     text = json.dumps(without_nan([row.to_dict() for row in rows]), indent=2, allow_nan=False)
     replace_file(json_file, (text + "\n").encode())
     columns = ("target", "value", "", "goal", "unit", "met", "detail")
-    print_table(f"{name}, quick" if quick else name, columns, [_cells(row) for row in rows])
+    print_table(
+        f"{name}, quick" if quick else name, columns, [_cells(row) for row in rows], ("value", "goal")
+    )
     print_lines([str(json_file)])
 
 

@@ -107,5 +107,5 @@ def _show(found: dict[str, dict[str, Any]], picture: Path, seconds: float, as_js
         for name, figures in found.items()
     ]
     columns = ("rays", "mean abs. error of range", "rms error", "residual", "time")
-    print_table("Table 6 phantom, inside the breast", columns, rows)
+    print_table("Table 6 phantom, inside the breast", columns, rows, columns[1:])
     print_lines([f"The whole took {seconds:.0f} s. The picture:", str(picture)])

@@ -1,4 +1,4 @@
-"""How a command ends: exit code 0 when the work is done, 1 when it failed, 2 when the input was bad."""
+"""How a command ends: exit code 0 when done, 1 when the work failed, 2 for bad input, 130 after Ctrl-C."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from typer.core import TyperGroup
 
 WORK_FAILED = 1
 BAD_INPUT = 2
-INTERRUPTED = 130
 
 
 class WorkFailed(Exception):  # noqa: N818 - the command's ending, not a fault of the program
@@ -39,8 +38,6 @@ class Commands(TyperGroup):
             context = getattr(error, "ctx", None)
             hint = f" (see {context.command_path} --help)" if context is not None else ""
             _end(error.format_message().rstrip(".") + hint, error.exit_code)
-        except (typer.Abort, KeyboardInterrupt):
-            _end("interrupted", INTERRUPTED)
         except OSError as error:
             _end(f"{error.filename or 'the system'}: {error.strerror or error}", WORK_FAILED)
         sys.exit(code if isinstance(code, int) else 0)

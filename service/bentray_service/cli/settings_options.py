@@ -21,10 +21,10 @@ Eikonal = Annotated[
     ),
 ]
 Sweeps = Annotated[
-    int | None, typer.Option("--sweeps", show_default="4", help="How often every emitter is used.")
+    int | None, typer.Option("--sweeps", show_default="5", help="How often every emitter is used.")
 ]
 Relaxation = Annotated[
-    float | None, typer.Option("--relaxation", show_default="0.5", help="SART's λ, between 0 and 2.")
+    float | None, typer.Option("--relaxation", show_default="0.1", help="SART's λ, between 0 and 2.")
 ]
 Nodes = Annotated[
     int | None, typer.Option("--nodes", show_default="128", help="Nodes along a side of the image.")
@@ -47,7 +47,7 @@ SpeedRange = Annotated[
 Smoothing = Annotated[
     float | None,
     typer.Option(
-        "--smoothing", show_default="0.0", help="Gaussian on each emitter's update, nodes; 0 is none."
+        "--smoothing", show_default="1.0", help="Gaussian on each emitter's update, nodes; 0 is none."
     ),
 ]
 Picker = Annotated[

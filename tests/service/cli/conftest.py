@@ -1,0 +1,41 @@
+"""What the tests of the command line share: a way to run it, and a small scan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from bentray_kernels.acquisition import Dataset
+from bentray_service.cli import app
+from bentray_workers.simulation import SimulationSettings, simulate
+
+Run = Callable[..., Result]
+
+
+@pytest.fixture
+def bentray() -> Run:
+    """Run the command line in this process: ``bentray("simulate", "-o", path)``."""
+
+    def run(*words: object) -> Result:
+        return CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def scan() -> Dataset:
+    """A phantom scan small enough for a test."""
+    return simulate(None, SimulationSettings(nodes=32, elements=24, coupling_mps=1375.0))
+
+
+@pytest.fixture(scope="session")
+def scan_file(scan: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same as a file."""
+    from bentray_workers.dataset_file import write_dataset
+
+    path = tmp_path_factory.mktemp("scan") / "scan.h5"
+    write_dataset(path, scan)
+    return path

@@ -1,0 +1,100 @@
+"""The bench frame, with a benchmark made for the test."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import Result
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.cli import bench as module
+from bentray_service.cli.bench import benchmark_folder, load
+from bentray_service.cli.endings import WorkFailed
+from bentray_service.cli.row import Row
+
+FAKE = """
+from bentray_service.cli.row import Row
+
+def rows(quick, progress):
+    progress(1, 2, "first")
+    yield Row("E1", 2.5 if quick else 1.0, 2.0, ">=", "", "ratio of times")
+    yield Row("E2", None, 1.02, "<=", "", "eikonalfm is not installed")
+    yield Row("E3", float("nan"), 1.0, "<=", "s", "diverged")
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of benchmarks that the command takes for its own."""
+    benchmarks = tmp_path / "benchmarks"
+    benchmarks.mkdir()
+    (benchmarks / "fake.py").write_text(FAKE)
+    (benchmarks / "empty.py").write_text("")
+    (benchmarks / "_hidden.py").write_text(FAKE)
+    monkeypatch.setattr("bentray_service.cli.bench.benchmark_folder", lambda: benchmarks)
+    return benchmarks
+
+
+@pytest.mark.parametrize(("options", "value", "met"), [([], 1.0, False), (["--quick"], 2.5, True)])
+def test_the_rows_are_written_and_shown(
+    bentray: Callable[..., Result], folder: Path, tmp_path: Path, options: list[str], value: float, met: bool
+) -> None:
+    file = tmp_path / "rows.json"
+    result = bentray("bench", "fake", *options, "--json", file)
+    assert result.exit_code == 0, "a row that misses its goal is a result, not a failure"
+    rows = json.loads(file.read_text(), parse_constant=pytest.fail)
+    assert [(row["target"], row["value"], row["met"]) for row in rows] == [
+        ("E1", value, met),
+        ("E2", None, False),
+        ("E3", None, False),
+    ]
+    assert rows[1]["detail"] == "eikonalfm is not installed"
+    assert "eikonalfm is not installed" in result.stdout
+    assert result.stdout.splitlines()[-1] == str(file)
+
+
+@pytest.mark.parametrize("name", ["nothing", "../fake", "_hidden", "fake.py"])
+def test_an_unknown_name_lists_the_known_ones(
+    bentray: Callable[..., Result], folder: Path, name: str
+) -> None:
+    result = bentray("bench", name, "--json", folder / "rows.json")
+    assert result.exit_code == 2
+    assert result.stderr == f"bentray: name: found {name!r}; accepted: one of empty, fake\n"
+
+
+def test_a_benchmark_without_rows_is_named(folder: Path) -> None:
+    with pytest.raises(WorkFailed, match=r"benchmarks/empty.py defines no rows"):
+        load("empty", folder)
+
+
+def test_the_file_for_the_rows_is_checked_before_anything_runs(
+    bentray: Callable[..., Result], folder: Path, tmp_path: Path
+) -> None:
+    (folder / "fake.py").write_text("raise SystemError('ran')")
+    result = bentray("bench", "fake", "--json", tmp_path / "absent" / "rows.json")
+    assert result.exit_code == 2
+    assert "its folder is absent" in result.stderr
+
+
+def test_outside_a_checkout_the_reason_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    installed = tmp_path / "lib" / "site-packages" / "bentray_service" / "cli" / "bench.py"
+    monkeypatch.setattr(module, "__file__", str(installed))
+    with pytest.raises(InvalidInput, match="a source checkout"):
+        benchmark_folder()
+
+
+@pytest.mark.parametrize("path", sorted(benchmark_folder().glob("[!_]*.py")), ids=lambda path: path.stem)
+def test_every_benchmark_of_the_checkout_fits_the_frame(path: Path) -> None:
+    assert callable(load(path.stem, path.parent))
+
+
+def test_the_reconstruction_benchmark_measures_what_it_promises() -> None:
+    rows = list(load("reconstruction", benchmark_folder())(True, lambda done, total, note="": None))
+    assert all(isinstance(row, Row) for row in rows)
+    labels = {row.target.split()[0] for row in rows}
+    assert {"R1", "R3"} <= labels
+    by_target = {row.target: row for row in rows}
+    assert by_target["R3 straight > curved"].met

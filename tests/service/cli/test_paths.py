@@ -1,0 +1,68 @@
+"""Paths are refused before work starts, and files are replaced whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.cli.paths import input_file, output_file, output_folder, replace_file
+
+
+def test_an_input_must_be_a_file(tmp_path: Path) -> None:
+    (tmp_path / "scan.h5").touch()
+    assert input_file(tmp_path / "scan.h5") == tmp_path / "scan.h5"
+    with pytest.raises(InvalidInput, match="a folder"):
+        input_file(tmp_path)
+    with pytest.raises(InvalidInput, match="no such file"):
+        input_file(tmp_path / "absent.h5")
+
+
+def test_an_output_folder_is_made_with_its_parents(tmp_path: Path) -> None:
+    assert output_folder(tmp_path / "a" / "b").is_dir()
+    assert output_folder(tmp_path / "a" / "b").is_dir(), "and may be there already"
+
+
+@pytest.mark.parametrize("below", ["", "deeper"])
+def test_a_file_in_the_way_of_an_output_folder_is_named(tmp_path: Path, below: str) -> None:
+    (tmp_path / "taken").touch()
+    with pytest.raises(InvalidInput, match="a file is in the way"):
+        output_folder(tmp_path / "taken" / below)
+
+
+def test_an_output_file_is_overwritten_only_by_force(tmp_path: Path) -> None:
+    path = tmp_path / "scan.h5"
+    assert output_file(path, force=False) == path
+    path.touch()
+    with pytest.raises(InvalidInput, match="--force"):
+        output_file(path, force=False)
+    assert output_file(path, force=True) == path
+
+
+def test_an_output_file_needs_a_folder_and_is_none(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="its folder is absent"):
+        output_file(tmp_path / "absent" / "scan.h5", force=True)
+    with pytest.raises(InvalidInput, match=r"\(a folder\)"):
+        output_file(tmp_path, force=True)
+
+
+def test_replacing_leaves_the_new_content_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "figures.json"
+    path.write_text("old")
+    replace_file(path, b"new")
+    assert path.read_bytes() == b"new"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_write_that_fails_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "figures.json"
+    path.write_text("old")
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        replace_file(path, b"new")
+    assert path.read_text() == "old"
