@@ -1,0 +1,175 @@
+"""Every error as RFC 9457 problem+json: one table from exception to status, and the handlers that use it."""
+
+from __future__ import annotations
+
+import logging
+import secrets
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+
+from bentray_kernels.errors import InvalidInput
+
+from . import refusals
+
+log = logging.getLogger("bentray.errors")
+
+MEDIA_TYPE = "application/problem+json"
+LONGEST_FOUND = 120
+
+
+class Fault(BaseModel):
+    """One wrong value."""
+
+    field: str = Field(description="The name of what is wrong.")
+    found: str = Field(description="What was there.")
+    accepted: str = Field(description="What would have been taken.")
+
+
+class Problem(BaseModel):
+    """An error in the form of RFC 9457."""
+
+    type: str = Field(description="Relative address that names the kind of problem.")
+    title: str
+    status: int
+    detail: str = Field(description="What went wrong, in words.")
+    instance: str | None = Field(None, description="The path that was asked for.")
+    field: str | None = None
+    found: str | None = None
+    accepted: str | None = None
+    errors: list[Fault] | None = Field(None, description="Every wrong value, where there may be several.")
+    correlation_id: str | None = Field(None, description="Quote it to find the error in the log.")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of problem: its HTTP status, the last part of its address and its title."""
+
+    status: int
+    slug: str
+    title: str
+
+
+PROBLEMS: Mapping[type[Exception], Kind] = {
+    InvalidInput: Kind(422, "invalid-input", "A value cannot be used"),
+    refusals.UnknownId: Kind(404, "unknown-id", "There is nothing with this id"),
+    refusals.WrongMediaType: Kind(415, "wrong-media-type", "The media type is not accepted"),
+    refusals.EmptyBody: Kind(422, "empty-body", "The request has no body"),
+    refusals.TooLarge: Kind(413, "too-large", "The body is too large"),
+    refusals.Finished: Kind(409, "job-finished", "The job has ended already"),
+    refusals.StorageFull: Kind(507, "storage-full", "The disk of the service is full"),
+    refusals.Busy: Kind(503, "busy", "No worker was free in time"),
+    refusals.NotReady: Kind(503, "not-ready", "The service cannot work now"),
+}
+INVALID_REQUEST = Kind(422, "invalid-request", "The request is not as it should be")
+NOT_FOUND = Kind(404, "not-found", "There is nothing at this address")
+INTERNAL = Kind(500, "internal", "The service failed")
+FAILED = Kind(500, "job-failed", "The job failed")
+
+
+def make(kind: Kind, detail: str, faults: Sequence[Fault] = (), **more: Any) -> Problem:
+    """A problem of one kind; the first fault also stands at the top level."""
+    first = faults[0].model_dump() if faults else {}
+    return Problem(
+        type=f"/problems/{kind.slug}", title=kind.title, status=kind.status, detail=detail, **first, **more
+    )
+
+
+def from_exception(error: InvalidInput, instance: str | None = None) -> Problem:
+    """The problem that says what an :class:`InvalidInput` (or a refusal) says."""
+    kind = next(PROBLEMS[cls] for cls in type(error).__mro__ if cls in PROBLEMS)
+    fault = Fault(field=error.field, found=error.value, accepted=error.accepted)
+    return make(kind, str(error), [fault], instance=instance)
+
+
+def described(*statuses: int | str) -> dict[int | str, dict[str, Any]]:
+    """The problems of a route, for its OpenAPI description."""
+    content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
+    titles: dict[int | str, str] = {kind.status: kind.title for kind in PROBLEMS.values()}
+    titles |= {422: INVALID_REQUEST.title, "default": "A problem"}
+    return {status: {"description": titles[status], "content": content} for status in statuses}
+
+
+def fault_of(error: Mapping[str, Any]) -> Fault:
+    """One entry of ``ValidationError.errors()`` as field, found, accepted."""
+    where = [str(part) for part in error["loc"]]
+    if where and where[0] in ("body", "query", "path", "header") and len(where) > 1:
+        where = where[1:]
+    context = error.get("ctx", {})
+    cause = context.get("error")
+    if isinstance(cause, InvalidInput):
+        return Fault(field=".".join([*where, cause.field]), found=cause.value, accepted=cause.accepted)
+    if error["type"] == "json_invalid":
+        return Fault(field="body", found=f"no JSON ({cause})", accepted="a JSON object")
+    if error["type"] == "missing":
+        return Fault(field=".".join(where), found="nothing", accepted="a value; it is required")
+    if error["type"] == "extra_forbidden":
+        return Fault(field=".".join(where), found=_short(error["input"]), accepted="no such field; see /docs")
+    accepted = str(context.get("expected") or error["msg"].removeprefix("Input should be "))
+    return Fault(field=".".join(where), found=_short(error["input"]), accepted=accepted)
+
+
+def install(app: FastAPI) -> None:
+    """Make every error of ``app`` a problem."""
+    app.add_exception_handler(InvalidInput, _refused)
+    app.add_exception_handler(refusals.NotReady, _not_ready)
+    app.add_exception_handler(RequestValidationError, _invalid_request)
+    app.add_exception_handler(HTTPException, _http)
+    app.add_exception_handler(Exception, _unexpected)
+
+
+def _respond(problem: Problem, headers: Mapping[str, str] | None = None) -> JSONResponse:
+    body = problem.model_dump(exclude_none=True)
+    return JSONResponse(body, problem.status, headers=headers, media_type=MEDIA_TYPE)
+
+
+def _refused(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, InvalidInput)
+    return _respond(from_exception(error, request.url.path))
+
+
+def _not_ready(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, refusals.NotReady)
+    faults = [Fault(field=part, found=found, accepted=needed) for part, found, needed in error.faults]
+    problem = make(PROBLEMS[refusals.NotReady], str(error), faults, errors=faults, instance=request.url.path)
+    return _respond(problem, {"Retry-After": "5"})
+
+
+def _invalid_request(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, RequestValidationError)
+    faults = [fault_of(one) for one in error.errors()]
+    words = "; ".join(f"{one.field}: found {one.found}; accepted: {one.accepted}" for one in faults)
+    return _respond(make(INVALID_REQUEST, words, faults, errors=faults, instance=request.url.path))
+
+
+def _http(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, HTTPException)
+    path = request.url.path
+    if error.status_code == NOT_FOUND.status:
+        return _respond(make(NOT_FOUND, f"nothing is at {path}; /docs lists every address", instance=path))
+    phrase = HTTPStatus(error.status_code).phrase
+    kind = Kind(error.status_code, phrase.lower().replace(" ", "-"), phrase)
+    allowed = (error.headers or {}).get("Allow")
+    detail = (
+        f"{request.method} is not possible at {path}; accepted: {allowed}" if allowed else str(error.detail)
+    )
+    return _respond(make(kind, detail, instance=path), error.headers)
+
+
+def _unexpected(request: Request, error: Exception) -> JSONResponse:
+    number = secrets.token_hex(8)
+    log.error("%s %s failed [%s]", request.method, request.url.path, number, exc_info=error)
+    detail = f"an error of the service, not of the request; it is in the log under {number}"
+    return _respond(make(INTERNAL, detail, instance=request.url.path, correlation_id=number))
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= LONGEST_FOUND else text[: LONGEST_FOUND - 1] + "…"

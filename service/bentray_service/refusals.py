@@ -1,0 +1,52 @@
+"""What the service refuses beside plain bad input; each names the field, what was found and what is taken."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from bentray_kernels.errors import InvalidInput
+
+
+class UnknownId(InvalidInput):
+    """No dataset, job or volume has this id."""
+
+    def __init__(self, field: str, value: str) -> None:
+        super().__init__(field, repr(value[:80]), f"the id of a {field} that exists; see GET /v1/{field}s")
+
+    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
+        return InvalidInput, (self.field, self.value, self.accepted)
+
+
+class WrongMediaType(InvalidInput):
+    """The Content-Type of the request is not one that the route takes."""
+
+    def __init__(self, found: str | None, accepted: Sequence[str]) -> None:
+        super().__init__("Content-Type", repr(found) if found else "nothing", " or ".join(accepted))
+
+
+class EmptyBody(InvalidInput):
+    """The request has no body."""
+
+
+class TooLarge(InvalidInput):
+    """The body is larger than the service takes."""
+
+
+class Finished(InvalidInput):
+    """The job has ended, so nothing can be asked of it any more."""
+
+
+class StorageFull(InvalidInput):
+    """The disk of the service is full."""
+
+
+class Busy(InvalidInput):
+    """No worker took the task in time."""
+
+
+class NotReady(Exception):  # noqa: N818 - names a state, like the other refusals
+    """Some part that the service needs does not work; each fault is (part, found, needed)."""
+
+    def __init__(self, faults: Sequence[tuple[str, str, str]]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("; ".join(f"{part}: {found}" for part, found, _ in faults))

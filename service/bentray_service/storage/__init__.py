@@ -1,0 +1,1 @@
+"""What outlives the process: the database rows and the files of the service."""

@@ -1,0 +1,97 @@
+"""The data folder: the path of every file, made from checked ids only."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from pathlib import Path
+from typing import IO
+
+from bentray_kernels.errors import InvalidInput
+
+from .ids import checked
+
+
+class Files:
+    """Folders of one service under ``data_dir``.
+
+    ``incoming/`` holds uploads that no one has checked, ``datasets/`` the canonical files, ``volumes/`` the
+    results, ``exports/`` the same results in other formats.
+    """
+
+    def __init__(self, data_dir: Path) -> None:
+        self.root = data_dir.resolve()
+        self._incoming = self.root / "incoming"
+        self._datasets = self.root / "datasets"
+        self._volumes = self.root / "volumes"
+        self._exports = self.root / "exports"
+        self.scratch = self.root / "scratch"
+
+    def prepare(self) -> None:
+        """Make the folders and drop the uploads that a dead process left half done.
+
+        Raises:
+            InvalidInput: when the folder cannot be made or written.
+        """
+        try:
+            for folder in (self._incoming, self._datasets, self._volumes, self._exports, self.scratch):
+                folder.mkdir(parents=True, exist_ok=True)
+            for left in self._incoming.iterdir():
+                left.unlink()
+        except OSError as error:
+            raise InvalidInput(
+                "data_dir", f"{self.root} ({error.strerror})", "a folder that can be written"
+            ) from error
+
+    def incoming(self, dataset_id: str) -> Path:
+        """Where an upload lands, before anything has looked at it."""
+        return self._incoming / f"{checked('dataset', dataset_id)}.upload"
+
+    def candidate(self, dataset_id: str) -> Path:
+        """Where the ingest process writes the canonical file."""
+        return self._incoming / f"{checked('dataset', dataset_id)}.h5"
+
+    def dataset(self, dataset_id: str) -> Path:
+        """The canonical file of a dataset."""
+        return self._datasets / f"{checked('dataset', dataset_id)}.h5"
+
+    def volume(self, volume_id: str) -> Path:
+        """The reconstruction file of a volume."""
+        return self._volumes / f"{checked('volume', volume_id)}.h5"
+
+    def export(self, volume_id: str, extension: str) -> Path:
+        """A volume in another format; made on demand."""
+        return self._exports / f"{checked('volume', volume_id)}.{extension}"
+
+    def adopt(self, dataset_id: str) -> Path:
+        """Move the checked canonical file to its place, durably."""
+        target = self.dataset(dataset_id)
+        self.candidate(dataset_id).replace(target)
+        sync_folder(target.parent)
+        return target
+
+
+def sync_folder(folder: Path) -> None:
+    """Make a rename in ``folder`` survive a power cut."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def lock(root: Path) -> IO[bytes]:
+    """Take the data folder for this process; closing the returned file, or dying, gives it back.
+
+    Raises:
+        InvalidInput: when another service has it. Two would run each other's jobs.
+    """
+    handle = (root / "service.lock").open("ab")
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        handle.close()
+        raise InvalidInput(
+            "data_dir", f"{root}, which another service is using", "a folder of its own for every service"
+        ) from error
+    return handle

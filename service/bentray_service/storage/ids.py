@@ -1,0 +1,33 @@
+"""Ids of datasets, jobs and volumes: made here, and checked here before one becomes part of a path."""
+
+from __future__ import annotations
+
+import re
+import secrets
+
+from ..refusals import UnknownId
+
+PREFIXES = {"dataset": "ds", "job": "job", "volume": "vol"}
+_RANDOM = re.compile(r"[0-9a-f]{20}")
+
+
+def new_id(what: str) -> str:
+    """A new random id, such as ``ds-`` and 20 hexadecimal digits; ``what`` is a key of ``PREFIXES``."""
+    return f"{PREFIXES[what]}-{secrets.token_hex(10)}"
+
+
+def checked(what: str, text: str) -> str:
+    """``text`` if it has the form of an id of ``what``.
+
+    Raises:
+        UnknownId: otherwise; no string that a user invents goes further.
+    """
+    prefix, _, random = text.partition("-")
+    if prefix != PREFIXES[what] or not _RANDOM.fullmatch(random):
+        raise UnknownId(what, text)
+    return text
+
+
+def volume_of(job_id: str) -> str:
+    """The volume id of a job; fixed, so a job that is run again writes the same file."""
+    return PREFIXES["volume"] + checked("job", job_id).removeprefix(PREFIXES["job"])

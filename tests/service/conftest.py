@@ -1,0 +1,245 @@
+"""A small scan, a light cluster, a reconstruction on a lead, and services started with them."""
+
+from __future__ import annotations
+
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import uvicorn
+
+from bentray_kernels.tomography.result import Progress, Reconstruction, Sweep
+from bentray_kernels.tomography.settings import Settings
+from bentray_service.app import create_app
+from bentray_service.settings import ServiceSettings
+from bentray_workers import slices
+
+with warnings.catch_warnings():
+    # Starlette's test client would rather have httpx2; our own client is written for httpx.
+    warnings.simplefilter("ignore", UserWarning)
+    from fastapi.testclient import TestClient
+
+HDF5 = {"Content-Type": "application/x-hdf5"}
+ENDED = ("succeeded", "failed", "cancelled")
+PATIENCE_S = 20.0
+
+
+class FakeFuture:
+    """The result of a task that has run already."""
+
+    def __init__(self, value: Any) -> None:
+        self._value = value
+
+    def result(self, timeout: float) -> Any:
+        if isinstance(self._value, Exception):
+            raise self._value
+        return self._value
+
+    def release(self) -> None:
+        """Nothing is held."""
+
+
+class FakeCluster:
+    """A cluster that runs every task at once, in the calling thread; remembers what was asked of it."""
+
+    def __init__(self) -> None:
+        self.workers = 1
+        self.closed = False
+        self.submitted: list[dict[str, Any]] = []
+
+    @property
+    def client(self) -> FakeCluster:
+        return self
+
+    def submit(self, task: Callable[..., Any], *given: Any, **how: Any) -> FakeFuture:
+        self.submitted.append(dict(how))
+        for name in ("resources", "priority", "pure"):
+            how.pop(name)
+        try:
+            return FakeFuture(task(*given, **how))
+        except Exception as error:
+            return FakeFuture(error)
+
+    def describe(self) -> dict[str, Any]:
+        return {"workers": self.workers}
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class FakeWork:
+    """In place of ``slices.reconstruct``: waits while ``hold`` is clear, raises ``error`` if there is one."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[Path, Settings]] = []
+        self.hold = threading.Event()
+        self.hold.set()
+        self.error: Exception | None = None
+
+    def __call__(
+        self,
+        client: Any,
+        path: Path,
+        settings: Settings,
+        on_progress: Callable[[Progress], None],
+        stop: Callable[[], bool],
+        work_dir: Path,
+    ) -> Reconstruction:
+        self.calls.append((path, settings))
+        assert work_dir.is_dir()
+        history: tuple[Sweep, ...] = ()
+        total = 8 * settings.sweeps
+        on_progress(Progress(0, total))
+        for sweep in range(1, settings.sweeps + 1):
+            while True:
+                if stop():
+                    raise slices.Cancelled
+                if self.hold.wait(0.01):
+                    break
+            history += (Sweep(0, sweep, 2e-6 / sweep, 8),)
+            on_progress(Progress(8 * sweep, total, history))
+        if self.error is not None:
+            raise self.error
+        x = np.linspace(-1.0, 1.0, settings.nodes)
+        speed = 1500.0 + 40.0 * (x[:, None] ** 2 + 0.5 * x[None, :] < 0.3)
+        return Reconstruction(
+            speed=speed,
+            coverage=np.ones_like(speed),
+            spacing_m=(1e-3, 1e-3),
+            origin_m=(-0.01, -0.01),
+            water_speed_mps=1500.0,
+            settings=settings,
+            history=history,
+            provenance={"bentray": "test"},
+        )
+
+
+@pytest.fixture
+def work(monkeypatch: pytest.MonkeyPatch) -> FakeWork:
+    """A reconstruction that the test holds and lets go."""
+    fake = FakeWork()
+    monkeypatch.setattr(slices, "reconstruct", fake)
+    return fake
+
+
+@pytest.fixture
+def cluster() -> FakeCluster:
+    return FakeCluster()
+
+
+@pytest.fixture
+def scan(tmp_path: Path) -> Callable[..., Path]:
+    """Write a ring of 16 elements with straight travel times; ``change(file)`` spoils it."""
+
+    def write(change: Callable[[h5py.File], None] | None = None, name: str = "scan.h5") -> Path:
+        path = tmp_path / name
+        angle = 2 * np.pi * np.arange(16) / 16
+        position = 0.05 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        with h5py.File(path, "w") as file:
+            file.attrs.update(
+                format="uct-transmission", format_version="1.0", dimension=2, title="Sixteen elements"
+            )
+            file.create_group("geometry").attrs.update(array_type="ring", radius_m=0.05)
+            file["geometry/element_position_m"] = position
+            file.create_group("acquisition").attrs.update(center_frequency_hz=1e6, t0_s=0.0)
+            file["acquisition/tx"] = np.arange(16)
+            file["acquisition/rx"] = np.arange(16)
+            file.create_group("water").attrs["sound_speed_mps"] = 1500.0
+            distance = np.linalg.norm(position[:, None] - position[None], axis=-1)
+            file["traveltime/delta_tof_s"] = -0.02 * distance / 1500.0
+            if change is not None:
+                change(file)
+        return path
+
+    return write
+
+
+@pytest.fixture
+def start(tmp_path: Path, cluster: FakeCluster) -> Iterator[Callable[..., TestClient]]:
+    """Start the application in this process; ``folder`` names its data folder, to start on it again."""
+    with ExitStack() as stack:
+
+        def go(folder: str = "data", **settings: Any) -> TestClient:
+            given = ServiceSettings(data_dir=tmp_path / folder, **settings)
+            app = create_app(given, settings.pop("cluster", cluster))
+            return stack.enter_context(TestClient(app, raise_server_exceptions=False))
+
+        yield go
+
+
+@pytest.fixture
+def uploaded(scan: Callable[..., Path]) -> Callable[[TestClient], str]:
+    """Upload the small scan; returns its id."""
+
+    def send(http: TestClient) -> str:
+        answer = http.post("/v1/datasets", content=scan().read_bytes(), headers=HDF5)
+        assert answer.status_code == 201, answer.text
+        return str(answer.json()["id"])
+
+    return send
+
+
+@pytest.fixture
+def submitted() -> Callable[..., dict[str, Any]]:
+    """Queue a reconstruction; returns the job record."""
+
+    def send(http: TestClient, dataset: str, **settings: Any) -> dict[str, Any]:
+        asked = {
+            "kind": "reconstruction",
+            "dataset": dataset,
+            "settings": {"nodes": 16, "sweeps": 3, **settings},
+        }
+        answer = http.post("/v1/jobs", json=asked)
+        assert answer.status_code == 202, answer.text
+        return dict(answer.json())
+
+    return send
+
+
+@pytest.fixture
+def until() -> Callable[..., dict[str, Any]]:
+    """Poll a job until it is in one of some states (any end by default); returns its record."""
+
+    def poll(http: TestClient, job_id: str, *states: str) -> dict[str, Any]:
+        wanted = states or ENDED
+        deadline = time.monotonic() + PATIENCE_S
+        while time.monotonic() < deadline:
+            job = dict(http.get(f"/v1/jobs/{job_id}").json())
+            if job["state"] in wanted:
+                return job
+            time.sleep(0.02)
+        raise AssertionError(f"{job['state']} is not {wanted} after {PATIENCE_S} s: {job}")
+
+    return poll
+
+
+@pytest.fixture
+def serve(tmp_path: Path, cluster: FakeCluster) -> Iterator[Callable[..., str]]:
+    """Start the service behind a real socket; returns its address."""
+    running: list[tuple[uvicorn.Server, threading.Thread]] = []
+
+    def go(**settings: Any) -> str:
+        app = create_app(ServiceSettings(data_dir=tmp_path / "served", **settings), cluster)
+        server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="warning", lifespan="on"))
+        thread = threading.Thread(target=server.run, daemon=True)
+        thread.start()
+        running.append((server, thread))
+        deadline = time.monotonic() + PATIENCE_S
+        while not server.started:
+            assert thread.is_alive()
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        return f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+
+    yield go
+    for server, thread in running:
+        server.should_exit = True
+        thread.join(PATIENCE_S)
+        assert not thread.is_alive()

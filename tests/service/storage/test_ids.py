@@ -1,0 +1,42 @@
+"""Ids: only what we made ourselves is an id."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bentray_service.refusals import UnknownId
+from bentray_service.storage.ids import PREFIXES, checked, new_id, volume_of
+
+
+@pytest.mark.parametrize("what", PREFIXES)
+def test_a_new_id_is_an_id(what):
+    made = new_id(what)
+    assert checked(what, made) == made
+    assert made != new_id(what)
+
+
+@given(st.text())
+def test_no_invented_string_is_an_id(text):
+    with pytest.raises(UnknownId):
+        checked("dataset", text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "ds-../../../../etc/passwd",
+        "ds-" + "0" * 19,
+        "ds-" + "0" * 20 + "\n",
+        "job-" + "0" * 20,
+        "ds-" + "A" * 20,
+    ],
+)
+def test_near_misses(text):
+    with pytest.raises(UnknownId) as caught:
+        checked("dataset", text)
+    assert caught.value.field == "dataset"
+
+
+def test_a_job_has_one_volume():
+    job = new_id("job")
+    assert volume_of(job) == volume_of(job) == checked("volume", volume_of(job))

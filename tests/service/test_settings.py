@@ -1,0 +1,37 @@
+"""Settings: read from the environment, refused in words."""
+
+from pathlib import Path
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.settings import ServiceSettings
+
+
+def test_every_field_is_described():
+    assert [name for name, field in ServiceSettings.model_fields.items() if not field.description] == []
+
+
+def test_environment_is_read(monkeypatch, tmp_path):
+    monkeypatch.setenv("BENTRAY_PORT", "8123")
+    monkeypatch.setenv("BENTRAY_DATA_DIR", str(tmp_path))
+    monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", "tcp://scheduler:8786")
+    settings = ServiceSettings.load()
+    assert (settings.port, settings.dask_scheduler_address) == (8123, "tcp://scheduler:8786")
+    assert settings.database == f"sqlite:///{tmp_path / 'bentray.sqlite'}"
+
+
+def test_what_is_given_wins(monkeypatch):
+    monkeypatch.setenv("BENTRAY_PORT", "8123")
+    assert ServiceSettings.load(port=9).port == 9
+    assert ServiceSettings.load(database_url="postgresql://db/x").database == "postgresql://db/x"
+    assert ServiceSettings.load(data_dir=Path("x")).data_dir == Path("x")
+
+
+@pytest.mark.parametrize(("name", "value"), [("BENTRAY_PORT", "http"), ("BENTRAY_MAX_UPLOAD_BYTES", "-1")])
+def test_a_wrong_value_names_its_variable(monkeypatch, name, value):
+    monkeypatch.setenv(name, value)
+    with pytest.raises(InvalidInput) as caught:
+        ServiceSettings.load()
+    assert caught.value.field == name
+    assert value in caught.value.value
