@@ -1,0 +1,1 @@
+"""From the bytes of a stranger to a canonical dataset file."""

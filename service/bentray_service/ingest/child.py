@@ -1,0 +1,102 @@
+"""The process that opens an uploaded file: limits itself, reads, rewrites, and prints one line of JSON.
+
+``python -m bentray_service.ingest.child IN OUT --memory BYTES --seconds SECONDS``
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import resource
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bentray_kernels.acquisition.dataset import Dataset
+
+LONGEST_TEXT = 200
+OPEN_FILES = 64
+
+
+def main() -> None:
+    """Print ``{"ok": summary}`` or ``{"error": {field, found, accepted}}``."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("source", type=Path)
+    parser.add_argument("target", type=Path)
+    parser.add_argument("--memory", type=int, required=True)
+    parser.add_argument("--seconds", type=float, required=True)
+    given = parser.parse_args()
+    limit(given.memory, given.seconds)
+    answer = convert(given.source, given.target)
+    sys.stdout.write(json.dumps(answer) + "\n")
+
+
+def limit(memory_bytes: int, seconds: float) -> None:
+    """Bound this process before it imports a reader or opens anything."""
+    cpu = math.ceil(seconds)
+    for what, amount in (
+        (resource.RLIMIT_AS, memory_bytes),
+        (resource.RLIMIT_FSIZE, memory_bytes),
+        (resource.RLIMIT_CPU, cpu),
+        (resource.RLIMIT_NOFILE, OPEN_FILES),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        hard = resource.getrlimit(what)[1]
+        allowed = amount if hard == resource.RLIM_INFINITY else min(amount, hard)
+        resource.setrlimit(what, (allowed, allowed))
+
+
+def convert(source: Path, target: Path) -> dict[str, Any]:
+    """Read ``source``, write the canonical ``target``, and say what it holds or what is wrong with it."""
+    try:
+        from bentray_workers.dataset_file import read_dataset, write_dataset
+
+        from bentray_kernels.errors import InvalidInput
+    except MemoryError:
+        return _error("file", "no memory left to start the reader", "a larger BENTRAY_INGEST_MEMORY_BYTES")
+    try:
+        dataset = read_dataset(source)
+        write_dataset(target, dataset)
+        return {"ok": summary(dataset)}
+    except InvalidInput as error:
+        return _error(error.field, error.value, error.accepted)
+    except MemoryError:
+        return _error("file", "data that does not fit into the memory of the reader", "a smaller dataset")
+    except Exception as error:
+        # A reader must never take the service down: whatever breaks it is a fault of the file.
+        return _error(
+            "file", f"{type(error).__name__}: {error}", "an HDF5 file in the format uct-transmission"
+        )
+
+
+def summary(dataset: Dataset) -> dict[str, Any]:
+    """What the service remembers of a dataset, in plain values."""
+    return {
+        "title": text(dataset.title),
+        "source": text(dataset.source),
+        "license": text(dataset.license),
+        "dimension": int(dataset.element_position_m.shape[1]),
+        "elements": len(dataset.element_position_m),
+        "ntx": len(dataset.tx),
+        "nrx": len(dataset.rx),
+        "slices": dataset.slices,
+        "has_traces": dataset.waveform is not None,
+        "has_travel_times": dataset.picked,
+        "has_truth": dataset.truth is not None,
+        "water_speed_mps": float(dataset.water_speed_mps),
+    }
+
+
+def text(value: str) -> str:
+    """A string from the file, printable and short."""
+    return "".join(c for c in value if c.isprintable())[:LONGEST_TEXT]
+
+
+def _error(field: str, found: str, accepted: str) -> dict[str, Any]:
+    return {"error": {"field": text(field), "found": text(found), "accepted": text(accepted)}}
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,60 @@
+"""The ingest process: what it says of a file."""
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bentray_service.ingest import child
+
+
+def test_summary_of_a_good_file(scan, tmp_path):
+    answer = child.convert(scan(), tmp_path / "out.h5")
+    assert answer["ok"] == {
+        "title": "Sixteen elements",
+        "source": "",
+        "license": "",
+        "dimension": 2,
+        "elements": 16,
+        "ntx": 16,
+        "nrx": 16,
+        "slices": 1,
+        "has_traces": False,
+        "has_travel_times": True,
+        "has_truth": False,
+        "water_speed_mps": 1500.0,
+    }
+    assert h5py.is_hdf5(tmp_path / "out.h5")
+
+
+def test_the_canonical_file_says_the_same(scan, tmp_path):
+    first = child.convert(scan(), tmp_path / "once.h5")
+    assert child.convert(tmp_path / "once.h5", tmp_path / "twice.h5") == first
+
+
+def test_a_bad_file_is_named(scan, tmp_path):
+    def spoil(file):
+        file["geometry/element_position_m"][3] = np.nan
+
+    answer = child.convert(scan(spoil), tmp_path / "out.h5")
+    assert answer["error"]["field"] == "geometry/element_position_m"
+    assert "element 3" in answer["error"]["found"]
+
+
+@pytest.mark.parametrize("error", [RuntimeError("odd"), MemoryError()])
+def test_a_reader_that_breaks_is_the_fault_of_the_file(scan, tmp_path, monkeypatch, error):
+    def broken(path):
+        raise error
+
+    monkeypatch.setattr("bentray_workers.dataset_file.read_dataset", broken)
+    answer = child.convert(scan(), tmp_path / "out.h5")
+    assert answer["error"]["field"] == "file"
+
+
+@given(st.text())
+def test_text_from_a_file_is_printable_and_short(value):
+    clean = child.text(value)
+    assert len(clean) <= child.LONGEST_TEXT
+    assert clean.isprintable()
+    clean.encode()

@@ -1,0 +1,95 @@
+"""The sandbox: a reader that crashes, hangs or eats the memory is a refused file, never more."""
+
+import os
+import signal
+import sys
+import threading
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.ingest import sandbox
+
+LIMITS = {"memory_bytes": 4 * 1024**3, "seconds": 60.0}
+
+
+@pytest.fixture
+def program(monkeypatch, tmp_path):
+    """Run a program of the test's own in place of the reader."""
+
+    def use(text):
+        stand_in = tmp_path / "python"
+        (tmp_path / "program.py").write_text(text)
+        stand_in.write_text(f'#!/bin/sh\nshift 3\nexec {sys.executable} {tmp_path / "program.py"} "$@"\n')
+        stand_in.chmod(0o755)
+        monkeypatch.setattr(sandbox.sys, "executable", str(stand_in))
+
+    return use
+
+
+def run(source, tmp_path, **more):
+    return sandbox.ingest(source, tmp_path / "out.h5", scratch=tmp_path, **{**LIMITS, **more})
+
+
+def test_a_good_file(scan, tmp_path):
+    assert run(scan(), tmp_path)["elements"] == 16
+    assert (tmp_path / "out.h5").exists()
+
+
+def test_not_hdf5(tmp_path):
+    (tmp_path / "in").write_bytes(b"no HDF5 at all")
+    with pytest.raises(InvalidInput) as caught:
+        run(tmp_path / "in", tmp_path)
+    assert "HDF5" in caught.value.accepted
+
+
+def test_a_killed_reader_is_a_refused_file(program, scan, tmp_path):
+    program("import time; time.sleep(60)")
+
+    def kill(process_id):
+        threading.Timer(0.2, os.killpg, (process_id, signal.SIGKILL)).start()
+
+    with pytest.raises(InvalidInput, match="SIGKILL"):
+        run(scan(), tmp_path, started=kill)
+
+
+def test_a_reader_that_hangs_is_ended_with_its_children(program, scan, tmp_path):
+    program("import os, time\nopen('pid', 'w').write(str(os.fork() or os.getpid()))\ntime.sleep(60)")
+    with pytest.raises(InvalidInput, match="takes more than 1 s"):
+        run(scan(), tmp_path, seconds=1.0)
+
+
+def test_a_reader_that_crashes(program, scan, tmp_path):
+    program("import os; os.abort()")
+    with pytest.raises(InvalidInput, match="SIGABRT"):
+        run(scan(), tmp_path)
+
+
+def test_a_reader_that_stops(program, scan, tmp_path):
+    program("raise SystemExit(7)")
+    with pytest.raises(InvalidInput, match="exit code 7"):
+        run(scan(), tmp_path)
+
+
+def test_memory_is_limited(program, scan, tmp_path):
+    program(
+        "import sys, json\n"
+        "from bentray_service.ingest.child import limit\n"
+        "limit(int(sys.argv[sys.argv.index('--memory') + 1]), 60)\n"
+        "try:\n    bytearray(2 * 1024**3)\n    found = 'room'\n"
+        "except MemoryError:\n    found = 'no room'\n"
+        "print(json.dumps({'error': {'field': 'file', 'found': found, 'accepted': ''}}))\n"
+    )
+    with pytest.raises(InvalidInput, match="no room"):
+        run(scan(), tmp_path, memory_bytes=1024**3)
+
+
+def test_too_little_memory_is_told(scan, tmp_path):
+    with pytest.raises(InvalidInput, match="memory"):
+        run(scan(), tmp_path, memory_bytes=48 * 1024**2)
+
+
+def test_the_environment_is_not_handed_on(program, scan, tmp_path, monkeypatch):
+    monkeypatch.setenv("BENTRAY_DATABASE_URL", "postgresql://user:secret@db/x")
+    program("import os, json; print(json.dumps({'ok': dict(os.environ)}))")
+    assert "BENTRAY_DATABASE_URL" not in run(scan(), tmp_path)
