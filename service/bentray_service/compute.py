@@ -1,0 +1,62 @@
+"""The cluster as the service sees it: how many workers there are, and pictures rendered by them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Protocol
+
+from bentray_workers import images
+from bentray_workers.lanes import RENDER
+
+from .refusals import Busy
+
+RENDER_SECONDS = 60.0
+# Above the tasks of reconstructions, so that a picture is next when a lane is shared.
+RENDER_PRIORITY = 10
+
+
+class Cluster(Protocol):
+    """What :func:`bentray_workers.cluster.open_cluster` gives; tests bring a lighter one."""
+
+    @property
+    def client(self) -> Any: ...
+
+    def describe(self) -> dict[str, Any]: ...
+
+
+class Compute:
+    """The worker pool of this service."""
+
+    def __init__(self, cluster: Cluster) -> None:
+        self._cluster = cluster
+
+    @property
+    def client(self) -> Any:
+        """The ``distributed.Client`` that jobs are given."""
+        return self._cluster.client
+
+    def workers(self) -> int:
+        """How many workers are connected now; 0 when the scheduler is gone."""
+        try:
+            return int(self._cluster.describe()["workers"])
+        except (OSError, TimeoutError):
+            return 0
+
+    def slice_png(self, path: Path, **how: Any) -> bytes:
+        """One slice of a reconstruction file as PNG; ``how`` as in ``bentray_workers.images.slice_png``.
+
+        Raises:
+            InvalidInput: from the renderer.
+            Busy: when no worker delivered it in time.
+        """
+        future = self.client.submit(
+            images.slice_png, path, **how, pure=False, resources=RENDER, priority=RENDER_PRIORITY
+        )
+        try:
+            return bytes(future.result(timeout=RENDER_SECONDS))
+        except TimeoutError:
+            raise Busy(
+                "workers", f"no answer in {RENDER_SECONDS:g} s", "another try, or more workers"
+            ) from None
+        finally:
+            future.release()

@@ -1,0 +1,43 @@
+"""Why a job failed, in plain words."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import secrets
+
+from distributed import KilledWorker
+from distributed.comm import CommClosedError
+from distributed.scheduler import NoValidWorkerError
+
+from bentray_kernels.errors import InvalidInput
+
+from ..errors import FAILED, INTERNAL, Problem, from_exception, make
+
+log = logging.getLogger("bentray.jobs")
+
+CRASHED = make(FAILED, "the service died while it ran this job, several times; the job is not tried again")
+
+
+def explain(job_id: str, error: BaseException) -> Problem:
+    """The problem to store with a failed job; what nobody foresaw goes to the log under a number."""
+    instance = f"/v1/jobs/{job_id}"
+    if isinstance(error, InvalidInput):
+        return from_exception(error, instance)
+    if isinstance(error, MemoryError):
+        return make(FAILED, "the memory ran out: use fewer nodes or fewer slices", instance=instance)
+    if isinstance(error, KilledWorker):
+        words = "the workers that ran this job died one after the other, most often for lack of memory"
+        return make(FAILED, words, instance=instance)
+    if isinstance(error, NoValidWorkerError):
+        return make(FAILED, "no worker was there to run this job; see /health/ready", instance=instance)
+    if isinstance(error, CommClosedError):
+        return make(
+            FAILED, "the connection to the Dask scheduler was lost; send the job again", instance=instance
+        )
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return make(FAILED, "the disk of the service is full", instance=instance)
+    number = secrets.token_hex(8)
+    log.error("job %s failed [%s]", job_id, number, exc_info=error)
+    words = f"an error of the service, not of the data; it is in the log under {number}"
+    return make(INTERNAL, words, instance=instance, correlation_id=number)

@@ -1,0 +1,65 @@
+"""Between a job that reports often and a database that is written a few times a second."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from bentray_kernels.tomography.result import Progress
+
+from ..storage.jobs import Jobs
+from .kinds import finite
+
+INTERVAL_SECONDS = 0.3
+
+
+class Reporter:
+    """Stores the progress of one job and asks whether to stop, both at most every ``INTERVAL_SECONDS``."""
+
+    def __init__(
+        self,
+        jobs: Jobs,
+        job_id: str,
+        leaving: Callable[[], bool],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._jobs = jobs
+        self._job_id = job_id
+        self._leaving = leaving
+        self._clock = clock
+        self._written = self._asked = -INTERVAL_SECONDS
+        self._pending: Progress | None = None
+        self._cancelled = False
+
+    def report(self, progress: Progress) -> None:
+        """Keep the newest progress; write it when the last write is long enough ago."""
+        self._pending = progress
+        if self._clock() - self._written >= INTERVAL_SECONDS:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what is kept; called at the end too, so that the last report always arrives."""
+        if self._pending is None:
+            return
+        kept, self._pending = self._pending, None
+        history: list[dict[str, Any]] = [
+            {
+                "slice": sweep.slice,
+                "sweep": sweep.sweep,
+                "residual_rms_s": finite(sweep.residual_rms_s),
+                "emitters": sweep.emitters,
+            }
+            for sweep in kept.history
+        ]
+        self._jobs.progress(self._job_id, kept.done, kept.total, history)
+        self._written = self._clock()
+
+    def stop(self) -> bool:
+        """Whether the job should give up: it was cancelled, or the service leaves."""
+        if self._leaving() or self._cancelled:
+            return True
+        if self._clock() - self._asked >= INTERVAL_SECONDS:
+            self._cancelled = self._jobs.state(self._job_id) == "cancelling"
+            self._asked = self._clock()
+        return self._cancelled

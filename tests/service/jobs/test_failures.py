@@ -1,0 +1,40 @@
+"""Why a job failed: known causes in words, unknown ones under a number."""
+
+import errno
+import logging
+
+import pytest
+from distributed import KilledWorker
+from distributed.comm import CommClosedError
+from distributed.scheduler import NoValidWorkerError
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.jobs.failures import explain
+
+
+def test_bad_input_keeps_its_fields():
+    problem = explain("job-1", InvalidInput("speed", -1, "more than 0"))
+    assert (problem.field, problem.found, problem.accepted) == ("speed", "-1", "more than 0")
+    assert problem.instance == "/v1/jobs/job-1"
+
+
+@pytest.mark.parametrize(
+    ("error", "word"),
+    [
+        (MemoryError(), "memory"),
+        (OSError(errno.ENOSPC, "full"), "disk"),
+        (KilledWorker("task", None, 3), "workers"),
+        (NoValidWorkerError("task", set(), set(), {}, 60.0), "no worker"),
+        (CommClosedError("gone"), "scheduler"),
+    ],
+)
+def test_known_causes(error, word):
+    assert word in explain("job-1", error).detail
+
+
+def test_a_surprise_goes_to_the_log(caplog):
+    with caplog.at_level(logging.ERROR, "bentray.jobs"):
+        problem = explain("job-1", RuntimeError("the secret inside"))
+    assert "secret" not in problem.detail
+    assert problem.correlation_id in caplog.text
+    assert "the secret inside" in caplog.text

@@ -1,0 +1,63 @@
+"""The reporter: a few writes a second, and the last report always."""
+
+from bentray_kernels.tomography.result import Progress, Sweep
+from bentray_service.jobs.reporter import Reporter
+
+
+class FakeJobs:
+    def __init__(self):
+        self.written = []
+        self.asked = 0
+        self.now = "running"
+
+    def progress(self, job_id, done, total, history):
+        self.written.append((done, total, history))
+
+    def state(self, job_id):
+        self.asked += 1
+        return self.now
+
+
+class Clock:
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+def test_writes_are_throttled_and_the_last_one_arrives():
+    jobs, clock = FakeJobs(), Clock()
+    reporter = Reporter(jobs, "job", lambda: False, clock)
+    for done in range(1, 1001):
+        clock.now += 0.001
+        reporter.report(Progress(done, 1000))
+    reporter.flush()
+    assert len(jobs.written) <= 5
+    assert jobs.written[-1][:2] == (1000, 1000)
+    reporter.flush()
+    assert [done for done, _, _ in jobs.written].count(1000) == 1
+
+
+def test_a_residual_that_json_cannot_hold():
+    jobs = FakeJobs()
+    Reporter(jobs, "job", lambda: False).report(Progress(1, 1, (Sweep(0, 1, float("nan"), 0),)))
+    assert jobs.written[0][2] == [{"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 0}]
+
+
+def test_stop_asks_the_database_now_and_then():
+    jobs, clock = FakeJobs(), Clock()
+    reporter = Reporter(jobs, "job", lambda: False, clock)
+    for _ in range(1000):
+        clock.now += 0.001
+        assert not reporter.stop()
+    assert jobs.asked <= 5
+    jobs.now = "cancelling"
+    clock.now += 1
+    assert reporter.stop()
+    assert reporter.stop()
+
+
+def test_stop_when_the_service_leaves():
+    jobs = FakeJobs()
+    assert Reporter(jobs, "job", lambda: True).stop()
+    assert jobs.asked == 0

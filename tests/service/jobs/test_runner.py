@@ -1,0 +1,63 @@
+"""The runner: jobs in order, a few at a time, each to its end."""
+
+import errno
+import time
+
+from bentray_kernels.errors import InvalidInput
+
+
+def test_at_most_so_many_at_a_time(start, uploaded, submitted, until, work):
+    http = start(jobs_at_once=2)
+    dataset = uploaded(http)
+    work.hold.clear()
+    made = [submitted(http, dataset)["id"] for _ in range(4)]
+    for job_id in made[:2]:
+        until(http, job_id, "running")
+    time.sleep(0.2)
+    assert [http.get(f"/v1/jobs/{job_id}").json()["state"] for job_id in made[2:]] == ["queued", "queued"]
+    work.hold.set()
+    assert [until(http, job_id)["state"] for job_id in made] == ["succeeded"] * 4
+
+
+def test_cancel_a_running_job(start, uploaded, submitted, until, work):
+    http = start()
+    work.hold.clear()
+    job = submitted(http, uploaded(http))
+    until(http, job["id"], "running")
+    answer = http.post(f"/v1/jobs/{job['id']}/cancel")
+    assert answer.status_code == 202
+    assert answer.json()["state"] in ("cancelling", "cancelled")
+    done = until(http, job["id"])
+    assert (done["state"], done["volume"]) == ("cancelled", None)
+    assert not list((http.app.state.parts.files.root / "volumes").iterdir())
+
+
+def test_a_refused_job_says_why(start, uploaded, submitted, until, work):
+    http = start()
+    work.error = InvalidInput("traveltime", "every pair missing", "at least one pair")
+    done = until(http, submitted(http, uploaded(http))["id"])
+    assert (done["state"], done["error"]["field"]) == ("failed", "traveltime")
+    assert done["progress"] == {"done": 24, "total": 24}
+
+
+def test_the_next_job_runs_after_a_failure(start, uploaded, submitted, until, work):
+    http = start(jobs_at_once=1)
+    dataset = uploaded(http)
+    work.error = OSError(errno.ENOSPC, "full")
+    first = until(http, submitted(http, dataset)["id"])
+    assert "disk" in first["error"]["detail"]
+    work.error = None
+    assert until(http, submitted(http, dataset)["id"])["state"] == "succeeded"
+
+
+def test_progress_is_seen_while_it_runs(start, uploaded, submitted, until, work):
+    http = start()
+    work.hold.clear()
+    job = submitted(http, uploaded(http))
+    until(http, job["id"], "running")
+    deadline = time.monotonic() + 10
+    while http.get(f"/v1/jobs/{job['id']}").json()["progress"]["total"] == 0:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    work.hold.set()
+    assert until(http, job["id"])["progress"]["done"] == 24
