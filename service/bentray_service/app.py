@@ -1,0 +1,94 @@
+"""The application: opens the database, the cluster and the runner, and closes them in the other order."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import ExitStack, asynccontextmanager
+
+import anyio
+from fastapi import FastAPI
+from fastapi.staticfiles import StaticFiles
+from starlette.concurrency import run_in_threadpool
+
+from bentray_workers.cluster import open_cluster
+
+from . import __version__, errors
+from .compute import Cluster, Compute
+from .jobs.runner import Runner
+from .routes import datasets, health, jobs, pages, volumes
+from .settings import ServiceSettings
+from .storage.database import open_database
+from .storage.datasets import Datasets
+from .storage.files import Files, lock
+from .storage.jobs import Jobs
+from .storage.volumes import Volumes
+from .web.headers import SecurityHeaders
+from .wiring import Parts
+
+DESCRIPTION = (
+    "Refraction-corrected ultrasound computed tomography. Upload a scan, start a reconstruction, "
+    "watch it, fetch the image. Every error is a problem+json that names the field, what was found and "
+    "what is accepted."
+)
+
+
+def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> FastAPI:
+    """The service as an ASGI application.
+
+    Args:
+        settings: where it keeps its data and what it allows.
+        cluster: an open cluster to use, which stays open; without it the application opens its own.
+    """
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        stack = ExitStack()
+        try:
+            app.state.parts = await run_in_threadpool(_open, settings, cluster, stack)
+            app.state.ingest_limiter = anyio.CapacityLimiter(datasets.INGESTS_AT_ONCE)
+            yield
+        finally:
+            await run_in_threadpool(stack.close)
+
+    app = FastAPI(
+        title="Bentray",
+        version=__version__,
+        description=DESCRIPTION,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        responses=errors.described("default"),
+    )
+    errors.install(app)
+    app.add_middleware(SecurityHeaders)
+    for part in (datasets, jobs, volumes, health, pages):
+        app.include_router(part.router)
+    app.mount("/static", StaticFiles(directory=pages.WEB / "static"), name="static")
+    return app
+
+
+def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) -> Parts:
+    """Open every part; ``stack`` closes what has been opened, also when a later part fails."""
+    files = Files(settings.data_dir)
+    files.prepare()
+    stack.enter_context(lock(files.root))
+    database = open_database(settings.database)
+    stack.callback(database.close)
+    if cluster is None:
+        cluster = stack.enter_context(
+            open_cluster(settings.dask_scheduler_address, settings.workers, local_directory=files.scratch)
+        )
+    store, compute = Jobs(database), Compute(cluster)
+    runner = Runner(store, files, compute, settings.jobs_at_once)
+    runner.start()
+    stack.callback(runner.stop)
+    return Parts(
+        settings=settings,
+        database=database,
+        files=files,
+        datasets=Datasets(database),
+        jobs=store,
+        volumes=Volumes(database),
+        compute=compute,
+        runner=runner,
+    )

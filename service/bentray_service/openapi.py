@@ -1,0 +1,19 @@
+"""Print the OpenAPI description: ``python -m bentray_service.openapi > openapi.json``."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+from .app import create_app
+from .settings import ServiceSettings
+
+
+def description() -> str:
+    """The OpenAPI document as text; the same on every machine."""
+    document = create_app(ServiceSettings.model_construct()).openapi()
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(description())

@@ -1,0 +1,51 @@
+"""What a request may bring: the check of its media type, and a limit for bodies that are kept in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+from starlette.types import Message
+
+from ..refusals import TooLarge, WrongMediaType
+
+# Settings are a few hundred bytes.
+LONGEST_JSON = 64 * 1024
+
+
+def only(*accepted: str) -> Callable[[Request], None]:
+    """A dependency that refuses every Content-Type but these.
+
+    Raises:
+        WrongMediaType: when called, naming what is accepted.
+    """
+
+    def check(request: Request) -> None:
+        found = request.headers.get("content-type")
+        if found is None or found.partition(";")[0].strip().lower() not in accepted:
+            raise WrongMediaType(found, accepted)
+
+    return check
+
+
+class SmallBody(APIRoute):
+    """A route whose body is read up to ``LONGEST_JSON`` bytes and no further."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        answer = super().get_route_handler()
+
+        async def read_then_answer(request: Request) -> Response:
+            body = bytearray()
+            async for chunk in request.stream():
+                body += chunk
+                if len(body) > LONGEST_JSON:
+                    raise TooLarge("body", f"more than {LONGEST_JSON} bytes", f"at most {LONGEST_JSON} bytes")
+
+            async def again() -> Message:
+                return {"type": "http.request", "body": bytes(body), "more_body": False}
+
+            return await answer(Request(request.scope, again))
+
+        return read_then_answer

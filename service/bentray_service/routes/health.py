@@ -1,0 +1,59 @@
+"""/health: whether the process lives, and whether it can do its work."""
+
+from __future__ import annotations
+
+import shutil
+
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+from sqlalchemy.exc import SQLAlchemyError
+
+from ..errors import described
+from ..refusals import NotReady
+from ..wiring import Service
+
+router = APIRouter(prefix="/health", tags=["health"])
+
+
+class Alive(BaseModel):
+    """The process answers."""
+
+    status: str = "alive"
+
+
+class Ready(BaseModel):
+    """The service can do its work."""
+
+    status: str = "ready"
+    workers: int = Field(description="Workers connected now.")
+    free_bytes: int = Field(description="Free space in the data folder.")
+
+
+@router.get("/live")
+def live() -> Alive:
+    """Whether the process answers; a failure here means: start it anew."""
+    return Alive()
+
+
+@router.get("/ready", responses=described(503))
+def ready(service: Service) -> Ready:
+    """Whether uploads and jobs can be served now; each fault is named."""
+    faults: list[tuple[str, str, str]] = []
+    try:
+        service.database.probe()
+    except SQLAlchemyError as error:
+        faults.append(
+            ("database", str(getattr(error, "orig", None) or error), "a database that can be written")
+        )
+    free = shutil.disk_usage(service.files.root).free
+    needed = service.settings.min_free_bytes
+    if free < needed:
+        faults.append(("disk", f"{free} bytes free", f"at least {needed} bytes (BENTRAY_MIN_FREE_BYTES)"))
+    workers = service.compute.workers()
+    if workers == 0:
+        faults.append(("workers", "0 connected", "at least one Dask worker"))
+    if not service.runner.alive():
+        faults.append(("runner", "a thread has ended", "every thread that runs jobs; start the service anew"))
+    if faults:
+        raise NotReady(faults)
+    return Ready(workers=workers, free_bytes=free)

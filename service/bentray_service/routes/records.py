@@ -1,0 +1,156 @@
+"""What the REST interface answers: one model a resource, and how it is made of a row."""
+
+from __future__ import annotations
+
+import time
+from datetime import UTC, datetime
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field
+
+from ..errors import Problem
+from ..storage.ids import volume_of
+
+State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
+Row = dict[str, Any]
+
+
+class DatasetRecord(BaseModel):
+    """One uploaded scan."""
+
+    id: str
+    title: str
+    source: str
+    license: str
+    dimension: int = Field(description="Coordinates of an element: 2 or 3.")
+    elements: int = Field(description="Transducer elements.")
+    ntx: int = Field(description="Emitters.")
+    nrx: int = Field(description="Receivers.")
+    slices: int = Field(description="Axial slices; 1 for a plain 2-D scan.")
+    has_traces: bool
+    has_travel_times: bool
+    has_truth: bool = Field(
+        description="Whether the file tells what the object really is, as a phantom does."
+    )
+    water_speed_mps: float
+    bytes: int = Field(description="Size of the uploaded file.")
+    sha256: str = Field(description="SHA-256 of the uploaded file.")
+    created: datetime
+    links: dict[str, str]
+
+
+class DatasetList(BaseModel):
+    """Datasets, newest first."""
+
+    datasets: list[DatasetRecord]
+
+
+class ProgressRecord(BaseModel):
+    """Emitter passes done and to do, over all slices and sweeps; 0 of 0 before it is known."""
+
+    done: int
+    total: int
+
+
+class SweepRecord(BaseModel):
+    """One pass over all emitters of one slice."""
+
+    slice: int
+    sweep: int = Field(description="Number of the pass, from 1.")
+    residual_rms_s: float | None = Field(description="Rms of measured minus predicted travel time, s.")
+    emitters: int = Field(description="Emitters that had data.")
+
+
+class JobRecord(BaseModel):
+    """One job."""
+
+    id: str
+    kind: str
+    state: State
+    dataset: str
+    settings: dict[str, Any]
+    progress: ProgressRecord
+    history: list[SweepRecord]
+    volume: str | None = Field(description="Id of the result, once there is one.")
+    error: Problem | None = Field(description="Why it failed.")
+    created: datetime
+    started: datetime | None
+    finished: datetime | None
+    seconds: float | None = Field(description="How long it has run.")
+    links: dict[str, str]
+
+
+class JobList(BaseModel):
+    """Jobs, newest first."""
+
+    jobs: list[JobRecord]
+
+
+class VolumeRecord(BaseModel):
+    """One result."""
+
+    id: str
+    job: str
+    dataset: str
+    axes: str = Field(description="Names of the axes, in order.")
+    shape: list[int] = Field(description="Nodes along each axis.")
+    spacing_m: list[float | None] = Field(description="Node spacing; null where it is not even.")
+    origin_m: list[float | None] = Field(description="Position of node 0.")
+    speed_range_mps: tuple[float, float]
+    water_speed_mps: float
+    provenance: dict[str, str]
+    bytes: int
+    created: datetime
+    links: dict[str, str]
+
+
+def dataset_record(row: Row) -> DatasetRecord:
+    return DatasetRecord(
+        **{**row, "created": _time(row["created"])}, links={"self": f"/v1/datasets/{row['id']}"}
+    )
+
+
+def job_record(row: Row) -> JobRecord:
+    links = {"self": f"/v1/jobs/{row['id']}", "dataset": f"/v1/datasets/{row['dataset_id']}"}
+    volume = None
+    if row["state"] == "succeeded":
+        volume = volume_of(row["id"])
+        links["volume"] = f"/v1/volumes/{volume}"
+        links["image"] = f"/v1/volumes/{volume}/slice.png"
+        links["data"] = f"/v1/volumes/{volume}/data"
+    elif row["state"] in ("queued", "running"):
+        links["cancel"] = f"/v1/jobs/{row['id']}/cancel"
+    end = row["finished"] or time.time()
+    return JobRecord(
+        id=row["id"],
+        kind=row["kind"],
+        state=row["state"],
+        dataset=row["dataset_id"],
+        settings=row["settings"],
+        progress=ProgressRecord(done=row["done"], total=row["total"]),
+        history=row["history"],
+        volume=volume,
+        error=row["error"],
+        created=_time(row["created"]),
+        started=_time(row["started"]) if row["started"] else None,
+        finished=_time(row["finished"]) if row["finished"] else None,
+        seconds=end - row["started"] if row["started"] else None,
+        links=links,
+    )
+
+
+def volume_record(row: Row) -> VolumeRecord:
+    here = f"/v1/volumes/{row['id']}"
+    links = {
+        "self": here,
+        "image": f"{here}/slice.png",
+        "data": f"{here}/data",
+        "job": f"/v1/jobs/{row['job_id']}",
+    }
+    return VolumeRecord(
+        **{**row, "created": _time(row["created"])}, job=row["job_id"], dataset=row["dataset_id"], links=links
+    )
+
+
+def _time(seconds: float) -> datetime:
+    return datetime.fromtimestamp(seconds, UTC)

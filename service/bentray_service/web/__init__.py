@@ -1,0 +1,1 @@
+"""The pages of the service; everything they load comes from here."""

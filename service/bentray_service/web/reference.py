@@ -1,0 +1,137 @@
+"""The page /docs: the REST interface written out from its OpenAPI description; it loads nothing foreign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from html import escape
+from typing import Any
+
+from ..errors import FAILED, INTERNAL, INVALID_REQUEST, NOT_FOUND, PROBLEMS
+
+Node = dict[str, Any]
+
+EXAMPLE = """curl -H 'Content-Type: application/x-hdf5' --data-binary @scan.h5 http://127.0.0.1:8000/v1/datasets
+curl -H 'Content-Type: application/json' \\
+     -d '{"kind": "reconstruction", "dataset": "ds-…", "settings": {"rays": "curved"}}' http://127.0.0.1:8000/v1/jobs
+curl http://127.0.0.1:8000/v1/jobs/job-…
+curl -o slice.png http://127.0.0.1:8000/v1/volumes/vol-…/slice.png"""
+
+
+def reference_page(document: Node) -> str:
+    """The OpenAPI ``document`` as one HTML page."""
+    operations = list(_operations(document))
+    contents = "".join(
+        f'<li><a href="#{_anchor(o)}"><code>{o[0].upper()} {escape(o[1])}</code></a></li>' for o in operations
+    )
+    schemas = document["components"]["schemas"]
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>Bentray: REST reference</title>
+<link rel="icon" href="/static/icon.svg" type="image/svg+xml">
+<link rel="stylesheet" href="/static/style.css">
+</head>
+<body>
+<header class="top">
+<img src="/static/icon.svg" alt="" width="36" height="36">
+<div><h1>Bentray {escape(document["info"]["version"])}</h1><p>REST reference</p></div>
+<nav><a href="/">Viewer</a> · <a href="/openapi.json">openapi.json</a></nav>
+</header>
+<main class="reference">
+<p>{escape(document["info"]["description"])}</p>
+<h2>In four lines</h2><pre tabindex="0">{escape(EXAMPLE)}</pre>
+<h2>Addresses</h2><ul class="toc">{contents}</ul>
+{"".join(_operation(o) for o in operations)}
+<h2 id="problems">Problems</h2>
+<p>Every error is <code>application/problem+json</code> (RFC 9457).</p>
+{_problems()}
+<h2>Records</h2>
+{"".join(_schema(name, schemas[name]) for name in sorted(schemas))}
+</main></body></html>"""
+
+
+def _operations(document: Node) -> Iterator[tuple[str, str, Node]]:
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
+            yield method, path, operation
+
+
+def _anchor(operation: tuple[str, str, Node]) -> str:
+    return escape(str(operation[2]["operationId"]))
+
+
+def _operation(operation: tuple[str, str, Node]) -> str:
+    method, path, what = operation
+    parts = [
+        f'<section class="panel" id="{_anchor(operation)}"><h3 class="path">'
+        f'<span class="method {method}">{method.upper()}</span> <code>{escape(path)}</code></h3>',
+        f"<p>{escape(what.get('description', ''))}</p>",
+    ]
+    if parameters := what.get("parameters"):
+        known = [(p["name"], p["in"], _type(p["schema"]), p.get("description", "")) for p in parameters]
+        parts.append(_table(("Parameter", "In", "Type", "Meaning"), known))
+    if body := what.get("requestBody"):
+        parts.append("<h3>Body</h3>")
+        bodies = [(media, _type(content["schema"])) for media, content in body["content"].items()]
+        parts.append(_table(("Media type", "Content"), bodies))
+    answers = [(code, _answer(answer), answer["description"]) for code, answer in what["responses"].items()]
+    parts.append("<h3>Answers</h3>" + _table(("Status", "Content", "Meaning"), answers))
+    return "".join(parts) + "</section>"
+
+
+def _answer(answer: Node) -> str:
+    return "; ".join(
+        _type(content.get("schema", {})) if media.endswith("json") else media
+        for media, content in answer.get("content", {}).items()
+    )
+
+
+def _type(schema: Node) -> str:
+    """A JSON schema in a few words."""
+    if "$ref" in schema:
+        return str(schema["$ref"]).rpartition("/")[2]
+    if "anyOf" in schema:
+        return " or ".join(_type(one) for one in schema["anyOf"])
+    if "const" in schema:
+        return f'"{schema["const"]}"'
+    if "enum" in schema:
+        return " or ".join(f'"{value}"' for value in schema["enum"])
+    if "prefixItems" in schema:
+        return "[" + ", ".join(_type(one) for one in schema["prefixItems"]) + "]"
+    if schema.get("type") == "array":
+        return f"list of {_type(schema.get('items', {}))}"
+    limits = [
+        f"{words} {schema[key]}" for key, words in (("minimum", "≥"), ("maximum", "≤")) if key in schema
+    ]
+    name = str(schema.get("format") or schema.get("type", "any"))
+    return " ".join([name, *limits])
+
+
+def _schema(name: str, schema: Node) -> str:
+    required = schema.get("required", [])
+    rows = []
+    for field, what in schema.get("properties", {}).items():
+        default = f", default {what['default']}" if what.get("default") is not None else ""
+        need = " (required)" if field in required else ""
+        rows.append((field, _type(what) + default + need, what.get("description", "")))
+    about = "".join(f"<p>{escape(text)}</p>" for text in schema.get("description", "").split("\n\n")[:1])
+    table = _table(("Field", "Type", "Meaning"), rows)
+    return f'<section class="panel" id="{escape(name)}"><h3>{escape(name)}</h3>{about}{table}</section>'
+
+
+def _problems() -> str:
+    kinds = [*PROBLEMS.values(), INVALID_REQUEST, NOT_FOUND, FAILED, INTERNAL]
+    return _table(
+        ("Type", "Status", "Title"), [(f"/problems/{k.slug}", str(k.status), k.title) for k in kinds]
+    )
+
+
+def _table(head: tuple[str, ...], rows: Sequence[Sequence[object]]) -> str:
+    top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'

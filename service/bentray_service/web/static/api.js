@@ -1,0 +1,42 @@
+// Requests to the service; every failure is an Error whose message can be shown as it is.
+
+function inWords(problem) {
+  if (problem.errors && problem.errors.length > 1) {
+    return problem.errors.map((one) => `${one.field}: found ${one.found}; accepted: ${one.accepted}`).join(" · ");
+  }
+  if (problem.field && problem.accepted) {
+    return `${problem.title}. ${problem.field}: found ${problem.found}; accepted: ${problem.accepted}.`;
+  }
+  return `${problem.title}: ${problem.detail}`;
+}
+
+export { inWords };
+
+export async function request(path, options = {}) {
+  let response;
+  try {
+    response = await fetch(path, options);
+  } catch {
+    throw new Error("The service does not answer.");
+  }
+  const body = await response.json().catch(() => ({ title: "The service failed", detail: `status ${response.status}` }));
+  if (!response.ok) throw new Error(inWords(body));
+  return body;
+}
+
+// fetch() cannot tell how much of a body has been sent; XMLHttpRequest can.
+export function upload(file, onProgress) {
+  return new Promise((resolve, reject) => {
+    const sender = new XMLHttpRequest();
+    sender.open("POST", "/v1/datasets");
+    sender.setRequestHeader("Content-Type", "application/x-hdf5");
+    sender.responseType = "json";
+    sender.upload.onprogress = (event) => event.lengthComputable && onProgress(event.loaded / event.total);
+    sender.onerror = () => reject(new Error("The upload broke off: the service did not take it or does not answer."));
+    sender.onload = () => {
+      if (sender.status === 201) resolve(sender.response);
+      else reject(new Error(sender.response ? inWords(sender.response) : `The service answered ${sender.status}.`));
+    };
+    sender.send(file);
+  });
+}

@@ -1,0 +1,140 @@
+// The list of jobs: one card a job, kept and updated in place so that the focus and the pictures stay.
+import { inWords } from "./api.js";
+
+const SVG = "http://www.w3.org/2000/svg";
+const cards = new Map();
+
+function make(tag, className, text) {
+  const node = document.createElement(tag);
+  if (className) node.className = className;
+  if (text !== undefined) node.textContent = text;
+  return node;
+}
+
+function link(text, address, saveAs) {
+  const node = make("a", "", text);
+  node.href = address;
+  if (saveAs) node.download = "";
+  return node;
+}
+
+function duration(seconds) {
+  return seconds < 90 ? `${seconds.toFixed(1)} s` : `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
+}
+
+// Mean residual of each sweep, over the slices.
+function residuals(history) {
+  const sums = new Map();
+  for (const { sweep, residual_rms_s: value } of history) {
+    if (value === null) continue;
+    const [sum, count] = sums.get(sweep) || [0, 0];
+    sums.set(sweep, [sum + value, count + 1]);
+  }
+  return [...sums.entries()].sort((a, b) => a[0] - b[0]).map(([, [sum, count]]) => sum / count);
+}
+
+function sparkline(values) {
+  const picture = document.createElementNS(SVG, "svg");
+  picture.setAttribute("class", "spark");
+  picture.setAttribute("viewBox", "0 0 100 40");
+  picture.setAttribute("preserveAspectRatio", "none");
+  picture.setAttribute("role", "img");
+  picture.setAttribute("aria-label", `Residual of ${values.length} sweeps`);
+  const top = Math.max(...values);
+  const base = document.createElementNS(SVG, "line");
+  for (const [name, value] of [["x1", 0], ["x2", 100], ["y1", 39], ["y2", 39]]) base.setAttribute(name, value);
+  const curve = document.createElementNS(SVG, "polyline");
+  const points = values.map((value, i) => `${(100 * i) / (values.length - 1)},${39 - (36 * value) / (top || 1)}`);
+  curve.setAttribute("points", points.join(" "));
+  picture.append(base, curve);
+  return picture;
+}
+
+function picture(job, title) {
+  const frame = make("div", "picture");
+  if (job.state === "succeeded") {
+    const image = make("img");
+    image.src = job.links.image;
+    image.alt = `Speed of sound, ${title}`;
+    image.loading = "lazy";
+    image.onerror = () => frame.replaceChildren("The picture could not be drawn.");
+    const anchor = link("", job.links.image);
+    anchor.append(image);
+    frame.append(anchor);
+  } else {
+    const ended = job.state === "failed" || job.state === "cancelled";
+    frame.textContent = ended ? "No image" : "The image appears here";
+  }
+  return frame;
+}
+
+function facts(job, title, onCancel) {
+  const box = make("div");
+  const heading = make("h3", "", job.settings.rays === "straight" ? "Straight rays" : "Bent rays");
+  heading.append(make("span", `state ${job.state}`, job.state));
+  const settings = `${job.settings.nodes} × ${job.settings.nodes} nodes, ${job.settings.sweeps} sweeps`;
+  box.append(heading, make("p", "", title), make("p", "", settings));
+  const { done, total } = job.progress;
+  if (job.state === "running" || job.state === "cancelling") {
+    const bar = make("progress");
+    bar.setAttribute("aria-label", "Progress");
+    if (total) {
+      bar.max = total;
+      bar.value = done;
+    }
+    const share = total ? `${Math.floor((100 * done) / total)} %` : "starting";
+    box.append(bar, make("p", "", `${share} · ${duration(job.seconds || 0)}`));
+  } else if (job.seconds !== null && job.finished) {
+    box.append(make("p", "", `took ${duration(job.seconds)}`));
+  }
+  const values = residuals(job.history);
+  if (values.length) {
+    const micro = (value) => `${(value * 1e6).toPrecision(3)} µs`;
+    const words = values.length > 1 ? `${micro(values[0])} → ${micro(values.at(-1))}` : micro(values[0]);
+    box.append(make("p", "", `residual ${words}`));
+  }
+  if (values.length > 1) box.append(sparkline(values));
+  if (job.error) box.append(make("p", "error", inWords(job.error)));
+  const row = make("div", "links");
+  if (job.state === "succeeded") {
+    row.append(link("HDF5", `${job.links.data}?format=hdf5`, true), link("NumPy", `${job.links.data}?format=npy`, true));
+  }
+  if (job.links.cancel) {
+    const cancel = make("button", "quiet", "Cancel");
+    cancel.type = "button";
+    cancel.addEventListener("click", () => onCancel(job));
+    row.append(cancel);
+  }
+  box.append(row);
+  return box;
+}
+
+export function showJobs(list, jobs, titles, onCancel) {
+  const present = new Set(jobs.map((job) => job.id));
+  for (const [id, card] of cards) {
+    if (!present.has(id)) {
+      card.node.remove();
+      cards.delete(id);
+    }
+  }
+  jobs.forEach((job, place) => {
+    const title = titles.get(job.dataset) || job.dataset;
+    const signature = JSON.stringify([job, title]);
+    let card = cards.get(job.id);
+    if (!card) {
+      card = { node: make("li", "job"), signature: "", state: "" };
+      card.node.id = job.id;
+      cards.set(job.id, card);
+    }
+    if (card.signature !== signature) {
+      const focused = card.node.contains(document.activeElement) && document.activeElement.tagName === "BUTTON";
+      const fresh = facts(job, title, onCancel);
+      if (card.state === job.state) card.node.lastChild.replaceWith(fresh);
+      else card.node.replaceChildren(picture(job, title), fresh);
+      if (focused) fresh.querySelector("button")?.focus();
+      card.signature = signature;
+      card.state = job.state;
+    }
+    if (list.children[place] !== card.node) list.insertBefore(card.node, list.children[place] || null);
+  });
+}

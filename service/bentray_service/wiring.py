@@ -1,0 +1,38 @@
+"""The parts of one running service, and how a route gets at them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, cast
+
+from fastapi import Depends, Request
+
+from .compute import Compute
+from .jobs.runner import Runner
+from .settings import ServiceSettings
+from .storage.database import Database
+from .storage.datasets import Datasets
+from .storage.files import Files
+from .storage.jobs import Jobs
+from .storage.volumes import Volumes
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What the lifespan of the application made."""
+
+    settings: ServiceSettings
+    database: Database
+    files: Files
+    datasets: Datasets
+    jobs: Jobs
+    volumes: Volumes
+    compute: Compute
+    runner: Runner
+
+
+def _parts(request: Request) -> Parts:
+    return cast(Parts, request.app.state.parts)
+
+
+Service = Annotated[Parts, Depends(_parts)]

@@ -1,0 +1,163 @@
+"""/v1/datasets: what is taken, and every way of being refused."""
+
+import hashlib
+
+import h5py
+import numpy as np
+import pytest
+
+HDF5 = {"Content-Type": "application/x-hdf5"}
+
+
+def upload(http, content, headers=HDF5):
+    return http.post("/v1/datasets", content=content, headers=headers)
+
+
+def problem(answer):
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.json()["status"] == answer.status_code
+    return answer.json()
+
+
+def test_upload_answers_with_the_record(start, scan):
+    http = start()
+    content = scan().read_bytes()
+    answer = upload(http, content)
+    body = answer.json()
+    assert answer.status_code == 201
+    assert answer.headers["location"] == f"/v1/datasets/{body['id']}" == body["links"]["self"]
+    assert body["title"] == "Sixteen elements"
+    assert (body["elements"], body["ntx"], body["nrx"], body["slices"]) == (16, 16, 16, 1)
+    assert (body["has_traces"], body["has_travel_times"], body["has_truth"]) == (False, True, False)
+    assert (body["bytes"], body["sha256"]) == (len(content), hashlib.sha256(content).hexdigest())
+    assert http.get(answer.headers["location"]).json() == body
+    assert http.get("/v1/datasets").json() == {"datasets": [body]}
+
+
+def test_only_the_canonical_file_is_kept(start, scan):
+    http = start()
+    dataset = upload(http, scan().read_bytes()).json()
+    root = http.app.state.parts.files.root
+    assert [path.name for path in (root / "datasets").iterdir()] == [f"{dataset['id']}.h5"]
+    assert not list((root / "incoming").iterdir())
+    assert h5py.is_hdf5(root / "datasets" / f"{dataset['id']}.h5")
+
+
+def test_octet_stream_is_taken_and_parameters_do_not_matter(start, scan):
+    http = start()
+    headers = {"Content-Type": "Application/Octet-Stream; charset=binary"}
+    assert upload(http, scan().read_bytes(), headers).status_code == 201
+
+
+def test_newest_first(start, scan):
+    http = start()
+    made = [upload(http, scan().read_bytes()).json()["id"] for _ in range(3)]
+    listed = http.get("/v1/datasets?limit=2").json()["datasets"]
+    assert [one["id"] for one in listed] == [made[2], made[1]]
+
+
+def without_geometry(file):
+    del file["geometry"]
+
+
+def nan_position(file):
+    file["geometry/element_position_m"][5] = np.nan
+
+
+def tx_out_of_range(file):
+    file["acquisition/tx"][2] = 99
+
+
+def negative_speed(file):
+    file["water"].attrs["sound_speed_mps"] = -1500.0
+
+
+def zero_speed(file):
+    file["water"].attrs["sound_speed_mps"] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("spoil", "field"),
+    [
+        (without_geometry, "geometry"),
+        (nan_position, "geometry/element_position_m"),
+        (tx_out_of_range, "acquisition/tx"),
+        (negative_speed, "sound_speed_mps"),
+        (zero_speed, "sound_speed_mps"),
+    ],
+)
+def test_bad_contents_are_named(start, scan, spoil, field):
+    http = start()
+    answer = upload(http, scan(spoil).read_bytes())
+    body = problem(answer)
+    assert answer.status_code == 422
+    assert field in body["field"]
+    assert body["found"]
+    assert body["accepted"]
+    assert http.get("/v1/datasets").json() == {"datasets": []}
+    root = http.app.state.parts.files.root
+    assert not list((root / "incoming").iterdir())
+    assert not list((root / "datasets").iterdir())
+
+
+def test_not_hdf5(start):
+    body = problem(upload(start(), b"P5 2 2 255 this is a picture"))
+    assert (body["status"], body["type"]) == (422, "/problems/invalid-input")
+    assert "HDF5" in body["detail"]
+
+
+@pytest.mark.parametrize("kept", [0.1, 0.5, 0.95])
+def test_truncated(start, scan, kept):
+    content = scan().read_bytes()
+    assert problem(upload(start(), content[: int(kept * len(content))]))["status"] == 422
+
+
+def test_empty_body(start):
+    http = start()
+    for content in (b"", iter([])):
+        body = problem(upload(http, content))
+        assert (body["status"], body["type"], body["field"]) == (422, "/problems/empty-body", "body")
+
+
+@pytest.mark.parametrize("headers", [{"Content-Type": "image/png"}, {}])
+def test_wrong_media_type_says_which_is_right(start, scan, headers):
+    body = problem(upload(start(), scan().read_bytes(), headers))
+    assert (body["status"], body["field"]) == (415, "Content-Type")
+    assert body["accepted"] == "application/x-hdf5 or application/octet-stream"
+
+
+def chunks():
+    for _ in range(100):
+        yield b"\0" * 1000
+
+
+@pytest.mark.parametrize("content", [b"\0" * 100_000, chunks()], ids=["announced", "while reading"])
+def test_too_large(start, content):
+    http = start(max_upload_bytes=50_000)
+    body = problem(upload(http, content))
+    assert (body["status"], body["type"]) == (413, "/problems/too-large")
+    assert "50000" in body["accepted"]
+    assert not list((http.app.state.parts.files.root / "incoming").iterdir())
+
+
+def test_a_file_larger_than_a_batch_arrives_whole(start, scan):
+    def pad(file):
+        file["padding"] = np.random.default_rng(0).integers(0, 256, 9_000_000, dtype=np.uint8)
+
+    content = scan(pad).read_bytes()
+    answer = upload(start(), content)
+    if answer.status_code == 201:
+        assert answer.json()["sha256"] == hashlib.sha256(content).hexdigest()
+    else:
+        assert "padding" in problem(answer)["field"]
+
+
+@pytest.mark.parametrize("path", ["ds-" + "0" * 20, "nonsense", "..%2f..%2fetc%2fpasswd", "%2e%2e", "ds-%00"])
+def test_unknown_and_hostile_ids(start, path):
+    assert problem(start().get(f"/v1/datasets/{path}"))["status"] == 404
+
+
+@pytest.mark.parametrize("limit", ["0", "1001", "many"])
+def test_wrong_limit(start, limit):
+    body = problem(start().get(f"/v1/datasets?limit={limit}"))
+    assert (body["status"], body["field"], body["found"]) == (422, "limit", repr(limit))

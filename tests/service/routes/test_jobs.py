@@ -1,0 +1,137 @@
+"""/v1/jobs: what is taken, and every way of being refused."""
+
+from dataclasses import fields
+
+import pytest
+
+from bentray_kernels.eikonal import methods
+from bentray_kernels.tomography.settings import Settings
+
+
+@pytest.fixture
+def http(start, work):
+    return start()
+
+
+@pytest.fixture
+def dataset(http, uploaded):
+    return uploaded(http)
+
+
+def ask(http, dataset, settings=None, **more):
+    return http.post(
+        "/v1/jobs", json={"kind": "reconstruction", "dataset": dataset, "settings": settings or {}, **more}
+    )
+
+
+def problem(answer):
+    assert answer.headers["content-type"] == "application/problem+json"
+    return answer.json()
+
+
+def test_a_job_is_stored_before_the_answer(http, dataset, work, until):
+    work.hold.clear()
+    answer = ask(http, dataset, {"nodes": 16})
+    body = answer.json()
+    assert answer.status_code == 202
+    assert answer.headers["location"] == f"/v1/jobs/{body['id']}"
+    assert http.app.state.parts.jobs.get(body["id"])["settings"] == body["settings"]
+    assert body["settings"]["nodes"] == 16
+    assert body["settings"]["rays"] == "curved"
+    assert body["volume"] is None
+    work.hold.set()
+    until(http, body["id"])
+
+
+def test_the_runner_gets_the_settings(http, dataset, work, until):
+    asked = {"nodes": 20, "rays": "straight", "speed_bounds_mps": [1400, 1600]}
+    until(http, ask(http, dataset, asked).json()["id"])
+    assert work.calls[0][1] == Settings(nodes=20, rays="straight", speed_bounds_mps=(1400.0, 1600.0))
+
+
+def test_settings_may_be_left_out(http, dataset, work, until):
+    answer = http.post("/v1/jobs", json={"kind": "reconstruction", "dataset": dataset})
+    until(http, answer.json()["id"])
+    assert work.calls[0][1] == Settings()
+
+
+def test_newest_first(http, dataset):
+    made = [ask(http, dataset, {"nodes": 16}).json()["id"] for _ in range(3)]
+    assert [job["id"] for job in http.get("/v1/jobs?limit=2").json()["jobs"]] == [made[2], made[1]]
+
+
+def test_unknown_method_lists_the_known_ones(http, dataset):
+    body = problem(ask(http, dataset, {"eikonal": "magic"}))
+    assert (body["status"], body["field"], body["found"]) == (422, "settings.eikonal", "'magic'")
+    assert all(method in body["accepted"] for method in methods())
+
+
+def test_unknown_setting_lists_the_known_ones(http, dataset):
+    body = problem(ask(http, dataset, {"node": 64}))
+    assert (body["status"], body["field"], body["found"]) == (422, "settings.node", "64")
+    assert all(field.name in body["accepted"] for field in fields(Settings))
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        ({"nodes": 1}, "settings.nodes"),
+        ({"nodes": "many"}, "settings.nodes"),
+        ({"rays": "wavy"}, "settings.rays"),
+        ({"relaxation": 2}, "settings.relaxation"),
+        ({"speed_bounds_mps": [-1, 1500]}, "settings.speed_bounds_mps"),
+        ({"speed_bounds_mps": [0, 1500]}, "settings.speed_bounds_mps"),
+        ({"speed_update": "data-driven"}, "settings.speed_range_mps"),
+        ([], "settings"),
+    ],
+)
+def test_wrong_settings(http, dataset, settings, field):
+    body = problem(
+        http.post("/v1/jobs", json={"kind": "reconstruction", "dataset": dataset, "settings": settings})
+    )
+    assert body["status"] == 422
+    assert body["field"].startswith(field)
+    assert body["errors"][0]["accepted"]
+
+
+def test_every_wrong_value_is_listed(http, dataset):
+    body = problem(ask(http, dataset, {"nodes": "many", "rays": "wavy"}, colour="red"))
+    assert {"settings.nodes", "settings.rays", "colour"} <= {one["field"] for one in body["errors"]}
+
+
+@pytest.mark.parametrize("dataset", ["ds-" + "0" * 20, "../../etc/passwd", ""])
+def test_unknown_dataset(http, dataset):
+    body = problem(ask(http, dataset))
+    assert (body["status"], body["type"], body["field"]) == (404, "/problems/unknown-id", "dataset")
+
+
+def test_wrong_kind(http, dataset):
+    body = problem(http.post("/v1/jobs", json={"kind": "miracle", "dataset": dataset}))
+    assert (body["status"], body["field"], body["accepted"]) == (422, "kind", "'reconstruction'")
+
+
+def test_no_json(http):
+    body = problem(http.post("/v1/jobs", content=b"{", headers={"Content-Type": "application/json"}))
+    assert (body["status"], body["accepted"]) == (422, "a JSON object")
+
+
+def test_a_request_of_megabytes(http, dataset):
+    body = problem(ask(http, dataset, {"eikonal": "x" * 1_000_000}))
+    assert (body["status"], body["type"], body["field"]) == (413, "/problems/too-large", "body")
+
+
+def test_wrong_media_type(http):
+    body = problem(http.post("/v1/jobs", content=b"a=b", headers={"Content-Type": "text/plain"}))
+    assert (body["status"], body["accepted"]) == (415, "application/json")
+
+
+@pytest.mark.parametrize("path", ["job-" + "0" * 20, "nonsense", "..%2f..%2fetc"])
+def test_unknown_job(http, path):
+    assert problem(http.get(f"/v1/jobs/{path}"))["status"] == 404
+    assert problem(http.post(f"/v1/jobs/{path}/cancel"))["status"] == 404
+
+
+def test_cancel_an_ended_job(http, dataset, until):
+    job = until(http, ask(http, dataset, {"nodes": 16}).json()["id"])
+    body = problem(http.post(f"/v1/jobs/{job['id']}/cancel"))
+    assert (body["status"], body["found"]) == (409, "succeeded")

@@ -1,0 +1,161 @@
+"""The application: the whole path, and what happens when it stops, dies and starts again."""
+
+import io
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import httpx
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import update
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.app import create_app
+from bentray_service.settings import ServiceSettings
+from bentray_service.storage import schema
+from bentray_workers.cluster import open_cluster
+
+
+def test_dataset_in_image_out(start, uploaded, submitted, until, work):
+    http = start()
+    job = submitted(http, uploaded(http), rays="straight")
+    assert job["state"] in ("queued", "running")
+    done = until(http, job["id"])
+    assert done["state"] == "succeeded"
+    assert done["progress"] == {"done": 24, "total": 24}
+    assert [sweep["sweep"] for sweep in done["history"]] == [1, 2, 3]
+    assert done["settings"]["rays"] == "straight"
+    assert done["seconds"] >= 0
+    volume = http.get(done["links"]["volume"]).json()
+    assert (volume["shape"], volume["axes"]) == ([16, 16], "x,y")
+    assert http.get(done["links"]["image"]).content.startswith(b"\x89PNG")
+    speed = np.load(io.BytesIO(http.get(done["links"]["data"], params={"format": "npy"}).content))
+    assert (speed.min(), speed.max()) == tuple(volume["speed_range_mps"]) == (1500.0, 1540.0)
+
+
+def test_whole_path_with_the_real_kernels(tmp_path, uploaded, submitted, until):
+    with open_cluster(workers=1, processes=False) as cluster:
+        app = create_app(ServiceSettings(data_dir=tmp_path / "data"), cluster)
+        with TestClient(app) as http:
+            job = submitted(http, uploaded(http), rays="straight", nodes=24, sweeps=3)
+            done = until(http, job["id"])
+            assert done["state"] == "succeeded", done["error"]
+            residuals = [sweep["residual_rms_s"] for sweep in done["history"]]
+            assert residuals[-1] < residuals[0]
+            volume = http.get(done["links"]["volume"]).json()
+            # Every pair came 2 % too early, so the object is 2 % faster than water.
+            assert 1510 < volume["speed_range_mps"][1] < 1600
+            assert http.get(done["links"]["image"]).content.startswith(b"\x89PNG")
+
+
+def test_an_injected_cluster_stays_open(start, cluster):
+    http = start()
+    assert http.get("/health/live").json() == {"status": "alive"}
+    http.__exit__()
+    assert not cluster.closed
+
+
+def test_clean_stop_puts_a_running_job_back(tmp_path, cluster, uploaded, submitted, until, work):
+    settings = ServiceSettings(data_dir=tmp_path / "data")
+    work.hold.clear()
+    with TestClient(create_app(settings, cluster)) as http:
+        job = submitted(http, uploaded(http))
+        until(http, job["id"], "running")
+    work.hold.set()
+    app = create_app(settings, cluster)
+    with TestClient(app) as http:
+        assert until(http, job["id"])["state"] == "succeeded"
+        states = [event["state"] for event in app.state.parts.jobs.events(job["id"])]
+    assert states == ["queued", "running", "queued", "running", "succeeded"]
+    assert len(work.calls) == 2
+
+
+def left_running(app, job_id, state="running", attempts=1):
+    with app.state.parts.database.write() as connection:
+        connection.execute(
+            update(schema.jobs)
+            .where(schema.jobs.c.id == job_id)
+            .values(state=state, attempts=attempts, started=time.time(), finished=None)
+        )
+
+
+@pytest.mark.parametrize(
+    ("state", "attempts", "end"),
+    [("running", 1, "succeeded"), ("cancelling", 1, "cancelled"), ("running", 3, "failed")],
+)
+def test_jobs_of_a_dead_process(tmp_path, cluster, uploaded, submitted, until, work, state, attempts, end):
+    settings = ServiceSettings(data_dir=tmp_path / "data")
+    work.hold.clear()
+    app = create_app(settings, cluster)
+    with TestClient(app) as http:
+        job = submitted(http, uploaded(http))
+        until(http, job["id"], "running")
+    left_running(app, job["id"], state, attempts)
+    work.hold.set()
+    with TestClient(create_app(settings, cluster)) as http:
+        done = until(http, job["id"])
+    assert done["state"] == end
+    if end == "failed":
+        assert "died" in done["error"]["detail"]
+
+
+def test_two_services_cannot_share_a_folder(start):
+    start("one")
+    with pytest.raises(InvalidInput, match="another service is using"):
+        start("one")
+
+
+def test_a_killed_service_loses_no_job(tmp_path, scan):
+    """The real thing: SIGKILL while a job runs, then the same folder again."""
+    program = (
+        "import sys, uvicorn\n"
+        "from bentray_service.app import create_app\n"
+        "from bentray_service.settings import ServiceSettings\n"
+        "from bentray_workers.cluster import open_cluster\n"
+        "cluster = open_cluster(workers=1, processes=False)\n"
+        "uvicorn.run(create_app(ServiceSettings(), cluster), port=int(sys.argv[1]), log_level='warning')\n"
+    )
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    environment = {**os.environ, "BENTRAY_DATA_DIR": str(tmp_path / "data")}
+    command = [sys.executable, "-c", program, str(port)]
+    with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=30) as http:
+        service = subprocess.Popen(command, env=environment)
+        try:
+            wait_for(lambda: http.get("/health/ready").is_success)
+            content = scan().read_bytes()
+            dataset = http.post(
+                "/v1/datasets", content=content, headers={"Content-Type": "application/x-hdf5"}
+            )
+            settings = {"rays": "straight", "nodes": 512, "sweeps": 40}
+            asked = {"kind": "reconstruction", "dataset": dataset.json()["id"], "settings": settings}
+            job = http.post("/v1/jobs", json=asked).json()
+            wait_for(lambda: http.get(job["links"]["self"]).json()["progress"]["done"] > 0)
+            service.send_signal(signal.SIGKILL)
+            service.wait()
+            service = subprocess.Popen(command, env=environment)
+            wait_for(lambda: http.get("/health/ready").is_success)
+            wait_for(lambda: http.get(job["links"]["self"]).json()["state"] in ("running", "succeeded"))
+            http.post(job["links"]["self"] + "/cancel")
+            wait_for(lambda: http.get(job["links"]["self"]).json()["state"] in ("cancelled", "succeeded"))
+        finally:
+            service.terminate()
+            service.wait()
+
+
+def wait_for(happened, seconds=60.0):
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        try:
+            if happened():
+                return
+        except httpx.TransportError:
+            pass
+        time.sleep(0.05)
+    raise AssertionError("it did not happen in time")

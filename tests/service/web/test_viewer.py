@@ -1,0 +1,92 @@
+"""The page / in a real browser: upload, start, watch, fail in words."""
+
+from pathlib import Path
+
+import pytest
+
+from bentray_kernels.tomography.settings import Settings
+
+CHROMIUM = Path("/usr/bin/chromium")
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason=f"no browser at {CHROMIUM}"),
+]
+
+
+@pytest.fixture
+def page():
+    sync_api = pytest.importorskip("playwright.sync_api")
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+        page = browser.new_page()
+        page.set_default_timeout(15_000)
+        wrong: list[str] = []
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on(
+            "console",
+            lambda message: wrong.append(message.text) if "Security Policy" in message.text else None,
+        )
+        yield page
+        browser.close()
+        assert wrong == []
+
+
+def test_without_jobs_it_says_what_to_do(page, serve):
+    page.goto(serve())
+    page.get_by_text("Nothing has run yet").wait_for()
+    page.get_by_text("ready, 1 worker").wait_for()
+    assert page.get_by_role("button", name="Start").is_disabled()
+    page.wait_for_function(f"document.querySelector('[name=sweeps]').value === '{Settings().sweeps}'")
+
+
+def test_upload_start_watch(page, serve, scan, work):
+    page.goto(serve())
+    page.set_input_files("#file", scan())
+    page.get_by_text("scan.h5 is stored").wait_for()
+    page.get_by_text("16 emitters").wait_for()
+    page.get_by_label("Straight").check()
+    page.get_by_label("Nodes a side").fill("32")
+    work.hold.clear()
+    page.get_by_role("button", name="Start").click()
+    job = page.locator(".job")
+    job.get_by_text("running").wait_for()
+    work.hold.set()
+    job.get_by_text("succeeded").wait_for()
+    job.get_by_text("residual 2.00 µs").wait_for()
+    assert job.get_by_role("heading", name="Straight rays").is_visible()
+    assert work.calls[0][1].nodes == 32
+    page.wait_for_function("document.querySelector('.job img')?.naturalWidth > 0")
+    assert page.get_by_text("Nothing has run yet").is_hidden()
+
+
+def test_cancel(page, serve, scan, work):
+    page.goto(serve())
+    page.set_input_files("#file", scan())
+    page.get_by_text("16 emitters").wait_for()
+    work.hold.clear()
+    page.get_by_role("button", name="Start").click()
+    page.get_by_role("button", name="Cancel").click()
+    page.locator(".state", has_text="cancelled").wait_for()
+
+
+def test_errors_in_words(page, serve, tmp_path):
+    (tmp_path / "notes.h5").write_text("only text")
+    page.goto(serve())
+    page.set_input_files("#file", tmp_path / "notes.h5")
+    alert = page.locator("#upload-error")
+    alert.wait_for()
+    assert "HDF5" in alert.inner_text()
+
+
+def test_by_keyboard_alone(page, serve, scan, work):
+    page.goto(serve())
+    page.set_input_files("#file", scan())
+    page.get_by_text("16 emitters").wait_for()
+    page.locator("#dataset").focus()
+    for _ in range(20):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.id") == "start":
+            break
+    page.keyboard.press("Enter")
+    page.locator(".job").wait_for()
