@@ -1,0 +1,97 @@
+"""The client against a real socket: every call, every refusal."""
+
+import numpy as np
+import pytest
+
+from bentray_kernels.eikonal import methods
+from bentray_kernels.errors import InvalidInput
+from bentray_service.client import Client, ClientError
+
+
+@pytest.fixture
+def client(serve, work):
+    with Client(serve(), poll_s=0.02) as client:
+        yield client
+
+
+@pytest.fixture
+def dataset(client, scan):
+    return client.upload(scan())["id"]
+
+
+def test_whole_path(client, scan, tmp_path):
+    sent = []
+    dataset = client.upload(scan(), lambda done, total: sent.append((done, total)))
+    assert sent[-1] == (dataset["bytes"], dataset["bytes"])
+    job = client.submit(dataset["id"], {"nodes": 16, "sweeps": 2})
+    seen = []
+    done = client.wait(job["id"], seen.append)
+    assert seen[-1] == done
+    assert client.volume(done["volume"])["shape"] == [16, 16]
+    assert client.slice_png(done["volume"], quantity="coverage").startswith(b"\x89PNG")
+    assert np.load(client.download(done["volume"], "npy", tmp_path / "speed.npy")).shape == (16, 16)
+    assert client.download(done["volume"], "hdf5", tmp_path / "r.h5").stat().st_size > 0
+    assert not list(tmp_path.glob("*.partial"))
+
+
+def test_refusal_carries_the_fields(client, dataset):
+    with pytest.raises(ClientError) as caught:
+        client.submit(dataset, {"eikonal": "magic"})
+    error = caught.value
+    assert (error.status, error.field, error.found) == (422, "settings.eikonal", "'magic'")
+    assert all(method in str(error) for method in methods())
+
+
+def test_failed_job_raises_its_problem(client, dataset, work):
+    work.error = InvalidInput("traveltime", "every pair missing", "at least one pair")
+    with pytest.raises(ClientError, match="every pair missing") as caught:
+        client.wait(client.submit(dataset, {"nodes": 16})["id"])
+    assert caught.value.field == "traveltime"
+
+
+def test_cancelled_job_raises(client, dataset, work):
+    work.hold.clear()
+    job = client.submit(dataset, {"nodes": 16})
+    client.cancel(job["id"])
+    with pytest.raises(ClientError, match="was cancelled"):
+        client.wait(job["id"])
+
+
+def test_wait_has_an_end(client, dataset, work):
+    work.hold.clear()
+    with pytest.raises(ClientError, match=r"after 0\.1 s"):
+        client.wait(client.submit(dataset, {"nodes": 16})["id"], timeout_s=0.1)
+
+
+def test_unknown_job(client):
+    with pytest.raises(ClientError, match="job") as caught:
+        client.job("job-" + "0" * 20)
+    assert caught.value.status == 404
+
+
+def test_too_large_is_told_though_the_body_is_not_read(serve, tmp_path):
+    (tmp_path / "big.h5").write_bytes(b"\0" * 20_000_000)
+    with Client(serve(max_upload_bytes=1000)) as client, pytest.raises(ClientError) as caught:
+        client.upload(tmp_path / "big.h5")
+    assert caught.value.status == 413
+
+
+def test_a_broken_download_leaves_nothing(client, tmp_path):
+    (tmp_path / "kept.h5").write_bytes(b"old")
+    with pytest.raises(ClientError):
+        client.download("vol-" + "0" * 20, "hdf5", tmp_path / "kept.h5")
+    assert [path.name for path in tmp_path.glob("kept*")] == ["kept.h5"]
+    assert (tmp_path / "kept.h5").read_bytes() == b"old"
+
+
+def test_missing_file_and_folder(client, tmp_path):
+    with pytest.raises(ClientError, match=r"none\.h5 cannot be read"):
+        client.upload(tmp_path / "none.h5")
+
+
+def test_nobody_there():
+    with (
+        Client("http://127.0.0.1:9") as client,
+        pytest.raises(ClientError, match=r"no answer from http://127.0.0.1:9"),
+    ):
+        client.job("x")
