@@ -1,0 +1,45 @@
+"""Every command has help that teaches, and asking for it loads nothing heavy."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+
+import pytest
+import typer
+from typer.testing import Result
+
+from bentray_service.cli import app
+
+COMMANDS = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+
+
+def test_the_commands_of_the_design_are_there() -> None:
+    assert {"serve", "demo", "reconstruct", "submit", "simulate", "bench"} <= set(COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_gives_an_example_that_parses(bentray: Callable[..., Result], command: str) -> None:
+    said = bentray(command, "--help")
+    assert said.exit_code == 0
+    example = said.stdout.split("Example:")[1].split("\n\n")[0].split("╭")[0].split()
+    assert example[:2] == ["bentray", command]
+    group = typer.main.get_command(app)
+    group.commands[command].make_context(command, list(example[2:]))  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_option_is_explained(command: str) -> None:
+    params = typer.main.get_command(app).commands[command].params  # type: ignore[attr-defined]
+    assert [param.name for param in params if not param.help] == []
+    assert "--json" in [option for param in params for option in param.opts]
+
+
+def test_help_is_quick_because_it_loads_nothing_heavy() -> None:
+    heavy = (
+        "{'numpy', 'numba', 'dask', 'distributed', 'fastapi', 'h5py', 'sqlalchemy', 'matplotlib', 'httpx'}"
+    )
+    code = f"import sys, bentray_service.cli; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,48 @@
+"""`bentray demo`: the whole path through a real service, small; and its judgement of the two results."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import Result
+
+from bentray_service.cli import demo as module
+
+SMALL = ("--nodes", 48, "--elements", 48)
+
+
+@pytest.mark.slow
+def test_the_whole_path_ends_with_bent_rays_ahead_and_a_picture(
+    bentray: Callable[..., Result], tmp_path: Path
+) -> None:
+    result = bentray("demo", *SMALL, "-o", tmp_path / "out", "--json")
+    assert result.exit_code == 0, result.stderr
+    said = json.loads(result.stdout)
+    errors = {name: found["truth"]["mean_absolute_error_of_range"] for name, found in said["jobs"].items()}
+    assert errors["bent"] < errors["straight"]
+    assert said["jobs"]["straight"]["settings"]["rays"] == "straight"
+    assert said["picture"] == str(tmp_path / "out" / "comparison.png")
+    assert Path(said["picture"]).read_bytes().startswith(b"\x89PNG\r\n")
+
+
+@pytest.mark.slow
+def test_it_fails_in_one_line_when_bent_rays_do_not_win(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(module, "JOBS", {"straight": {"rays": "straight"}, "bent": {"rays": "straight"}})
+    result = bentray("demo", *SMALL, "-o", tmp_path)
+    assert result.exit_code == 1
+    assert "do not beat straight ones" in result.stderr.splitlines()[-1]
+    assert "rms error" in result.stdout, "the figures are shown all the same"
+
+
+def test_a_bad_number_is_refused_before_a_service_starts(
+    bentray: Callable[..., Result], tmp_path: Path
+) -> None:
+    result = bentray("demo", "--elements", 1, "-o", tmp_path)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("bentray: elements: found 1")
+    assert not (tmp_path / "service.log").exists()

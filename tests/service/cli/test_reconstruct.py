@@ -1,0 +1,125 @@
+"""`bentray reconstruct`: three files and honest figures, with no server about."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from bentray_workers.reconstruction_file import read_reconstruction
+from typer.testing import Result
+
+QUICK = ("--nodes", 32, "--sweeps", 2)
+
+
+def test_it_writes_volume_picture_and_figures(
+    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
+) -> None:
+    result = bentray(
+        "reconstruct", scan_file, "-o", tmp_path / "new" / "out", *QUICK, "--rays", "straight", "--json"
+    )
+    assert result.exit_code == 0
+    said = json.loads(result.stdout)
+    folder = tmp_path / "new" / "out"
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "reconstruction.h5",
+        "reconstruction.json",
+        "reconstruction.png",
+    ]
+    assert json.loads((folder / "reconstruction.json").read_text()) == said
+    assert (folder / "reconstruction.png").read_bytes().startswith(b"\x89PNG\r\n")
+    volume = read_reconstruction(folder / "reconstruction.h5")
+    assert volume.settings.rays == "straight"
+    assert said["speed_range_mps"] == [volume.speed.min(), volume.speed.max()]
+    assert [sweep["sweep"] for sweep in said["history"]] == [1, 2]
+    assert said["history"][1]["residual_rms_s"] < said["history"][0]["residual_rms_s"]
+    assert said["truth"]["region"] == "mask/roi of the file"
+    assert 0 < said["truth"]["rmse_mps"] < 60
+
+
+def test_without_json_it_ends_with_a_table_and_the_paths(
+    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
+) -> None:
+    result = bentray("reconstruct", scan_file, "-o", tmp_path, *QUICK)
+    assert result.exit_code == 0
+    assert result.stdout.splitlines()[-3:] == [
+        str(tmp_path / f"reconstruction.{kind}") for kind in ("h5", "png", "json")
+    ]
+    assert "rms error" in result.stdout
+    assert result.stderr == ""
+
+
+def test_worker_processes_give_the_same_bits(
+    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
+) -> None:
+    for workers in (1, 2):
+        done = bentray("reconstruct", scan_file, "-o", tmp_path / str(workers), *QUICK, "--workers", workers)
+        assert done.exit_code == 0
+    alone, shared = (read_reconstruction(tmp_path / str(n) / "reconstruction.h5") for n in (1, 2))
+    np.testing.assert_array_equal(alone.speed, shared.speed)
+
+
+def spoil(path: Path, change: Callable[[h5py.File], None]) -> Path:
+    with h5py.File(path, "r+") as file:
+        change(file)
+    return path
+
+
+def no_geometry(file: h5py.File) -> None:
+    del file["geometry"]
+
+
+def tx_out_of_range(file: h5py.File) -> None:
+    file["acquisition/tx"][2] = 9999
+
+
+def nan_position(file: h5py.File) -> None:
+    file["geometry/element_position_m"][3, 0] = np.nan
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        (no_geometry, "geometry"),
+        (tx_out_of_range, "acquisition/tx"),
+        (nan_position, "geometry/element_position_m"),
+    ],
+)
+def test_a_bad_dataset_is_one_line_that_names_the_field(
+    bentray: Callable[..., Result],
+    scan_file: Path,
+    tmp_path: Path,
+    change: Callable[[h5py.File], None],
+    field: str,
+) -> None:
+    path = tmp_path / "bad.h5"
+    path.write_bytes(scan_file.read_bytes())
+    result = bentray("reconstruct", spoil(path, change), "-o", tmp_path / "out")
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"bentray: {field}")
+    assert "accepted: " in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("kept", [0, 20, 3000])
+def test_what_is_not_a_whole_hdf5_file_is_one_line(
+    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path, kept: int
+) -> None:
+    path = tmp_path / "bad.h5"
+    path.write_bytes(scan_file.read_bytes()[:kept])
+    result = bentray("reconstruct", path, "-o", tmp_path / "out")
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+
+
+def test_paths_are_checked_first(bentray: Callable[..., Result], tmp_path: Path, scan_file: Path) -> None:
+    absent = bentray("reconstruct", tmp_path / "absent.h5", "-o", tmp_path)
+    assert absent.exit_code == 2
+    assert "no such file" in absent.stderr
+    (tmp_path / "taken").touch()
+    taken = bentray("reconstruct", scan_file, "-o", tmp_path / "taken")
+    assert taken.exit_code == 2
+    assert "a file is in the way" in taken.stderr

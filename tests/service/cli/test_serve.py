@@ -1,0 +1,100 @@
+"""`bentray serve`: says where it is and who can reach it, and refuses in one line what cannot work."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from typer.testing import Result
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.cli import serve as module
+
+
+@pytest.fixture
+def busy() -> Iterator[int]:
+    """A port that another program listens on."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield server.getsockname()[1]
+
+
+def test_a_busy_port_is_refused_before_anything_starts(
+    bentray: Callable[..., Result], busy: int, tmp_path: Path
+) -> None:
+    result = bentray("serve", "--port", busy, "--data", tmp_path / "data")
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"bentray: port: found {busy} on 127.0.0.1 (Address already in use)")
+    assert "0 picks one" in result.stderr
+    assert not (tmp_path / "data").exists()
+
+
+def test_a_host_that_is_not_of_this_machine_is_refused(
+    bentray: Callable[..., Result], tmp_path: Path
+) -> None:
+    # 192.0.2.0/24 is reserved for documentation (RFC 5737), so no machine has it.
+    result = bentray("serve", "--host", "192.0.2.1", "--port", 0, "--data", tmp_path)
+    assert result.exit_code == 2
+    assert "0 on 192.0.2.1" in result.stderr
+
+
+def test_an_unknown_host_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(*given: object, **more: object) -> None:
+        raise socket.gaierror(-2, "Name or service not known")
+
+    monkeypatch.setattr("socket.getaddrinfo", unknown)
+    with pytest.raises(InvalidInput, match=r"host: found 'nowhere'"):
+        module._listen("nowhere", 0)
+
+
+@pytest.mark.parametrize(
+    ("words", "environment", "line"),
+    [
+        (["--port", "70000"], {}, "--port: found 70000"),
+        (["--workers", "0"], {}, "--workers: found 0"),
+        ([], {"BENTRAY_PORT": "http"}, "BENTRAY_PORT: found 'http'"),
+        (["--workers", "2"], {"BENTRAY_PORT": "http"}, "BENTRAY_PORT: found 'http'"),
+    ],
+)
+def test_a_bad_setting_is_named_as_it_was_given(
+    bentray: Callable[..., Result],
+    monkeypatch: pytest.MonkeyPatch,
+    words: list[str],
+    environment: dict[str, str],
+    line: str,
+) -> None:
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    result = bentray("serve", *words)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"bentray: {line}; accepted: ")
+
+
+def test_an_option_wins_over_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("BENTRAY_WORKERS", "7")
+    monkeypatch.setenv("BENTRAY_JOBS_AT_ONCE", "3")
+    seen = []
+    monkeypatch.setattr(module, "_run", lambda settings, listening, as_json: seen.append(settings))
+    module.serve(port=0, data=tmp_path, workers=2)
+    assert (seen[0].workers, seen[0].jobs_at_once, seen[0].data_dir) == (2, 3, tmp_path)
+
+
+@pytest.mark.parametrize(("host", "loopback"), [("127.0.0.1", True), ("::1", True), ("0.0.0.0", False)])
+def test_who_can_reach_it_is_said(host: str, loopback: bool) -> None:
+    assert ("loopback only" in module._reach(host)) == loopback
+    assert ("asks for no key" in module._reach(host)) != loopback
+
+
+def test_what_stops_the_application_from_starting_is_one_line(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def unreachable(*given: object, **more: object) -> None:
+        raise InvalidInput("scheduler_address", "tcp://127.0.0.1:1", "a running scheduler")
+
+    monkeypatch.setattr("bentray_service.app.open_cluster", unreachable)
+    result = bentray("serve", "--port", 0, "--data", tmp_path, "--scheduler", "tcp://127.0.0.1:1")
+    assert result.exit_code == 2
+    assert result.stderr == (
+        "bentray: scheduler_address: found tcp://127.0.0.1:1; accepted: a running scheduler\n"
+    )

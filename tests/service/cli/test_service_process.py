@@ -1,0 +1,126 @@
+"""A service in a child process: it answers inside the block and is gone after it, however the block ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import httpx
+import pytest
+
+from bentray_service.cli import service_process
+from bentray_service.cli.endings import WorkFailed
+from bentray_service.cli.service_process import running_service
+
+# Says that it is there, then works until it is told to stop; the last word ignores being told.
+STAND_IN = """
+import json, signal, subprocess, sys, time
+if "stubborn" in sys.argv:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+print(json.dumps({"url": f"http://child/{child.pid}"}), flush=True)
+time.sleep(600)
+"""
+
+
+def stand_in(monkeypatch: pytest.MonkeyPatch, code: str, *words: str) -> None:
+    """Start ``code`` where the service would be started."""
+    real = subprocess.Popen
+
+    def start(command: list[str], **how: object) -> subprocess.Popen[bytes]:
+        assert command[3] == "serve"
+        return real([sys.executable, "-c", code, *words], **how)  # type: ignore[call-overload,no-any-return]
+
+    monkeypatch.setattr(service_process.subprocess, "Popen", start)
+
+
+def child_in(block: AbstractContextManager[str], then: Callable[[int], None]) -> None:
+    """Enter a service block, do ``then`` with the process id of the stand-in's own child, and leave."""
+    with block as url:
+        child = int(url.rsplit("/", 1)[1])
+        assert not ended(child)
+        then(child)
+
+
+def ended(pid: int) -> bool:
+    """Whether a process has ended; a child that nobody has waited for counts as ended."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return True
+
+
+def gone(pid: int) -> bool:
+    """Whether a process that was killed has ended; the kernel takes a moment."""
+    deadline = time.monotonic() + 10
+    while not ended(pid) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return ended(pid)
+
+
+@pytest.mark.parametrize("words", [(), ("stubborn",)])
+def test_it_and_its_workers_are_gone_after_a_failure(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: tuple[str, ...]
+) -> None:
+    stand_in(monkeypatch, STAND_IN, *words)
+    monkeypatch.setattr(service_process, "STOP_S", 0.5)
+    seen: list[int] = []
+
+    def fail(child: int) -> None:
+        seen.append(child)
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        child_in(running_service(tmp_path, tmp_path / "log"), fail)
+    assert gone(seen[0])
+
+
+def test_it_is_stopped_when_this_process_is_told_to_end(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    stand_in(monkeypatch, STAND_IN)
+    before = signal.getsignal(signal.SIGTERM)
+    seen: list[int] = []
+
+    def end(child: int) -> None:
+        seen.append(child)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    with pytest.raises(KeyboardInterrupt):
+        child_in(running_service(tmp_path, tmp_path / "log"), end)
+    assert gone(seen[0])
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
+def test_the_last_words_of_one_that_ends_at_once_are_told(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    stand_in(monkeypatch, "import sys; sys.exit('bentray: the disk is full')")
+    with (
+        pytest.raises(WorkFailed, match="ended at once: bentray: the disk is full"),
+        running_service(tmp_path, tmp_path / "log"),
+    ):
+        pytest.fail("it cannot have started")
+
+
+def test_one_that_stays_silent_is_given_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    stand_in(monkeypatch, "import time; time.sleep(600)")
+    monkeypatch.setattr(service_process, "START_S", 0.0)
+    with pytest.raises(WorkFailed, match="did not start within"), running_service(tmp_path, tmp_path / "log"):
+        pytest.fail("it cannot have started")
+
+
+def test_the_real_service_answers_and_stops(tmp_path: Path) -> None:
+    with running_service(tmp_path / "data", tmp_path / "log") as url:
+        assert httpx.get(f"{url}/health/ready", timeout=30).json()["status"] == "ready"
+    with pytest.raises(httpx.TransportError):
+        httpx.get(f"{url}/health/live", timeout=5)
+    assert "Traceback" not in (tmp_path / "log").read_text()
+    assert json.dumps(url)[1:-1] in (tmp_path / "log").read_text()

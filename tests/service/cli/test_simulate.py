@@ -1,0 +1,78 @@
+"""`bentray simulate`: a dataset file with its truth, the same for the same words."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bentray_workers.dataset_file import read_dataset
+from typer.testing import Result
+
+SMALL = ("--nodes", 24, "--elements", 12, "--coupling", 1400)
+
+
+def test_the_file_holds_the_scan_that_was_asked_for(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    path = tmp_path / "phantom.h5"
+    result = bentray("simulate", "-o", path, *SMALL, "--json")
+    assert result.exit_code == 0
+    said = json.loads(result.stdout)
+    assert said["output"] == str(path)
+    assert said["settings"]["elements"] == 12
+    dataset = read_dataset(path)
+    assert dataset.water_speed_mps == 1400.0
+    assert dataset.delta_tof_s is not None
+    assert dataset.delta_tof_s.shape == (12, 12)
+    assert dataset.truth is not None
+    assert dataset.truth.sound_speed_mps.shape == (24, 24)
+
+
+def test_noise_has_the_size_and_the_seed_asked_for(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    times = {}
+    for name, words in {
+        "clean": (),
+        "noisy": ("--noise-ns", 50, "--seed", 1),
+        "again": ("--noise-ns", 50, "--seed", 1),
+        "other": ("--noise-ns", 50, "--seed", 2),
+    }.items():
+        assert bentray("simulate", "-o", tmp_path / name, *SMALL, *words).exit_code == 0
+        times[name] = read_dataset(tmp_path / name).differential_tof()
+    assert np.nanstd(times["noisy"] - times["clean"]) == pytest.approx(50e-9, rel=0.3)
+    np.testing.assert_array_equal(times["noisy"], times["again"])
+    assert np.nanmax(np.abs(times["noisy"] - times["other"])) > 1e-9
+
+
+def test_a_file_that_exists_is_kept_without_force(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    path = tmp_path / "phantom.h5"
+    path.write_text("mine")
+    refused = bentray("simulate", "-o", path, *SMALL)
+    assert refused.exit_code == 2
+    assert "--force" in refused.stderr
+    assert path.read_text() == "mine"
+    forced = bentray("simulate", "-o", path, *SMALL, "--force")
+    assert forced.exit_code == 0
+    assert forced.stdout.splitlines()[-1] == str(path)
+    assert read_dataset(path).water_speed_mps == 1400.0
+
+
+@pytest.mark.parametrize(
+    ("words", "field"),
+    [
+        (("--nodes", 2), "nodes"),
+        (("--elements", 2), "elements"),
+        (("--coupling", -1), "coupling_mps"),
+        (("--coupling", "nan"), "coupling_mps"),
+        (("--refinement", 1), "refinement"),
+        (("--noise-ns", -5), "noise_s"),
+    ],
+)
+def test_bad_words_are_one_line(
+    bentray: Callable[..., Result], tmp_path: Path, words: tuple[object, ...], field: str
+) -> None:
+    result = bentray("simulate", "-o", tmp_path / "x.h5", *words)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"bentray: {field}: found ")
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "x.h5").exists()

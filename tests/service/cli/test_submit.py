@@ -1,0 +1,144 @@
+"""`bentray submit`: against a stand-in for the client here, against the real service in the demo's test."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+from bentray_workers.reconstruction_file import write_reconstruction
+from typer.testing import Result
+
+from bentray_kernels.tomography import Settings
+from bentray_service.client import ClientError
+from bentray_workers import slices
+
+
+class StandIn:
+    """Answers as the client does, and remembers what it was asked."""
+
+    asked: ClassVar[list[Any]] = []
+    scan: ClassVar[Path]
+
+    def __init__(self, url: str) -> None:
+        self.asked.append(url)
+
+    def __enter__(self) -> StandIn:
+        return self
+
+    def __exit__(self, *ending: object) -> None:
+        self.asked.append("closed")
+
+    def upload(self, path: Path, on_progress: Callable[[int, int], None]) -> dict[str, Any]:
+        on_progress(1, 2)
+        StandIn.scan = path
+        return {"id": "dataset-1"}
+
+    def submit(self, dataset: str, settings: dict[str, Any]) -> dict[str, Any]:
+        self.asked.append((dataset, settings))
+        return self.record("queued")
+
+    def wait(self, job: str, on_progress: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
+        for state in ("queued", "running", "succeeded"):
+            on_progress(self.record(state))
+        return self.record("succeeded")
+
+    def download(self, volume: str, format: str, path: Path) -> Path:  # noqa: A002
+        assert (volume, format) == ("volume-1", "hdf5")
+        write_reconstruction(path, slices.reconstruct(None, StandIn.scan, Settings(nodes=24, sweeps=1)))
+        return path
+
+    def record(self, state: str) -> dict[str, Any]:
+        done = 24 if state == "succeeded" else 0
+        return {
+            "id": "job-1",
+            "state": state,
+            "progress": {"done": done, "total": 24},
+            "history": [{"residual_rms_s": 1e-7}] if done else [],
+            "volume": "volume-1" if done else None,
+            "seconds": 1.5,
+            "links": {"self": "/v1/jobs/job-1"},
+        }
+
+
+@pytest.fixture
+def client(monkeypatch: pytest.MonkeyPatch) -> type[StandIn]:
+    monkeypatch.setattr("bentray_service.client.Client", StandIn)
+    monkeypatch.setattr(StandIn, "asked", [])
+    return StandIn
+
+
+def test_it_sends_the_scan_and_fetches_three_files(
+    bentray: Callable[..., Result], client: type[StandIn], scan_file: Path, tmp_path: Path
+) -> None:
+    result = bentray("submit", scan_file, "--url", "http://lab:8000", "-o", tmp_path, "--sweeps", 1, "--json")
+    assert result.exit_code == 0
+    url, (dataset, settings), closed = client.asked
+    assert (url, dataset, closed) == ("http://lab:8000", "dataset-1", "closed")
+    assert settings == Settings(sweeps=1).to_dict()
+    said = json.loads(result.stdout)
+    assert said["job"] == "job-1"
+    assert said["seconds"] == 1.5
+    assert said["truth"]["rmse_mps"] > 0
+    for kind in ("h5", "png", "json"):
+        assert (tmp_path / f"reconstruction.{kind}").stat().st_size > 100
+
+
+@pytest.mark.parametrize(("words", "state"), [((), "succeeded"), (("--no-wait",), "queued")])
+def test_without_a_folder_it_prints_the_job_and_its_address(
+    bentray: Callable[..., Result], client: type[StandIn], scan_file: Path, words: tuple[str, ...], state: str
+) -> None:
+    result = bentray("submit", scan_file, "--url", "http://lab:8000/", *words)
+    assert result.exit_code == 0
+    assert result.stdout == f"job-1 {state}\nhttp://lab:8000/v1/jobs/job-1\n"
+    assert json.loads(bentray("submit", scan_file, *words, "--json").stdout)["state"] == state
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (
+            ClientError("t", 422, {"field": "acquisition/tx", "found": "999", "accepted": "0 to 255"}),
+            2,
+            "bentray: acquisition/tx: found 999; accepted: 0 to 255\n",
+        ),
+        (ClientError("no answer from http://lab"), 1, "bentray: no answer from http://lab\n"),
+    ],
+)
+def test_a_refusal_is_one_line(
+    bentray: Callable[..., Result],
+    client: type[StandIn],
+    monkeypatch: pytest.MonkeyPatch,
+    scan_file: Path,
+    error: ClientError,
+    code: int,
+    line: str,
+) -> None:
+    def refuse(*given: object) -> None:
+        raise error
+
+    monkeypatch.setattr(StandIn, "upload", refuse)
+    result = bentray("submit", scan_file)
+    assert (result.exit_code, result.stderr, result.stdout) == (code, line, "")
+    assert client.asked[-1] == "closed"
+
+
+def test_nothing_listening_is_failed_work(bentray: Callable[..., Result], scan_file: Path) -> None:
+    # Port 1 of loopback: reserved, and nothing listens on it.
+    result = bentray("submit", scan_file, "--url", "http://127.0.0.1:1")
+    assert result.exit_code == 1
+    assert result.stderr.startswith("bentray: no answer from http://127.0.0.1:1")
+    assert result.stderr.count("\n") == 1
+
+
+def test_options_that_exclude_each_other_and_bad_addresses_are_refused(
+    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
+) -> None:
+    both = bentray("submit", scan_file, "-o", tmp_path, "--no-wait")
+    assert both.exit_code == 2
+    assert "there is no result to fetch yet" in both.stderr
+    address = bentray("submit", scan_file, "--url", "lab:8000")
+    assert address.exit_code == 2
+    assert address.stderr.startswith("bentray: url: found 'lab:8000'")
