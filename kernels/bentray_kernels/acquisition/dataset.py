@@ -8,48 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
+from . import rules
+from .truth import Truth
+from .waveform import Waveform
+
+__all__ = ["Dataset", "Truth", "Waveform"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 PLAUSIBLE_SPEED_MPS = (200.0, 10_000.0)
-
-
-@dataclass(frozen=True)
-class Waveform:
-    """Raw traces of the object scan and of the same scan in water alone.
-
-    Attributes:
-        object: (ntx, nrx, nt), with a leading nz axis for several slices; int16 or float32.
-        water: as ``object``, or None.
-        scale: pressure per count; the traces are ``scale * object`` in pascal (or any one unit).
-        object_scale, water_scale: (ntx, nrx), optional further factor per trace.
-    """
-
-    object: NDArray[np.int16] | NDArray[np.float32]
-    water: NDArray[np.int16] | NDArray[np.float32] | None = None
-    scale: float = 1.0
-    object_scale: Floats | None = None
-    water_scale: Floats | None = None
-
-
-@dataclass(frozen=True)
-class Truth:
-    """What a phantom really is, on nodes ``origin_m + index * spacing_m`` in (x, y[, z]) order."""
-
-    sound_speed_mps: Floats
-    spacing_m: tuple[float, ...]
-    origin_m: tuple[float, ...]
-    attenuation_np_m: Floats | None = None
-    axes: str = "x,y"
+ARRAY_TYPES = ("ring", "rings", "free")
 
 
 @dataclass(frozen=True)
 class Dataset:
     """One transmission scan, in SI units; NaN means missing.
 
-    Arrays over pairs are (ntx, nrx), or (nz, ntx, nrx) when ``slice_z_m`` is given.
+    Arrays over pairs are (ntx, nrx), or (nz, ntx, nrx) when ``slice_z_m`` is given. A dataset without
+    travel times (``picked`` is false) needs its traces, which may still lie in the file it came from.
 
     Attributes:
         element_position_m: (elements, 2 or 3), m, origin at the centre of the ring.
@@ -97,7 +75,9 @@ class Dataset:
         position = self.element_position_m
         if position.ndim != 2 or position.shape[1] not in (2, 3) or len(position) < 3:
             raise InvalidInput(
-                "geometry/element_position_m", f"shape {position.shape}", "(elements, 2 or 3), at least 3 elements"
+                "geometry/element_position_m",
+                f"shape {position.shape}",
+                "(elements, 2 or 3), at least 3 elements",
             )
         bad = np.flatnonzero(~np.isfinite(position).all(axis=1))
         if bad.size:
@@ -108,7 +88,9 @@ class Dataset:
             )
         for name, index in (("tx", self.tx), ("rx", self.rx)):
             if index.ndim != 1 or index.size == 0:
-                raise InvalidInput(f"acquisition/{name}", f"shape {index.shape}", "a non-empty list of element indices")
+                raise InvalidInput(
+                    f"acquisition/{name}", f"shape {index.shape}", "a non-empty list of element indices"
+                )
             wrong = np.flatnonzero((index < 0) | (index >= len(position)))
             if wrong.size:
                 raise InvalidInput(
@@ -118,10 +100,44 @@ class Dataset:
                 )
         low, high = PLAUSIBLE_SPEED_MPS
         if not low <= self.water_speed_mps <= high:
-            raise InvalidInput("water/sound_speed_mps", self.water_speed_mps, f"a speed from {low:g} to {high:g} m/s")
-        if self.tof_s is None and self.delta_tof_s is None and self.waveform is None:
-            raise InvalidInput("traveltime", "neither travel times nor traces", "traveltime/… or waveform/object")
+            raise InvalidInput(
+                "water@sound_speed_mps", self.water_speed_mps, f"a speed from {low:g} to {high:g} m/s"
+            )
+        self._check_description()
         self._check_pairs()
+
+    def _check_description(self) -> None:
+        if self.array_type not in ARRAY_TYPES:
+            raise InvalidInput(
+                "geometry@array_type", repr(self.array_type), "one of " + ", ".join(ARRAY_TYPES)
+            )
+        if self.element_normal is not None:
+            rules.shape("geometry/element_normal", self.element_normal, self.element_position_m.shape)
+            rules.finite("geometry/element_normal", self.element_normal)
+        for name, value, unit in (
+            ("geometry@radius_m", self.radius_m, "m"),
+            ("acquisition@center_frequency_hz", self.center_frequency_hz, "Hz"),
+            ("acquisition@sampling_rate_hz", self.sampling_rate_hz, "Hz"),
+            ("amplitude@frequency_hz", self.amplitude_frequency_hz, "Hz"),
+        ):
+            rules.positive(name, value, unit)
+        if not np.isfinite(self.t0_s):
+            raise InvalidInput("acquisition@t0_s", self.t0_s, "a finite time in s")
+        alpha = self.water_attenuation_np_m
+        if alpha is not None and not 0.0 <= alpha < np.inf:
+            raise InvalidInput("water@attenuation_np_m", alpha, "a finite number >= 0 Np/m")
+        if self.wavelet is not None:
+            if self.wavelet.ndim != 1 or self.wavelet.size == 0:
+                raise InvalidInput("acquisition/wavelet", f"shape {self.wavelet.shape}", "(nt,), not empty")
+            rules.finite("acquisition/wavelet", self.wavelet)
+        if self.slice_z_m is not None:
+            if self.slice_z_m.ndim != 1 or self.slice_z_m.size == 0:
+                raise InvalidInput("slice/z_m", f"shape {self.slice_z_m.shape}", "(nz,), not empty")
+            rules.finite("slice/z_m", self.slice_z_m)
+            if not (np.diff(self.slice_z_m) > 0.0).all():
+                raise InvalidInput(
+                    "slice/z_m", "positions that do not rise", "strictly rising positions in m"
+                )
 
     def _check_pairs(self) -> None:
         pairs: tuple[int, ...] = (len(self.tx), len(self.rx))
@@ -134,14 +150,20 @@ class Dataset:
             ("amplitude/log_ratio_np", self.log_ratio_np),
             ("mask/valid", self.valid),
         ):
-            if array is not None and array.shape != pairs:
-                raise InvalidInput(name, f"shape {array.shape}", f"shape {pairs}")
+            if array is not None:
+                rules.shape(name, array, pairs)
+                rules.no_infinity(name, array)
+        if self.sigma_s is not None:
+            rules.positive_or_nan("traveltime/sigma_s", self.sigma_s)
         if self.waveform is not None:
-            for name, traces in (("object", self.waveform.object), ("water", self.waveform.water)):
-                if traces is not None and traces.shape[:-1] != pairs:
-                    raise InvalidInput(f"waveform/{name}", f"shape {traces.shape}", f"shape {(*pairs, 'nt')}")
-            if self.sampling_rate_hz is None or not self.sampling_rate_hz > 0:
-                raise InvalidInput("acquisition@sampling_rate_hz", self.sampling_rate_hz, "a rate in Hz > 0")
+            traces = self.waveform.object
+            if traces.shape[:-1] != pairs:
+                accepted = "(" + ", ".join(str(n) for n in pairs) + ", nt)"
+                raise InvalidInput("waveform/object", f"shape {traces.shape}", f"shape {accepted}")
+            if self.sampling_rate_hz is None:
+                raise InvalidInput(
+                    "acquisition@sampling_rate_hz", "nothing", "a rate in Hz > 0, since there are traces"
+                )
 
     @property
     def slices(self) -> int:
@@ -166,7 +188,11 @@ class Dataset:
         traces = self.waveform
         if traces is not None:
             traces = Waveform(
-                traces.object[index], one(traces.water), traces.scale, one(traces.object_scale), one(traces.water_scale)
+                traces.object[index],
+                one(traces.water),
+                traces.scale,
+                one(traces.object_scale),
+                one(traces.water_scale),
             )
         return replace(
             self,
@@ -194,7 +220,7 @@ class Dataset:
         elif self.tof_s is not None:
             delta = self.tof_s - self.distance_m() / self.water_speed_mps
         else:
-            raise InvalidInput("traveltime", "traces only", "picked travel times: run a picker first")
+            raise InvalidInput("traveltime", "no travel times", "picked travel times: run a picker first")
         if self.valid is not None:
             delta[~self.valid] = np.nan
         delta[..., self.tx[:, None] == self.rx[None, :]] = np.nan

@@ -1,0 +1,193 @@
+"""First motion in one trace at a time: AIC and threshold onsets, and their match with the water pulse.
+
+Traces are (nt,) in any unit; places and lengths are in samples and may be fractions. Nothing here
+depends on the unit of a trace, so per-trace scales are not needed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Trace = NDArray[Any]
+
+AIC, THRESHOLD = 0, 1
+
+# Fewest samples before the arrival that tell the noise.
+LEAD = 16
+
+# Floor of the standard deviations in the AIC, part of the peak. Without it the logarithm of a noiseless
+# lead reacts to the first bit that moves, which an attenuating object hides and water does not.
+AIC_FLOOR = 0.01
+
+# Height of the threshold: part of the peak, or multiples of the noise if that is more.
+THRESHOLD_PART = 0.2
+THRESHOLD_NOISE = 4.0
+
+# The first arrival ends where the trace first comes this near its peak in the window: what follows may be
+# stronger (paths around a lens) but is later.
+STRONG_PART = 0.5
+
+# A peak below this many standard deviations of the noise is none.
+FAINTEST = 4.0
+
+
+@njit(cache=True, nogil=True)
+def prepare(trace: Trace, lead: int, rounding: float, out: Trace) -> float:
+    """Copy a trace less its offset to ``out``; give the noise, NaN where a sample is not finite.
+
+    Offset and noise are the median and the median deviation of the first ``lead`` samples, which a spike
+    among them, such as the cross-talk of the emission, does not move. Where the lead is too short to
+    tell, the noise is ``rounding``, the standard deviation that whole numbers have by themselves.
+    """
+    n = trace.size
+    for i in range(n):
+        out[i] = trace[i]
+        if not math.isfinite(out[i]):
+            return np.nan
+    known = lead >= LEAD
+    offset = np.median(out[:lead]) if known else np.median(out)
+    for i in range(n):
+        out[i] -= offset
+    return max(1.4826 * np.median(np.abs(out[:lead])), rounding) if known else rounding
+
+
+@njit(cache=True, nogil=True)
+def first_strong(x: Trace, begin: int, end: int, period: float, noise: float) -> int:
+    """Place of the largest swing of the first arrival in ``x[begin:end]``; −1 if there is none."""
+    peak = 0.0
+    for i in range(begin, end):
+        peak = max(peak, abs(x[i]))
+    if peak <= FAINTEST * noise or peak == 0.0:
+        return -1
+    at = begin
+    while abs(x[at]) < STRONG_PART * peak:
+        at += 1
+    best = at
+    for i in range(at, min(end, at + math.ceil(period))):
+        if abs(x[i]) > abs(x[best]):
+            best = i
+    return best
+
+
+@njit(cache=True, nogil=True)
+def aic(x: Trace, begin: int, end: int) -> float:
+    """Onset where ``x[begin:end]`` splits best into two stationary parts; NaN at the window's rim.
+
+    AIC(k) = k ln var(before k) + (n − k) ln var(from k), N. Maeda, Zisin 38 (1985) 365-379, with a
+    parabola through the lowest three values for the fraction of a sample.
+    """
+    n = end - begin
+    if n < 8:
+        return np.nan
+    total = 0.0
+    square = 0.0
+    peak = 0.0
+    for i in range(begin, end):
+        total += x[i]
+        square += x[i] * x[i]
+        peak = max(peak, abs(x[i]))
+    floor = (AIC_FLOOR * peak) ** 2
+    value = np.full(n, np.inf)
+    lowest = 2
+    left = 0.0
+    left_square = 0.0
+    for k in range(1, n):
+        left += x[begin + k - 1]
+        left_square += x[begin + k - 1] ** 2
+        if 2 <= k <= n - 2:
+            before = max(left_square / k - (left / k) ** 2, 0.0)
+            m = n - k
+            after = max((square - left_square) / m - ((total - left) / m) ** 2, 0.0)
+            value[k] = k * math.log(before + floor) + m * math.log(after + floor)
+            if value[k] < value[lowest]:
+                lowest = k
+    if lowest == 2 or lowest == n - 2:
+        return np.nan
+    return float(begin + lowest + vertex(value[lowest - 1], value[lowest], value[lowest + 1]))
+
+
+@njit(cache=True, nogil=True)
+def threshold(x: Trace, begin: int, end: int, noise: float) -> float:
+    """Where ``|x[begin:end]|`` first crosses the threshold, between samples; NaN if it starts above."""
+    peak = 0.0
+    for i in range(begin, end):
+        peak = max(peak, abs(x[i]))
+    height = max(THRESHOLD_PART * peak, THRESHOLD_NOISE * noise)
+    if end - begin < 2 or abs(x[begin]) >= height:
+        return np.nan
+    for i in range(begin + 1, end):
+        if abs(x[i]) >= height:
+            low = abs(x[i - 1])
+            return float(i - 1 + (height - low) / (abs(x[i]) - low))
+    return np.nan
+
+
+@njit(cache=True, nogil=True)
+def onset(x: Trace, begin: int, end: int, period: float, noise: float, picker: int) -> tuple[float, int]:
+    """Onset of the first arrival in ``x[begin:end]`` and the place of its largest swing; NaN, −1 if none."""
+    strong = first_strong(x, begin, end, period, noise)
+    if strong < 0:
+        return np.nan, -1
+    if picker == AIC:
+        # A little past the swing, or its part of the window is too short for a variance.
+        return aic(x, begin, min(strong + 1 + math.ceil(0.25 * period), end)), strong
+    return threshold(x, begin, strong + 1, noise), strong
+
+
+@njit(cache=True, nogil=True)
+def match(
+    water: Trace, object_: Trace, begin: int, end: int, shift: float, reach: float
+) -> tuple[float, float]:
+    """Delay, near ``shift``, at which ``water[begin:end]`` best resembles the object trace, and how well.
+
+    The likeness is the normalised correlation Σwo/√(Σw²Σo²) of equally long pieces, so a weaker pulse
+    counts as much; a cosine through the best three gives the fraction of a sample. NaN when the best lies at the rim of
+    ``shift ± reach`` or outside the trace.
+    """
+    first = math.floor(shift - reach) - 1
+    count = math.ceil(shift + reach) + 1 - first + 1
+    likeness = np.full(count, -2.0)
+    power = 0.0
+    for i in range(begin, end):
+        power += water[i] * water[i]
+    for k in range(count):
+        lag = first + k
+        if begin + lag >= 0 and end + lag <= object_.size:
+            both = 0.0
+            other = 0.0
+            for i in range(begin, end):
+                both += water[i] * object_[i + lag]
+                other += object_[i + lag] * object_[i + lag]
+            if other > 0.0 and power > 0.0:
+                likeness[k] = both / math.sqrt(power * other)
+    best = int(np.argmax(likeness))
+    if best == 0 or best == count - 1 or likeness[best - 1] < -1.5 or likeness[best + 1] < -1.5:
+        return np.nan, 0.0
+    part, height = crest(likeness[best - 1], likeness[best], likeness[best + 1])
+    return first + best + part, min(height, 1.0)
+
+
+@njit(cache=True, inline="always")
+def vertex(left: float, middle: float, right: float) -> float:
+    """Place of the extremum of the parabola through (−1, left), (0, middle), (1, right)."""
+    bend = left - 2.0 * middle + right
+    return 0.5 * (left - right) / bend if bend != 0.0 and math.isfinite(bend) else 0.0
+
+
+@njit(cache=True, inline="always")
+def crest(left: float, middle: float, right: float) -> tuple[float, float]:
+    """Place and height of the crest of the cosine through (−1, left), (0, middle), (1, right).
+
+    The likeness of a pulse with itself is a cosine near its crest; at few samples a period a parabola
+    would miss the height, and a true copy would look unlike by its sampling alone.
+    """
+    turn = math.acos(min(max((left + right) / (2.0 * middle), -1.0), 1.0))
+    if turn < 1e-9:
+        return 0.0, middle
+    phase = math.atan2(right - left, 2.0 * middle * math.sin(turn))
+    return phase / turn, middle / math.cos(phase)

@@ -1,0 +1,49 @@
+"""What a field of a dataset may hold; each rule raises InvalidInput in the words of the file format."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+
+
+def shape(name: str, array: NDArray[Any], expected: tuple[int, ...]) -> None:
+    """The array has exactly this shape."""
+    if array.shape != expected:
+        raise InvalidInput(name, f"shape {array.shape}", f"shape {expected}")
+
+
+def no_infinity(name: str, array: NDArray[Any]) -> None:
+    """Every value is a number or NaN, which stands for a missing one."""
+    _refuse(name, array, np.isinf(array), "finite values, NaN for missing ones")
+
+
+def finite(name: str, array: NDArray[Any]) -> None:
+    """Every value is a number."""
+    _refuse(name, array, ~np.isfinite(array), "finite values")
+
+
+def positive_or_nan(name: str, array: NDArray[Any]) -> None:
+    """Every value is above zero, or NaN for a missing one."""
+    _refuse(
+        name,
+        array,
+        ~(np.isnan(array) | (array > 0.0) & np.isfinite(array)),
+        "values > 0, NaN for missing ones",
+    )
+
+
+def positive(name: str, value: float | None, unit: str) -> None:
+    """A number above zero, where one is given."""
+    if value is not None and not 0.0 < value < math.inf:
+        raise InvalidInput(name, value, f"a finite number > 0 {unit}")
+
+
+def _refuse(name: str, array: NDArray[Any], wrong: NDArray[np.bool_], accepted: str) -> None:
+    if wrong.any():
+        first = tuple(int(i) for i in np.argwhere(wrong)[0])
+        raise InvalidInput(name, f"{array[first]} at {list(first)} ({wrong.sum()} such values)", accepted)

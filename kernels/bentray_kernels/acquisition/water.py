@@ -1,0 +1,53 @@
+"""Speed of sound in pure water from its temperature, and back."""
+
+from __future__ import annotations
+
+import math
+
+from ..errors import InvalidInput
+
+# W. Marczak, "Water as a standard in the measurements of speed of sound in liquids",
+# J. Acoust. Soc. Am. 102 (1997) 2776-2779, table II: powers 0 to 5 of the temperature in °C.
+MARCZAK = (1.402385e3, 5.038813, -5.799136e-2, 3.287156e-4, -1.398845e-6, 2.787860e-9)
+
+# The fit holds from 0 to 95 °C; the speed rises up to 74.1 °C and falls from there on.
+RANGE_C = (0.0, 95.0)
+FASTEST_C = 74.0
+
+
+def speed_from_temperature(temperature_c: float) -> float:
+    """Speed of sound in water, m/s, by Marczak (1997) at atmospheric pressure.
+
+    Raises:
+        InvalidInput: for a temperature outside 0 to 95 °C.
+    """
+    low, high = RANGE_C
+    if not low <= temperature_c <= high:
+        raise InvalidInput("water@temperature_c", temperature_c, f"a temperature from {low:g} to {high:g} °C")
+    speed = 0.0
+    for coefficient in reversed(MARCZAK):
+        speed = speed * temperature_c + coefficient
+    return speed
+
+
+def temperature_from_speed(speed_mps: float) -> float:
+    """Temperature of water, °C, whose speed of sound this is; the one below 74 °C, where it is unique.
+
+    Raises:
+        InvalidInput: for a speed that water does not have between 0 and 74 °C.
+    """
+    low, high = RANGE_C[0], FASTEST_C
+    slowest, fastest = speed_from_temperature(low), speed_from_temperature(high)
+    if not slowest <= speed_mps <= fastest:
+        raise InvalidInput(
+            "water@sound_speed_mps", speed_mps, f"a speed from {slowest:.1f} to {fastest:.1f} m/s"
+        )
+    # Halving converges to the last bit: the speed rises strictly on this interval.
+    while True:
+        middle = 0.5 * (low + high)
+        if middle in (low, high) or math.isclose(low, high, rel_tol=0.0, abs_tol=1e-12):
+            return middle
+        if speed_from_temperature(middle) < speed_mps:
+            low = middle
+        else:
+            high = middle

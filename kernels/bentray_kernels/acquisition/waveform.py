@@ -1,0 +1,47 @@
+"""Raw traces of a scan, as they were digitised."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+from . import rules
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Waveform:
+    """Raw traces of the object scan and of the same scan in water alone.
+
+    Attributes:
+        object: (ntx, nrx, nt), with a leading nz axis for several slices; int16 or float32.
+        water: as ``object``, or None.
+        scale: pressure per count; the traces are ``scale * object`` in pascal (or any one unit).
+        object_scale, water_scale: (ntx, nrx), optional further factor per trace.
+    """
+
+    object: NDArray[np.int16] | NDArray[np.float32]
+    water: NDArray[np.int16] | NDArray[np.float32] | None = None
+    scale: float = 1.0
+    object_scale: Floats | None = None
+    water_scale: Floats | None = None
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.scale) and self.scale != 0.0):
+            raise InvalidInput("waveform@scale", self.scale, "a finite number other than 0")
+        if self.object.ndim not in (3, 4) or 0 in self.object.shape:
+            raise InvalidInput(
+                "waveform/object",
+                f"shape {self.object.shape}",
+                "(ntx, nrx, nt), or (nz, ntx, nrx, nt), none 0",
+            )
+        if self.water is not None:
+            rules.shape("waveform/water", self.water, self.object.shape)
+        for name, scale in (("object_scale", self.object_scale), ("water_scale", self.water_scale)):
+            if scale is not None:
+                rules.shape(f"waveform/{name}", scale, self.object.shape[:-1])
+                rules.no_infinity(f"waveform/{name}", scale)

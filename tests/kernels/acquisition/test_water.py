@@ -1,0 +1,36 @@
+"""Speed of sound in water: published values, and back again."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bentray_kernels.acquisition import speed_from_temperature, temperature_from_speed
+from bentray_kernels.errors import InvalidInput
+
+
+# Del Grosso and Mader, J. Acoust. Soc. Am. 52 (1972) 1442, which Marczak's fit follows to 0.02 m/s.
+@pytest.mark.parametrize(
+    ("temperature", "speed"),
+    [(0.0, 1402.388), (20.0, 1482.343), (25.0, 1496.687), (40.0, 1528.863), (74.0, 1555.147)],
+)
+def test_the_published_speeds(temperature, speed):
+    assert speed_from_temperature(temperature) == pytest.approx(speed, abs=0.05)
+
+
+@given(st.floats(0.0, 73.0))
+def test_the_inverse_gives_the_temperature_back(temperature):
+    assert temperature_from_speed(speed_from_temperature(temperature)) == pytest.approx(temperature, abs=1e-6)
+
+
+@pytest.mark.parametrize("temperature", [-1.0, 96.0, float("nan")])
+def test_a_temperature_outside_the_fit_is_refused(temperature):
+    with pytest.raises(InvalidInput, match="water@temperature_c"):
+        speed_from_temperature(temperature)
+
+
+@pytest.mark.parametrize("speed", [1375.0, 1600.0, float("nan")])
+def test_a_speed_that_water_does_not_have_is_refused(speed):
+    with pytest.raises(InvalidInput, match="water@sound_speed_mps"):
+        temperature_from_speed(speed)

@@ -1,0 +1,68 @@
+"""Made-up ring scans: Ricker pulses at known delays."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bentray_kernels.acquisition import Dataset, Waveform
+
+WATER_MPS = 1480.0
+FREQUENCY_HZ = 1.0e6
+RATE_HZ = 8.0e6
+RADIUS_M = 0.05
+START_S = -4.0e-6
+
+
+def ricker(time_s: np.ndarray, frequency_hz: float) -> np.ndarray:
+    a = (np.pi * frequency_hz * time_s) ** 2
+    return (1.0 - 2.0 * a) * np.exp(-a)
+
+
+def ring(elements: int = 32) -> np.ndarray:
+    angle = 2.0 * np.pi * np.arange(elements) / elements
+    return RADIUS_M * np.column_stack((np.cos(angle), np.sin(angle)))
+
+
+def scan(
+    delay_s: np.ndarray | float = 0.0,
+    *,
+    elements: int = 32,
+    noise: float = 0.0,
+    gain: float = 1.0,
+    seed: int = 0,
+    rate_hz: float = RATE_HZ,
+    frequency_hz: float = FREQUENCY_HZ,
+) -> Dataset:
+    """float32 traces; the object's pulse is ``delay_s`` later than the water's and ``gain`` times as high."""
+    position = ring(elements)
+    every = np.arange(elements)
+    distance = np.linalg.norm(position[:, None] - position[None], axis=-1)
+    last = 2.0 * RADIUS_M / WATER_MPS + 12.0e-6
+    time = START_S + np.arange(int((last - START_S) * rate_hz)) / rate_hz
+    arrival = (distance / WATER_MPS)[..., None]
+    late = np.broadcast_to(np.asarray(delay_s, dtype=float), distance.shape)[..., None]
+    random = np.random.default_rng(seed)
+
+    def traces(at: np.ndarray, height: float) -> np.ndarray:
+        clean = height * ricker(time - at, frequency_hz)
+        return (clean + noise * random.standard_normal(clean.shape)).astype(np.float32)
+
+    return Dataset(
+        element_position_m=position,
+        tx=every,
+        rx=every,
+        water_speed_mps=WATER_MPS,
+        waveform=Waveform(traces(arrival + late, gain), traces(arrival, 1.0)),
+        sampling_rate_hz=rate_hz,
+        center_frequency_hz=frequency_hz,
+        t0_s=START_S,
+    )
+
+
+def smooth_delay(elements: int, largest_s: float, seed: int = 0) -> np.ndarray:
+    """(elements, elements) delays that change slowly around the ring and are the same both ways."""
+    random = np.random.default_rng(seed)
+    angle = 2.0 * np.pi * np.arange(elements) / elements
+    a, b = angle[:, None], angle[None, :]
+    phase = random.uniform(0.0, 2.0 * np.pi, 2)
+    return largest_s * 0.5 * (np.cos(a + b + phase[0]) + np.cos(a - b) * np.cos(phase[1]))
