@@ -72,6 +72,7 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
     files = Files(settings.data_dir)
     files.prepare()
     stack.enter_context(lock(files.root))
+    files.drop_leftovers()
     database = open_database(settings.database)
     stack.callback(database.close)
     if cluster is None:

@@ -11,7 +11,9 @@ class UnknownId(InvalidInput):
     """No dataset, job or volume has this id."""
 
     def __init__(self, field: str, value: str) -> None:
-        super().__init__(field, repr(value[:80]), f"the id of a {field} that exists; see GET /v1/{field}s")
+        # A volume is found through its job.
+        listed = "jobs" if field == "volume" else f"{field}s"
+        super().__init__(field, repr(value[:80]), f"the id of a {field} that exists; see GET /v1/{listed}")
 
     def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
         return InvalidInput, (self.field, self.value, self.accepted)

@@ -18,6 +18,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_service.app import create_app
 from bentray_service.settings import ServiceSettings
 from bentray_service.storage import schema
+from bentray_service.storage.ids import new_id
 from bentray_workers.cluster import open_cluster
 
 
@@ -105,9 +106,12 @@ def test_jobs_of_a_dead_process(tmp_path, cluster, uploaded, submitted, until, w
 
 
 def test_two_services_cannot_share_a_folder(start):
-    start("one")
+    files = start("one").app.state.parts.files
+    arriving = files.incoming(new_id("dataset"))
+    arriving.write_bytes(b"half an upload")
     with pytest.raises(InvalidInput, match="another service is using"):
         start("one")
+    assert arriving.exists()
 
 
 def test_a_killed_service_loses_no_job(tmp_path, scan):

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from typing import Any
+
+from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.tomography.result import Progress
 
 from ..storage.jobs import Jobs
 from .kinds import finite
+
+log = logging.getLogger("bentray.jobs")
 
 INTERVAL_SECONDS = 0.3
 
@@ -35,14 +40,20 @@ class Reporter:
     def report(self, progress: Progress) -> None:
         """Keep the newest progress; write it when the last write is long enough ago."""
         self._pending = progress
-        if self._clock() - self._written >= INTERVAL_SECONDS:
+        if self._clock() - self._written < INTERVAL_SECONDS:
+            return
+        try:
             self.flush()
+        except SQLAlchemyError:
+            # A database that is away for a while must not cost a job; the next report says the same.
+            log.warning("the progress of %s could not be stored", self._job_id, exc_info=True)
 
     def flush(self) -> None:
         """Write what is kept; called at the end too, so that the last report always arrives."""
         if self._pending is None:
             return
-        kept, self._pending = self._pending, None
+        kept = self._pending
+        self._written = self._clock()
         history: list[dict[str, Any]] = [
             {
                 "slice": sweep.slice,
@@ -53,13 +64,16 @@ class Reporter:
             for sweep in kept.history
         ]
         self._jobs.progress(self._job_id, kept.done, kept.total, history)
-        self._written = self._clock()
+        self._pending = None
 
     def stop(self) -> bool:
         """Whether the job should give up: it was cancelled, or the service leaves."""
         if self._leaving() or self._cancelled:
             return True
         if self._clock() - self._asked >= INTERVAL_SECONDS:
-            self._cancelled = self._jobs.state(self._job_id) == "cancelling"
             self._asked = self._clock()
+            try:
+                self._cancelled = self._jobs.state(self._job_id) == "cancelling"
+            except SQLAlchemyError:
+                log.warning("whether %s is cancelled could not be read", self._job_id, exc_info=True)
         return self._cancelled

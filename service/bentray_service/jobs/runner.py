@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -24,6 +25,8 @@ log = logging.getLogger("bentray.jobs")
 
 # How long an idle thread waits before it looks by itself; a new job wakes it at once.
 IDLE_SECONDS = 1.0
+# How long a job may take to notice that the service leaves.
+STOP_SECONDS = 30.0
 
 
 class Runner:
@@ -65,8 +68,11 @@ class Runner:
         with self._wake:
             self._wake.notify_all()
         for thread in self._threads:
+            thread.join(STOP_SECONDS)
             if thread.is_alive():
-                thread.join()
+                log.warning(
+                    "%s did not stop in %g s; its job runs again at the next start", thread.name, STOP_SECONDS
+                )
 
     def _loop(self) -> None:
         while not self._leaving.is_set():
@@ -98,17 +104,37 @@ class Runner:
                         stop=reporter.stop,
                     )
                 )
-            reporter.flush()
         except Cancelled:
-            reporter.flush()
-            if self._leaving.is_set():
-                self._jobs.release(job["id"])
-            else:
-                self._jobs.cancelled(job["id"])
+            self._settle(lambda: self._stopped(job["id"], reporter))
         except Exception as error:
-            reporter.flush()
-            self._jobs.fail(job["id"], explain(job["id"], error).model_dump(exclude_none=True))
+            problem = explain(job["id"], error).model_dump(exclude_none=True)
+            self._settle(lambda: self._failed(job["id"], reporter, problem))
         else:
-            if not self._jobs.succeed(job["id"], {"id": volume_id, **volume}):
-                target.unlink(missing_ok=True)
-                self._jobs.cancelled(job["id"])
+            self._settle(lambda: self._succeeded(job["id"], reporter, {"id": volume_id, **volume}))
+
+    def _stopped(self, job_id: str, reporter: Reporter) -> None:
+        reporter.flush()
+        if self._leaving.is_set():
+            self._jobs.release(job_id)
+        else:
+            self._jobs.cancelled(job_id)
+
+    def _failed(self, job_id: str, reporter: Reporter, problem: dict[str, Any]) -> None:
+        reporter.flush()
+        self._jobs.fail(job_id, problem)
+
+    def _succeeded(self, job_id: str, reporter: Reporter, volume: dict[str, Any]) -> None:
+        reporter.flush()
+        if not self._jobs.succeed(job_id, volume):
+            self._files.volume(volume["id"]).unlink(missing_ok=True)
+            self._jobs.cancelled(job_id)
+
+    def _settle(self, write_the_end: Callable[[], None]) -> None:
+        """Write the end of a job, as often as it takes: it would count as running for ever otherwise."""
+        while True:
+            try:
+                return write_the_end()
+            except SQLAlchemyError:
+                log.exception("the end of a job could not be stored; trying again in %g s", IDLE_SECONDS)
+                if self._leaving.wait(IDLE_SECONDS):
+                    raise

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import shutil
 from pathlib import Path
 from typing import IO
 
@@ -16,7 +17,7 @@ class Files:
     """Folders of one service under ``data_dir``.
 
     ``incoming/`` holds uploads that no one has checked, ``datasets/`` the canonical files, ``volumes/`` the
-    results, ``exports/`` the same results in other formats.
+    results, ``exports/`` the same results in other formats, ``scratch/`` what workers need while they work.
     """
 
     def __init__(self, data_dir: Path) -> None:
@@ -28,7 +29,7 @@ class Files:
         self.scratch = self.root / "scratch"
 
     def prepare(self) -> None:
-        """Make the folders and drop the uploads that a dead process left half done.
+        """Make the folders.
 
         Raises:
             InvalidInput: when the folder cannot be made or written.
@@ -36,12 +37,20 @@ class Files:
         try:
             for folder in (self._incoming, self._datasets, self._volumes, self._exports, self.scratch):
                 folder.mkdir(parents=True, exist_ok=True)
-            for left in self._incoming.iterdir():
-                left.unlink()
         except OSError as error:
             raise InvalidInput(
                 "data_dir", f"{self.root} ({error.strerror})", "a folder that can be written"
             ) from error
+
+    def drop_leftovers(self) -> None:
+        """Remove what a dead process left half done; call it once the folder is locked."""
+        for left in self._incoming.iterdir():
+            left.unlink()
+        for left in self.scratch.iterdir():
+            if left.is_dir():
+                shutil.rmtree(left)
+            else:
+                left.unlink()
 
     def incoming(self, dataset_id: str) -> Path:
         """Where an upload lands, before anything has looked at it."""

@@ -11,10 +11,17 @@ from ..errors import FAILED, INTERNAL, INVALID_REQUEST, NOT_FOUND, PROBLEMS
 Node = dict[str, Any]
 
 EXAMPLE = """curl -H 'Content-Type: application/x-hdf5' --data-binary @scan.h5 http://127.0.0.1:8000/v1/datasets
-curl -H 'Content-Type: application/json' \\
-     -d '{"kind": "reconstruction", "dataset": "ds-…", "settings": {"rays": "curved"}}' http://127.0.0.1:8000/v1/jobs
+
+curl -H 'Content-Type: application/json' http://127.0.0.1:8000/v1/jobs \\
+     -d '{"kind": "reconstruction", "dataset": "ds-…", "settings": {"rays": "curved"}}'
+
 curl http://127.0.0.1:8000/v1/jobs/job-…
+
 curl -o slice.png http://127.0.0.1:8000/v1/volumes/vol-…/slice.png"""
+
+
+# What FastAPI writes where a route says nothing.
+UNSAID = "Successful Response"
 
 
 def reference_page(document: Node) -> str:
@@ -36,13 +43,13 @@ def reference_page(document: Node) -> str:
 </head>
 <body>
 <header class="top">
-<img src="/static/icon.svg" alt="" width="36" height="36">
-<div><h1>Bentray {escape(document["info"]["version"])}</h1><p>REST reference</p></div>
+<div class="brand"><img src="/static/icon.svg" alt="" width="36" height="36">
+<div><h1>Bentray {escape(document["info"]["version"])}</h1><p>REST reference</p></div></div>
 <nav><a href="/">Viewer</a> · <a href="/openapi.json">openapi.json</a></nav>
 </header>
 <main class="reference">
 <p>{escape(document["info"]["description"])}</p>
-<h2>In four lines</h2><pre tabindex="0">{escape(EXAMPLE)}</pre>
+<h2>In four steps</h2><pre tabindex="0">{escape(EXAMPLE)}</pre>
 <h2>Addresses</h2><ul class="toc">{contents}</ul>
 {"".join(_operation(o) for o in operations)}
 <h2 id="problems">Problems</h2>
@@ -77,7 +84,11 @@ def _operation(operation: tuple[str, str, Node]) -> str:
         parts.append("<h3>Body</h3>")
         bodies = [(media, _type(content["schema"])) for media, content in body["content"].items()]
         parts.append(_table(("Media type", "Content"), bodies))
-    answers = [(code, _answer(answer), answer["description"]) for code, answer in what["responses"].items()]
+    answers = [
+        (code, _answer(answer), "" if answer["description"] == UNSAID else answer["description"])
+        for code, answer in what["responses"].items()
+        if code != "default"
+    ]
     parts.append("<h3>Answers</h3>" + _table(("Status", "Content", "Meaning"), answers))
     return "".join(parts) + "</section>"
 

@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -57,6 +58,9 @@ def test_a_reader_that_hangs_is_ended_with_its_children(program, scan, tmp_path)
     program("import os, time\nopen('pid', 'w').write(str(os.fork() or os.getpid()))\ntime.sleep(60)")
     with pytest.raises(InvalidInput, match="takes more than 1 s"):
         run(scan(), tmp_path, seconds=1.0)
+    status = Path("/proc", (tmp_path / "pid").read_text(), "stat")
+    # Gone, or dead and not yet collected by the process that inherited it.
+    assert not status.exists() or status.read_text().split()[2] == "Z"
 
 
 def test_a_reader_that_crashes(program, scan, tmp_path):

@@ -1,5 +1,7 @@
 """The reporter: a few writes a second, and the last report always."""
 
+from sqlalchemy.exc import OperationalError
+
 from bentray_kernels.tomography.result import Progress, Sweep
 from bentray_service.jobs.reporter import Reporter
 
@@ -9,11 +11,18 @@ class FakeJobs:
         self.written = []
         self.asked = 0
         self.now = "running"
+        self.away = False
+
+    def check(self):
+        if self.away:
+            raise OperationalError("select", {}, Exception("database is locked"))
 
     def progress(self, job_id, done, total, history):
+        self.check()
         self.written.append((done, total, history))
 
     def state(self, job_id):
+        self.check()
         self.asked += 1
         return self.now
 
@@ -55,6 +64,17 @@ def test_stop_asks_the_database_now_and_then():
     clock.now += 1
     assert reporter.stop()
     assert reporter.stop()
+
+
+def test_a_database_that_is_away_costs_no_job():
+    jobs, clock = FakeJobs(), Clock()
+    reporter = Reporter(jobs, "job", lambda: False, clock)
+    jobs.away = True
+    reporter.report(Progress(1, 2))
+    assert not reporter.stop()
+    jobs.away = False
+    reporter.flush()
+    assert jobs.written[-1][:2] == (1, 2)
 
 
 def test_stop_when_the_service_leaves():

@@ -3,7 +3,10 @@
 import errno
 import time
 
+from sqlalchemy.exc import OperationalError
+
 from bentray_kernels.errors import InvalidInput
+from bentray_service.storage.jobs import Jobs
 
 
 def test_at_most_so_many_at_a_time(start, uploaded, submitted, until, work):
@@ -48,6 +51,22 @@ def test_the_next_job_runs_after_a_failure(start, uploaded, submitted, until, wo
     assert "disk" in first["error"]["detail"]
     work.error = None
     assert until(http, submitted(http, dataset)["id"])["state"] == "succeeded"
+
+
+def test_the_end_is_stored_once_the_database_is_back(start, uploaded, submitted, until, work, monkeypatch):
+    http = start()
+    jobs, store = http.app.state.parts.jobs, Jobs.succeed
+    tries = []
+
+    def away_at_first(*given):
+        tries.append(given)
+        if len(tries) == 1:
+            raise OperationalError("update", {}, Exception("database is locked"))
+        return store(jobs, *given)
+
+    monkeypatch.setattr(jobs, "succeed", away_at_first)
+    assert until(http, submitted(http, uploaded(http))["id"])["state"] == "succeeded"
+    assert len(tries) == 2
 
 
 def test_progress_is_seen_while_it_runs(start, uploaded, submitted, until, work):

@@ -8,15 +8,18 @@ from bentray_service.storage.files import Files, lock
 from bentray_service.storage.ids import new_id
 
 
-def test_half_done_uploads_are_dropped_at_the_start(tmp_path):
+def test_half_done_work_is_dropped(tmp_path):
     files = Files(tmp_path)
     files.prepare()
     left = files.incoming(new_id("dataset"))
     left.write_bytes(b"half")
     kept = files.dataset(new_id("dataset"))
     kept.write_bytes(b"whole")
-    files.prepare()
+    (files.scratch / "job").mkdir()
+    (files.scratch / "job" / "picked.h5").write_bytes(b"x")
+    files.drop_leftovers()
     assert not left.exists()
+    assert not list(files.scratch.iterdir())
     assert kept.exists()
 
 

@@ -43,7 +43,7 @@ async function loadDatasets(chosen) {
 
 async function send(file) {
   say("upload-error", null);
-  at("upload").hidden = false;
+  at("upload").hidden = at("upload-bar").hidden = false;
   at("upload-name").textContent = `Sending ${file.name}`;
   at("upload-bar").value = 0;
   try {
@@ -52,6 +52,7 @@ async function send(file) {
       if (share === 1) at("upload-name").textContent = `Checking ${file.name}`;
     });
     at("upload-name").textContent = `${file.name} is stored`;
+    at("upload-bar").hidden = true;
     await loadDatasets(dataset.id);
   } catch (error) {
     at("upload").hidden = true;

@@ -63,7 +63,7 @@ function picture(job, title) {
     frame.append(anchor);
   } else {
     const ended = job.state === "failed" || job.state === "cancelled";
-    frame.textContent = ended ? "No image" : "The image appears here";
+    frame.textContent = ended ? "No image" : "Image to come";
   }
   return frame;
 }
