@@ -1,0 +1,125 @@
+"""The README is true: its commands and addresses exist, its tables hold the real defaults."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from dataclasses import fields
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+import typer
+
+from bentray_kernels.eikonal import methods
+from bentray_kernels.tomography import Settings
+from bentray_service.app import create_app
+from bentray_service.cli import app
+from bentray_service.settings import ServiceSettings
+
+ROOT = Path(__file__).resolve().parents[1]
+TEXTS = ("README.md", "CONTRIBUTING.md", "deploy/README.md")
+COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+
+
+def shell_lines() -> list[tuple[str, list[str]]]:
+    """Every command in a block of shell in the texts, as words; ``a && b`` are two."""
+    found = []
+    for name in TEXTS:
+        for block in re.findall(r"```sh\n(.*?)```", (ROOT / name).read_text(), re.DOTALL):
+            for line in block.splitlines():
+                found += [(name, shlex.split(part)) for part in line.split(" && ")]
+    return found
+
+
+def lines_of(program: str) -> list[list[str]]:
+    """The words after ``program`` on every line that runs it."""
+    found = []
+    for _, words in shell_lines():
+        command = [word for word in words if not re.fullmatch(r"[A-Z_]+=[a-z]+://.*", word)]
+        if command[0].removeprefix(".venv/bin/") == program:
+            found.append(command[1:])
+    return found
+
+
+def test_the_readme_opens_with_the_two_commands() -> None:
+    block = re.search(r"```sh\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert block is not None
+    assert block[1].splitlines()[-1] == "make demo"
+    assert len(block[1].splitlines()) == 2
+
+
+def test_nothing_else_is_asked_for_than_what_is_tested_here() -> None:
+    programs = {words[0].removeprefix(".venv/bin/").split("=")[0] for _, words in shell_lines()}
+    assert programs <= {"git", "cd", "make", "bentray", "curl", "dask", "docker", "DASK_SCHEDULER_ADDRESS"}
+
+
+@pytest.mark.parametrize("words", lines_of("bentray"), ids=" ".join)
+def test_every_bentray_line_parses(words: list[str]) -> None:
+    command, *rest = words
+    assert command in COMMANDS
+    COMMANDS[command].make_context(command, list(rest))
+
+
+def test_every_target_of_make_exists() -> None:
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    asked = {words[0] for words in lines_of("make")}
+    assert {"demo", "install", "serve"} <= asked
+    assert asked - targets == set()
+    for name in TEXTS:
+        mentioned = set(re.findall(r"`make ([a-z-]+)`", (ROOT / name).read_text()))
+        assert mentioned - targets == set(), name
+
+
+def test_every_address_of_curl_is_served(tmp_path: Path) -> None:
+    served = {
+        (method.upper(), re.compile(re.sub(r"\{\w+\}", "[^/]+", path)))
+        for path, methods_of_path in create_app(ServiceSettings(data_dir=tmp_path)).openapi()["paths"].items()
+        for method in methods_of_path
+    }
+    assert len(lines_of("curl")) == 5
+    for words in lines_of("curl"):
+        method = "POST" if {"-d", "--data-binary"} & set(words) else "GET"
+        url = next(word for word in words if word.startswith("http://"))
+        assert any(m == method and p.fullmatch(urlsplit(url).path) for m, p in served), url
+        for body in (words[n + 1] for n, word in enumerate(words) if word == "-d"):
+            assert json.loads(body)["kind"] == "reconstruction"
+
+
+def table(first: str) -> dict[str, list[str]]:
+    """The rows of the README's table whose first heading is ``first``: name to the cells after it."""
+    text = (ROOT / "README.md").read_text()
+    body = text.split(f"| {first} |", 1)[1].split("\n\n", 1)[0].splitlines()[2:]
+    rows = [[cell.strip().replace("`", "") for cell in line.strip("|").split("|")] for line in body]
+    return {row[0]: row[1:] for row in rows}
+
+
+def test_the_table_of_the_service_has_every_setting_and_its_default() -> None:
+    stated = {name.removeprefix("BENTRAY_").lower(): cells[0] for name, cells in table("variable").items()}
+    assert set(stated) == set(ServiceSettings.model_fields)
+    for name, field in ServiceSettings.model_fields.items():
+        if field.default is not None:
+            assert stated[name] == str(field.default), name
+
+
+def test_the_table_of_a_reconstruction_has_every_setting_its_default_and_its_option() -> None:
+    rows = table("setting")
+    assert list(rows) == sorted(rows, key=list(rows).index)
+    assert set(rows) == {field.name for field in fields(Settings)}
+    options = {option for param in COMMANDS["reconstruct"].params for option in param.opts}
+    for name, (default, option, _) in rows.items():
+        real = Settings().to_dict()[name]
+        assert default == (real if isinstance(real, str) else json.dumps(real)), name
+        assert not option or option in options, name
+    assert all(method in rows["eikonal"][2] for method in methods())
+
+
+@pytest.mark.parametrize("name", [*TEXTS, "CHANGELOG.md"])
+def test_every_file_that_a_text_points_to_exists(name: str) -> None:
+    text = (ROOT / name).read_text()
+    linked = {target for target in re.findall(r"\]\(([^)]+)\)", text) if "://" not in target}
+    named = set(re.findall(r"`((?:kernels|workers|service|tests|benchmarks|deploy)/[\w./-]*)`", text))
+    base = (ROOT / name).parent
+    assert [path for path in linked if not (base / path).exists()] == []
+    assert [path for path in named if not (ROOT / path).exists()] == []

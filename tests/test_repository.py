@@ -1,0 +1,158 @@
+"""The repository itself: import rules, first lines, lock files, and nothing of anybody's machine in it."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = {"bentray_kernels": "kernels", "bentray_workers": "workers", "bentray_service": "service"}
+LOCKS = {"requirements.lock": ("build",), "requirements-dev.lock": ("build", "test", "lint")}
+
+# Folders of one machine, and hosts of package indexes; spelt so that this file does not contain them.
+MACHINE_PATH = re.compile(r"(?<![\w./-])/(?:work|root|opt|Users|home/(?!bentray\b)\w+)/[\w.]")
+INDEX_HOST = re.compile(
+    r"py[p]i\.|python[h]osted|npm[j]s|[-]-(?:extra-)?index-url[ =]|find-[l]inks", re.IGNORECASE
+)
+
+
+def committed() -> list[Path]:
+    """The files that git knows, present in this tree."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
+    return [path for name in listed.stdout.split("\0") if name and (path := ROOT / name).is_file()]
+
+
+def committed_texts() -> list[tuple[str, str]]:
+    """Name and content of every committed text file."""
+    texts = []
+    for path in committed():
+        content = path.read_bytes()
+        if b"\0" not in content:
+            texts.append((str(path.relative_to(ROOT)), content.decode()))
+    return texts
+
+
+def modules(package: str) -> list[str]:
+    """The names of every module of a package."""
+    folder = ROOT / PACKAGES[package]
+    names = []
+    for path in sorted((folder / package).rglob("*.py")):
+        parts = path.relative_to(folder).with_suffix("").parts
+        names.append(".".join(parts[:-1] if parts[-1] == "__init__" else parts))
+    return names
+
+
+@pytest.mark.parametrize(
+    ("package", "heavy"),
+    [
+        (
+            "bentray_kernels",
+            "dask distributed fastapi h5py httpx matplotlib pydantic sqlalchemy typer uvicorn",
+        ),
+        ("bentray_workers", "fastapi httpx pydantic sqlalchemy typer uvicorn"),
+    ],
+)
+def test_importing_a_lower_layer_loads_nothing_of_the_upper_ones(package: str, heavy: str) -> None:
+    names = modules(package)
+    assert len(names) > 5
+    code = (
+        "import importlib, sys\n"
+        f"for name in {names!r}: importlib.import_module(name)\n"
+        f"print(*sorted(set({heavy.split()!r}) & set(sys.modules)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+def test_the_first_line_of_every_source_file_says_what_it_is_for() -> None:
+    without = []
+    for path in committed():
+        if path.suffix != ".py":
+            continue
+        first = (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n")[0].strip()
+        if not first.endswith((".", "?")) or not path.read_text().startswith(('"""', 'r"""')):
+            without.append(str(path.relative_to(ROOT)))
+    assert without == []
+
+
+def test_no_file_is_named_for_having_no_job() -> None:
+    vague = {"utils", "util", "helpers", "helper", "common", "misc"}
+    assert [str(path) for path in committed() if {path.stem, *path.parts} & vague] == []
+
+
+def test_no_file_names_a_folder_of_somebodys_machine() -> None:
+    found = [(name, match[0]) for name, text in committed_texts() if (match := MACHINE_PATH.search(text))]
+    assert found == []
+
+
+def test_no_file_names_a_package_index() -> None:
+    found = [(name, match[0]) for name, text in committed_texts() if (match := INDEX_HOST.search(text))]
+    assert found == []
+
+
+@pytest.mark.parametrize("line", ["see /root/x", "'/work/a'", "(/home/ann/b)", "/opt/wheels"])
+def test_the_search_for_machine_folders_finds_them(line: str) -> None:
+    assert MACHINE_PATH.search(line)
+
+
+@pytest.mark.parametrize(
+    "line", ["/v1/jobs", "a/work/b", "https://x.org/opt/y", "/home/bentray/data", "src/root/x"]
+)
+def test_the_search_for_machine_folders_spares_the_rest(line: str) -> None:
+    assert not MACHINE_PATH.search(line)
+
+
+def test_no_committed_file_is_large() -> None:
+    large = [
+        str(p.relative_to(ROOT)) for p in committed() if p.stat().st_size > 300_000 and p.suffix != ".lock"
+    ]
+    assert large == []
+
+
+def requirements(lock: str) -> dict[str, list[str]]:
+    """The packages of a lock file, by their normalised name, each with the lines below it."""
+    found: dict[str, list[str]] = {}
+    below: list[str] = []
+    for line in (ROOT / lock).read_text().splitlines():
+        if line.startswith("#") or not line.strip():
+            continue
+        if not line.startswith(" "):
+            below = found.setdefault(normal(line), [])
+        below.append(line)
+    return found
+
+
+def normal(requirement: str) -> str:
+    """The name in a requirement, as the packaging standards compare names."""
+    name = re.match(r"[A-Za-z0-9._-]+", requirement)
+    assert name is not None, requirement
+    return re.sub(r"[-_.]+", "-", name[0]).lower()
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_every_package_of_a_lock_file_is_pinned_with_a_hash_and_no_address(lock: str) -> None:
+    for name, lines in requirements(lock).items():
+        assert "==" in lines[0], f"{name} is not pinned"
+        assert any("--hash=sha256:" in line for line in lines), f"{name} has no hash"
+    assert "://" not in (ROOT / lock).read_text()
+
+
+@pytest.mark.parametrize(("lock", "extras"), LOCKS.items())
+def test_a_lock_file_covers_what_pyproject_asks_for(lock: str, extras: tuple[str, ...]) -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    asked = [
+        *project["dependencies"],
+        *(one for extra in extras for one in project["optional-dependencies"][extra]),
+    ]
+    assert {normal(one) for one in asked} - set(requirements(lock)) == set()
+
+
+def test_both_lock_files_pin_the_same_versions() -> None:
+    plain, development = (requirements(lock) for lock in LOCKS)
+    assert {name: lines[0] for name, lines in plain.items() if development[name][0] != lines[0]} == {}
