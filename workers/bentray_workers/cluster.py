@@ -8,8 +8,9 @@ from types import TracebackType
 from typing import Any
 
 import dask
-from bentray_kernels.errors import InvalidInput
 from distributed import Client, LocalCluster
+
+from bentray_kernels.errors import InvalidInput
 
 from .lanes import OFFERED, THREADS
 
@@ -85,7 +86,9 @@ def open_cluster(
             return Cluster(Client(scheduler_address, timeout=connect_timeout_s, set_as_default=False))
         except (OSError, TimeoutError, ValueError) as error:
             raise InvalidInput(
-                "scheduler_address", f"{scheduler_address} ({error})", "the address of a running Dask scheduler"
+                "scheduler_address",
+                f"{scheduler_address} ({error})",
+                "the address of a running Dask scheduler",
             ) from error
     count = workers if workers is not None else len(os.sched_getaffinity(0))
     if count < 1:

@@ -9,14 +9,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from distributed import Client, as_completed
+from numpy.typing import NDArray
+
 from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Progress
 from bentray_kernels.tomography.problem import MARGIN_NODES
-from distributed import Client, as_completed
-from numpy.typing import NDArray
 
 from .lanes import RECONSTRUCTION
 
@@ -115,7 +116,9 @@ def _run(
     if client is None:
         _fine_speed(settings)
         with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-            yield from zip(batches, pool.map(lambda batch: simulate_emitters(settings, batch), batches), strict=True)
+            yield from zip(
+                batches, pool.map(lambda batch: simulate_emitters(settings, batch), batches), strict=True
+            )
         return
     futures = {
         client.submit(simulate_emitters, settings, batch, resources=RECONSTRUCTION, pure=False): batch

@@ -10,6 +10,8 @@ from contextlib import nullcontext
 from functools import lru_cache
 from pathlib import Path
 
+from distributed import Client, Future, wait
+
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.picking import pick
 from bentray_kernels.tomography import (
@@ -20,10 +22,11 @@ from bentray_kernels.tomography import (
     State,
     advance,
     begin,
+)
+from bentray_kernels.tomography import (
     reconstruct as reconstruct_here,
 )
 from bentray_kernels.tomography.reconstruction import assemble, measure
-from distributed import Client, Future, wait
 
 from .dataset_file import read_dataset, write_dataset
 from .lanes import RECONSTRUCTION
@@ -127,7 +130,15 @@ def _drive(
             while ready and len(running) < window:
                 k, batch = ready.popleft()
                 future = client.submit(
-                    advance_slice, path, stamp, settings, k, states[k], batch, resources=RECONSTRUCTION, pure=False
+                    advance_slice,
+                    path,
+                    stamp,
+                    settings,
+                    k,
+                    states[k],
+                    batch,
+                    resources=RECONSTRUCTION,
+                    pure=False,
                 )
                 running[future] = (k, batch)
             for future in _finished(running):

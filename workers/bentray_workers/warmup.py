@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from bentray_kernels.eikonal import methods, solve
 from bentray_kernels.rays import trace
 
@@ -15,7 +16,7 @@ def warm_up() -> None:
     for method in methods():
         tof = solve(speed, 1e-3, (1e-3, 1e-3), method)
     for kind in ("curved", "straight"):
-        trace(tof, 1e-3, [[6e-3, 6e-3]], (1e-3, 1e-3), kind=kind)  # type: ignore[arg-type]
+        trace(tof, 1e-3, [[6e-3, 6e-3]], (1e-3, 1e-3), kind=kind)
 
 
 def dask_setup(worker: Any) -> None:

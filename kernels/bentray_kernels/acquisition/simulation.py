@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..eikonal import solve
 from ..errors import InvalidInput
 from ..phantoms.ellipses import EllipsePhantom
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -59,9 +57,13 @@ class TravelTimeScan:
 
     def __post_init__(self) -> None:
         if self.refinement < 4:
-            raise InvalidInput("refinement", self.refinement, "at least 4: a coarser grid would be an inverse crime")
+            raise InvalidInput(
+                "refinement", self.refinement, "at least 4: a coarser grid would be an inverse crime"
+            )
         if self.ring.radius_m > 0.5 * self.side_m:
-            raise InvalidInput("radius_m", self.ring.radius_m, f"at most half the side, {0.5 * self.side_m:g} m")
+            raise InvalidInput(
+                "radius_m", self.ring.radius_m, f"at most half the side, {0.5 * self.side_m:g} m"
+            )
 
     def fine_speed(self) -> Floats:
         """Speed on the fine grid, (fine nodes, fine nodes), m/s."""
@@ -71,7 +73,7 @@ class TravelTimeScan:
     def fine_nodes(self) -> int:
         return self.refinement * (self.nodes - 1) + 1
 
-    def delta_tof(self, emitters: NDArray[np.int64], fine_speed: Floats | None = None) -> Floats:
+    def delta_tof(self, emitters: Ints, fine_speed: Floats | None = None) -> Floats:
         """Object minus water travel time from some emitters to every element.
 
         The wave front marches by the heap (``hafmm``) and is read off the grid itself; inversions
@@ -105,7 +107,7 @@ def _read(tof: Floats, spacing: float, source: Floats, points: Floats) -> Floats
     weight_sum = np.zeros(len(points))
     for dx in (0, 1):
         for dy in (0, 1):
-            node = low + (dx, dy)
+            node = low + np.array((dx, dy))
             distance = np.linalg.norm(node * spacing - source, axis=1)
             weight = np.where(dx, part[:, 0], 1.0 - part[:, 0]) * np.where(dy, part[:, 1], 1.0 - part[:, 1])
             weight = np.where(distance > 0.0, weight, 0.0)

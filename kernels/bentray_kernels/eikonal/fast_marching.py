@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..arrays import Floats, Ints
+from ..compiled import kernel
 from ..errors import InvalidInput
-from .problem import Floats, PointSource
+from .problem import PointSource
 from .updates import factored_update, plain_update, scratch
 
 FAR = -1
@@ -32,7 +33,13 @@ def fast_marching(problem: PointSource, *, order: int = 2) -> Floats:
         raise InvalidInput("order", order, "1 or 2")
     seeds, times = problem.seeds()
     time = _march(
-        problem.padded_slowness, problem.padded_shape, problem.strides, problem.spacing, seeds, times, order == 2
+        problem.padded_slowness,
+        problem.padded_shape,
+        problem.strides,
+        problem.spacing,
+        seeds,
+        times,
+        order == 2,
     )
     return problem.interior(time)
 
@@ -63,8 +70,16 @@ def high_accuracy_fast_marching(problem: PointSource) -> Floats:
     return problem.interior(time)
 
 
-@njit(cache=True, nogil=True)
-def _march(slowness, shape, strides, spacing, seeds, seed_times, second_order):
+@kernel
+def _march(
+    slowness: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    spacing: float,
+    seeds: Ints,
+    seed_times: Floats,
+    second_order: bool,
+) -> Floats:
     size = slowness.size
     time = np.full(size, math.inf)
     accepted = np.zeros(size, np.bool_)
@@ -83,15 +98,34 @@ def _march(slowness, shape, strides, spacing, seeds, seed_times, second_order):
                 if place[neighbour] == DONE:
                     continue
                 trial = plain_update(
-                    neighbour, strides, spacing, slowness, time, accepted, second_order, times, weights, newest
+                    neighbour,
+                    strides,
+                    spacing,
+                    slowness,
+                    time,
+                    accepted,
+                    second_order,
+                    times,
+                    weights,
+                    newest,
                 )
                 if trial < time[neighbour]:
                     length = _lower(heap, place, time, length, neighbour, trial)
     return time
 
 
-@njit(cache=True, nogil=True)
-def _march_factored(slowness, shape, strides, spacing, source, source_slowness, reference, seeds, seed_times):
+@kernel
+def _march_factored(
+    slowness: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    spacing: float,
+    source: Floats,
+    source_slowness: float,
+    reference: Floats,
+    seeds: Ints,
+    seed_times: Floats,
+) -> Floats:
     size = slowness.size
     time = np.full(size, math.inf)
     tau = np.ones(size)
@@ -137,8 +171,8 @@ def _march_factored(slowness, shape, strides, spacing, source, source_slowness, 
     return time
 
 
-@njit(cache=True)
-def _places(shape):
+@kernel
+def _places(shape: tuple[int, ...]) -> Ints:
     """Heap place of every node: FAR inside, DONE on the border so that the front never enters it."""
     place = np.full(shape, DONE)
     if len(shape) == 2:
@@ -148,8 +182,8 @@ def _places(shape):
     return place.ravel()
 
 
-@njit(cache=True, inline="always")
-def _lower(heap, place, time, length, node, value):
+@kernel(inline="always")
+def _lower(heap: Ints, place: Ints, time: Floats, length: int, node: int, value: float) -> int:
     """Give ``node`` an earlier time and move it towards the root; returns the heap's length."""
     hole = place[node]
     if hole == FAR:
@@ -169,8 +203,8 @@ def _lower(heap, place, time, length, node, value):
     return length
 
 
-@njit(cache=True, inline="always")
-def _pop(heap, place, time, length):
+@kernel(inline="always")
+def _pop(heap: Ints, place: Ints, time: Floats, length: int) -> int:
     """Remove the root; returns the heap's length."""
     place[heap[0]] = DONE
     length -= 1

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..arrays import Floats
+from ..compiled import kernel
 from ..errors import InvalidInput
-from .problem import Floats, PointSource
+from .problem import PointSource
 from .updates import first_order_2d, first_order_3d
 
 
@@ -45,8 +46,8 @@ def sweep_until_settled(problem: PointSource, tolerance: float) -> Floats:
     return time
 
 
-@njit(cache=True, nogil=True)
-def _sweep_2d(time, slowness, spacing, tolerance):
+@kernel
+def _sweep_2d(time: Floats, slowness: Floats, spacing: float, tolerance: float) -> None:
     nx, ny = time.shape
     while True:
         changed = False
@@ -72,8 +73,8 @@ def _sweep_2d(time, slowness, spacing, tolerance):
             return
 
 
-@njit(cache=True, nogil=True)
-def _sweep_3d(time, slowness, spacing, tolerance):
+@kernel
+def _sweep_3d(time: Floats, slowness: Floats, spacing: float, tolerance: float) -> None:
     nx, ny, nz = time.shape
     while True:
         changed = False

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats, Ints
 from ..errors import InvalidInput
-
-Floats = NDArray[np.float64]
 
 # A source closer to a node than this, in nodes, is taken to sit on it.
 ON_NODE = 1e-9
@@ -92,7 +91,7 @@ class PointSource:
         """Slowness at the source, multilinear between its cell's nodes, s/m."""
         return float(sum(weight * self.slowness[node] for node, weight in self._cell()))
 
-    def seeds(self) -> tuple[NDArray[np.int64], Floats]:
+    def seeds(self) -> tuple[Ints, Floats]:
         """Nodes of the source's cell: flat padded indices and travel times along straight lines, s.
 
         A source on a node gives that node alone, at time 0.

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Floats
 from ..errors import InvalidInput
 from .accurate import accurate
 from .fast_marching import fast_marching, high_accuracy_fast_marching
 from .fast_sweeping import fast_sweeping
-from .problem import Floats, PointSource
+from .problem import PointSource
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,13 @@ class Registry:
 METHODS = (
     Registry()
     .register(
-        Method("accurate", accurate, 2, True, "factored second order in the order of a first-order sweep (default)")
+        Method(
+            "accurate",
+            accurate,
+            2,
+            True,
+            "factored second order in the order of a first-order sweep (default)",
+        )
     )
     .register(Method("fmm", fast_marching, 2, False, "fast marching, binary heap; option order=1 or 2"))
     .register(Method("hafmm", high_accuracy_fast_marching, 2, True, "fast marching, factored second order"))
@@ -86,7 +93,9 @@ def methods() -> tuple[str, ...]:
     return tuple(METHODS.by_name)
 
 
-def solve(speed: ArrayLike, spacing: float, source: ArrayLike, method: str = "accurate", **options: Any) -> Floats:
+def solve(
+    speed: ArrayLike, spacing: float, source: ArrayLike, method: str = "accurate", **options: Any
+) -> Floats:
     """Travel time from a point source to every node: |∇T| = 1/speed (chapter 6, equation 2).
 
     Args:

@@ -9,14 +9,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from ..arrays import Flags, Floats
+from ..compiled import kernel
 
 # Two nodes at one distance either side of the source differ by rounding; neither is later.
 TIE = 1e-12
 
 
-@njit(cache=True, inline="always")
-def solve_upwind(times, weights, newest, count, rhs):
+@kernel(inline="always")
+def solve_upwind(times: Floats, weights: Floats, newest: Floats, count: int, rhs: float) -> float:
     """Largest T with Σ w (T − t)² = rhs² that lies downwind of all its neighbours.
 
     ``newest`` holds each axis's nearest neighbour time. An axis whose neighbour is later than the
@@ -40,15 +42,15 @@ def solve_upwind(times, weights, newest, count, rhs):
                 return time
         if count == 1:
             # The second-order stencil of a single axis can fall below its neighbour; first order cannot.
-            return newest[0] + rhs
+            return float(newest[0] + rhs)
         count -= 1
         times[latest] = times[count]
         weights[latest] = weights[count]
         newest[latest] = newest[count]
 
 
-@njit(cache=True, inline="always")
-def upwind(node, stride, time, accepted):
+@kernel(inline="always")
+def upwind(node: int, stride: int, time: Floats, accepted: Flags) -> int:
     """Offset to the earlier accepted neighbour along one axis, 0 where there is none."""
     left = time[node - stride] if accepted[node - stride] else math.inf
     right = time[node + stride] if accepted[node + stride] else math.inf
@@ -57,8 +59,19 @@ def upwind(node, stride, time, accepted):
     return -stride if left <= right else stride
 
 
-@njit(cache=True)
-def plain_update(node, strides, spacing, slowness, time, accepted, second_order, times, weights, newest):
+@kernel
+def plain_update(
+    node: int,
+    strides: tuple[int, ...],
+    spacing: float,
+    slowness: Floats,
+    time: Floats,
+    accepted: Flags,
+    second_order: bool,
+    times: Floats,
+    weights: Floats,
+    newest: Floats,
+) -> float:
     """Travel time of one node from its accepted neighbours (Sethian 1996; order two: Sethian 1999).
 
     Derivatives are (T − T1)/h, or (3T − 4T1 + T2)/(2h) where the second neighbour is accepted and
@@ -82,10 +95,22 @@ def plain_update(node, strides, spacing, slowness, time, accepted, second_order,
     return solve_upwind(times, weights, newest, count, spacing * slowness[node])
 
 
-@njit(cache=True)
+@kernel
 def factored_update(
-    node, strides, spacing, slowness, source_slowness, offset_m, reference, tau, time, accepted, slope, shift, newest
-):
+    node: int,
+    strides: tuple[int, ...],
+    spacing: float,
+    slowness: Floats,
+    source_slowness: float,
+    offset_m: Floats,
+    reference: Floats,
+    tau: Floats,
+    time: Floats,
+    accepted: Flags,
+    slope: Floats,
+    shift: Floats,
+    newest: Floats,
+) -> float:
     """Travel time of one node with T = T0·τ, T0 the time in the source's own slowness.
 
     Only the smooth factor τ is differenced, so the source's singularity costs no accuracy (Fomel,
@@ -94,7 +119,10 @@ def factored_update(
     node minus the source, (ndim,), m; ``slope``, ``shift`` and ``newest`` are scratch.
     """
     base = reference[node]
+    local = slowness[node]
     count = 0
+    earliest = math.inf
+    beside = local
     for axis in range(len(strides)):
         offset = upwind(node, strides[axis], time, accepted)
         if offset == 0:
@@ -117,13 +145,12 @@ def factored_update(
         slope[count] = along + weight * base / spacing
         shift[count] = -weight * base * near / spacing
         newest[count] = time[node + offset]
+        if newest[count] < earliest:
+            earliest = newest[count]
+            beside = slowness[node + offset]
         count += 1
-    local = slowness[node]
-    earliest = math.inf
-    for k in range(count):
-        if newest[k] >= 0.0:
-            earliest = min(earliest, newest[k])
-    bound = earliest + spacing * local
+    # The way straight from the earliest neighbour: no time is later than along it at its slower end.
+    latest_possible = earliest + spacing * max(local, beside)
     while count > 0:
         a = 0.0
         b = 0.0
@@ -144,24 +171,24 @@ def factored_update(
             for k in range(count):
                 upwinded = upwinded and slope[k] * factor + shift[k] >= 0.0
             if upwinded:
-                return min(base * factor, bound)
+                return float(min(base * factor, latest_possible))
         count -= 1
         slope[latest] = slope[count]
         shift[latest] = shift[count]
         newest[latest] = newest[count]
-    return bound
+    return float(earliest + 0.5 * spacing * (local + beside))
 
 
-@njit(cache=True, inline="always")
-def first_order_2d(a, b, rhs):
+@kernel(inline="always")
+def first_order_2d(a: float, b: float, rhs: float) -> float:
     """First-order time from the earlier neighbour of each of two axes (Zhao 2005, equation 2.4)."""
     if abs(a - b) >= rhs:
         return min(a, b) + rhs
     return 0.5 * (a + b + math.sqrt(2.0 * rhs * rhs - (a - b) * (a - b)))
 
 
-@njit(cache=True, inline="always")
-def first_order_3d(a, b, c, rhs):
+@kernel(inline="always")
+def first_order_3d(a: float, b: float, c: float, rhs: float) -> float:
     """As ``first_order_2d`` with three axes: take in the axes in order of time while they are upwind."""
     low = min(a, min(b, c))
     high = max(a, max(b, c))
@@ -176,7 +203,7 @@ def first_order_3d(a, b, c, rhs):
     return time
 
 
-@njit(cache=True)
-def scratch(axes):
+@kernel
+def scratch(axes: int) -> tuple[Floats, Floats, Floats]:
     """Three small arrays for the updates above; made once a solve."""
     return np.empty(axes), np.empty(axes), np.empty(axes)

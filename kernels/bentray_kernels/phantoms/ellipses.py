@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Flags, Floats
 from ..errors import InvalidInput
-
-Floats = NDArray[np.float64]
 
 # Points a side that a node's cell is averaged over.
 SUBSAMPLES = 8
@@ -36,7 +35,7 @@ class Ellipse:
     name: str
     angle_rad: float = 0.0
 
-    def contains(self, x: Floats, y: Floats) -> NDArray[np.bool_]:
+    def contains(self, x: Floats, y: Floats) -> Flags:
         """Whether points (x, y), m, lie inside; any shapes that broadcast."""
         dx, dy = x - self.centre_m[0], y - self.centre_m[1]
         c, s = math.cos(self.angle_rad), math.sin(self.angle_rad)
@@ -83,7 +82,7 @@ class EllipsePhantom:
         """As ``speed``, Np/m."""
         return self._average(nodes, side_m, self.coupling_np_m, [e.attenuation_np_m for e in self.ellipses])
 
-    def inside(self, nodes: int, side_m: float) -> NDArray[np.bool_]:
+    def inside(self, nodes: int, side_m: float) -> Flags:
         """Nodes inside the outline, (nodes, nodes)."""
         axis = node_positions(nodes, side_m)
         return self.ellipses[0].contains(axis[:, None], axis[None, :])

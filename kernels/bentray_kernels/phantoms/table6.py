@@ -27,7 +27,9 @@ def table6(coupling_mps: float = 1500.0) -> EllipsePhantom:
         The phantom, centred on 0, in a square of ``TABLE6_SIDE_M``.
     """
 
-    def spot(x: float, y: float, pixels: float, *, large: bool, faint: bool = False, flat: float = 1.0) -> Ellipse:
+    def spot(
+        x: float, y: float, pixels: float, *, large: bool, faint: bool = False, flat: float = 1.0
+    ) -> Ellipse:
         radius = 0.5 * pixels * PIXEL_M
         speed = LARGE_MPS if large else SMALL_MPS
         attenuation = (FAINT_NP_M if faint else LARGE_NP_M) if large else SMALL_NP_M

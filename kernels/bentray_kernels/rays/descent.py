@@ -11,7 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from ..arrays import Floats, Ints
+from ..compiled import kernel
 
 # Length of a step, nodes. Half a node keeps the error of RK2 below that of the interpolation.
 STEP = 0.5
@@ -20,8 +22,8 @@ STEP = 0.5
 ARRIVED = 1.0
 
 
-@njit(cache=True, nogil=True)
-def squared_gradient(tof, shape, strides):
+@kernel
+def squared_gradient(tof: Floats, shape: tuple[int, ...], strides: tuple[int, ...]) -> Floats:
     """∇(T²) at the nodes, (nodes, ndim): central differences, one-sided of second order on the rim."""
     squared = tof * tof
     axes = len(shape)
@@ -51,8 +53,8 @@ def squared_gradient(tof, shape, strides):
     return gradient
 
 
-@njit(cache=True, inline="always")
-def locate(point, shape, strides, part):
+@kernel(inline="always")
+def locate(point: Floats, shape: tuple[int, ...], strides: tuple[int, ...], part: Floats) -> int:
     """Flat index of the lowest node of the point's cell; ``part`` receives the place in the cell."""
     node = 0
     for axis in range(len(shape)):
@@ -62,8 +64,10 @@ def locate(point, shape, strides, part):
     return node
 
 
-@njit(cache=True, inline="always")
-def corner(which, node, shape, strides, part):
+@kernel(inline="always")
+def corner(
+    which: int, node: int, shape: tuple[int, ...], strides: tuple[int, ...], part: Floats
+) -> tuple[int, float]:
     """Flat index and multilinear weight of one of the cell's 2^ndim corners."""
     weight = 1.0
     for axis in range(len(shape)):
@@ -76,8 +80,15 @@ def corner(which, node, shape, strides, part):
     return node, weight
 
 
-@njit(cache=True, inline="always")
-def _direction(point, gradient, shape, strides, part, direction):
+@kernel(inline="always")
+def _direction(
+    point: Floats,
+    gradient: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    part: Floats,
+    direction: Floats,
+) -> bool:
     """Unit −∇(T²) at a point; returns False where it vanishes."""
     node = locate(point, shape, strides, part)
     for axis in range(len(shape)):
@@ -97,16 +108,24 @@ def _direction(point, gradient, shape, strides, part, direction):
     return True
 
 
-@njit(cache=True, inline="always")
-def _distance(a, b, axes):
+@kernel(inline="always")
+def _distance(a: Floats, b: Floats, axes: int) -> float:
     total = 0.0
     for axis in range(axes):
         total += (a[axis] - b[axis]) ** 2
     return math.sqrt(total)
 
 
-@njit(cache=True, nogil=True)
-def curved_ray(receiver, source, tof, gradient, shape, strides, path):
+@kernel
+def curved_ray(
+    receiver: Floats,
+    source: Floats,
+    tof: Floats,
+    gradient: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    path: Floats,
+) -> int:
     """Fill ``path`` (room, ndim) from receiver to source by RK2 descent; returns the number of points.
 
     A descent that has not arrived when the room is used up has been caught where the discrete gradient
@@ -137,8 +156,10 @@ def curved_ray(receiver, source, tof, gradient, shape, strides, path):
     return _node_descent(source, tof, shape, strides, path)
 
 
-@njit(cache=True, nogil=True)
-def _node_descent(source, tof, shape, strides, path):
+@kernel
+def _node_descent(
+    source: Floats, tof: Floats, shape: tuple[int, ...], strides: tuple[int, ...], path: Floats
+) -> int:
     """From ``path[0]`` along the lowest neighbours to the source; returns the number of points."""
     axes = len(shape)
     part = np.empty(axes)
@@ -177,9 +198,9 @@ def _node_descent(source, tof, shape, strides, path):
     return count + 1
 
 
-@njit(cache=True, nogil=True)
-def straight_ray(receiver, source, axes, path):
-    """Fill ``path`` with equal steps of at most ``STEP`` from receiver to source; returns the number of points."""
+@kernel
+def straight_ray(receiver: Floats, source: Floats, axes: int, path: Floats) -> int:
+    """Fill ``path`` with equal steps of at most ``STEP`` to the source; returns the number of points."""
     steps = max(1, math.ceil(_distance(receiver, source, axes) / STEP))
     for k in range(steps + 1):
         for axis in range(axes):
@@ -187,8 +208,10 @@ def straight_ray(receiver, source, axes, path):
     return steps + 1
 
 
-@njit(cache=True, nogil=True)
-def walk(path, count, shape, strides, nodes, lengths):
+@kernel
+def walk(
+    path: Floats, count: int, shape: tuple[int, ...], strides: tuple[int, ...], nodes: Ints, lengths: Floats
+) -> int:
     """Nodes that a path weighs on and by how much; returns the number of entries.
 
     Each piece of the path gives its length to the corners of the cell at its middle, multilinearly,

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Floats
 from ..errors import InvalidInput
 from .descent import STEP, squared_gradient
 
-Floats = NDArray[np.float64]
 Kind = Literal["curved", "straight"]
 
 # A ray longer than this many times the straight way round the grid has left the physics behind.
@@ -39,7 +39,9 @@ class Fan:
     curved: bool
 
     @classmethod
-    def checked(cls, tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, kind: Kind) -> Fan:
+    def checked(
+        cls, tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, kind: Kind
+    ) -> Fan:
         """The fan of ``trace``.
 
         Raises:
@@ -83,5 +85,7 @@ def _inside(name: str, points: Floats, last: Floats, spacing: float) -> Floats:
     if bad.any():
         first = int(np.flatnonzero(bad)[0])
         extent = (last * spacing).tolist()
-        raise InvalidInput(name, f"{(points[first] * spacing).tolist()} (number {first})", f"points from 0 to {extent} m")
+        raise InvalidInput(
+            name, f"{(points[first] * spacing).tolist()} (number {first})", f"points from 0 to {extent} m"
+        )
     return np.clip(points, 0.0, last)

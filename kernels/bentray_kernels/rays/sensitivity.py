@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
+from ..arrays import Floats, Ints
+from ..compiled import kernel
 from .descent import curved_ray, straight_ray, walk
 from .fan import Fan, Kind
 
@@ -35,8 +36,17 @@ def sensitivities(
     return csr_array((lengths * spacing, columns, pointers), shape=(len(fan.receivers), fan.tof.size))
 
 
-@njit(cache=True, nogil=True)
-def _rows(receivers, source, tof, gradient, shape, strides, curved, room):
+@kernel
+def _rows(
+    receivers: Floats,
+    source: Floats,
+    tof: Floats,
+    gradient: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    curved: bool,
+    room: int,
+) -> tuple[Ints, Ints, Floats]:
     axes = len(shape)
     path = np.empty((room, axes))
     nodes = np.empty(room << axes, np.int64)

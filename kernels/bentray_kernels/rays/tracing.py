@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
+from ..arrays import Floats
+from ..compiled import kernel
 from .descent import curved_ray, straight_ray
-from .fan import Fan, Floats, Kind
+from .fan import Fan, Kind
 
 
 def trace(
@@ -40,8 +41,17 @@ def trace(
     return paths
 
 
-@njit(cache=True, nogil=True)
-def _one(receiver, source, tof, gradient, shape, strides, curved, path):
+@kernel
+def _one(
+    receiver: Floats,
+    source: Floats,
+    tof: Floats,
+    gradient: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    curved: bool,
+    path: Floats,
+) -> int:
     if curved:
         return curved_ray(receiver, source, tof, gradient, shape, strides, path)
     return straight_ray(receiver, source, len(shape), path)

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..acquisition import Dataset
+from ..arrays import Flags, Floats, Ints
 from ..errors import InvalidInput
 from .settings import Settings
-
-Floats = NDArray[np.float64]
 
 # Water kept around the outermost transducer, nodes, so that wave front and gradient have room.
 MARGIN_NODES = 3
@@ -36,7 +34,7 @@ class SliceProblem:
     emitters: Floats
     receivers: Floats
     delta_tof: Floats
-    region: NDArray[np.bool_]
+    region: Flags
     spacing: float
     origin: tuple[float, float]
     water_speed: float
@@ -50,7 +48,11 @@ class SliceProblem:
                 the image.
         """
         if dataset.slices != 1 or dataset.element_position_m.shape[1] != 2:
-            raise InvalidInput("dataset", f"{dataset.slices} slices, positions {dataset.element_position_m.shape}", "one 2-D slice")
+            raise InvalidInput(
+                "dataset",
+                f"{dataset.slices} slices, positions {dataset.element_position_m.shape}",
+                "one 2-D slice",
+            )
         delta = dataset.differential_tof()
         if delta.ndim == 3:
             delta = delta[0]
@@ -58,7 +60,9 @@ class SliceProblem:
         if settings.reciprocity:
             emitters, receivers, delta = _with_reverses(emitters, receivers, delta)
         if not np.isfinite(delta).any():
-            raise InvalidInput("traveltime", "no valid pair", "at least one finite travel time between two elements")
+            raise InvalidInput(
+                "traveltime", "no valid pair", "at least one finite travel time between two elements"
+            )
         position = dataset.element_position_m
         centre = 0.5 * (position.min(axis=0) + position.max(axis=0))
         reach = float(np.abs(position - centre).max())
@@ -83,9 +87,7 @@ class SliceProblem:
         )
 
 
-def _with_reverses(
-    tx: NDArray[np.int64], rx: NDArray[np.int64], delta: Floats
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+def _with_reverses(tx: Ints, rx: Ints, delta: Floats) -> tuple[Ints, Ints, Floats]:
     """All elements as both emitters and receivers, missing pairs filled by their reverse.
 
     Travel times are the same both ways, so a half matrix is as good as a whole one, and every

@@ -32,7 +32,9 @@ def rmse(image: ArrayLike, truth: ArrayLike, region: ArrayLike) -> float:
 def _difference(image: ArrayLike, truth: ArrayLike, region: ArrayLike) -> NDArray[np.float64]:
     a, b, where = np.asarray(image, np.float64), np.asarray(truth, np.float64), np.asarray(region, np.bool_)
     if a.shape != b.shape or where.shape != a.shape:
-        raise InvalidInput("region", f"shapes {a.shape}, {b.shape}, {where.shape}", "image, truth and region of one shape")
+        raise InvalidInput(
+            "region", f"shapes {a.shape}, {b.shape}, {where.shape}", "image, truth and region of one shape"
+        )
     if not where.any():
         raise InvalidInput("region", "no node", "at least one node")
     return np.asarray(a[where] - b[where])

@@ -6,18 +6,16 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from ..arrays import Flags, Floats, Ints
+from ..compiled import kernel
 from ..eikonal import solve
 from ..rays.descent import curved_ray, straight_ray, walk
 from ..rays.fan import Fan
 from .problem import SliceProblem
 from .result import Sweep
 from .settings import Settings
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,9 @@ def begin(problem: SliceProblem) -> State:
     return State(np.full(shape, 1.0 / problem.water_speed), np.zeros(shape))
 
 
-def advance(problem: SliceProblem, settings: Settings, state: State, emitters: int, slice_index: int = 0) -> State:
+def advance(
+    problem: SliceProblem, settings: Settings, state: State, emitters: int, slice_index: int = 0
+) -> State:
     """Use up to ``emitters`` more emitters, ending at the latest with the pass under way.
 
     For each emitter in random order: the travel time through the current image, the rays down it, the
@@ -89,13 +89,13 @@ def advance(problem: SliceProblem, settings: Settings, state: State, emitters: i
     return state if state.emitter < len(order) else _close_sweep(state, settings, slice_index, len(order))
 
 
-def emitter_order(problem: SliceProblem, seed: int, slice_index: int, sweep: int) -> NDArray[np.int64]:
+def emitter_order(problem: SliceProblem, seed: int, slice_index: int, sweep: int) -> Ints:
     """Emitters with data, in the random order of one pass; the same for every worker and every resume."""
     with_data = np.flatnonzero(np.isfinite(problem.delta_tof).any(axis=1))
     return np.random.default_rng((seed, slice_index, sweep)).permutation(with_data)
 
 
-def propagation_speed(slowness: Floats, region: NDArray[np.bool_], settings: Settings, *, warm: bool) -> Floats:
+def propagation_speed(slowness: Floats, region: Flags, settings: Settings, *, warm: bool) -> Floats:
     """The speed F that the wave front runs in (chapter 6, equations 5 and 6, with k = 1).
 
     ``fixed`` is the image itself. ``data-driven`` stretches the image's own range to the range that the
@@ -156,9 +156,9 @@ def _use(
         measured[heard] + water,
     )
     seen = weights > 0.0
-    update = np.zeros(slowness.size)
-    update[seen] = corrections[seen] / (weights[seen] * problem.spacing)
-    update = update.reshape(slowness.shape)
+    flat = np.zeros(slowness.size)
+    flat[seen] = corrections[seen] / (weights[seen] * problem.spacing)
+    update = flat.reshape(slowness.shape)
     update[~problem.region] = 0.0
     if settings.smoothing_nodes > 0.0:
         update = gaussian_filter(update, settings.smoothing_nodes, mode="nearest")
@@ -169,8 +169,19 @@ def _use(
     return squares, len(heard)
 
 
-@njit(cache=True, nogil=True)
-def _back_project(receivers, source, tof, gradient, shape, strides, curved, room, crossing, measured):
+@kernel
+def _back_project(
+    receivers: Floats,
+    source: Floats,
+    tof: Floats,
+    gradient: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    curved: bool,
+    room: int,
+    crossing: Floats,
+    measured: Floats,
+) -> tuple[Floats, Floats, float]:
     """Sums of equation 1 over the rays of one emitter.
 
     Args:

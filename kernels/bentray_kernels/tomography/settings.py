@@ -29,7 +29,7 @@ class Settings:
         side_m: side of the image, m; None: the array with a margin.
         sweeps: how often every emitter is used.
         relaxation: the λ of SART (chapter 6, equation 1), in (0, 2).
-        smoothing_nodes: standard deviation, in nodes, of the Gaussian applied to each emitter's update; 0: none.
+        smoothing_nodes: standard deviation, nodes, of the Gaussian applied to each emitter's update; 0: none.
         stop_rms_s: stop once the rms of the receiver misfit is below this, s.
         reciprocity: use a missing pair's reverse (emitter and receiver exchanged) in its place.
         picker: how travel times are read where only traces were uploaded.
@@ -65,7 +65,9 @@ class Settings:
         if self.speed_range_mps is not None:
             _speeds("speed_range_mps", self.speed_range_mps)
         elif self.speed_update == "data-driven":
-            raise InvalidInput("speed_range_mps", None, "(lowest, highest) in m/s, since speed_update is data-driven")
+            raise InvalidInput(
+                "speed_range_mps", None, "(lowest, highest) in m/s, since speed_update is data-driven"
+            )
         _within("nodes", self.nodes, 16, 2048)
         _within("sweeps", self.sweeps, 1, 1000)
         if self.side_m is not None:

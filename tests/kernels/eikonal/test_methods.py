@@ -1,0 +1,233 @@
+"""What every Eikonal method must do; a new method inherits the suite by its name in the registry."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels import eikonal
+from bentray_kernels.errors import InvalidInput
+
+SOURCES = st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+
+
+def rough_speed(seed, shape):
+    """Speeds between 0.2 and 5 m/s without any smoothness."""
+    return np.random.default_rng(seed).uniform(0.2, 5.0, shape)
+
+
+def smooth_speed(seed, shape):
+    """A speed of a few plane waves, within a factor of two."""
+    rng = np.random.default_rng(seed)
+    grids = np.meshgrid(*[np.linspace(0.0, 1.0, n) for n in shape], indexing="ij")
+    waves = sum(
+        np.sin(2.0 * np.pi * sum(k * x for k, x in zip(rng.normal(size=len(shape)), grids, strict=True)))
+        for _ in range(3)
+    )
+    return 1.5 + 0.16 * waves
+
+
+def gradient_problem(shape, place):
+    """Speed 1 + 4x on the unit cube and the exact travel time from ``place``."""
+    spacing = 1.0 / (shape[0] - 1)
+    grids = np.meshgrid(*[np.arange(n) * spacing for n in shape], indexing="ij")
+    speed = 1.0 + 4.0 * grids[0]
+    squared = sum((x - p) ** 2 for x, p in zip(grids, place, strict=True))
+    exact = np.arccosh(1.0 + 16.0 * squared / (2.0 * speed * (1.0 + 4.0 * place[0]))) / 4.0
+    return speed, spacing, exact
+
+
+@pytest.fixture(params=eikonal.methods())
+def method(request):
+    return request.param
+
+
+@pytest.fixture(params=[2, 3], ids=["2d", "3d"])
+def ndim(request):
+    return request.param
+
+
+def test_default_comes_first():
+    assert eikonal.methods()[0] == "accurate"
+    speed = smooth_speed(1, (9, 9))
+    assert np.array_equal(
+        eikonal.solve(speed, 0.1, (0.1, 0.2)), eikonal.solve(speed, 0.1, (0.1, 0.2), "accurate")
+    )
+
+
+def test_converges_with_its_order(method, ndim):
+    ring = []
+    for n in (17, 33, 65) if ndim == 3 else (33, 65, 129):
+        speed, spacing, exact = gradient_problem((n,) * ndim, (0.5, 0.47, 0.52)[:ndim])
+        error = np.abs(eikonal.solve(speed, spacing, (0.5, 0.47, 0.52)[:ndim], method) - exact)
+        away = (
+            np.sqrt(sum((g - 0.5) ** 2 for g in np.meshgrid(*[np.linspace(0, 1, n)] * ndim, indexing="ij")))
+            > 0.35
+        )
+        ring.append(np.sqrt((error[away] ** 2).mean()))
+    rate = np.log2(ring[0] / ring[2]) / 2.0
+    chosen = eikonal.METHODS.get(method)
+    assert rate > (1.5 if chosen.order == 2 and chosen.factored else 0.75)
+
+
+@pytest.mark.parametrize("method", [m.name for m in eikonal.METHODS.by_name.values() if m.factored])
+def test_factored_methods_are_exact_in_a_homogeneous_medium(method, ndim):
+    source = np.array([0.031, 0.077, 0.05])[:ndim]
+    tof = eikonal.solve(np.full((14,) * ndim, 2.0), 0.01, source, method)
+    grids = np.meshgrid(*[np.arange(14) * 0.01] * ndim, indexing="ij")
+    exact = np.sqrt(sum((g - s) ** 2 for g, s in zip(grids, source, strict=True))) / 2.0
+    assert np.allclose(tof, exact, rtol=1e-10, atol=1e-14)
+
+
+def test_sweeping_equals_first_order_marching():
+    for ndim, seed in ((2, 3), (3, 4)):
+        speed = rough_speed(seed, (12,) * ndim)
+        source = (3.3,) * ndim
+        marched = eikonal.solve(speed, 1.0, source, "fmm", order=1)
+        assert np.allclose(eikonal.solve(speed, 1.0, source, "fsm"), marched, rtol=1e-11)
+
+
+@given(seed=st.integers(0, 2**32 - 1), place=SOURCES, flat=st.booleans())
+@settings(max_examples=40, deadline=None)
+def test_rough_models_give_finite_causal_times(seed, place, flat):
+    shape = (7, 9) if flat else (5, 6, 4)
+    speed = rough_speed(seed, shape)
+    source = np.array(place[: len(shape)]) * (np.array(shape) - 1)
+    for method in eikonal.methods():
+        tof = eikonal.solve(speed, 1.0, source, method)
+        assert np.isfinite(tof).all()
+        assert (tof >= 0.0).all()
+        distance = np.sqrt(sum((g - s) ** 2 for g, s in zip(np.indices(shape), source, strict=True)))
+        # No wave is faster than the fastest node allows; second order may undercut it by its own error.
+        assert (tof >= 0.8 * distance / speed.max() - 1e-12).all()
+        # Every node but those round the source has an earlier neighbour: no local minimum to lose a ray in.
+        padded = np.pad(tof, 1, constant_values=np.inf)
+        inside = (slice(1, -1),) * tof.ndim
+        lowest = np.minimum.reduce([np.roll(padded, s, a)[inside] for a in range(tof.ndim) for s in (1, -1)])
+        assert ((lowest <= tof) | (distance < np.sqrt(tof.ndim))).all()
+
+
+@given(seed=st.integers(0, 2**32 - 1), axis=st.integers(0, 1))
+@settings(max_examples=25, deadline=None)
+def test_flips_transposes_and_units_change_nothing(seed, axis):
+    speed = smooth_speed(seed, (11, 11))
+    source = np.array([0.23, 0.61])
+    for method in eikonal.methods():
+        tof = eikonal.solve(speed, 0.1, source, method)
+        mirrored = source.copy()
+        mirrored[axis] = 1.0 - source[axis]
+        flipped = eikonal.solve(np.flip(speed, axis), 0.1, mirrored, method)
+        # Ties of the first-order sweep may fall the other way round in a mirror: second-order size.
+        close = 2e-3 if method == "accurate" else 1e-9
+        assert np.allclose(np.flip(flipped, axis), tof, rtol=close, atol=1e-12)
+        assert np.allclose(eikonal.solve(speed.T, 0.1, source[::-1], method).T, tof, rtol=close, atol=1e-12)
+        millimetres = eikonal.solve(speed * 1e3, 0.1 * 1e3, source * 1e3, method)
+        assert np.allclose(millimetres, tof, rtol=1e-9, atol=1e-13)
+        assert np.allclose(eikonal.solve(2.0 * speed, 0.1, source, method), 0.5 * tof, rtol=1e-9, atol=1e-13)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_slower_media_are_later(seed):
+    """Monotone in slowness; strictly so for the first-order schemes, to their error for the others."""
+    rng = np.random.default_rng(seed)
+    speed = smooth_speed(seed, (12, 12))
+    slower = speed * rng.uniform(0.8, 1.0, speed.shape)
+    for method in eikonal.methods():
+        before = eikonal.solve(speed, 0.1, (0.4, 0.5), method)
+        after = eikonal.solve(slower, 0.1, (0.4, 0.5), method)
+        slack = 1e-12 if method == "fsm" else 0.02 * before.max()
+        assert (after >= before - slack).all()
+
+
+def test_reciprocity_on_a_smooth_model(method):
+    gaps = []
+    for n in (65, 129):
+        speed, spacing = smooth_speed(5, (n, n)), 1.0 / (n - 1)
+        a, b = np.array([10, 20]) * (n // 64), np.array([55, 40]) * (n // 64)
+        there = eikonal.solve(speed, spacing, a * spacing, method)[tuple(b)]
+        back = eikonal.solve(speed, spacing, b * spacing, method)[tuple(a)]
+        gaps.append(abs(there / back - 1.0))
+    chosen = eikonal.METHODS.get(method)
+    assert gaps[0] < (5e-4 if chosen.factored else 1e-2)
+    assert gaps[1] < gaps[0] * (0.35 if chosen.factored else 0.8)
+
+
+def test_one_node_wide_grids_are_the_integral_along_the_line(method):
+    speed = smooth_speed(7, (40, 1))
+    tof = eikonal.solve(speed, 0.1, (0.0, 0.0), method)
+    exact = np.concatenate(([0.0], np.cumsum(0.05 * (1 / speed[1:, 0] + 1 / speed[:-1, 0]))))
+    assert np.allclose(tof[:, 0], exact, atol=0.1 * (1 / speed).max())
+    assert (np.diff(tof[:, 0]) > 0.0).all()
+    assert eikonal.solve([[3.0]], 0.1, (0.0, 0.0), method) == 0.0
+
+
+def test_every_corner_may_be_the_source(method, ndim):
+    speed = np.full((6,) * ndim, 3.0)
+    for corner in np.ndindex(*(2,) * ndim):
+        node = tuple(5 * c for c in corner)
+        tof = eikonal.solve(speed, 0.2, np.array(node) * 0.2, method)
+        assert tof[node] == 0.0
+        assert tof.argmax() == np.ravel_multi_index(tuple(5 - n for n in node), speed.shape)
+
+
+def test_float32_and_lists_are_computed_in_double(method):
+    single = np.full((8, 8), 1500.0, np.float32)
+    tof = eikonal.solve(single, 1e-3, (2e-3, 2e-3), method)
+    assert tof.dtype == np.float64
+    assert np.array_equal(tof, eikonal.solve(single.astype(float).tolist(), 1e-3, (2e-3, 2e-3), method))
+
+
+def test_inputs_are_left_alone(method):
+    speed, source = smooth_speed(3, (9, 9)), np.array([0.2, 0.3])
+    kept = speed.copy(), source.copy()
+    eikonal.solve(speed, 0.1, source, method)
+    assert np.array_equal(speed, kept[0])
+    assert np.array_equal(source, kept[1])
+
+
+def test_many_equals_one_by_one(method):
+    speeds = np.stack([smooth_speed(k, (10, 8)) for k in range(3)])
+    sources = np.array([[0.1, 0.2], [0.5, 0.3], [0.9, 0.7]])
+    many = eikonal.solve_many(speeds, 0.1, sources, method)
+    for k in range(3):
+        assert np.array_equal(many[k], eikonal.solve(speeds[k], 0.1, sources[k], method))
+    shared = eikonal.solve_many(speeds[:1], 0.1, sources, method)
+    assert np.array_equal(shared[2], eikonal.solve(speeds[0], 0.1, sources[2], method))
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "words"),
+    [
+        ({"speed": np.array([[1.0, 2.0], [0.0, 1.0]])}, "speed", "node (1, 0)"),
+        ({"speed": np.array([[1.0, np.nan], [1.0, 1.0]])}, "speed", "node (0, 1)"),
+        ({"speed": np.array([[1.0, -2.0], [1.0, 1.0]])}, "speed", "-2"),
+        ({"speed": np.ones(4)}, "speed", "2-D or 3-D"),
+        ({"speed": np.ones((0, 3))}, "speed", "non-empty"),
+        ({"spacing": 0.0}, "spacing", "> 0"),
+        ({"spacing": float("nan")}, "spacing", "finite"),
+        ({"source": (0.5,)}, "source", "2 coordinates"),
+        ({"source": (0.5, 1.2)}, "source", "a point in the grid"),
+        ({"source": (-0.1, 0.5)}, "source", "a point in the grid"),
+        ({"source": (np.nan, 0.5)}, "source", "a point in the grid"),
+        ({"method": "magic"}, "method", "accurate, fmm, hafmm, fsm"),
+        ({"tolerance": 1.0, "method": "fmm"}, "options", "order"),
+        ({"order": 3, "method": "fmm"}, "order", "1 or 2"),
+        ({"tolerance": -1.0, "method": "fsm"}, "tolerance", ">= 0"),
+    ],
+)
+def test_bad_input_is_named(change, field, words):
+    arguments = {"speed": np.ones((2, 2)), "spacing": 1.0, "source": (0.5, 0.5), **change}
+    with pytest.raises(InvalidInput) as refusal:
+        eikonal.solve(**arguments)
+    assert refusal.value.field == field
+    assert words in str(refusal.value)
+
+
+def test_registry_is_frozen():
+    extra = eikonal.Method("twice", lambda problem: 2 * problem.slowness, 1, False, "for this test")
+    larger = eikonal.METHODS.register(extra)
+    assert "twice" in larger.by_name
+    assert "twice" not in eikonal.methods()
+    with pytest.raises(InvalidInput, match="twice"):
+        larger.register(extra)
