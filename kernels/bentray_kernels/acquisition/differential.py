@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kernel
 from .onset import Trace, match, onset, prepare
 
 # Speeds along the straight path that a first arrival may have, m/s: slower than fat, faster than skin.
@@ -32,7 +32,7 @@ LEAST_LIKENESS = 0.8
 NEAREST = 2.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def emission(
     object_: Trace,
     water: Trace,
@@ -93,7 +93,7 @@ def emission(
             likeness[r] = same
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def clip(begin: float, end: float, nt: int) -> tuple[int, int]:
     """The samples of a window inside the trace, as (first, one past the last)."""
     return min(max(math.floor(begin), 0), nt), min(max(math.ceil(end) + 1, 0), nt)

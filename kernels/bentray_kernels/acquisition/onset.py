@@ -10,8 +10,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..compiled import kernel
 
 Trace = NDArray[Any]
 
@@ -36,7 +37,7 @@ STRONG_PART = 0.5
 FAINTEST = 4.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def prepare(trace: Trace, lead: int, rounding: float, out: Trace) -> float:
     """Copy a trace less its offset to ``out``; give the noise, NaN where a sample is not finite.
 
@@ -56,7 +57,7 @@ def prepare(trace: Trace, lead: int, rounding: float, out: Trace) -> float:
     return max(1.4826 * np.median(np.abs(out[:lead])), rounding) if known else rounding
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def first_strong(x: Trace, begin: int, end: int, period: float, noise: float) -> int:
     """Place of the largest swing of the first arrival in ``x[begin:end]``; −1 if there is none."""
     peak = 0.0
@@ -74,7 +75,7 @@ def first_strong(x: Trace, begin: int, end: int, period: float, noise: float) ->
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def aic(x: Trace, begin: int, end: int) -> float:
     """Onset where ``x[begin:end]`` splits best into two stationary parts; NaN at the window's rim.
 
@@ -111,7 +112,7 @@ def aic(x: Trace, begin: int, end: int) -> float:
     return float(begin + lowest + vertex(value[lowest - 1], value[lowest], value[lowest + 1]))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def threshold(x: Trace, begin: int, end: int, noise: float) -> float:
     """Where ``|x[begin:end]|`` first crosses the threshold, between samples; NaN if it starts above."""
     peak = 0.0
@@ -127,7 +128,7 @@ def threshold(x: Trace, begin: int, end: int, noise: float) -> float:
     return np.nan
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def onset(x: Trace, begin: int, end: int, period: float, noise: float, picker: int) -> tuple[float, int]:
     """Onset of the first arrival in ``x[begin:end]`` and the place of its largest swing; NaN, −1 if none."""
     strong = first_strong(x, begin, end, period, noise)
@@ -139,15 +140,15 @@ def onset(x: Trace, begin: int, end: int, period: float, noise: float, picker: i
     return threshold(x, begin, strong + 1, noise), strong
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def match(
     water: Trace, object_: Trace, begin: int, end: int, shift: float, reach: float
 ) -> tuple[float, float]:
     """Delay, near ``shift``, at which ``water[begin:end]`` best resembles the object trace, and how well.
 
     The likeness is the normalised correlation Σwo/√(Σw²Σo²) of equally long pieces, so a weaker pulse
-    counts as much; a cosine through the best three gives the fraction of a sample. NaN when the best lies at the rim of
-    ``shift ± reach`` or outside the trace.
+    counts as much; a cosine through the best three gives the fraction of a sample. NaN when the best lies at
+    the rim of ``shift ± reach`` or outside the trace.
     """
     first = math.floor(shift - reach) - 1
     count = math.ceil(shift + reach) + 1 - first + 1
@@ -172,14 +173,14 @@ def match(
     return first + best + part, min(height, 1.0)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def vertex(left: float, middle: float, right: float) -> float:
     """Place of the extremum of the parabola through (−1, left), (0, middle), (1, right)."""
     bend = left - 2.0 * middle + right
     return 0.5 * (left - right) / bend if bend != 0.0 and math.isfinite(bend) else 0.0
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def crest(left: float, middle: float, right: float) -> tuple[float, float]:
     """Place and height of the crest of the cosine through (−1, left), (0, middle), (1, right).
 

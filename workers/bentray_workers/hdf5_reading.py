@@ -1,0 +1,257 @@
+"""Reading HDF5 that a stranger wrote: every object is checked for what it is before its data are touched."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.errors import InvalidInput
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+FILTERS = {
+    h5py.h5z.FILTER_DEFLATE: "gzip",
+    h5py.h5z.FILTER_SHUFFLE: "shuffle",
+    h5py.h5z.FILTER_FLETCHER32: "fletcher32",
+    h5py.h5z.FILTER_LZF: "lzf",
+}
+TYPES = {h5py.h5t.INTEGER: "integers", h5py.h5t.FLOAT: "floating-point numbers", h5py.h5t.ENUM: "booleans"}
+OTHER_TYPES = {
+    h5py.h5t.STRING: "text",
+    h5py.h5t.COMPOUND: "records",
+    h5py.h5t.REFERENCE: "references",
+    h5py.h5t.VLEN: "lists of varying length",
+    h5py.h5t.OPAQUE: "opaque bytes",
+    h5py.h5t.ARRAY: "arrays as elements",
+    h5py.h5t.BITFIELD: "bit fields",
+    h5py.h5t.TIME: "times",
+}
+
+# What HDF5 and h5py raise on damaged files.
+DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much a file may make its reader do.
+
+    Attributes:
+        total_bytes: of all arrays read from one file, unpacked.
+        chunk_bytes: of one chunk, unpacked: HDF5 holds it in memory as a whole.
+        packing: unpacked over stored bytes; gzip cannot do better than 1032.
+        small_bytes: an array below this may be packed as well as it likes.
+        text: characters of an attribute.
+    """
+
+    total_bytes: int = 32 * 2**30
+    chunk_bytes: int = 512 * 2**20
+    packing: float = 1100.0
+    small_bytes: int = 16 * 2**20
+    text: int = 100_000
+
+
+@contextmanager
+def opened(path: Path, limits: Limits) -> Iterator[Reader]:
+    """A reader of the file.
+
+    Raises:
+        InvalidInput: for a file that is absent, empty, not HDF5, cut short or damaged.
+    """
+    accepted = "a whole HDF5 file"
+    try:
+        with path.open("rb") as raw:
+            start = raw.read(len(SIGNATURE))
+    except OSError as error:
+        raise InvalidInput("file", f"{path.name}: {error.strerror}", accepted) from None
+    try:
+        file = h5py.File(path, "r", locking=False)
+    except DAMAGE:
+        if not start:
+            found = "an empty file"
+        elif start == SIGNATURE:
+            found = f"an HDF5 file that is cut short or damaged ({path.stat().st_size} bytes)"
+        else:
+            found = f"a file that is not HDF5 (it begins with {start!r})"
+        raise InvalidInput("file", found, accepted) from None
+    try:
+        yield Reader(file, limits)
+    finally:
+        file.close()
+
+
+class Reader:
+    """Fields of one open file by path, such as ``waveform/object``; attributes as ``waveform@scale``."""
+
+    def __init__(self, file: h5py.File, limits: Limits) -> None:
+        self._file = file
+        self._limits = limits
+        self._read_bytes = 0
+
+    def has(self, path: str) -> bool:
+        """Whether a group or array of that path is there."""
+        return self._object(path) is not None
+
+    def array(self, path: str, kinds: str, accepted: str) -> NDArray[Any] | None:
+        """An array, or None where it is absent.
+
+        Args:
+            path: of the array.
+            kinds: numpy kinds that will do: of ``i``, ``u``, ``f``, ``b``.
+            accepted: these in words, with the shape.
+
+        Raises:
+            InvalidInput: for anything else in that place.
+        """
+        found = self.checked(path, kinds, accepted)
+        if found is None:
+            return None
+        self._read_bytes += found.size * found.dtype.itemsize
+        with refusing(path, accepted):
+            return np.asarray(found[()])
+
+    def checked(self, path: str, kinds: str, accepted: str) -> h5py.Dataset | None:
+        """As ``array``, with every check done and nothing read."""
+        found = self._object(path)
+        if found is None:
+            return None
+        if not isinstance(found, h5py.Dataset):
+            raise InvalidInput(path, "a group", accepted)
+        with refusing(path, accepted):
+            self._check_storage(path, found, accepted)
+            if found.dtype.kind not in kinds:
+                raise InvalidInput(
+                    path, f"{TYPES[found.id.get_type().get_class()]} ({found.dtype})", accepted
+                )
+        return found
+
+    def attribute(self, path: str, name: str) -> Any:
+        """Value of an attribute: str, or an array of numbers; None where it or its owner is absent.
+
+        Raises:
+            InvalidInput: for any other type, or more than the limits allow.
+        """
+        field = f"{path}@{name}"
+        owner = self._object(path)
+        if owner is None:
+            return None
+        with refusing(field, "text or numbers"):
+            if not h5py.h5a.exists(owner.id, name.encode()):
+                return None
+            attribute = h5py.h5a.open(owner.id, name.encode())
+            kind = attribute.get_type().get_class()
+            if kind != h5py.h5t.STRING and kind not in TYPES:
+                raise InvalidInput(field, OTHER_TYPES.get(kind, "an unknown type"), "text or numbers")
+            if attribute.get_space().get_simple_extent_npoints() not in range(1, 17):
+                raise InvalidInput(field, f"shape {attribute.shape}", "one value, or one per axis")
+            if attribute.get_storage_size() > self._limits.text:
+                raise InvalidInput(
+                    field, f"{attribute.get_storage_size()} bytes", f"at most {self._limits.text}"
+                )
+            value = owner.attrs[name]
+            if kind != h5py.h5t.STRING:
+                return np.atleast_1d(np.asarray(value)).ravel()
+            text = np.atleast_1d(np.asarray(value, dtype=object)).ravel()[0]
+            text = text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
+        if len(text) > self._limits.text:
+            raise InvalidInput(field, f"{len(text)} characters", f"at most {self._limits.text}")
+        return printable(text)
+
+    def text(self, path: str, name: str) -> str | None:
+        """A text attribute, or None."""
+        value = self.attribute(path, name)
+        if value is not None and not isinstance(value, str):
+            raise InvalidInput(f"{path}@{name}", f"the number {value[0]}", "text")
+        return value
+
+    def numbers(self, path: str, name: str, unit: str) -> tuple[float, ...] | None:
+        """A number or one per axis, or None."""
+        value = self.attribute(path, name)
+        if value is None:
+            return None
+        if isinstance(value, str):
+            raise InvalidInput(f"{path}@{name}", f"the text {value[:40]!r}", f"a number in {unit}")
+        return tuple(float(v) for v in value)
+
+    def number(self, path: str, name: str, unit: str) -> float | None:
+        """A finite number, or None."""
+        values = self.numbers(path, name, unit)
+        if values is None:
+            return None
+        if len(values) != 1 or not math.isfinite(values[0]):
+            found = values[0] if len(values) == 1 else f"{len(values)} numbers"
+            raise InvalidInput(f"{path}@{name}", found, f"one finite number in {unit}")
+        return values[0]
+
+    def _object(self, path: str) -> Any:
+        """The group or array at a path, reached over hard links alone."""
+        here: Any = self._file
+        walked = ""
+        for name in filter(None, path.split("/")):
+            walked = f"{walked}/{name}".lstrip("/")
+            with refusing(walked, "a group or an array of this file"):
+                if not isinstance(here, h5py.Group):
+                    raise InvalidInput(walked.rpartition("/")[0], "an array", "a group")
+                if not here.id.links.exists(name.encode()):
+                    return None
+                if here.id.links.get_info(name.encode()).type != h5py.h5l.TYPE_HARD:
+                    raise InvalidInput(walked, "a soft or external link", "a group or an array of this file")
+                here = here[name]
+                if isinstance(here, h5py.Datatype):
+                    raise InvalidInput(walked, "a named type", "a group or an array")
+        return here
+
+    def _check_storage(self, path: str, found: h5py.Dataset, accepted: str) -> None:
+        kind = found.id.get_type().get_class()
+        if kind not in TYPES:
+            raise InvalidInput(path, OTHER_TYPES.get(kind, "an unknown type"), accepted)
+        if found.shape is None:
+            raise InvalidInput(path, "an array without a shape", accepted)
+        how = found.id.get_create_plist()
+        if how.get_layout() not in (h5py.h5d.COMPACT, h5py.h5d.CONTIGUOUS, h5py.h5d.CHUNKED):
+            raise InvalidInput(path, "a virtual dataset", "data in this file")
+        if how.get_layout() != h5py.h5d.CHUNKED and how.get_external_count():
+            raise InvalidInput(path, "data in another file", "data in this file")
+        for k in range(how.get_nfilters()):
+            code = how.get_filter(k)[0]
+            if code not in FILTERS:
+                raise InvalidInput(path, f"filter {code}", "the filters " + ", ".join(FILTERS.values()))
+        limits = self._limits
+        size = math.prod(found.shape) * found.dtype.itemsize
+        if size + self._read_bytes > limits.total_bytes:
+            raise InvalidInput(
+                path, f"{size} bytes unpacked", f"at most {limits.total_bytes} bytes in a file"
+            )
+        if found.chunks is not None:
+            chunk = math.prod(found.chunks) * found.dtype.itemsize
+            if chunk > limits.chunk_bytes:
+                raise InvalidInput(path, f"chunks of {chunk} bytes", f"at most {limits.chunk_bytes} bytes")
+        stored = found.id.get_storage_size()
+        if size > limits.small_bytes and size > limits.packing * stored:
+            raise InvalidInput(
+                path, f"{size} bytes, of which {stored} are stored", "data that are in the file"
+            )
+
+
+@contextmanager
+def refusing(field: str, accepted: str) -> Iterator[None]:
+    """Turn what HDF5 raises on damage into InvalidInput for this field."""
+    try:
+        yield
+    except InvalidInput:
+        raise
+    except DAMAGE as error:
+        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
+        raise InvalidInput(field, f"damaged data ({reason[:120]})", accepted) from None
+
+
+def printable(text: str) -> str:
+    """Text without control characters and half characters, which HDF5 and JSON cannot carry."""
+    return "".join(c for c in text if c.isprintable() or c in "\n\t")

@@ -1,0 +1,135 @@
+"""Reconstructions as files: ``reconstruction.h5``, written atomically and read back exactly."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Reconstruction, Settings, Sweep
+
+from .atomic import replacing
+from .dataset_writing import write_array
+from .hdf5_reading import Limits, Reader, opened
+
+FORMAT = "bentray-reconstruction"
+VERSION = "1.0"
+HISTORY = {"slice": np.int64, "sweep": np.int64, "residual_rms_s": np.float64, "emitters": np.int64}
+IMAGES = {"speed": "speed_mps", "coverage": "coverage_m", "attenuation": "attenuation_np_m"}
+
+
+def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
+    """Write a reconstruction; ``path`` is replaced whole or not touched.
+
+    The file holds ``speed_mps``, ``coverage_m`` and, where there is one, ``attenuation_np_m``, each (nx, ny)
+    or (nx, ny, nz); ``history`` with a column a field of ``Sweep``; and root attributes ``spacing_m``,
+    ``origin_m``, ``axes``, ``water_speed_mps``, ``settings`` and ``provenance``, the last two JSON.
+
+    Raises:
+        OSError: where the folder cannot be written to.
+    """
+    with replacing(Path(path)) as partial, h5py.File(partial, "w-") as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["format_version"] = VERSION
+        file.attrs["axes"] = "x,y" if reconstruction.speed.ndim == 2 else "x,y,z"
+        file.attrs["spacing_m"] = reconstruction.spacing_m
+        file.attrs["origin_m"] = reconstruction.origin_m
+        file.attrs["water_speed_mps"] = reconstruction.water_speed_mps
+        file.attrs["settings"] = json.dumps(reconstruction.settings.to_dict())
+        file.attrs["provenance"] = json.dumps(reconstruction.provenance)
+        for name, place in IMAGES.items():
+            if getattr(reconstruction, name) is not None:
+                write_array(file, place, getattr(reconstruction, name))
+        history = file.create_group("history")
+        for column, dtype in HISTORY.items():
+            rows = np.array([getattr(sweep, column) for sweep in reconstruction.history], dtype=dtype)
+            write_array(history, column, rows)
+
+
+def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstruction:
+    """Read what ``write_reconstruction`` wrote.
+
+    Raises:
+        InvalidInput: naming the first field that is missing or wrong, as ``read_dataset`` does.
+    """
+    with opened(Path(path), limits or Limits()) as reader:
+        for name, expected in (("format", FORMAT), ("format_version", VERSION)):
+            if (found := reader.text("", name)) != expected:
+                raise InvalidInput(f"@{name}", repr(found), f'"{expected}"')
+        speed = _image(reader, "speed_mps", None)
+        coverage = _image(reader, "coverage_m", speed.shape)
+        attenuation = (
+            _image(reader, "attenuation_np_m", speed.shape) if reader.has("attenuation_np_m") else None
+        )
+        water = reader.number("", "water_speed_mps", "m/s")
+        if water is None:
+            raise InvalidInput("@water_speed_mps", "nothing", "a speed in m/s")
+        return Reconstruction(
+            speed=speed,
+            coverage=coverage,
+            attenuation=attenuation,
+            spacing_m=_per_axis(reader, "spacing_m", speed.ndim),
+            origin_m=_per_axis(reader, "origin_m", speed.ndim),
+            water_speed_mps=water,
+            settings=_settings(_json(reader, "settings")),
+            history=_history(reader),
+            provenance={str(k): str(v) for k, v in _json(reader, "provenance").items()},
+        )
+
+
+def _image(reader: Reader, place: str, shape: tuple[int, ...] | None) -> NDArray[np.float64]:
+    accepted = "(nx, ny) or (nx, ny, nz) numbers" if shape is None else f"numbers of shape {shape}"
+    image = reader.array(place, "f", accepted)
+    if image is None:
+        raise InvalidInput(place, "nothing", accepted)
+    if image.ndim not in (2, 3) or 0 in image.shape or (shape is not None and image.shape != shape):
+        raise InvalidInput(place, f"shape {image.shape}", accepted)
+    return np.asarray(image, dtype=np.float64)
+
+
+def _per_axis(reader: Reader, name: str, ndim: int) -> tuple[float, ...]:
+    values = reader.numbers("", name, "m")
+    if values is None or len(values) != ndim:
+        raise InvalidInput(f"@{name}", "nothing" if values is None else values, f"{ndim} numbers in m")
+    return values
+
+
+def _history(reader: Reader) -> tuple[Sweep, ...]:
+    columns = {}
+    for column, dtype in HISTORY.items():
+        found = reader.array(f"history/{column}", np.dtype(dtype).kind, "a column of numbers")
+        if found is None or found.ndim != 1:
+            raise InvalidInput(
+                f"history/{column}", "nothing" if found is None else f"shape {found.shape}", "a column"
+            )
+        columns[column] = found.tolist()
+    if len({len(column) for column in columns.values()}) != 1:
+        raise InvalidInput("history", "columns of different lengths", "columns of one length")
+    return tuple(Sweep(*row) for row in zip(*(columns[f.name] for f in fields(Sweep)), strict=True))
+
+
+def _json(reader: Reader, name: str) -> dict[str, Any]:
+    text = reader.text("", name)
+    try:
+        found = json.loads(text or "")
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        raise InvalidInput(f"@{name}", repr((text or "")[:60]), "a JSON object")
+    return found
+
+
+def _settings(values: dict[str, Any]) -> Settings:
+    # JSON has lists where Settings has tuples.
+    given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
+    try:
+        return Settings(**given)
+    except TypeError as error:
+        accepted = "the settings of a reconstruction by this version"
+        raise InvalidInput("@settings", str(error), accepted) from None
