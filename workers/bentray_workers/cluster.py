@@ -99,7 +99,7 @@ def open_cluster(
             threads_per_worker=THREADS,
             processes=processes,
             resources=OFFERED,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",
             preload=PRELOAD,
             local_directory=None if local_directory is None else str(local_directory),
         )

@@ -124,7 +124,7 @@ def _run(
         client.submit(simulate_emitters, settings, batch, resources=RECONSTRUCTION, pure=False): batch
         for batch in batches
     }
-    for future, rows in as_completed(futures, with_results=True):
+    for future, rows in as_completed(futures, loop=client.loop, with_results=True):
         yield futures[future], rows
 
 

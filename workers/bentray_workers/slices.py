@@ -141,7 +141,7 @@ def _drive(
                     pure=False,
                 )
                 running[future] = (k, batch)
-            for future in _finished(running):
+            for future in _finished(client, running):
                 k, batch = running.pop(future)
                 before = states[k]
                 states[k], seconds = future.result()
@@ -157,11 +157,13 @@ def _drive(
     return assemble(dataset, settings, problems, states)
 
 
-def _finished(running: dict[Future, tuple[int, int]]) -> list[Future]:
-    try:
-        return list(wait(list(running), timeout=POLL_S, return_when="FIRST_COMPLETED").done)
-    except TimeoutError:
-        return []
+def _finished(client: Client, running: dict[Future, tuple[int, int]]) -> list[Future]:
+    # The client is nobody's default, so ``wait`` must be told which it is.
+    with client.as_current():
+        try:
+            return list(wait(list(running), timeout=POLL_S, return_when="FIRST_COMPLETED").done)
+        except TimeoutError:
+            return []
 
 
 def _next_batch(batch: int, before: State, after: State, seconds: float) -> int:

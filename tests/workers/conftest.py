@@ -1,0 +1,31 @@
+"""One small cluster in this process for all worker tests, and a small scan."""
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation import Ring
+from bentray_workers.cluster import open_cluster
+
+
+@pytest.fixture(scope="session")
+def cluster(tmp_path_factory):
+    with open_cluster(workers=2, local_directory=tmp_path_factory.mktemp("dask"), processes=False) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def scan():
+    """Three slices of smooth made-up delays: enough to reconstruct, nothing to admire."""
+    ring = Ring(24, 0.08)
+    angle = np.arange(24) * 2 * np.pi / 24
+    chord = np.sin(0.5 * (angle[:, None] - angle[None, :])) ** 2
+    everyone = np.arange(24)
+    return Dataset(
+        ring.positions(),
+        everyone,
+        everyone,
+        1500.0,
+        delta_tof_s=-1e-6 * chord * np.array([1.0, 0.5, 0.2])[:, None, None],
+        slice_z_m=np.array([0.0, 0.003, 0.006]),
+    )

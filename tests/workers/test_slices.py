@@ -1,0 +1,82 @@
+"""Slices on a cluster: the same bits as in one process, progress, stopping, failure."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography import reconstruct as reconstruct_here
+from bentray_workers import slices
+from bentray_workers.dataset_file import write_dataset
+from bentray_workers.slices import Cancelled
+
+PLAN = Settings(nodes=32, sweeps=2)
+
+
+@pytest.fixture
+def path(scan, tmp_path):
+    target = tmp_path / "scan.h5"
+    write_dataset(target, scan)
+    return target
+
+
+def test_cluster_and_one_process_give_the_same_bits(cluster, scan, path):
+    expected = reconstruct_here(scan, PLAN)
+    for client in (cluster.client, None):
+        result = slices.reconstruct(client, path, PLAN)
+        assert np.array_equal(result.speed, expected.speed)
+        assert np.array_equal(result.coverage, expected.coverage)
+        assert result.history == expected.history
+        assert result.spacing_m == expected.spacing_m
+
+
+def test_progress_rises_to_the_end(cluster, path):
+    seen = []
+    slices.reconstruct(cluster.client, path, PLAN, seen.append)
+    done = [p.done for p in seen]
+    assert done == sorted(done)
+    assert done[-1] == seen[-1].total == 3 * 2 * 24
+    assert len(done) > 6
+
+
+@pytest.mark.parametrize("embedded", [True, False])
+def test_stop_ends_within_a_task(cluster, path, embedded):
+    calls = []
+
+    def stop():
+        calls.append(None)
+        return len(calls) > 2
+
+    with pytest.raises(Cancelled):
+        slices.reconstruct(cluster.client if embedded else None, path, replace(PLAN, sweeps=500), stop=stop)
+    assert len(calls) == 3
+
+
+def test_bad_input_crosses_the_cluster_as_itself(cluster, path):
+    with pytest.raises(InvalidInput, match="side_m"):
+        slices.reconstruct(cluster.client, path, Settings(side_m=0.01))
+
+
+def test_missing_file_is_named(cluster, tmp_path):
+    with pytest.raises((InvalidInput, OSError), match="nothing"):
+        slices.reconstruct(cluster.client, tmp_path / "nothing.h5", PLAN)
+
+
+def test_nothing_is_left_on_the_cluster(cluster, path):
+    before = set(cluster.client.futures)
+    slices.reconstruct(cluster.client, path, PLAN)
+    assert set(cluster.client.futures) <= before
+
+
+def test_batches_aim_at_the_time_of_a_task():
+    from bentray_kernels.tomography import State
+
+    state = State(np.ones((2, 2)), np.ones((2, 2)))
+    after = replace(state, emitter=8)
+    assert slices._next_batch(8, state, after, 0.5) == 8
+    assert slices._next_batch(8, state, after, 0.25) == 16
+    assert slices._next_batch(8, state, after, 0.001) == 32
+    assert slices._next_batch(8, state, after, 60.0) == 1
+    assert slices._next_batch(8, state, replace(state, sweep=1, emitter=0), 0.1) == 8
