@@ -96,9 +96,10 @@ def test_no_file_names_a_package_index() -> None:
     assert found == []
 
 
-@pytest.mark.parametrize("line", ["see /root/x", "'/work/a'", "(/home/ann/b)", "/opt/wheels"])
-def test_the_search_for_machine_folders_finds_them(line: str) -> None:
-    assert MACHINE_PATH.search(line)
+@pytest.mark.parametrize("folder", ["root", "work", "opt", "home/ann", "Users"])
+@pytest.mark.parametrize("line", ["see /{}/x", "'/{}/x'", "(/{}/x)", "path=/{}/x"])
+def test_the_search_for_machine_folders_finds_them(line: str, folder: str) -> None:
+    assert MACHINE_PATH.search(line.format(folder))
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import ipaddress
 import json
 import os
 import socket
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -115,7 +116,9 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
 
     app = _Starting(create_app(settings))
     server = Announcing(uvicorn.Config(app, log_level="warning", lifespan="on"))
-    server.run(sockets=[listening])
+    # Uvicorn ends the process when the application cannot start; here the reason has the last word.
+    with suppress(SystemExit):
+        server.run(sockets=[listening])
     if app.failure is not None:
         raise app.failure
     if not server.started:
