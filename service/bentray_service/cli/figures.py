@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
 
 from bentray_kernels.acquisition.dataset import Dataset, Truth
 from bentray_kernels.tomography import Reconstruction, mean_absolute_error, rmse
-
-# A truth within this of the water speed is taken for water when no region is given, m/s.
-WATER_TOLERANCE_MPS = 1.0
+from bentray_workers.truth_on_grid import WATER_TOLERANCE_MPS, object_in, truth_on_grid
 
 
 def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[str, Any]:
@@ -49,39 +47,30 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
 def errors(result: Reconstruction, truth: Truth, roi: NDArray[np.bool_] | None = None) -> dict[str, Any]:
     """How far the image is from the truth, at the image's own nodes, and in which region that was read.
 
-    The truth is read at the nodes by linear interpolation, without any registration. The region is
-    ``roi`` where it is on the truth's grid; else where the truth is not water; else every node that the
-    truth covers. ``region`` says which of these it was, or why nothing could be compared.
+    The truth is laid on the nodes by linear interpolation, without any registration. The region is
+    ``roi`` where it is on the truth's grid; else the outline of what is not water; else every node that
+    the truth covers. ``region`` says which of these it was, or why nothing could be compared.
     """
-    if truth.sound_speed_mps.ndim != result.speed.ndim or not np.isfinite(result.spacing_m).all():
-        return {
-            "region": "not compared: truth and image differ in their axes",
-            "region_nodes": 0,
-        }
-    points = np.stack(
-        np.meshgrid(
-            *(
-                start + step * np.arange(count)
-                for start, step, count in zip(
-                    result.origin_m, result.spacing_m, result.speed.shape, strict=True
-                )
-            ),
-            indexing="ij",
-        ),
-        axis=-1,
-    )
-    true_speed = _read(truth, truth.sound_speed_mps, points)
+    true_speed = _on_grid(truth, result)
+    if true_speed is None:
+        return _not_compared(f"the truth, on axes {truth.axes!r}, must be registered with the image first")
     covered = np.isfinite(true_speed)
+    if not covered.any():
+        return _not_compared("no node of the image lies within the truth")
+    marked = None
     if roi is not None and roi.shape == truth.sound_speed_mps.shape:
-        choice = "mask/roi of the file"
-        region = covered & (_read(truth, roi.astype(np.float64), points) > 0.5)
+        # As values 1 and 2, for a truth must be above 0.
+        marked = _on_grid(replace(truth, sound_speed_mps=1.0 + roi.astype(np.float64)), result)
+    water = np.abs(np.where(covered, true_speed, result.water_speed_mps) - result.water_speed_mps)
+    if marked is not None and (marked > 1.5).any():
+        choice, region = "mask/roi of the file", covered & (marked > 1.5)
+    elif (water > WATER_TOLERANCE_MPS).any():
+        choice = "the outline of what is not water in the truth"
+        slices = np.atleast_3d(true_speed)
+        outline = [object_in(slices[..., k], result.water_speed_mps) for k in range(slices.shape[2])]
+        region = np.stack(outline, axis=-1).reshape(true_speed.shape)
     else:
-        choice = f"where the true speed is more than {WATER_TOLERANCE_MPS:g} m/s off the water's"
-        region = covered & (np.abs(true_speed - result.water_speed_mps) > WATER_TOLERANCE_MPS)
-    if not region.any():
         choice, region = "every node that the truth covers", covered
-    if not region.any():
-        return {"region": "not compared: no node of the image lies within the truth", "region_nodes": 0}
     low, high = float(true_speed[region].min()), float(true_speed[region].max())
     return {
         "region": choice,
@@ -95,13 +84,15 @@ def errors(result: Reconstruction, truth: Truth, roi: NDArray[np.bool_] | None =
     }
 
 
-def _read(truth: Truth, values: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    # NaN outside the truth's grid, so that such nodes drop out of the region.
-    axes = [
-        start + step * np.arange(count)
-        for start, step, count in zip(truth.origin_m, truth.spacing_m, values.shape, strict=True)
-    ]
-    return np.asarray(RegularGridInterpolator(axes, values, bounds_error=False, fill_value=np.nan)(points))
+def _on_grid(truth: Truth, result: Reconstruction) -> NDArray[np.float64] | None:
+    """The truth at the nodes of the image, in the image's shape; None where the axes do not tell how."""
+    count = 1 if result.speed.ndim == 2 else result.speed.shape[2]
+    slices = [found for k in range(count) if (found := truth_on_grid(truth, result, k)) is not None]
+    return np.stack(slices, axis=-1).reshape(result.speed.shape) if len(slices) == count else None
+
+
+def _not_compared(why: str) -> dict[str, Any]:
+    return {"region": f"not compared: {why}", "region_nodes": 0}
 
 
 def summary(found: dict[str, Any]) -> list[tuple[str, str]]:

@@ -30,7 +30,8 @@ def image(speed: np.ndarray, origin: tuple[float, ...] = (0.0, 0.0)) -> Reconstr
 
 
 def truth(speed: np.ndarray, spacing: float = STEP) -> Truth:
-    return Truth(speed, (spacing,) * speed.ndim, (0.0,) * speed.ndim)
+    axes = ",".join("xyz"[: speed.ndim])
+    return Truth(speed, (spacing,) * speed.ndim, (0.0,) * speed.ndim, axes=axes)
 
 
 def disc(nodes: int = 17) -> np.ndarray:
@@ -81,11 +82,28 @@ def test_x_and_y_are_not_exchanged() -> None:
     assert errors(image(disc().T), truth(disc()))["rmse_mps"] > 10.0
 
 
+def test_a_truth_on_axes_y_x_is_turned() -> None:
+    turned = replace(truth(disc().T), axes="y,x")
+    assert errors(image(disc()), turned)["rmse_mps"] == 0.0
+
+
+def test_several_slices_are_compared_with_a_solid_truth() -> None:
+    solid = np.stack([disc(), np.full((17, 17), WATER), disc()[::-1]], axis=-1)
+    found = errors(image(solid + 2.0, (0.0,) * 3), truth(solid))
+    assert found["rmse_mps"] == pytest.approx(2.0)
+    assert errors(image(solid[..., ::-1], (0.0,) * 3), truth(solid))["rmse_mps"] > 10.0
+
+
 def test_what_cannot_be_compared_is_said() -> None:
     away = errors(image(disc(), origin=(1.0, 1.0)), truth(disc()))
     assert away["region"] == "not compared: no node of the image lies within the truth"
     solid = errors(image(np.full((17, 17, 2), WATER), (0.0,) * 3), truth(disc()))
-    assert solid["region"].startswith("not compared: truth and image differ in their axes")
+    assert solid["region"].startswith("not compared: the truth, on axes 'x,y', must be registered")
+    display = replace(truth(disc()), axes="as displayed")
+    assert errors(image(disc()), display) == {
+        "region": "not compared: the truth, on axes 'as displayed', must be registered with the image first",
+        "region_nodes": 0,
+    }
     uneven = replace(image(np.full((17, 17, 2), WATER), (0.0,) * 3), spacing_m=(STEP, STEP, math.nan))
     assert "rmse_mps" not in errors(uneven, truth(np.full((17, 17, 2), WATER)))
 
@@ -113,4 +131,4 @@ def test_the_summary_tells_the_errors_and_their_region_only_with_a_truth() -> No
     with_truth = dict(summary(figures(image(disc() + 10.0), dataset(truth(disc())), 1.0)))
     assert with_truth["rms error"] == "10.0 m/s"
     assert with_truth["mean absolute error"] == "10.0 % of the range"
-    assert "m/s off the water" in with_truth["errors read"]
+    assert with_truth["errors read"] == "the outline of what is not water in the truth"
