@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import expect, sync_playwright
 
 from bentray_kernels.tomography.settings import Settings
 
@@ -16,8 +17,7 @@ pytestmark = [
 
 @pytest.fixture
 def page():
-    sync_api = pytest.importorskip("playwright.sync_api")
-    with sync_api.sync_playwright() as playwright:
+    with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
         page = browser.new_page()
         page.set_default_timeout(15_000)
@@ -37,7 +37,7 @@ def test_without_jobs_it_says_what_to_do(page, serve):
     page.get_by_text("Nothing has run yet").wait_for()
     page.get_by_text("ready, 1 worker").wait_for()
     assert page.get_by_role("button", name="Start").is_disabled()
-    page.wait_for_function(f"document.querySelector('[name=sweeps]').value === '{Settings().sweeps}'")
+    expect(page.get_by_label("Sweeps")).to_have_value(str(Settings().sweeps))
 
 
 def test_upload_start_watch(page, serve, scan, work):
@@ -56,7 +56,10 @@ def test_upload_start_watch(page, serve, scan, work):
     job.get_by_text("residual 2.00 µs").wait_for()
     assert job.get_by_role("heading", name="Straight rays").is_visible()
     assert work.calls[0][1].nodes == 32
-    page.wait_for_function("document.querySelector('.job img')?.naturalWidth > 0")
+    image = job.locator("img")
+    image.scroll_into_view_if_needed()
+    expect(image).to_have_js_property("complete", True)
+    assert image.evaluate("image => image.naturalWidth") > 0
     assert page.get_by_text("Nothing has run yet").is_hidden()
 
 
