@@ -43,7 +43,6 @@ def demo(
 
     from bentray_workers.dataset_file import write_dataset
     from bentray_workers.images import comparison_png
-
     from bentray_workers.simulation import SimulationSettings, simulate
 
     from ..client import Client

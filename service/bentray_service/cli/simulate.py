@@ -30,9 +30,8 @@ def simulate(
     """
     path = output_file(output, force=force)
 
-    from bentray_workers.dataset_file import write_dataset
-
     from bentray_workers import simulation
+    from bentray_workers.dataset_file import write_dataset
 
     settings = simulation.SimulationSettings(nodes, elements, coupling, refinement, noise_ns * 1e-9, seed)
     started = time.perf_counter()

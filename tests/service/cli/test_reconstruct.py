@@ -9,8 +9,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from bentray_workers.reconstruction_file import read_reconstruction
 from typer.testing import Result
+
+from bentray_workers.reconstruction_file import read_reconstruction
 
 QUICK = ("--nodes", 32, "--sweeps", 2)
 

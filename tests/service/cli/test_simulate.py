@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bentray_workers.dataset_file import read_dataset
 from typer.testing import Result
+
+from bentray_workers.dataset_file import read_dataset
 
 SMALL = ("--nodes", 24, "--elements", 12, "--coupling", 1400)
 

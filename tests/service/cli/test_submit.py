@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
-from bentray_workers.reconstruction_file import write_reconstruction
 from typer.testing import Result
 
 from bentray_kernels.tomography import Settings
 from bentray_service.client import ClientError
 from bentray_workers import slices
+from bentray_workers.reconstruction_file import write_reconstruction
 
 
 class StandIn:
