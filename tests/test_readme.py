@@ -9,6 +9,7 @@ from dataclasses import fields
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 import typer
 
@@ -17,6 +18,7 @@ from bentray_kernels.tomography import Settings
 from bentray_service.app import create_app
 from bentray_service.cli import app
 from bentray_service.settings import ServiceSettings
+from bentray_workers.dataset_file import read_dataset
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXTS = ("README.md", "CONTRIBUTING.md", "deploy/README.md")
@@ -123,3 +125,20 @@ def test_every_file_that_a_text_points_to_exists(name: str) -> None:
     base = (ROOT / name).parent
     assert [path for path in linked if not (base / path).exists()] == []
     assert [path for path in named if not (ROOT / path).exists()] == []
+
+
+def test_the_lines_that_write_a_scan_write_one_that_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert code is not None
+    angle = 2 * np.pi * np.arange(8) / 8
+    position = 0.1 * np.column_stack((np.cos(angle), np.sin(angle)))
+    delta = np.full((8, 8), -1e-6)
+    delta[0, 1] = np.nan
+    monkeypatch.chdir(tmp_path)
+    exec(code[1], {"position": position, "delta": delta, "n": 8})
+    dataset = read_dataset(tmp_path / "scan.h5")
+    np.testing.assert_array_equal(dataset.element_position_m, position)
+    assert dataset.water_speed_mps == pytest.approx(1482.3, abs=0.1), "that of water of 20 degrees"
+    assert np.isnan(dataset.differential_tof()[0, 1])
