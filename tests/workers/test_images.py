@@ -1,0 +1,142 @@
+"""Pictures: right size and colours, up is up, and bad arguments are named."""
+
+from __future__ import annotations
+
+import io
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.images import COLORMAPS, comparison_png, report_png, slice_png
+from bentray_workers.reconstruction_file import write_reconstruction
+
+from .reconstructions import made, truth
+
+
+def pixels(png: bytes) -> np.ndarray:
+    with Image.open(io.BytesIO(png)) as image:
+        assert image.format == "PNG"
+        return np.asarray(image.convert("RGB")).astype(int)
+
+
+def near(picture: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
+    return (np.abs(picture - np.array(colour)).sum(axis=-1) < 12).nonzero()
+
+
+YELLOW = (253, 231, 37)
+
+
+@pytest.fixture
+def file(tmp_path):
+    write_reconstruction(tmp_path / "r.h5", made())
+    return tmp_path / "r.h5"
+
+
+@pytest.fixture
+def volume(tmp_path):
+    write_reconstruction(tmp_path / "v.h5", made(slices=3))
+    return tmp_path / "v.h5"
+
+
+def test_x_is_to_the_right_and_y_up(tmp_path):
+    result = made()
+    speed = np.full_like(result.speed, 1500.0)
+    speed[18:22, 3:6] = 1600.0
+    write_reconstruction(tmp_path / "r.h5", replace(result, speed=speed))
+    picture = pixels(slice_png(tmp_path / "r.h5", low=1500.0, high=1600.0))
+    map_part = picture[:, : int(0.84 * picture.shape[1])]
+    rows, columns = near(map_part, YELLOW)
+    assert rows.size > 500
+    assert columns.mean() > 0.65 * map_part.shape[1]
+    assert rows.mean() > 0.6 * map_part.shape[0]
+
+
+def test_the_limits_set_the_colours(file):
+    fewer = pixels(slice_png(file, low=1000.0, high=1500.0))
+    more = pixels(slice_png(file, low=1600.0, high=1700.0))
+    assert near(fewer, YELLOW)[0].size > 20 * max(1, near(more, YELLOW)[0].size)
+
+
+def test_quantities_maps_and_slices_differ(volume):
+    pictures = [
+        slice_png(volume),
+        slice_png(volume, quantity="coverage"),
+        slice_png(volume, quantity="attenuation"),
+        slice_png(volume, colormap="gray"),
+        slice_png(volume, index=0),
+    ]
+    assert len(set(pictures)) == len(pictures)
+    assert slice_png(volume, index=1) == slice_png(volume)
+
+
+def test_a_constant_image_is_drawn(tmp_path):
+    result = made()
+    flat = replace(result, speed=np.full_like(result.speed, 1500.0), coverage=np.zeros_like(result.coverage))
+    write_reconstruction(tmp_path / "r.h5", flat)
+    for quantity in ("speed", "coverage"):
+        assert pixels(slice_png(tmp_path / "r.h5", quantity=quantity)).shape[0] > 300
+
+
+@pytest.mark.parametrize(
+    ("given", "field", "accepted"),
+    [
+        ({"quantity": "mass"}, "quantity", "speed, coverage"),
+        ({"colormap": "jet"}, "colormap", "viridis"),
+        ({"index": 1}, "index", "0 to 0"),
+        ({"index": -1}, "index", "0 to 0"),
+        ({"low": 1500.0, "high": 1500.0}, "low", "below"),
+        ({"low": 9000.0}, "low", "below"),
+        ({"high": 10.0}, "high", "above"),
+        ({"low": float("nan")}, "low", "finite"),
+        ({"high": float("inf")}, "high", "finite"),
+    ],
+)
+def test_bad_arguments_are_named(file, given, field, accepted):
+    with pytest.raises(InvalidInput) as refused:
+        slice_png(file, **given)
+    assert refused.value.field == field
+    assert accepted in refused.value.accepted
+
+
+def test_a_quantity_that_the_file_lacks_is_refused(tmp_path):
+    write_reconstruction(tmp_path / "r.h5", replace(made(), attenuation=None))
+    with pytest.raises(InvalidInput, match="quantity"):
+        slice_png(tmp_path / "r.h5", quantity="attenuation")
+
+
+def test_pictures_drawn_in_threads_are_those_drawn_alone(file):
+    jobs = [{"colormap": name} for name in COLORMAPS[:4]] * 2
+    alone = [slice_png(file, **job) for job in jobs]
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(lambda job: slice_png(file, **job), jobs)) == alone
+
+
+def test_reports_grow_with_what_is_known():
+    plain = pixels(report_png(made())).shape
+    with_truth = pixels(report_png(made(), truth())).shape
+    unregistered = pixels(report_png(made(), truth(axes="needs registration"))).shape
+    assert with_truth[0] > 1.5 * plain[0]
+    assert with_truth[1] == plain[1] > unregistered[1]
+    assert pixels(report_png(made(slices=3))).shape == plain
+    assert pixels(report_png(replace(made(), history=()))).shape == plain
+
+
+def test_the_comparison_has_a_column_a_result():
+    one = pixels(comparison_png(truth(), {"straight": made()}))
+    two = pixels(comparison_png(truth(), {"straight": made(height_mps=20.0), "bent": made()}))
+    assert two.shape[0] == one.shape[0]
+    assert two.shape[1] == pytest.approx(1.5 * one.shape[1], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("results", "shown", "field"),
+    [({}, truth(), "results"), ({"bent": made()}, truth(axes="as displayed"), "truth@axes")],
+)
+def test_a_comparison_needs_results_and_a_truth_that_fits(results, shown, field):
+    with pytest.raises(InvalidInput) as refused:
+        comparison_png(shown, results)
+    assert refused.value.field == field
