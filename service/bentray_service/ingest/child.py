@@ -51,9 +51,8 @@ def limit(memory_bytes: int, seconds: float) -> None:
 def convert(source: Path, target: Path) -> dict[str, Any]:
     """Read ``source``, write the canonical ``target``, and say what it holds or what is wrong with it."""
     try:
-        from bentray_workers.dataset_file import read_dataset, write_dataset
-
         from bentray_kernels.errors import InvalidInput
+        from bentray_workers.dataset_file import read_dataset, write_dataset
     except MemoryError:
         return _error("file", "no memory left to start the reader", "a larger BENTRAY_INGEST_MEMORY_BYTES")
     try:

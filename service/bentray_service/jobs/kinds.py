@@ -9,12 +9,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
 
-from bentray_workers.reconstruction_file import write_reconstruction
 from pydantic import TypeAdapter
 
 from bentray_kernels.tomography.result import Progress, Reconstruction
 from bentray_kernels.tomography.settings import Settings
 from bentray_workers import slices
+from bentray_workers.reconstruction_file import write_reconstruction
 
 
 @dataclass(frozen=True)

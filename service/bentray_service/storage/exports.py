@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+
 from bentray_workers.reconstruction_file import read_reconstruction
 
 
