@@ -10,7 +10,7 @@ from ..arrays import Floats, Ints
 from ..compiled import kernel
 from .fast_sweeping import sweep_until_settled
 from .problem import PointSource
-from .updates import factored_update, scratch
+from .updates import factored_update
 
 # The order of arrival is all that the first-order times are for; they need not settle to rounding.
 ORDER_TOLERANCE = 1e-3
@@ -31,8 +31,8 @@ def accurate(problem: PointSource) -> Floats:
         (nx, ny[, nz]), s.
     """
     seeds, times = problem.seeds()
-    source_slowness = problem.source_slowness()
-    reference = source_slowness * problem.distance()
+    squares = problem.reference_squares()
+    limit = problem.source_slowness() ** 2 * problem.spacing
     time = sweep_until_settled(problem, ORDER_TOLERANCE)
     for _ in range(PASSES):
         time = _pass(
@@ -40,9 +40,8 @@ def accurate(problem: PointSource) -> Floats:
             problem.padded_slowness,
             problem.strides,
             problem.spacing,
-            problem.source,
-            source_slowness,
-            reference,
+            squares,
+            limit,
             seeds,
             times,
         )
@@ -88,41 +87,22 @@ def _pass(
     slowness: Floats,
     strides: tuple[int, ...],
     spacing: float,
-    source: Floats,
-    source_slowness: float,
-    reference: Floats,
+    squares: Floats,
+    limit: float,
     seeds: Ints,
     seed_times: Floats,
 ) -> Floats:
-    time = np.full(slowness.size, math.inf)
+    # A constant 0 for the third of two axes lets the compiler drop its code.
+    steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
+    settled = np.full(slowness.size, math.inf)
     tau = np.ones(slowness.size)
-    accepted = np.zeros(slowness.size, np.bool_)
-    slope, shift, newest = scratch(len(strides))
-    offset_m = np.empty(len(strides))
     for k in range(seeds.size):
-        time[seeds[k]] = seed_times[k]
+        settled[seeds[k]] = seed_times[k]
+        if squares[seeds[k]] > 0.0:
+            tau[seeds[k]] = seed_times[k] / math.sqrt(squares[seeds[k]])
     for node in order:
-        rest = node
-        for k in range(len(strides)):
-            offset_m[k] = (rest // strides[k] - 1) * spacing - source[k]
-            rest = rest % strides[k]
-        if reference[node] > 0.0:
-            trial = factored_update(
-                node,
-                strides,
-                spacing,
-                slowness,
-                source_slowness,
-                offset_m,
-                reference,
-                tau,
-                time,
-                accepted,
-                slope,
-                shift,
-                newest,
-            )
-            time[node] = min(time[node], trial)
-            tau[node] = time[node] / reference[node]
-        accepted[node] = True
-    return time
+        if settled[node] < math.inf:
+            continue
+        settled[node] = factored_update(node, steps, spacing, slowness, squares, tau, settled, limit)
+        tau[node] = settled[node] / math.sqrt(squares[node])
+    return settled

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
@@ -72,20 +72,26 @@ class PointSource:
         shape = self.padded_shape
         return tuple(math.prod(shape[axis + 1 :]) for axis in range(len(shape)))
 
+    def places(self, inside: int, border: int) -> NDArray[np.int32]:
+        """Flat, padded: one value inside the grid and another on the border, which no front may enter."""
+        marks = np.full(self.padded_shape, border, np.int32)
+        marks[(slice(1, -1),) * self.slowness.ndim] = inside
+        return marks.ravel()
+
     def interior(self, padded: Floats) -> Floats:
         """The grid without its border, as a fresh C-ordered array."""
         inside = (slice(1, -1),) * self.slowness.ndim
         return np.ascontiguousarray(padded.reshape(self.padded_shape)[inside])
 
-    def distance(self) -> Floats:
-        """Padded flat distance of every node from the source, m."""
-        squared: Floats = np.zeros(self.padded_shape)
+    def reference_squares(self) -> Floats:
+        """T0², the squared travel time in the source's own slowness; padded and flat, s²."""
+        squares: Floats = np.zeros(self.padded_shape)
         for axis, n in enumerate(self.padded_shape):
             offset = (np.arange(n) - 1.0) * self.spacing - self.source[axis]
             shape = [1] * len(self.padded_shape)
             shape[axis] = n
-            squared += (offset**2).reshape(shape)
-        return np.asarray(np.sqrt(squared)).ravel()
+            squares += (offset**2).reshape(shape)
+        return np.asarray(squares * self.source_slowness() ** 2).ravel()
 
     def source_slowness(self) -> float:
         """Slowness at the source, multilinear between its cell's nodes, s/m."""

@@ -1,182 +1,199 @@
 """Local (Godunov) updates of a node from its upwind neighbours; every solver shares them.
 
-All arrays are flat over a grid with a border of one node. ``strides`` is a tuple, one entry an axis, so
-that the compiler unrolls the loops over axes. ``accepted`` marks the nodes whose time may be used.
+All arrays are flat over a grid with a border of one node. ``strides`` has three entries; a grid of two
+axes has 0 for the third, whose neighbour is then the node itself and never settled. ``settled`` holds
+the final times and infinity elsewhere, so an unknown neighbour drops out of every minimum by itself.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from ..arrays import Flags, Floats
+from ..arrays import Floats
 from ..compiled import kernel
 
 # Two nodes at one distance either side of the source differ by rounding; neither is later.
 TIE = 1e-12
 
+# An axis of the plain scheme: T at the base of the difference, its weight, time of the nearest neighbour.
+PlainAxis = tuple[float, float, float]
+
+# An axis of the factored scheme: slope and shift of ∂T/∂x = slope·τ + shift, time of the nearest
+# neighbour, offset to it.
+FactoredAxis = tuple[float, float, float, int]
+
 
 @kernel(inline="always")
-def solve_upwind(times: Floats, weights: Floats, newest: Floats, count: int, rhs: float) -> float:
-    """Largest T with Σ w (T − t)² = rhs² that lies downwind of all its neighbours.
+def plain_axis(node: int, stride: int, settled: Floats, second_order: bool) -> PlainAxis:
+    """One axis of the upwind difference; its time is infinite where no neighbour is settled.
 
-    ``newest`` holds each axis's nearest neighbour time. An axis whose neighbour is later than the
-    root breaks causality: the latest is dropped and the rest solved again.
+    The derivative is (T − T1)/h, or (3T − 4T1 + T2)/(2h) where the second neighbour is settled and not
+    later than the first (chapter 6, equation 3); both are sqrt(weight)·(T − base)/h.
     """
-    while True:
-        a = 0.0
-        b = 0.0
-        c = -rhs * rhs
-        latest = 0
-        for k in range(count):
-            a += weights[k]
-            b += weights[k] * times[k]
-            c += weights[k] * times[k] * times[k]
-            if newest[k] > newest[latest]:
-                latest = k
-        root = b * b - a * c
-        if root >= 0.0:
-            time = (b + math.sqrt(root)) / a
-            if time >= newest[latest]:
-                return time
-        if count == 1:
-            # The second-order stencil of a single axis can fall below its neighbour; first order cannot.
-            return float(newest[0] + rhs)
-        count -= 1
-        times[latest] = times[count]
-        weights[latest] = weights[count]
-        newest[latest] = newest[count]
+    left = settled[node - stride]
+    right = settled[node + stride]
+    if left <= right:
+        # Beyond the border there is nothing to read; an infinite first neighbour may be the border.
+        first, second = left, (settled[node - 2 * stride] if left < math.inf else math.inf)
+    else:
+        first, second = right, settled[node + 2 * stride]
+    if second_order and second <= first and first < math.inf:
+        return (4.0 * first - second) / 3.0, 2.25, first
+    return first, 1.0, first
 
 
 @kernel(inline="always")
-def upwind(node: int, stride: int, time: Floats, accepted: Flags) -> int:
-    """Offset to the earlier accepted neighbour along one axis, 0 where there is none."""
-    left = time[node - stride] if accepted[node - stride] else math.inf
-    right = time[node + stride] if accepted[node + stride] else math.inf
-    if left == math.inf and right == math.inf:
-        return 0
-    return -stride if left <= right else stride
-
-
-@kernel
 def plain_update(
-    node: int,
-    strides: tuple[int, ...],
-    spacing: float,
-    slowness: Floats,
-    time: Floats,
-    accepted: Flags,
-    second_order: bool,
-    times: Floats,
-    weights: Floats,
-    newest: Floats,
+    node: int, strides: tuple[int, int, int], rhs: float, settled: Floats, second_order: bool
 ) -> float:
-    """Travel time of one node from its accepted neighbours (Sethian 1996; order two: Sethian 1999).
+    """Travel time of one node from its settled neighbours (Sethian 1996; order two: Sethian 1999).
 
-    Derivatives are (T − T1)/h, or (3T − 4T1 + T2)/(2h) where the second neighbour is accepted and
-    not later than the first (chapter 6, equation 3). ``times``, ``weights`` and ``newest`` are scratch.
+    T with Σ weight·(T − base)² = rhs², rhs being spacing times slowness, s. An axis whose neighbour is
+    later than the root breaks causality and is dropped, the latest first.
     """
-    count = 0
-    for axis in range(len(strides)):
-        offset = upwind(node, strides[axis], time, accepted)
-        if offset == 0:
-            continue
-        first = time[node + offset]
-        times[count] = first
-        weights[count] = 1.0
-        newest[count] = first
-        if second_order and accepted[node + 2 * offset]:
-            second = time[node + 2 * offset]
-            if second <= first:
-                times[count] = (4.0 * first - second) / 3.0
-                weights[count] = 2.25
-        count += 1
-    return solve_upwind(times, weights, newest, count, spacing * slowness[node])
+    a = plain_axis(node, strides[0], settled, second_order)
+    b = plain_axis(node, strides[1], settled, second_order)
+    if b[2] < a[2]:
+        a, b = b, a
+    if strides[2] != 0:
+        c = plain_axis(node, strides[2], settled, second_order)
+        if c[2] < b[2]:
+            b, c = c, b
+            if b[2] < a[2]:
+                a, b = b, a
+        if c[2] < math.inf:
+            weights = a[1] + b[1] + c[1]
+            mixed = a[1] * a[0] + b[1] * b[0] + c[1] * c[0]
+            squares = a[1] * a[0] * a[0] + b[1] * b[0] * b[0] + c[1] * c[0] * c[0]
+            root = mixed * mixed - weights * (squares - rhs * rhs)
+            if root >= 0.0:
+                time = (mixed + math.sqrt(root)) / weights
+                if time >= c[2]:
+                    return time
+    if b[2] < math.inf:
+        gap = b[0] - a[0]
+        root = (a[1] + b[1]) * rhs * rhs - a[1] * b[1] * gap * gap
+        if root >= 0.0:
+            time = (a[1] * a[0] + b[1] * b[0] + math.sqrt(root)) / (a[1] + b[1])
+            if time >= b[2]:
+                return time
+    time = a[0] + rhs / math.sqrt(a[1])
+    # The second-order difference of a single axis can fall below its neighbour; first order cannot.
+    return time if time >= a[2] else a[2] + rhs
 
 
-@kernel
+@kernel(inline="always")
+def factored_axis(
+    node: int,
+    stride: int,
+    spacing: float,
+    base: float,
+    squares: Floats,
+    tau: Floats,
+    settled: Floats,
+    limit: float,
+) -> FactoredAxis:
+    """One axis of the factored difference, taken positive away from its neighbour.
+
+    Where no neighbour is settled the time is infinite and the offset 0. The slope is then that of T0 if
+    the source lies beside the node, between two node lines (the minimum along the axis is at no node,
+    so ∂T/∂x is not 0 there), and else 0.
+    """
+    left = settled[node - stride]
+    right = settled[node + stride]
+    # s0²·x from the squares of T0 either side, exactly: no coordinates need to be kept.
+    along = (squares[node + stride] - squares[node - stride]) / (4.0 * spacing * base)
+    if left == math.inf and right == math.inf:
+        return (abs(along) if abs(along) * base < limit else 0.0), 0.0, math.inf, 0
+    offset = -stride if left <= right else stride
+    first = min(left, right)
+    near = tau[node + offset]
+    weight = base / spacing
+    second = settled[node + 2 * offset]
+    if second <= first:
+        near = (4.0 * near - tau[node + 2 * offset]) / 3.0
+        weight *= 1.5
+    if offset > 0:
+        along = -along
+    return along + weight, -weight * near, first, offset
+
+
+@kernel(inline="always")
+def factored_root(a: float, b: float, c: float, latest: float, base: float) -> float:
+    """Downwind root of a·τ² + 2b·τ + c = 0, or −1 where none is as late as ``latest``."""
+    root = b * b - a * c
+    if root < 0.0 or a <= 0.0:
+        return -1.0
+    factor = (-b + math.sqrt(root)) / a
+    return factor if base * factor >= latest * (1.0 - TIE) else -1.0
+
+
+@kernel(inline="always")
 def factored_update(
     node: int,
-    strides: tuple[int, ...],
+    strides: tuple[int, int, int],
     spacing: float,
     slowness: Floats,
-    source_slowness: float,
-    offset_m: Floats,
-    reference: Floats,
+    squares: Floats,
     tau: Floats,
-    time: Floats,
-    accepted: Flags,
-    slope: Floats,
-    shift: Floats,
-    newest: Floats,
+    settled: Floats,
+    limit: float,
 ) -> float:
     """Travel time of one node with T = T0·τ, T0 the time in the source's own slowness.
 
-    Only the smooth factor τ is differenced, so the source's singularity costs no accuracy (Fomel,
-    Luo & Zhao 2009; Treister & Haber 2016). Upwind along an axis, ∂T/∂x is slope·τ + shift; the
-    nodal equation Σ (slope·τ + shift)² = slowness² is solved for the downwind root. ``offset_m`` is the
-    node minus the source, (ndim,), m; ``slope``, ``shift`` and ``newest`` are scratch.
+    Only the smooth factor τ is differenced, so the source's singularity costs no accuracy (Fomel, Luo &
+    Zhao 2009; Treister & Haber 2016). Σ (slope·τ + shift)² = slowness² is solved for the downwind root;
+    an axis that is later than the root, or not upwind, is dropped, the latest first.
+
+    Args:
+        squares: T0² of every node, border included, s².
+        limit: (source slowness)²·spacing; |x| < spacing is |x|·s0² < limit.
     """
-    base = reference[node]
+    base = math.sqrt(squares[node])
     local = slowness[node]
-    count = 0
-    earliest = math.inf
-    beside = local
-    for axis in range(len(strides)):
-        offset = upwind(node, strides[axis], time, accepted)
-        if offset == 0:
-            # Beside a source between two node lines the minimum along the axis is at no node, so
-            # ∂T/∂x is not 0 there but that of T0.
-            if 0.0 < abs(offset_m[axis]) < spacing:
-                slope[count] = source_slowness * source_slowness * abs(offset_m[axis]) / base
-                shift[count] = 0.0
-                newest[count] = -1.0
-                count += 1
-            continue
-        sign = 1.0 if offset > 0 else -1.0
-        near = tau[node + offset]
-        weight = 1.0
-        if accepted[node + 2 * offset] and time[node + 2 * offset] <= time[node + offset]:
-            near = (4.0 * near - tau[node + 2 * offset]) / 3.0
-            weight = 1.5
-        # ∂T0/∂x = s0²·x/T0; signs are turned so that the derivative is positive away from the neighbour.
-        along = -sign * source_slowness * source_slowness * offset_m[axis] / base
-        slope[count] = along + weight * base / spacing
-        shift[count] = -weight * base * near / spacing
-        newest[count] = time[node + offset]
-        if newest[count] < earliest:
-            earliest = newest[count]
-            beside = slowness[node + offset]
-        count += 1
-    # The way straight from the earliest neighbour: no time is later than along it at its slower end.
-    latest_possible = earliest + spacing * max(local, beside)
-    while count > 0:
-        a = 0.0
-        b = 0.0
-        c = -local * local
-        latest = 0
-        for k in range(count):
-            a += slope[k] * slope[k]
-            b += slope[k] * shift[k]
-            c += shift[k] * shift[k]
-            if newest[k] > newest[latest]:
-                latest = k
-        if newest[latest] < 0.0:
-            break
-        root = b * b - a * c
-        if root >= 0.0 and a > 0.0:
-            factor = (-b + math.sqrt(root)) / a
-            upwinded = base * factor >= newest[latest] * (1.0 - TIE)
-            for k in range(count):
-                upwinded = upwinded and slope[k] * factor + shift[k] >= 0.0
-            if upwinded:
-                return float(min(base * factor, latest_possible))
-        count -= 1
-        slope[latest] = slope[count]
-        shift[latest] = shift[count]
-        newest[latest] = newest[count]
-    return float(earliest + 0.5 * spacing * (local + beside))
+    a = factored_axis(node, strides[0], spacing, base, squares, tau, settled, limit)
+    b = factored_axis(node, strides[1], spacing, base, squares, tau, settled, limit)
+    c = (0.0, 0.0, math.inf, 0)
+    if b[2] < a[2]:
+        a, b = b, a
+    if strides[2] != 0:
+        c = factored_axis(node, strides[2], spacing, base, squares, tau, settled, limit)
+        if c[2] < b[2]:
+            b, c = c, b
+            if b[2] < a[2]:
+                a, b = b, a
+    # Coefficients of the quadratic: the earliest axis, and those beside the source without a neighbour.
+    slopes = a[0] * a[0]
+    mixed = a[0] * a[1]
+    shifts = a[1] * a[1] - local * local
+    if b[2] == math.inf:
+        slopes += b[0] * b[0]
+    if c[2] == math.inf:
+        slopes += c[0] * c[0]
+    factor = -1.0
+    if c[2] < math.inf:
+        factor = factored_root(
+            slopes + b[0] * b[0] + c[0] * c[0],
+            mixed + b[0] * b[1] + c[0] * c[1],
+            shifts + b[1] * b[1] + c[1] * c[1],
+            c[2],
+            base,
+        )
+        if a[0] * factor + a[1] < 0.0 or b[0] * factor + b[1] < 0.0 or c[0] * factor + c[1] < 0.0:
+            factor = -1.0
+    if factor < 0.0 and b[2] < math.inf:
+        factor = factored_root(slopes + b[0] * b[0], mixed + b[0] * b[1], shifts + b[1] * b[1], b[2], base)
+        if a[0] * factor + a[1] < 0.0 or b[0] * factor + b[1] < 0.0:
+            factor = -1.0
+    if factor < 0.0:
+        factor = factored_root(slopes, mixed, shifts, a[2], base)
+        if a[0] * factor + a[1] < 0.0:
+            factor = -1.0
+    beside = slowness[node + a[3]]
+    if factor < 0.0:
+        return float(a[2] + 0.5 * spacing * (local + beside))
+    # No time is later than straight from the earliest neighbour at the slower of the two nodes.
+    return float(min(base * factor, a[2] + spacing * max(local, beside)))
 
 
 @kernel(inline="always")
@@ -201,9 +218,3 @@ def first_order_3d(a: float, b: float, c: float, rhs: float) -> float:
             squares = low * low + middle * middle + high * high
             time = (total + math.sqrt(total * total - 3.0 * (squares - rhs * rhs))) / 3.0
     return time
-
-
-@kernel
-def scratch(axes: int) -> tuple[Floats, Floats, Floats]:
-    """Three small arrays for the updates above; made once a solve."""
-    return np.empty(axes), np.empty(axes), np.empty(axes)
