@@ -32,7 +32,7 @@ def accurate(problem: PointSource) -> Floats:
     """
     seeds, times = problem.seeds()
     squares = problem.reference_squares()
-    limit = problem.source_slowness() ** 2 * problem.spacing
+    limit = 4.0 * (problem.source_slowness() * problem.spacing) ** 2
     time = sweep_until_settled(problem, ORDER_TOLERANCE)
     for _ in range(PASSES):
         time = _pass(

@@ -58,7 +58,7 @@ def high_accuracy_fast_marching(problem: PointSource) -> Floats:
         problem.strides,
         problem.spacing,
         problem.reference_squares(),
-        problem.source_slowness() ** 2 * problem.spacing,
+        4.0 * (problem.source_slowness() * problem.spacing) ** 2,
         seeds,
         times,
     )

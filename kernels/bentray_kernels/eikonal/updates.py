@@ -84,48 +84,29 @@ def plain_update(
 
 @kernel(inline="always")
 def factored_axis(
-    node: int,
-    stride: int,
-    spacing: float,
-    base: float,
-    squares: Floats,
-    tau: Floats,
-    settled: Floats,
-    limit: float,
+    node: int, stride: int, curl: float, squares: Floats, tau: Floats, settled: Floats, limit: float
 ) -> FactoredAxis:
-    """One axis of the factored difference, taken positive away from its neighbour.
+    """One axis of the factored difference, taken positive away from its neighbour, over T0/h.
 
     Where no neighbour is settled the time is infinite and the offset 0. The slope is then that of T0 if
     the source lies beside the node, between two node lines (the minimum along the axis is at no node,
-    so ∂T/∂x is not 0 there), and else 0.
+    so ∂T/∂x is not 0 there), and else 0. ``curl`` is 1/(4·T0²).
     """
     left = settled[node - stride]
     right = settled[node + stride]
-    # s0²·x from the squares of T0 either side, exactly: no coordinates need to be kept.
-    along = (squares[node + stride] - squares[node - stride]) / (4.0 * spacing * base)
-    if left == math.inf and right == math.inf:
-        return (abs(along) if abs(along) * base < limit else 0.0), 0.0, math.inf, 0
-    offset = -stride if left <= right else stride
     first = min(left, right)
-    near = tau[node + offset]
-    weight = base / spacing
+    # h·s0²·x from the squares of T0 either side, exactly: no coordinates need to be kept.
+    difference = squares[node + stride] - squares[node - stride]
+    if first == math.inf:
+        return (abs(difference) * curl if abs(difference) < limit else 0.0), 0.0, math.inf, 0
+    offset = -stride if left <= right else stride
+    along = difference if left <= right else -difference
     second = settled[node + 2 * offset]
-    if second <= first:
-        near = (4.0 * near - tau[node + 2 * offset]) / 3.0
-        weight *= 1.5
-    if offset > 0:
-        along = -along
-    return along + weight, -weight * near, first, offset
-
-
-@kernel(inline="always")
-def factored_root(a: float, b: float, c: float, latest: float, base: float) -> float:
-    """Downwind root of a·τ² + 2b·τ + c = 0, or −1 where none is as late as ``latest``."""
-    root = b * b - a * c
-    if root < 0.0 or a <= 0.0:
-        return -1.0
-    factor = (-b + math.sqrt(root)) / a
-    return factor if base * factor >= latest * (1.0 - TIE) else -1.0
+    weight = 1.5 if second <= first else 1.0
+    # Second order: 3/2·(4τ1 − τ2)/3; first order: τ1.
+    near = tau[node + offset]
+    shift = 2.0 * near - 0.5 * tau[node + 2 * offset] if second <= first else near
+    return weight + along * curl, -shift, first, offset
 
 
 @kernel(inline="always")
@@ -142,30 +123,71 @@ def factored_update(
     """Travel time of one node with T = T0·τ, T0 the time in the source's own slowness.
 
     Only the smooth factor τ is differenced, so the source's singularity costs no accuracy (Fomel, Luo &
-    Zhao 2009; Treister & Haber 2016). Σ (slope·τ + shift)² = slowness² is solved for the downwind root;
-    an axis that is later than the root, or not upwind, is dropped, the latest first.
+    Zhao 2009; Treister & Haber 2016). With derivatives in units of T0/h, Σ (slope·τ + shift)² =
+    (h·slowness/T0)² is solved for the downwind root; an axis that is later than the root, or not
+    upwind, is dropped, the latest first.
 
     Args:
         squares: T0² of every node, border included, s².
-        limit: (source slowness)²·spacing; |x| < spacing is |x|·s0² < limit.
+        limit: 4·(source slowness·spacing)²; a source nearer than the spacing differs by less.
     """
-    base = math.sqrt(squares[node])
-    local = slowness[node]
-    a = factored_axis(node, strides[0], spacing, base, squares, tau, settled, limit)
-    b = factored_axis(node, strides[1], spacing, base, squares, tau, settled, limit)
+    square = squares[node]
+    inverse = 1.0 / square
+    curl = 0.25 * inverse
+    base = math.sqrt(square)
+    local = spacing * slowness[node]
+    rhs = local * local * inverse
+    a = factored_axis(node, strides[0], curl, squares, tau, settled, limit)
+    b = factored_axis(node, strides[1], curl, squares, tau, settled, limit)
     c = (0.0, 0.0, math.inf, 0)
+    if strides[2] != 0:
+        c = factored_axis(node, strides[2], curl, squares, tau, settled, limit)
+    # Nearly every node: all axes have a neighbour, and the root is downwind of them.
+    slopes = a[0] * a[0] + b[0] * b[0] + c[0] * c[0]
+    mixed = a[0] * a[1] + b[0] * b[1] + c[0] * c[1]
+    shifts = a[1] * a[1] + b[1] * b[1] + c[1] * c[1] - rhs
+    root = mixed * mixed - slopes * shifts
+    latest = max(a[2], b[2])
+    if strides[2] != 0:
+        latest = max(latest, c[2])
+    if root >= 0.0 and latest < math.inf:
+        factor = (math.sqrt(root) - mixed) / slopes
+        if (
+            base * factor >= latest * (1.0 - TIE)
+            and a[0] * factor + a[1] >= 0.0
+            and b[0] * factor + b[1] >= 0.0
+            and c[0] * factor + c[1] >= 0.0
+        ):
+            first = a if a[2] <= b[2] else b
+            first = c if c[2] < first[2] else first
+            # No time is later than straight from the earliest neighbour at the slower of the two nodes.
+            return float(min(base * factor, first[2] + max(local, spacing * slowness[node + first[3]])))
+    return _factored_fewer(a, b, c, node, spacing, slowness, base, local, rhs)
+
+
+@kernel(inline="always")
+def _factored_fewer(
+    a: FactoredAxis,
+    b: FactoredAxis,
+    c: FactoredAxis,
+    node: int,
+    spacing: float,
+    slowness: Floats,
+    base: float,
+    local: float,
+    rhs: float,
+) -> float:
+    """The update where an axis has no neighbour or must be dropped."""
     if b[2] < a[2]:
         a, b = b, a
-    if strides[2] != 0:
-        c = factored_axis(node, strides[2], spacing, base, squares, tau, settled, limit)
-        if c[2] < b[2]:
-            b, c = c, b
-            if b[2] < a[2]:
-                a, b = b, a
-    # Coefficients of the quadratic: the earliest axis, and those beside the source without a neighbour.
+    if c[2] < b[2]:
+        b, c = c, b
+        if b[2] < a[2]:
+            a, b = b, a
     slopes = a[0] * a[0]
     mixed = a[0] * a[1]
-    shifts = a[1] * a[1] - local * local
+    shifts = a[1] * a[1] - rhs
+    # Axes beside the source turn the front even without a neighbour.
     if b[2] == math.inf:
         slopes += b[0] * b[0]
     if c[2] == math.inf:
@@ -189,11 +211,20 @@ def factored_update(
         factor = factored_root(slopes, mixed, shifts, a[2], base)
         if a[0] * factor + a[1] < 0.0:
             factor = -1.0
-    beside = slowness[node + a[3]]
+    beside = spacing * slowness[node + a[3]]
     if factor < 0.0:
-        return float(a[2] + 0.5 * spacing * (local + beside))
-    # No time is later than straight from the earliest neighbour at the slower of the two nodes.
-    return float(min(base * factor, a[2] + spacing * max(local, beside)))
+        return float(a[2] + 0.5 * (local + beside))
+    return float(min(base * factor, a[2] + max(local, beside)))
+
+
+@kernel(inline="always")
+def factored_root(a: float, b: float, c: float, latest: float, base: float) -> float:
+    """Downwind root of a·τ² + 2b·τ + c = 0, or −1 where none is as late as ``latest``."""
+    root = b * b - a * c
+    if root < 0.0 or a <= 0.0:
+        return -1.0
+    factor = (math.sqrt(root) - b) / a
+    return factor if base * factor >= latest * (1.0 - TIE) else -1.0
 
 
 @kernel(inline="always")

@@ -1,9 +1,9 @@
 """One ray down the travel time to its source; the inner loop of every ray kernel.
 
 Positions are in nodes (metres divided by the spacing) and arrays are flat, with ``strides`` a tuple of
-one entry an axis, so that the compiler unrolls the loops over axes. The direction is −∇(T²), not −∇T:
-near the source T² is a paraboloid, whose gradient is linear and vanishes at the source alone, where ∇T
-would jump from one side to the other.
+one entry an axis, so that the compiler unrolls the loops over axes; ``scratch`` is (3, ndim), for the
+callee's use. The direction is −∇(T²), not −∇T: near the source T² is a paraboloid, whose gradient is
+linear and vanishes at the source alone, where ∇T would jump from one side to the other.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def _distance(a: Floats, b: Floats, axes: int) -> float:
     return math.sqrt(total)
 
 
-@kernel
+@kernel(inline="always")
 def curved_ray(
     receiver: Floats,
     source: Floats,
@@ -125,6 +125,7 @@ def curved_ray(
     shape: tuple[int, ...],
     strides: tuple[int, ...],
     path: Floats,
+    scratch: Floats,
 ) -> int:
     """Fill ``path`` (room, ndim) from receiver to source by RK2 descent; returns the number of points.
 
@@ -133,9 +134,7 @@ def curved_ray(
     ends, since a travel time has no local minimum but its source.
     """
     axes = len(shape)
-    part = np.empty(axes)
-    slope = np.empty(axes)
-    middle = np.empty(axes)
+    part, slope, middle = scratch[0], scratch[1], scratch[2]
     for axis in range(axes):
         path[0, axis] = receiver[axis]
     room = len(path) - 1
@@ -153,16 +152,21 @@ def curved_ray(
             break
         for axis in range(axes):
             path[count, axis] = min(max(here[axis] + STEP * slope[axis], 0.0), shape[axis] - 1.0)
-    return _node_descent(source, tof, shape, strides, path)
+    return _node_descent(source, tof, shape, strides, path, scratch)
 
 
-@kernel
+@kernel(inline="always")
 def _node_descent(
-    source: Floats, tof: Floats, shape: tuple[int, ...], strides: tuple[int, ...], path: Floats
+    source: Floats,
+    tof: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    path: Floats,
+    scratch: Floats,
 ) -> int:
     """From ``path[0]`` along the lowest neighbours to the source; returns the number of points."""
     axes = len(shape)
-    part = np.empty(axes)
+    part = scratch[0]
     node = locate(path[0], shape, strides, part)
     best = node
     for which in range(1 << axes):
@@ -198,7 +202,7 @@ def _node_descent(
     return count + 1
 
 
-@kernel
+@kernel(inline="always")
 def straight_ray(receiver: Floats, source: Floats, axes: int, path: Floats) -> int:
     """Fill ``path`` with equal steps of at most ``STEP`` to the source; returns the number of points."""
     steps = max(1, math.ceil(_distance(receiver, source, axes) / STEP))
@@ -208,9 +212,15 @@ def straight_ray(receiver: Floats, source: Floats, axes: int, path: Floats) -> i
     return steps + 1
 
 
-@kernel
+@kernel(inline="always")
 def walk(
-    path: Floats, count: int, shape: tuple[int, ...], strides: tuple[int, ...], nodes: Ints, lengths: Floats
+    path: Floats,
+    count: int,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    nodes: Ints,
+    lengths: Floats,
+    scratch: Floats,
 ) -> int:
     """Nodes that a path weighs on and by how much; returns the number of entries.
 
@@ -219,8 +229,7 @@ def walk(
     every piece near it.
     """
     axes = len(shape)
-    part = np.empty(axes)
-    middle = np.empty(axes)
+    part, middle = scratch[0], scratch[1]
     entries = 0
     for k in range(1, count):
         length = _distance(path[k], path[k - 1], axes)

@@ -49,6 +49,7 @@ def _rows(
 ) -> tuple[Ints, Ints, Floats]:
     axes = len(shape)
     path = np.empty((room, axes))
+    scratch = np.empty((3, axes))
     nodes = np.empty(room << axes, np.int64)
     lengths = np.empty(room << axes)
     total = np.zeros(tof.size)
@@ -60,10 +61,10 @@ def _rows(
     filled = 0
     for row in range(len(receivers)):
         if curved:
-            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, path)
+            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, path, scratch)
         else:
             count = straight_ray(receivers[row], source, axes, path)
-        entries = walk(path, count, shape, strides, nodes, lengths)
+        entries = walk(path, count, shape, strides, nodes, lengths, scratch)
         distinct = 0
         for k in range(entries):
             if total[nodes[k]] == 0.0 and lengths[k] > 0.0:

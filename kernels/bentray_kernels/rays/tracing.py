@@ -34,9 +34,12 @@ def trace(
     """
     fan = Fan.checked(tof, spacing, receivers, source, kind)
     path = np.empty((fan.room, len(fan.shape)))
+    scratch = np.empty((3, len(fan.shape)))
     paths = []
     for receiver in fan.receivers:
-        count = _one(receiver, fan.source, fan.tof, fan.gradient, fan.shape, fan.strides, fan.curved, path)
+        count = _one(
+            receiver, fan.source, fan.tof, fan.gradient, fan.shape, fan.strides, fan.curved, path, scratch
+        )
         paths.append(path[:count] * spacing)
     return paths
 
@@ -51,7 +54,8 @@ def _one(
     strides: tuple[int, ...],
     curved: bool,
     path: Floats,
+    scratch: Floats,
 ) -> int:
     if curved:
-        return curved_ray(receiver, source, tof, gradient, shape, strides, path)
+        return curved_ray(receiver, source, tof, gradient, shape, strides, path, scratch)
     return straight_ray(receiver, source, len(shape), path)

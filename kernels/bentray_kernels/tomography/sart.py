@@ -193,6 +193,7 @@ def _back_project(
     """
     axes = len(shape)
     path = np.empty((room, axes))
+    scratch = np.empty((3, axes))
     nodes = np.empty(room << axes, np.int64)
     lengths = np.empty(room << axes)
     corrections = np.zeros(tof.size)
@@ -200,10 +201,10 @@ def _back_project(
     squares = 0.0
     for row in range(len(receivers)):
         if curved:
-            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, path)
+            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, path, scratch)
         else:
             count = straight_ray(receivers[row], source, axes, path)
-        entries = walk(path, count, shape, strides, nodes, lengths)
+        entries = walk(path, count, shape, strides, nodes, lengths, scratch)
         predicted = 0.0
         length = 0.0
         for k in range(entries):
