@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats
 from ..errors import InvalidInput
 from .accurate import accurate
+from .fast_iterative import fast_iterative
 from .fast_marching import fast_marching, high_accuracy_fast_marching
 from .fast_sweeping import fast_sweeping
 from .problem import PointSource
@@ -85,6 +86,7 @@ METHODS = (
     .register(Method("fmm", fast_marching, 2, False, "fast marching, binary heap; option order=1 or 2"))
     .register(Method("hafmm", high_accuracy_fast_marching, 2, True, "fast marching, factored second order"))
     .register(Method("fsm", fast_sweeping, 1, False, "fast sweeping, first order; option tolerance"))
+    .register(Method("fim", fast_iterative, 1, False, "fast iterative, first order; option tolerance"))
 )
 
 
