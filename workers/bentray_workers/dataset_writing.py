@@ -11,9 +11,9 @@ import numpy as np
 from bentray_kernels.acquisition import Dataset, Truth, Waveform
 from bentray_kernels.errors import InvalidInput
 
-from .atomic import replacing
 from .dataset_format import FORMAT, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
 from .hdf5_reading import printable
+from .hdf5_writing import creating
 
 # Below this many bytes a chunk's bookkeeping outweighs what packing saves.
 PACK_FROM_BYTES = 4096
@@ -24,11 +24,11 @@ def write_dataset(path: Path, dataset: Dataset) -> None:
 
     Raises:
         InvalidInput: for a dataset without travel times and traces.
-        OSError: where the folder cannot be written to.
+        OSError: where the folder cannot be written to or the disk is full.
     """
     if not dataset.picked and dataset.waveform is None:
         raise InvalidInput("traveltime", "neither travel times nor traces", "at least one of the two")
-    with replacing(Path(path)) as partial, h5py.File(partial, "w-") as file:
+    with creating(Path(path)) as file:
         _write(file, dataset)
 
 

@@ -7,16 +7,15 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction, Settings, Sweep
 
-from .atomic import replacing
 from .dataset_writing import write_array
 from .hdf5_reading import Limits, Reader, opened
+from .hdf5_writing import creating
 
 FORMAT = "bentray-reconstruction"
 VERSION = "1.0"
@@ -32,9 +31,9 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
     ``origin_m``, ``axes``, ``water_speed_mps``, ``settings`` and ``provenance``, the last two JSON.
 
     Raises:
-        OSError: where the folder cannot be written to.
+        OSError: where the folder cannot be written to or the disk is full.
     """
-    with replacing(Path(path)) as partial, h5py.File(partial, "w-") as file:
+    with creating(Path(path)) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = VERSION
         file.attrs["axes"] = "x,y" if reconstruction.speed.ndim == 2 else "x,y,z"

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import math
 import resource
@@ -21,7 +22,7 @@ OPEN_FILES = 64
 
 
 def main() -> None:
-    """Print ``{"ok": summary}`` or ``{"error": {field, found, accepted}}``."""
+    """Print ``{"ok": summary}``, ``{"error": {field, found, accepted}}`` or ``{"full": true}``."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("source", type=Path)
     parser.add_argument("target", type=Path)
@@ -64,6 +65,8 @@ def convert(source: Path, target: Path) -> dict[str, Any]:
     except MemoryError:
         return _error("file", "data that does not fit into the memory of the reader", "a smaller dataset")
     except Exception as error:
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+            return {"full": True}
         # A reader must never take the service down: whatever breaks it is a fault of the file.
         return _error(
             "file", f"{type(error).__name__}: {error}", "an HDF5 file in the format uct-transmission"

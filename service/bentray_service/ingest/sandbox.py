@@ -15,6 +15,8 @@ from typing import Any
 
 from bentray_kernels.errors import InvalidInput
 
+from ..refusals import StorageFull
+
 log = logging.getLogger("bentray.ingest")
 
 ACCEPTED = "an HDF5 file in the format uct-transmission"
@@ -50,6 +52,7 @@ def ingest(
 
     Raises:
         InvalidInput: when the file is refused, and also when reading it crashed, hung or ate the memory.
+        StorageFull: when there is no space for the canonical file.
     """
     command = [sys.executable, "-I", "-m", "bentray_service.ingest.child", str(source), str(target)]
     command += ["--memory", str(memory_bytes), "--seconds", str(seconds)]
@@ -75,6 +78,8 @@ def ingest(
         )
         raise InvalidInput("file", _death(process.returncode, memory_bytes), ACCEPTED)
     answer: dict[str, Any] = json.loads(output)
+    if "full" in answer:
+        raise StorageFull("body", "no space for the checked copy", "a smaller file, or a larger disk")
     if "error" in answer:
         raise InvalidInput(answer["error"]["field"], answer["error"]["found"], answer["error"]["accepted"])
     return dict(answer["ok"])

@@ -74,18 +74,17 @@ def show_dataset(dataset_id: str, service: Service) -> DatasetRecord:
 
 def _take_in(service: Parts, dataset_id: str, received: Received) -> DatasetRecord:
     """From the received file to the stored dataset; nothing is left behind when it is refused."""
-    candidate = service.files.candidate(dataset_id)
     try:
         summary = ingest(
             service.files.incoming(dataset_id),
-            candidate,
+            service.files.candidate(dataset_id),
             memory_bytes=service.settings.ingest_memory_bytes,
             seconds=service.settings.ingest_seconds,
             scratch=service.files.scratch,
         )
         service.files.adopt(dataset_id)
     finally:
-        candidate.unlink(missing_ok=True)
+        service.files.discard_candidate(dataset_id)
     return dataset_record(
         service.datasets.add(dataset_id, size=received.size, sha256=received.sha256, summary=summary)
     )

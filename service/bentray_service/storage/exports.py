@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
+from bentray_workers.atomic import replacing
 from bentray_workers.reconstruction_file import read_reconstruction
 
 
@@ -16,15 +15,6 @@ def speed_as_npy(volume: Path, target: Path) -> Path:
     if target.exists():
         return target
     speed = read_reconstruction(volume).speed
-    # A name of its own for each writer: two requests may make the same file at the same time.
-    handle, name = tempfile.mkstemp(dir=target.parent, suffix=".partial")
-    partial = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.save(file, np.ascontiguousarray(speed), allow_pickle=False)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(target)
-    finally:
-        partial.unlink(missing_ok=True)
+    with replacing(target) as partial, partial.open("wb") as file:
+        np.save(file, np.ascontiguousarray(speed), allow_pickle=False)
     return target

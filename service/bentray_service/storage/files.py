@@ -46,6 +46,9 @@ class Files:
         """Remove what a dead process left half done; call it once the folder is locked."""
         for left in self._incoming.iterdir():
             left.unlink()
+        for folder in (self._volumes, self._exports):
+            for left in folder.glob("*.partial"):
+                left.unlink()
         for left in self.scratch.iterdir():
             if left.is_dir():
                 shutil.rmtree(left)
@@ -71,6 +74,11 @@ class Files:
     def export(self, volume_id: str, extension: str) -> Path:
         """A volume in another format; made on demand."""
         return self._exports / f"{checked('volume', volume_id)}.{extension}"
+
+    def discard_candidate(self, dataset_id: str) -> None:
+        """Remove a canonical file that was not adopted, also what a killed process left of it."""
+        for left in self._incoming.glob(f"{self.candidate(dataset_id).name}*"):
+            left.unlink(missing_ok=True)
 
     def adopt(self, dataset_id: str) -> Path:
         """Move the checked canonical file to its place, durably."""

@@ -1,5 +1,7 @@
 """The ingest process: what it says of a file."""
 
+import errno
+
 import h5py
 import numpy as np
 import pytest
@@ -50,6 +52,14 @@ def test_a_reader_that_breaks_is_the_fault_of_the_file(scan, tmp_path, monkeypat
     monkeypatch.setattr("bentray_workers.dataset_file.read_dataset", broken)
     answer = child.convert(scan(), tmp_path / "out.h5")
     assert answer["error"]["field"] == "file"
+
+
+def test_a_full_disk_is_no_fault_of_the_file(scan, tmp_path, monkeypatch):
+    def full(path, dataset):
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    monkeypatch.setattr("bentray_workers.dataset_file.write_dataset", full)
+    assert child.convert(scan(), tmp_path / "out.h5") == {"full": True}
 
 
 @given(st.text())

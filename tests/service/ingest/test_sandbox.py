@@ -10,6 +10,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.ingest import sandbox
+from bentray_service.refusals import StorageFull
 
 LIMITS = {"memory_bytes": 4 * 1024**3, "seconds": 60.0}
 
@@ -72,6 +73,12 @@ def test_a_reader_that_crashes(program, scan, tmp_path):
 def test_a_reader_that_stops(program, scan, tmp_path):
     program("raise SystemExit(7)")
     with pytest.raises(InvalidInput, match="exit code 7"):
+        run(scan(), tmp_path)
+
+
+def test_a_full_disk_is_told_as_such(program, scan, tmp_path):
+    program("print('{\"full\": true}')")
+    with pytest.raises(StorageFull, match="no space"):
         run(scan(), tmp_path)
 
 

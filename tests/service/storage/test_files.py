@@ -15,12 +15,27 @@ def test_half_done_work_is_dropped(tmp_path):
     left.write_bytes(b"half")
     kept = files.dataset(new_id("dataset"))
     kept.write_bytes(b"whole")
+    cut_off = files.volume(volume := "vol-" + 20 * "0").with_suffix(".h5.1f.partial")
+    cut_off.write_bytes(b"half")
+    files.volume(volume).write_bytes(b"whole")
     (files.scratch / "job").mkdir()
     (files.scratch / "job" / "picked.h5").write_bytes(b"x")
     files.drop_leftovers()
     assert not left.exists()
+    assert not cut_off.exists()
+    assert files.volume(volume).exists()
     assert not list(files.scratch.iterdir())
     assert kept.exists()
+
+
+def test_a_candidate_goes_with_what_a_killed_writer_left_of_it(tmp_path):
+    files = Files(tmp_path)
+    files.prepare()
+    mine, other = files.candidate(new_id("dataset")), files.candidate(new_id("dataset"))
+    for path in (mine, mine.with_name(f"{mine.name}.1f.partial"), other):
+        path.write_bytes(b"x")
+    files.discard_candidate(mine.stem)
+    assert list(tmp_path.glob("incoming/*")) == [other]
 
 
 def test_adopt_moves_the_checked_file(tmp_path):

@@ -1,0 +1,69 @@
+"""Writing HDF5 files, atomically, and so that a full disk is an ordinary error: HDF5 itself crashes on it."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, cast
+
+import h5py
+
+from .atomic import replacing
+
+
+@contextmanager
+def creating(target: Path) -> Iterator[h5py.File]:
+    """An HDF5 file to fill; on leaving it takes the target's place, whole or not at all.
+
+    Raises:
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    with replacing(target) as partial, io.FileIO(partial, "x+") as raw:
+        sink = _Sink(raw)
+        try:
+            with h5py.File(sink, "w") as file:
+                yield file
+        finally:
+            if sink.failure is not None:
+                # It is the cause of whatever else HDF5 may have said.
+                raise OSError(sink.failure.errno, sink.failure.strerror, str(target)) from sink.failure
+
+
+class _Sink(io.RawIOBase):
+    """A file for HDF5 that keeps its first failure and from then on only pretends to write.
+
+    HDF5 cannot close a file that refuses its writes: it frees what it still uses.
+    """
+
+    def __init__(self, raw: io.FileIO) -> None:
+        self._raw = raw
+        self.failure: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        left = memoryview(data).cast("B")
+        length = len(left)
+        try:
+            while left and self.failure is None:
+                left = left[self._raw.write(left) :]
+        except OSError as error:
+            self.failure = error
+        return length
+
+    def readinto(self, buffer: Any) -> int:
+        return cast(int, self._raw.readinto(buffer))
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        return self._raw.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._raw.tell()
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return self._raw.truncate(size)
+        except OSError as error:
+            self.failure = self.failure or error
+            return self._raw.tell()
