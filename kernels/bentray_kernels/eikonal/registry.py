@@ -15,6 +15,7 @@ from ..arrays import Floats
 from ..errors import InvalidInput
 from .accurate import accurate
 from .fast_iterative import fast_iterative
+from .fast_iterative_opencl import fast_iterative_opencl, fast_iterative_opencl_many
 from .fast_marching import fast_marching, high_accuracy_fast_marching
 from .fast_sweeping import fast_sweeping
 from .problem import PointSource
@@ -30,6 +31,8 @@ class Method:
         order: order of accuracy away from shocks.
         factored: whether the source's singularity is factored out.
         summary: one line for help texts.
+        run_many: as ``run`` for a sequence of problems of one shape and spacing, with the batch as the
+            first axis; None where the method has nothing better than one after the other.
     """
 
     name: str
@@ -37,6 +40,7 @@ class Method:
     order: int
     factored: bool
     summary: str
+    run_many: Callable[..., Floats] | None = None
 
     def options(self) -> tuple[str, ...]:
         """Names of the keyword options that ``run`` takes."""
@@ -87,6 +91,16 @@ METHODS = (
     .register(Method("hafmm", high_accuracy_fast_marching, 2, True, "fast marching, factored second order"))
     .register(Method("fsm", fast_sweeping, 1, False, "fast sweeping, first order; option tolerance"))
     .register(Method("fim", fast_iterative, 1, False, "fast iterative, first order; option tolerance"))
+    .register(
+        Method(
+            "fim-opencl",
+            fast_iterative_opencl,
+            1,
+            False,
+            "fim in blocks on an OpenCL device (BENTRAY_OPENCL_DEVICE); option tolerance",
+            fast_iterative_opencl_many,
+        )
+    )
 )
 
 
@@ -146,9 +160,13 @@ def solve_many(
     if len(fields) != len(points) and 1 not in (len(fields), len(points)):
         raise InvalidInput("sources", f"a batch of {len(points)}", f"1 or as many as speeds, {len(fields)}")
     batch = max(len(fields), len(points)) if len(fields) and len(points) else 0
+    problems = (
+        PointSource.checked(fields[k % len(fields)], spacing, points[k % len(points)]) for k in range(batch)
+    )
+    if chosen.run_many is not None and batch:
+        return chosen.run_many(list(problems), **options)
     times = np.empty((batch, *fields.shape[1:]))
-    for k in range(batch):
-        problem = PointSource.checked(fields[k % len(fields)], spacing, points[k % len(points)])
+    for k, problem in enumerate(problems):
         times[k] = chosen.run(problem, **options)
     return times
 

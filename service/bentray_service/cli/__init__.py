@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from . import bench, demo, reconstruct, serve, simulate, submit
+from . import bench, demo, devices, reconstruct, serve, simulate, submit
 from .endings import Commands
 
 __all__ = ["app", "main"]
@@ -27,6 +27,7 @@ for command in (
     reconstruct.reconstruct,
     simulate.simulate,
     bench.bench,
+    devices.devices,
 ):
     app.command()(command)
 

@@ -1,0 +1,59 @@
+"""The fast iterative method on an OpenCL device, or on the CPU where no device can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import InvalidInput
+from .fast_iterative import fast_iterative
+from .problem import PointSource
+
+
+def fast_iterative_opencl(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
+    """Travel time by blocks of points advanced in an OpenCL device's local memory (chapter 7.2.2).
+
+    Args:
+        problem: the checked problem.
+        tolerance: as in ``fim``.
+
+    Returns:
+        (nx, ny[, nz]), s; equal to ``fim`` up to the tolerance.
+
+    Raises:
+        InvalidInput: for a negative tolerance, or where ``BENTRAY_OPENCL_DEVICE`` names no one device.
+
+    Warns:
+        OpenCLFallbackWarning: once, where no device passes its trial and ``fim`` computes instead.
+    """
+    times: Floats = fast_iterative_opencl_many([problem], tolerance=tolerance)[0]
+    return times
+
+
+def fast_iterative_opencl_many(problems: Sequence[PointSource], *, tolerance: float = 1e-12) -> Floats:
+    """As ``fast_iterative_opencl`` for several problems of one shape and spacing, in the same launches.
+
+    Returns:
+        (batch, nx, ny[, nz]), s; each bit for bit as if alone.
+    """
+    if not tolerance >= 0.0:
+        raise InvalidInput("tolerance", tolerance, "a number >= 0")
+    # Here, so that whoever never asks for OpenCL never loads it.
+    from ..opencl.blocks import travel_times
+    from ..opencl.choice import session_or_warning
+
+    session = session_or_warning(instead="fim")
+    if session is None:
+        return np.stack([fast_iterative(problem, tolerance=tolerance) for problem in problems])
+    first = problems[0]
+    same = all(np.array_equal(problem.slowness, first.slowness) for problem in problems[1:])
+    fields = [first] if same else problems
+    crossings = np.stack([problem.spacing * problem.slowness for problem in fields])
+    seeds = []
+    for problem in problems:
+        nodes, times = problem.seeds()
+        places = np.array(np.unravel_index(nodes, problem.padded_shape)) - 1
+        seeds.append((np.ravel_multi_index(tuple(places), problem.slowness.shape), times))
+    return travel_times(session, crossings, seeds, tolerance)

@@ -1,0 +1,19 @@
+"""OpenCL with care: a device is chosen by name, tried in a child process, and only then used."""
+
+from .choice import Choice, OpenCLFallbackWarning, choose, session_or_warning
+from .devices import WISH, Device, find_devices
+from .session import Session
+from .verdict import Verdict, verdict_on
+
+__all__ = [
+    "WISH",
+    "Choice",
+    "Device",
+    "OpenCLFallbackWarning",
+    "Session",
+    "Verdict",
+    "choose",
+    "find_devices",
+    "session_or_warning",
+    "verdict_on",
+]

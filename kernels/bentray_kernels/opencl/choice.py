@@ -1,0 +1,82 @@
+"""The device that the kernels use: wished for or best, tried, and open; or none, with one warning."""
+
+from __future__ import annotations
+
+import os
+import threading
+import warnings
+from dataclasses import dataclass
+from functools import cache
+
+from .devices import WISH, Device, find_devices, wished
+from .session import Session
+from .verdict import verdict_on
+
+
+class OpenCLFallbackWarning(UserWarning):
+    """No OpenCL device can be trusted; the same is computed on the CPU without OpenCL."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The device to use and what was refused before it was found.
+
+    Attributes:
+        device: None where none passed.
+        refusals: a sentence for each refused device.
+    """
+
+    device: Device | None
+    refusals: tuple[str, ...]
+
+
+def choose() -> Choice:
+    """The first device that passes its trial, the one of ``BENTRAY_OPENCL_DEVICE`` or GPUs first.
+
+    Raises:
+        InvalidInput: when the variable fits no device or more than one.
+    """
+    refusals: list[str] = []
+    for device in wished(find_devices(), os.environ.get(WISH)):
+        verdict = verdict_on(device)
+        if verdict.usable:
+            return Choice(device, tuple(refusals))
+        refusals.append(f"{device.label} was refused: {verdict.reason}")
+    return Choice(None, tuple(refusals))
+
+
+def session_or_warning(instead: str) -> Session | None:
+    """The chosen device, open; or None after a warning that names what is used instead.
+
+    Args:
+        instead: the method that takes over.
+
+    Raises:
+        InvalidInput: as ``choose``.
+    """
+    # Two threads must not try or open one device at the same time.
+    with _OPENING:
+        found = _found(os.environ.get(WISH))
+        if isinstance(found, Session):
+            return found
+        _warn_once(instead, found)
+        return None
+
+
+_OPENING = threading.Lock()
+
+
+@cache
+def _found(wish: str | None) -> Session | str:
+    """The open device or why there is none; asked for once by each wish in a process."""
+    choice = choose()
+    if choice.device is not None:
+        return Session(choice.device)
+    return "; ".join(choice.refusals) or "this machine has no OpenCL device"
+
+
+@cache
+def _warn_once(instead: str, reason: str) -> None:
+    # A warning made an error is not remembered, so it is raised each time.
+    message = f"no OpenCL device can be used, {instead} takes over: {reason} (see `bentray devices`)"
+    warnings.warn(OpenCLFallbackWarning(message), stacklevel=5)

@@ -1,0 +1,109 @@
+"""The OpenCL devices of this machine: what there is, and which one the user wants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import InvalidInput
+
+# The environment variable that names the device to use.
+WISH = "BENTRAY_OPENCL_DEVICE"
+
+
+@dataclass(frozen=True)
+class Device:
+    """An OpenCL device as its driver describes it; plain words, so that it can be kept and sent.
+
+    Attributes:
+        index: its place among all devices of all platforms.
+        platform: name of the platform.
+        name: name of the device.
+        kind: ``gpu``, ``accelerator``, ``cpu`` or ``other``.
+        version: the OpenCL version it says; PoCL adds the processor that it compiles for.
+        driver: version of the driver.
+        double_precision: whether it computes in float64.
+    """
+
+    index: int
+    platform: str
+    name: str
+    kind: str
+    version: str
+    driver: str
+    double_precision: bool
+
+    @property
+    def label(self) -> str:
+        return f"{self.platform}:{self.name}"
+
+
+def find_devices() -> tuple[Device, ...]:
+    """Every OpenCL device, in the order of the platforms; empty where OpenCL is not installed."""
+    return tuple(_described(index, handle) for index, handle in enumerate(_handles()))
+
+
+def handle_of(device: Device) -> Any:
+    """The ``pyopencl.Device`` of a found device.
+
+    Raises:
+        LookupError: when the machine's devices have changed since.
+    """
+    handles = _handles()
+    if device.index < len(handles) and _described(device.index, handles[device.index]) == device:
+        return handles[device.index]
+    raise LookupError(f"{device.label} is no longer OpenCL device {device.index}")
+
+
+def wished(devices: Sequence[Device], wish: str | None) -> tuple[Device, ...]:
+    """The devices to try, in order: the one that ``wish`` names, else GPUs before all others.
+
+    Args:
+        devices: what there is.
+        wish: an index, or a part of ``platform:device`` in any case; None or empty for no wish.
+
+    Raises:
+        InvalidInput: when the wish fits no device or more than one; lists what there is.
+    """
+    if not wish:
+        ranks = {"gpu": 0, "accelerator": 1, "cpu": 2}
+        return tuple(sorted(devices, key=lambda device: ranks.get(device.kind, 3)))
+    if wish.strip().isdecimal():
+        fitting = [device for device in devices if device.index == int(wish)]
+    else:
+        fitting = [device for device in devices if wish.strip().lower() in device.label.lower()]
+    if len(fitting) != 1:
+        known = "; ".join(f"{device.index} = {device.label}" for device in devices) or "there is none here"
+        found = f"{wish!r}, which fits {len(fitting)} devices"
+        raise InvalidInput(WISH, found, f"an index or a part of the name of one OpenCL device: {known}")
+    return tuple(fitting)
+
+
+def _handles() -> list[Any]:
+    try:
+        import pyopencl as cl
+    except ImportError:  # no OpenCL loader on this machine
+        return []
+    handles: list[Any] = []
+    try:
+        for platform in cl.get_platforms():
+            handles += platform.get_devices()
+    except cl.Error:  # "no platform" is an error in OpenCL, as is a platform without devices
+        pass
+    return handles
+
+
+def _described(index: int, handle: Any) -> Device:
+    import pyopencl as cl
+
+    kinds = {"gpu": cl.device_type.GPU, "accelerator": cl.device_type.ACCELERATOR, "cpu": cl.device_type.CPU}
+    return Device(
+        index,
+        handle.platform.name.strip(),
+        handle.name.strip(),
+        next((kind for kind, bit in kinds.items() if handle.type & bit), "other"),
+        handle.version.strip(),
+        handle.driver_version.strip(),
+        bool(handle.double_fp_config) if "cl_khr_fp64" in handle.extensions else False,
+    )

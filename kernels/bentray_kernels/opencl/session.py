@@ -1,0 +1,108 @@
+"""An open OpenCL device: its context, its queue and the programs built for it."""
+
+from __future__ import annotations
+
+import threading
+import warnings
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats
+from .devices import Device, handle_of
+
+
+class Session:
+    """A device in use. Hold ``lock`` while setting arguments and launching: kernels keep them inside.
+
+    Attributes:
+        lock: one task at a time.
+        handle: the ``pyopencl.Device``.
+        queue: in order.
+    """
+
+    def __init__(self, device: Device) -> None:
+        import pyopencl as cl
+
+        self.lock = threading.RLock()
+        self.handle = handle_of(device)
+        self.context = cl.Context([self.handle])
+        self.queue = cl.CommandQueue(self.context)
+        self._kernels: dict[tuple[str, str, tuple[str, ...]], Any] = {}
+
+    def kernel(self, source: str, name: str, *defines: str) -> Any:
+        """A kernel of ``sources/<source>.cl``, built on first use.
+
+        Args:
+            source: name of the file.
+            name: name of the kernel.
+            defines: ``NAME=VALUE`` for the compiler.
+        """
+        import pyopencl as cl
+
+        key = (source, name, defines)
+        if key not in self._kernels:
+            text = resources.files(__package__).joinpath("sources", f"{source}.cl").read_text()
+            with warnings.catch_warnings():
+                # Remarks of a compiler about a program that then passes its trial.
+                warnings.simplefilter("ignore", cl.CompilerWarning)
+                # Drivers keep built programs themselves; pyopencl's own cache would warn under load.
+                program = cl.Program(self.context, text).build(
+                    [f"-D{define}" for define in defines], cache_dir=False
+                )
+            self._kernels[key] = cl.Kernel(program, name)
+        return self._kernels[key]
+
+    def upload(self, array: Any) -> Any:
+        """A buffer on the device with a copy of a C-ordered array."""
+        import pyopencl as cl
+
+        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
+        return cl.Buffer(self.context, flags, hostbuf=array)
+
+    def reserve(self, size_bytes: int) -> Any:
+        """A buffer on the device, its content undefined."""
+        import pyopencl as cl
+
+        return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size_bytes)
+
+    def download(self, array: Any, buffer: Any, offset_bytes: int = 0) -> None:
+        """Fill ``array`` from a buffer when all that was launched has ended."""
+        import pyopencl as cl
+
+        cl.enqueue_copy(self.queue, array, buffer, src_offset=offset_bytes, is_blocking=True)
+
+    def launch(self, kernel: Any, size: tuple[int, ...], group: tuple[int, ...] | None) -> None:
+        """Enqueue a kernel whose arguments are set."""
+        import pyopencl as cl
+
+        cl.enqueue_nd_range_kernel(self.queue, kernel, size, group)
+
+    def doubles_at_once(self) -> int:
+        """How many doubles a pair of buffers may hold together without filling the device."""
+        return int(min(self.handle.max_mem_alloc_size, self.handle.global_mem_size // 4)) // 8
+
+
+def set_arguments(kernel: Any, *arguments: Any) -> None:
+    """Set buffers and numpy scalars in order, without the launcher that pyopencl would write and cache."""
+    for place, argument in enumerate(arguments):
+        kernel.set_arg(place, argument)
+
+
+def probe(session: Session, width: int, a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """sqrt(a) and fmin(a, b) as the device computes them in vectors of ``width`` doubles.
+
+    Args:
+        a, b: (n,), n a multiple of ``width``.
+    """
+    real = "double" if width == 1 else f"double{width}"
+    kernel = session.kernel("probe", "probe", f"REAL={real}")
+    root, lower = np.empty_like(a), np.empty_like(a)
+    with session.lock:
+        buffers = [session.upload(array) for array in (a, b, root, lower)]
+        set_arguments(kernel, *buffers)
+        session.launch(kernel, (a.size // width,), None)
+        session.download(root, buffers[2])
+        session.download(lower, buffers[3])
+    return root, lower

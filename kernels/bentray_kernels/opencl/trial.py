@@ -1,0 +1,109 @@
+"""The program that tries a device: run as a child process, which may abort, hang or compute nonsense.
+
+``python -m bentray_kernels.opencl.trial INDEX LABEL STAGE…`` prints one line of JSON for each stage,
+``{"stage", "fault"}``, the fault empty where the device was right. A device that ends the process leaves the
+line out.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import sys
+
+import numpy as np
+
+from ..arrays import Floats
+from .blocks import travel_times
+from .devices import find_devices
+from .session import Session, probe
+
+# Vectors of so many doubles are tried, each in a stage of its own.
+WIDTHS = (1, 2, 4, 8, 16)
+
+# What our kernels need; they use no vectors.
+NEEDED = ("double1", "solve")
+STAGES = (*NEEDED, *(f"double{width}" for width in WIDTHS[1:]))
+
+
+def fault_of(session: Session, stage: str) -> str:
+    """What the device does wrong in a stage; empty where it is right."""
+    return _fault_of_solve(session) if stage == "solve" else _fault_of_width(session, int(stage[6:]))
+
+
+def _fault_of_width(session: Session, width: int) -> str:
+    rng = np.random.default_rng(width)
+    a, b = rng.uniform(0.0, 1e6, (2, 256))
+    a[::7], b[::5] = math.inf, 0.0
+    root, lower = probe(session, width, a, b)
+    # Correctly rounded on all devices that we know, although OpenCL would allow more.
+    if not np.allclose(root, np.sqrt(a), rtol=1e-15, atol=0.0):
+        return "wrong sqrt"
+    return "" if np.array_equal(lower, np.minimum(a, b)) else "wrong fmin"
+
+
+def _fault_of_solve(session: Session) -> str:
+    for shape in ((19, 13), (7, 6, 9)):
+        rng = np.random.default_rng(len(shape))
+        crossings = rng.uniform(0.2, 5.0, (2, *shape))
+        source = np.ravel_multi_index((4,) * len(shape), shape)
+        seeds = [(np.array([source]), np.zeros(1))] * 2
+        for found, crossing in zip(travel_times(session, crossings, seeds), crossings, strict=True):
+            if not np.allclose(found, reference(crossing, (4,) * len(shape)), rtol=1e-10, atol=0.0):
+                return f"wrong travel times in {len(shape)}-D"
+    return ""
+
+
+def reference(crossing: Floats, source: tuple[int, ...]) -> Floats:
+    """First-order travel time in plain Python, by rounds over all nodes until none is earlier."""
+    time: Floats = np.full(crossing.shape, math.inf)
+    time[source] = 0.0
+    padded = np.pad(time, 1, constant_values=math.inf)
+    nodes = [tuple(i + 1 for i in node) for node in np.ndindex(crossing.shape)]
+    changed = True
+    while changed:
+        changed = False
+        for node in itertools.chain(nodes, reversed(nodes)):
+            earliest = sorted(_earlier(padded, node, axis) for axis in range(crossing.ndim))
+            new = _godunov(earliest, float(crossing[tuple(i - 1 for i in node)]))
+            if new < padded[node]:
+                padded[node] = new
+                changed = True
+    return padded[(slice(1, -1),) * crossing.ndim]
+
+
+def _earlier(padded: Floats, node: tuple[int, ...], axis: int) -> float:
+    before, after = list(node), list(node)
+    before[axis] -= 1
+    after[axis] += 1
+    return min(float(padded[tuple(before)]), float(padded[tuple(after)]))
+
+
+def _godunov(earliest: list[float], crossing: float) -> float:
+    """T with Σ max(T − t, 0)² = crossing², from the neighbours' times t in rising order."""
+    time = earliest[0] + crossing
+    for count in range(2, len(earliest) + 1):
+        if time <= earliest[count - 1]:
+            break
+        mean = sum(earliest[:count]) / count
+        spread = sum((t - mean) ** 2 for t in earliest[:count])
+        time = mean + math.sqrt((crossing**2 - spread) / count)
+    return time
+
+
+def main(arguments: list[str]) -> None:
+    """Try the stages named on the command line, one line on stdout each."""
+    index, label, *stages = arguments
+    device = find_devices()[int(index)]
+    if device.label != label:
+        raise SystemExit(f"device {index} is {device.label}")
+    session = Session(device)
+    for stage in stages:
+        fault = fault_of(session, stage)
+        sys.stdout.write(json.dumps({"stage": stage, "fault": fault}) + "\n")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
