@@ -103,7 +103,7 @@ def advance_slice(
 @lru_cache(maxsize=8)
 def _problem(path: Path, stamp: int, settings: Settings, index: int) -> SliceProblem:
     """One slice's problem, read once a process; ``stamp`` tells a rewritten file from the old one."""
-    return SliceProblem.of(_dataset(path, stamp).slice(index), settings)
+    return SliceProblem.of(_dataset(path, stamp), settings, index)
 
 
 @lru_cache(maxsize=2)
@@ -120,7 +120,7 @@ def _drive(
 ) -> Reconstruction:
     stamp = path.stat().st_mtime_ns
     dataset = read_dataset(path, traces=False)
-    problems = [SliceProblem.of(dataset.slice(k), settings) for k in range(dataset.slices)]
+    problems = [SliceProblem.of(dataset, settings, k) for k in range(dataset.slices)]
     states = [begin(problem) for problem in problems]
     ready = deque((k, FIRST_BATCH) for k in range(dataset.slices))
     running: dict[Future, tuple[int, int]] = {}

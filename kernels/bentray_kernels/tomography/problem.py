@@ -40,28 +40,34 @@ class SliceProblem:
     water_speed: float
 
     @classmethod
-    def of(cls, dataset: Dataset, settings: Settings) -> SliceProblem:
-        """The problem of a one-slice dataset.
+    def of(cls, dataset: Dataset, settings: Settings, index: int = 0) -> SliceProblem:
+        """The problem of one slice of a dataset; ``index`` counts slices from 0.
 
         Raises:
-            InvalidInput: several slices, three-dimensional positions, no travel times, elements outside
-                the image.
+            InvalidInput: three-dimensional positions, no travel times in the slice, elements outside the
+                image, an image without a node inside the array, bounds that exclude the water.
         """
-        if dataset.slices != 1 or dataset.element_position_m.shape[1] != 2:
+        if dataset.element_position_m.shape[1] != 2:
             raise InvalidInput(
-                "dataset",
-                f"{dataset.slices} slices, positions {dataset.element_position_m.shape}",
-                "one 2-D slice",
+                "geometry/element_position_m",
+                f"shape {dataset.element_position_m.shape}",
+                "(elements, 2): arrays in three dimensions cannot be reconstructed yet",
             )
-        delta = dataset.differential_tof()
-        if delta.ndim == 3:
-            delta = delta[0]
+        low, high = settings.speed_bounds_mps
+        if not low <= dataset.water_speed_mps <= high:
+            raise InvalidInput(
+                "speed_bounds_mps",
+                settings.speed_bounds_mps,
+                f"bounds around the speed of the water, {dataset.water_speed_mps:g} m/s",
+            )
+        delta = dataset.slice(index).differential_tof()
         emitters, receivers = dataset.tx, dataset.rx
         if settings.reciprocity:
             emitters, receivers, delta = _with_reverses(emitters, receivers, delta)
         if not np.isfinite(delta).any():
+            where = f" in slice {index}" if dataset.slices > 1 else ""
             raise InvalidInput(
-                "traveltime", "no valid pair", "at least one finite travel time between two elements"
+                "traveltime", f"no valid pair{where}", "at least one finite travel time between two elements"
             )
         position = dataset.element_position_m
         centre = 0.5 * (position.min(axis=0) + position.max(axis=0))
@@ -75,12 +81,18 @@ class SliceProblem:
         spacing = side / (settings.nodes - 1)
         axis = np.arange(settings.nodes) * spacing
         nearest = float(np.linalg.norm(position - centre, axis=1).min()) - RIM_NODES * spacing
-        off_centre = np.hypot(axis[:, None] - 0.5 * side, axis[None, :] - 0.5 * side)
+        region = np.hypot(axis[:, None] - 0.5 * side, axis[None, :] - 0.5 * side) <= nearest
+        if reach == 0.0 or not region.any():
+            raise InvalidInput(
+                "geometry/element_position_m",
+                f"no node inside the array: nodes {spacing:.3g} m apart, array {2.0 * reach:.3g} m wide",
+                "elements around the object, and nodes (settings nodes, side_m) between them",
+            )
         return cls(
             emitters=position[emitters] - origin,
             receivers=position[receivers] - origin,
             delta_tof=delta,
-            region=off_centre <= nearest,
+            region=region,
             spacing=spacing,
             origin=(float(origin[0]), float(origin[1])),
             water_speed=dataset.water_speed_mps,

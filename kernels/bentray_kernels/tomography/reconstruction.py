@@ -34,7 +34,7 @@ def reconstruct(
     Raises:
         InvalidInput: from the dataset or a setting that does not fit it.
     """
-    problems = [SliceProblem.of(dataset.slice(k), settings) for k in range(dataset.slices)]
+    problems = [SliceProblem.of(dataset, settings, k) for k in range(dataset.slices)]
     states = [begin(problem) for problem in problems]
     while not all(state.done for state in states):
         for k, problem in enumerate(problems):

@@ -6,6 +6,7 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal
 
+from ..acquisition.dataset import PLAUSIBLE_SPEED_MPS
 from ..eikonal import methods
 from ..errors import InvalidInput
 
@@ -94,5 +95,7 @@ def _within(name: str, value: float, low: float, high: float) -> None:
 
 
 def _speeds(name: str, pair: tuple[float, float]) -> None:
-    if len(pair) != 2 or not 0.0 < pair[0] < pair[1] < math.inf:
-        raise InvalidInput(name, tuple(pair), "(lowest, highest) in m/s, 0 < lowest < highest")
+    slowest, fastest = PLAUSIBLE_SPEED_MPS
+    if len(pair) != 2 or not slowest <= pair[0] < pair[1] <= fastest:
+        accepted = f"(lowest, highest) in m/s, {slowest:g} <= lowest < highest <= {fastest:g}"
+        raise InvalidInput(name, tuple(pair), accepted)

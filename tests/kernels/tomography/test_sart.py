@@ -190,6 +190,10 @@ def test_progress_rises_to_the_end(scan):
         ({"sweeps": 0}, "sweeps"),
         ({"speed_update": "data-driven"}, "speed_range_mps"),
         ({"speed_bounds_mps": (1600.0, 1500.0)}, "speed_bounds_mps"),
+        ({"speed_bounds_mps": (1e-300, 1e300)}, "speed_bounds_mps"),
+        ({"speed_bounds_mps": (1400.0, 1800.0)}, "speed_bounds_mps"),
+        ({"speed_range_mps": (1400.0, float("inf"))}, "speed_range_mps"),
+        ({"side_m": 20.0}, "geometry/element_position_m"),
         ({"seed": -1}, "seed"),
         ({"picker": "eye"}, "picker"),
     ],
@@ -203,3 +207,25 @@ def test_bad_settings_are_named(scan, change, field):
 def test_scan_without_one_valid_pair_is_refused(scan):
     with pytest.raises(InvalidInput, match="at least one finite travel time"):
         reconstruct(replace(scan, valid=np.zeros(scan.delta_tof_s.shape, bool)), plan())
+
+
+def test_the_slice_without_a_valid_pair_is_named(scan):
+    times = np.stack([scan.delta_tof_s, np.full_like(scan.delta_tof_s, np.nan)])
+    stacked = replace(scan, delta_tof_s=times, slice_z_m=np.array([0.0, 0.004]))
+    with pytest.raises(InvalidInput, match="slice 1"):
+        reconstruct(stacked, plan())
+
+
+@pytest.mark.parametrize(
+    "position",
+    [
+        np.zeros((RING.elements, 2)),
+        np.column_stack((np.linspace(-0.05, 0.05, RING.elements), np.zeros(RING.elements))),
+        np.column_stack((RING.positions(), np.zeros(RING.elements))),
+    ],
+    ids=["one point", "a line", "three coordinates"],
+)
+def test_an_array_that_surrounds_no_image_is_refused(scan, position):
+    with pytest.raises(InvalidInput) as refusal:
+        reconstruct(replace(scan, element_position_m=position), Settings(nodes=32))
+    assert refusal.value.field == "geometry/element_position_m"
