@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import json
+import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated
@@ -67,11 +68,10 @@ def load(name: str, folder: Path) -> Rows:
     known = sorted(path.stem for path in folder.glob("*.py") if not path.stem.startswith("_"))
     if name not in known:
         raise InvalidInput("name", repr(name), "one of " + ", ".join(known))
-    spec = importlib.util.spec_from_file_location(f"bentray_benchmark_{name}", folder / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    # As a script would see it: benchmarks share files whose names begin with an underscore.
+    if str(folder) not in sys.path:
+        sys.path.insert(0, str(folder))
+    module = importlib.import_module(name)
     measure: Rows | None = getattr(module, "rows", None)
     if measure is None:
         raise WorkFailed(f"benchmarks/{name}.py defines no rows(quick, progress)")

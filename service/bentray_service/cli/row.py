@@ -50,13 +50,13 @@ class Row:
     @property
     def met(self) -> bool:
         """Whether the goal is reached; a missing value or NaN never is."""
-        return self.value is not None and OPERATORS[self.op](self.value, self.goal)
+        return self.value is not None and bool(OPERATORS[self.op](self.value, self.goal))
 
     def to_dict(self) -> dict[str, Any]:
         """The row for JSON, keys in the order of a sentence."""
         return {
             "target": self.target,
-            "value": self.value,
+            "value": None if self.value is None else float(self.value),
             "goal": self.goal,
             "op": self.op,
             "met": self.met,
