@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,10 +70,10 @@ def wished(devices: Sequence[Device], wish: str | None) -> tuple[Device, ...]:
     if not wish:
         ranks = {"gpu": 0, "accelerator": 1, "cpu": 2}
         return tuple(sorted(devices, key=lambda device: ranks.get(device.kind, 3)))
-    if wish.strip().isdecimal():
-        fitting = [device for device in devices if device.index == int(wish)]
-    else:
-        fitting = [device for device in devices if wish.strip().lower() in device.label.lower()]
+    word = wish.strip().lower()
+    # A number that is no index may still be a model's: "3090".
+    fitting = [device for device in devices if str(device.index) == word]
+    fitting = fitting or [device for device in devices if word in device.label.lower()]
     if len(fitting) != 1:
         known = "; ".join(f"{device.index} = {device.label}" for device in devices) or "there is none here"
         found = f"{wish!r}, which fits {len(fitting)} devices"
@@ -85,12 +86,15 @@ def _handles() -> list[Any]:
         import pyopencl as cl
     except ImportError:  # no OpenCL loader on this machine
         return []
-    handles: list[Any] = []
+    # "No platform" is an error in OpenCL, as is a platform without devices.
     try:
-        for platform in cl.get_platforms():
+        platforms = cl.get_platforms()
+    except cl.Error:
+        return []
+    handles: list[Any] = []
+    for platform in platforms:
+        with suppress(cl.Error):
             handles += platform.get_devices()
-    except cl.Error:  # "no platform" is an error in OpenCL, as is a platform without devices
-        pass
     return handles
 
 

@@ -1,0 +1,46 @@
+"""An open device for the tests of this folder, and devices that are not there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from bentray_kernels.opencl import Device, Session, choice, choose, verdict
+
+GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True)
+
+
+@pytest.fixture(scope="session")
+def session() -> Session:
+    """The device that this machine's trial lets pass; PoCL comes with our dependencies."""
+    chosen = choose().device
+    assert chosen is not None, "no OpenCL device of this machine passes its trial: see `bentray devices`"
+    return Session(chosen)
+
+
+@pytest.fixture
+def gpu() -> Device:
+    return GPU
+
+
+@pytest.fixture
+def three() -> tuple[Device, ...]:
+    """A processor, a GPU and one more of the same, in the order of their platforms."""
+    cpu = replace(GPU, platform="Slow Platform", name="Processor", kind="cpu")
+    return (cpu, replace(GPU, index=1), replace(GPU, index=2, name="GPU 9001"))
+
+
+@pytest.fixture
+def fresh(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
+    """Nothing remembered of any device, in the process or on disk; gives the folder of the latter."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("BENTRAY_OPENCL_DEVICE", raising=False)
+    remembered = (verdict.verdict_on, choice._found, choice._warn_once)
+    for function in remembered:
+        function.cache_clear()
+    yield tmp_path / "bentray"
+    for function in remembered:
+        function.cache_clear()

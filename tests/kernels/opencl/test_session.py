@@ -1,0 +1,36 @@
+"""An open device builds our programs once and computes what they say."""
+
+import numpy as np
+import pyopencl as cl
+import pytest
+
+from bentray_kernels.opencl.session import probe
+
+
+def test_a_kernel_is_built_once(session):
+    first = session.kernel("probe", "probe", "REAL=double")
+    assert session.kernel("probe", "probe", "REAL=double") is first
+    assert session.kernel("probe", "probe", "REAL=double2") is not first
+
+
+def test_a_source_that_does_not_compile_is_an_error(session):
+    with pytest.raises(cl.RuntimeError):
+        session.kernel("probe", "probe", "REAL=no_such_type")
+
+
+def test_buffers_come_back_as_they_went(session):
+    sent = np.arange(10.0)
+    buffer = session.upload(sent)
+    whole, rest = np.empty(10), np.empty(4)
+    session.download(whole, buffer)
+    session.download(rest, buffer, 6 * 8)
+    assert np.array_equal(whole, sent)
+    assert np.array_equal(rest, sent[6:])
+
+
+@pytest.mark.parametrize("width", [1, 2, 4])
+def test_probe_gives_root_and_minimum(session, width):
+    a, b = np.arange(16.0), np.full(16, 7.5)
+    root, lower = probe(session, width, a, b)
+    assert np.allclose(root, np.sqrt(a), rtol=1e-15, atol=0.0)
+    assert np.array_equal(lower, np.minimum(a, b))

@@ -1,0 +1,134 @@
+"""Verdicts on devices that pass, lie, abort and hang; and what is remembered of them."""
+
+from dataclasses import replace
+
+import pytest
+
+from bentray_kernels.opencl import find_devices, verdict
+from bentray_kernels.opencl.trial import STAGES
+from bentray_kernels.opencl.verdict import Verdict, examine, in_a_child, verdict_on
+
+
+def child_of(bad):
+    """A child process of a device that is right but for ``bad``: stage to fault, or None to abort there."""
+    calls = []
+
+    def child(device, stages, time_out_s):
+        calls.append(tuple(stages))
+        answers = {}
+        for stage in stages:
+            if bad.get(stage, "") is None:
+                return answers, "ended by signal 6"
+            answers[stage] = bad.get(stage, "")
+        return answers, "ended with exit code 0"
+
+    child.calls = calls
+    return child
+
+
+def test_a_right_device_is_tried_once(gpu):
+    child = child_of({})
+    assert examine(gpu, child) == Verdict("", (1, 2, 4, 8, 16), {})
+    assert child.calls == [STAGES]
+
+
+def test_the_faults_of_pocl_cost_only_the_widths(gpu):
+    """PoCL 3.0-rc2: double8 aborts and double16 is silently wrong; our kernels use neither."""
+    child = child_of({"double8": None, "double16": "wrong fmin"})
+    found = examine(gpu, child)
+    assert found.usable
+    assert found.widths == (1, 2, 4)
+    assert found.faults == {"double8": "ended by signal 6", "double16": "wrong fmin"}
+    assert child.calls == [STAGES, ("double16",)]
+
+
+@pytest.mark.parametrize("stage", ["double1", "solve"])
+@pytest.mark.parametrize(("fault", "said"), [(None, "ended by signal 6"), ("wrong sqrt", "wrong sqrt")])
+def test_a_fault_in_what_we_need_refuses_the_device(gpu, stage, fault, said):
+    child = child_of({stage: fault, "double4": None})
+    found = examine(gpu, child)
+    assert not found.usable
+    assert found.reason == f"{stage}: {said}"
+    assert len(child.calls) <= 2, "what cannot be used is not tried any further"
+
+
+def test_a_child_that_answers_what_was_not_asked_is_not_believed(gpu):
+    def child(device, stages, time_out_s):
+        return {"double32": ""}, "ended with exit code 0"
+
+    found = examine(gpu, child)
+    assert found.reason == "double1: ended with exit code 0"
+
+
+def test_a_hanging_child_is_stopped():
+    answers, ending = in_a_child(find_devices()[0], STAGES, 0.01)
+    assert answers == {}
+    assert ending == "no answer in 0.01 s"
+
+
+def test_a_child_that_fails_says_why(gpu):
+    answers, ending = in_a_child(gpu, STAGES, 60.0)
+    assert answers == {}
+    assert ending.startswith("ended with exit code 1 (device 0 is ")
+
+
+def test_an_aborting_child_is_survived(monkeypatch, tmp_path):
+    package = tmp_path / "aborting"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "trial.py").write_text(
+        'import os\nprint(\'{"stage": "double1", "fault": ""}\', flush=True)\nprint(\'remark\')\nos.abort()\n'
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(verdict, "__package__", "aborting")
+    answers, ending = in_a_child(find_devices()[0], STAGES, 60.0)
+    assert answers == {"double1": ""}
+    assert ending.startswith("ended by signal 6")
+
+
+def test_without_double_precision_nothing_is_tried(gpu, monkeypatch, fresh):
+    monkeypatch.setattr(verdict, "in_a_child", None)
+    found = verdict_on(replace(gpu, double_precision=False))
+    assert found.reason == "it has no double precision"
+    assert found.widths == ()
+
+
+def test_a_pass_is_remembered_on_disk_until_the_driver_changes(gpu, monkeypatch, fresh):
+    child = child_of({"double8": None})
+    monkeypatch.setattr(verdict, "in_a_child", child)
+    first = verdict_on(gpu)
+    tried = len(child.calls)
+    verdict_on.cache_clear()
+    assert verdict_on(gpu) == first
+    assert len(child.calls) == tried
+    verdict_on(replace(gpu, driver="1.2.4"))
+    assert len(child.calls) == 2 * tried
+    monkeypatch.setattr("platform.node", lambda: "another host")
+    verdict_on.cache_clear()
+    verdict_on(gpu)
+    assert len(child.calls) == 3 * tried
+
+
+@pytest.mark.parametrize(
+    "content", ["", "[]", "{}", '{"widths": 3, "faults": {}}', '{"widths": [1], "faults": 1}']
+)
+def test_a_damaged_memory_is_no_pass(gpu, monkeypatch, fresh, content):
+    monkeypatch.setattr(verdict, "in_a_child", child_of({}))
+    verdict_on(gpu)
+    (file,) = fresh.iterdir()
+    file.write_text(content)
+    verdict_on.cache_clear()
+    monkeypatch.setattr(verdict, "in_a_child", child_of({"solve": "wrong travel times in 2-D"}))
+    assert not verdict_on(gpu).usable
+
+
+def test_a_refusal_is_not_remembered_on_disk(gpu, monkeypatch, fresh):
+    monkeypatch.setattr(verdict, "in_a_child", child_of({"solve": None}))
+    assert not verdict_on(gpu).usable
+    assert not fresh.exists()
+
+
+def test_without_a_place_to_remember_the_verdict_stands(gpu, monkeypatch, fresh):
+    fresh.write_text("a file where the folder should be")
+    monkeypatch.setattr(verdict, "in_a_child", child_of({}))
+    assert verdict_on(gpu).usable
