@@ -83,12 +83,14 @@ kernel void advance(global double *times, global const double *crossings, global
     const uint here = (x + 1) * ROW_X + y + 1;
     const uint by = block % blocks_y, bx = block / blocks_y;
     const uint apart_x = blocks_y;
+    const uint colour = (x + y) & 1;
 #else
     const uint z = get_local_id(0), y = get_local_id(1), x = get_local_id(2);
     const uint item = x * STEP_X + y * STEP_Y + z;
     const uint here = (x + 1) * ROW_X + (y + 1) * ROW_Y + z + 1;
     const uint bz = block % blocks_z, by = block / blocks_z % blocks_y, bx = block / blocks_z / blocks_y;
     const uint apart_x = blocks_y * blocks_z, apart_y = blocks_z;
+    const uint colour = (x + y + z) & 1;
 #endif
     global double *own = times + (ulong)entry * ITEMS;
     const double crossing = crossings[(ulong)(shared ? block : entry) * ITEMS + item];
@@ -97,28 +99,27 @@ kernel void advance(global double *times, global const double *crossings, global
     double now = before;
 
     tile[here] = now;
-#define BORDER(at, inside, apart, jump) ((inside) ? times[(ulong)(apart) * ITEMS + item + (jump)] : INFINITY)
+#define BORDER(inside, apart, jump) ((inside) ? times[(ulong)(apart) * ITEMS + item + (jump)] : INFINITY)
     if (x == 0)
-        tile[here - ROW_X] = BORDER(x, bx > 0, entry - apart_x, LAST * STEP_X);
+        tile[here - ROW_X] = BORDER(bx > 0, entry - apart_x, LAST * STEP_X);
     if (x == LAST)
-        tile[here + ROW_X] = BORDER(x, bx + 1 < blocks_x, entry + apart_x, -LAST * STEP_X);
+        tile[here + ROW_X] = BORDER(bx + 1 < blocks_x, entry + apart_x, -LAST * STEP_X);
 #if DIMS == 2
     if (y == 0)
-        tile[here - 1] = BORDER(y, by > 0, entry - 1, LAST);
+        tile[here - 1] = BORDER(by > 0, entry - 1, LAST);
     if (y == LAST)
-        tile[here + 1] = BORDER(y, by + 1 < blocks_y, entry + 1, -LAST);
-    const bool first = item == 0;
+        tile[here + 1] = BORDER(by + 1 < blocks_y, entry + 1, -LAST);
 #else
     if (y == 0)
-        tile[here - ROW_Y] = BORDER(y, by > 0, entry - apart_y, LAST * STEP_Y);
+        tile[here - ROW_Y] = BORDER(by > 0, entry - apart_y, LAST * STEP_Y);
     if (y == LAST)
-        tile[here + ROW_Y] = BORDER(y, by + 1 < blocks_y, entry + apart_y, -LAST * STEP_Y);
+        tile[here + ROW_Y] = BORDER(by + 1 < blocks_y, entry + apart_y, -LAST * STEP_Y);
     if (z == 0)
-        tile[here - 1] = BORDER(z, bz > 0, entry - 1, LAST);
+        tile[here - 1] = BORDER(bz > 0, entry - 1, LAST);
     if (z == LAST)
-        tile[here + 1] = BORDER(z, bz + 1 < blocks_z, entry + 1, -LAST);
-    const bool first = item == 0;
+        tile[here + 1] = BORDER(bz + 1 < blocks_z, entry + 1, -LAST);
 #endif
+    const bool first = item == 0;
     if (first) {
         queued[entry] = 0;
         falling[0] = 0;
@@ -129,27 +130,30 @@ kernel void advance(global double *times, global const double *crossings, global
     }
     barrier(CLK_LOCAL_MEM_FENCE);
 
+    // Points of one colour read only those of the other, so they may be renewed in place, all at once.
     int going = 1;
     for (uint turn = 0; going; ++turn) {
-        const double a = LOWER(tile[here - ROW_X], tile[here + ROW_X]);
+        for (uint phase = 0; phase < 2; ++phase) {
+            if (colour == phase) {
+                const double a = LOWER(tile[here - ROW_X], tile[here + ROW_X]);
 #if DIMS == 2
-        const double b = LOWER(tile[here - 1], tile[here + 1]);
-        const double trial = first_order(a, b, crossing);
+                const double b = LOWER(tile[here - 1], tile[here + 1]);
+                const double trial = first_order(a, b, crossing);
 #else
-        const double b = LOWER(tile[here - ROW_Y], tile[here + ROW_Y]);
-        const double c = LOWER(tile[here - 1], tile[here + 1]);
-        const double trial = first_order(a, b, c, crossing);
+                const double b = LOWER(tile[here - ROW_Y], tile[here + ROW_Y]);
+                const double c = LOWER(tile[here - 1], tile[here + 1]);
+                const double trial = first_order(a, b, c, crossing);
 #endif
-        const bool fell = now - trial > enough;
-        now = trial < now ? trial : now;
-        barrier(CLK_LOCAL_MEM_FENCE);
-        tile[here] = now;
-        if (fell)
-            falling[turn & 1] = 1;
-        // The flag of the next turn; all have read its last value before the barrier above.
-        if (first)
-            falling[(turn + 1) & 1] = 0;
-        barrier(CLK_LOCAL_MEM_FENCE);
+                if (now - trial > enough)
+                    falling[turn & 1] = 1;
+                now = LOWER(trial, now);
+                tile[here] = now;
+            }
+            // The flag of the next turn: all have read its last value before the first barrier of this turn.
+            if (phase == 1 && first)
+                falling[(turn + 1) & 1] = 0;
+            barrier(CLK_LOCAL_MEM_FENCE);
+        }
         going = falling[turn & 1];
     }
     own[item] = now;
