@@ -1,16 +1,26 @@
-"""Fast sweeping: first-order Gauss–Seidel in the alternating orders (Zhao 2005; chapter 7.2.2)."""
+"""Fast sweeping: first-order Gauss–Seidel in the alternating orders (Zhao 2005; chapter 7.2.2).
+
+Two things make it fast. The nodes of a diagonal are independent of each other in a sweep, so whole vectors
+of them are updated at once (see ``diagonals``). And a node is updated only after a neighbour gave one of its
+axes an earlier time (locking: Bak, McLaughlin & Renzi 2010): what is skipped would change nothing.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
+from .diagonals import FIRST, NONE, RUN, Diagonals, include
 from .problem import PointSource
-from .updates import first_order_2d, first_order_3d
+
+# First and last changed node of a run, the same of those whose change the nodes just left must hear of
+# (diagonal, then plane), and whether a change was above the tolerance.
+Outcome = tuple[int, int, int, int, int, int, int]
 
 
 def fast_sweeping(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
@@ -18,8 +28,8 @@ def fast_sweeping(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
 
     Args:
         problem: the checked problem.
-        tolerance: a round of sweeps that lowers no time by more than this part of a node's own
-            crossing time ends the iteration.
+        tolerance: sweeps in all orders that lower no time by more than this part of a node's own
+            crossing time end the iteration.
 
     Returns:
         (nx, ny[, nz]), s; equal to first-order fast marching up to the tolerance.
@@ -34,70 +44,273 @@ def fast_sweeping(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
 
 def sweep_until_settled(problem: PointSource, tolerance: float) -> Floats:
     """As ``fast_sweeping``, flat and with the border, for solvers that go on from there."""
-    time = np.full(problem.padded_slowness.size, math.inf)
-    seeds, times = problem.seeds()
-    time[seeds] = times
-    grid = time.reshape(problem.padded_shape)
-    slowness = problem.padded_slowness.reshape(problem.padded_shape)
-    if grid.ndim == 2:
-        _sweep_2d(grid, slowness, problem.spacing, tolerance)
-    else:
-        _sweep_3d(grid, slowness, problem.spacing, tolerance)
-    return time
+    return Sweeper(problem.slowness.shape).solve(problem, tolerance)
+
+
+class Sweeper:
+    """The arrays that sweeps over grids of one shape work in, used again from solve to solve."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self._grid = Diagonals.of(shape)
+        self._sweep = _sweep_3d if len(shape) == 3 else _sweep_2d
+        # One block: freed ones of this size are kept by the allocator, smaller ones given back each time.
+        arrays = np.empty((4, self._grid.size))
+        arrays[:2].fill(-math.inf)
+        arrays[2:].fill(math.inf)
+        self._times = arrays[0], arrays[1]
+        self._crossings = arrays[2], arrays[3]
+        # Of which slowness and spacing the crossing times are, in the grid as it is and in the flipped one.
+        self._stored: list[tuple[Floats, float] | None] = [None, None]
+
+    def solve(self, problem: PointSource, tolerance: float) -> Floats:
+        """Travel time of a problem of this shape, flat and padded, s."""
+        time = np.full(problem.padded_slowness.size, math.inf)
+        seeds, times = problem.seeds()
+        time[seeds] = times
+        self.settle(time, problem.padded_slowness, problem.spacing, tolerance, seeds)
+        return time
+
+    def settle(self, time: Floats, slowness: Floats, spacing: float, tolerance: float, nodes: Ints) -> None:
+        """Sweep ``time`` in place until it is settled; its border stands for what lies beyond.
+
+        Args:
+            time: flat and padded, s; infinity where nothing is known.
+            slowness: flat and padded, s/m; that of the border is not read.
+            spacing: node spacing, m.
+            tolerance: as for ``fast_sweeping``.
+            nodes: flat padded indices of the nodes whose neighbours are updated first.
+        """
+        grid = self._grid
+        grid.store(time, self._times[0], False)
+        low, high = grid.neighbours(nodes)
+        quiet = 0
+        for turns in itertools.count():
+            side = turns % 2
+            crossing = self._crossing(side, slowness, spacing)
+            moved = self._sweep(self._times[side], crossing, low, high, grid.shape, grid.stored, tolerance)
+            quiet = 0 if moved else quiet + 1
+            if quiet == 2 or not (low <= high).any():
+                grid.load(time, self._times[side], side == 1)
+                return
+            grid.turn(self._times[side], self._times[1 - side])
+            low, high = grid.flip(low, high)
+
+    def _crossing(self, side: int, slowness: Floats, spacing: float) -> Floats:
+        """Crossing times of the nodes by diagonals, kept from the last solve where they are the same."""
+        stored = self._stored[side]
+        if stored is None or stored[1] != spacing or not _same(stored[0], slowness):
+            self._grid.store(slowness, self._crossings[side], side == 1, scale=spacing, rim=1)
+        self._stored[side] = slowness, spacing
+        crossing: Floats = self._crossings[side]
+        return crossing
+
+
+def _same(a: Floats, b: Floats) -> bool:
+    return a is b or np.array_equal(a, b)
 
 
 @kernel
-def _sweep_2d(time: Floats, slowness: Floats, spacing: float, tolerance: float) -> None:
-    nx, ny = time.shape
-    while True:
-        changed = False
-        for order in range(4):
-            down_x = order & 1
-            down_y = order >> 1
-            for step_x in range(1, nx - 1):
-                i = nx - 1 - step_x if down_x else step_x
-                for step_y in range(1, ny - 1):
-                    j = ny - 1 - step_y if down_y else step_y
-                    a = min(time[i - 1, j], time[i + 1, j])
-                    b = min(time[i, j - 1], time[i, j + 1])
-                    old = time[i, j]
-                    # A node earlier than both its axes is settled already: nothing can lower it.
-                    if a >= old and b >= old:
-                        continue
-                    crossing = spacing * slowness[i, j]
-                    new = first_order_2d(a, b, crossing)
-                    if new < old:
-                        time[i, j] = new
-                        changed = changed or old - new > tolerance * crossing
-        if not changed:
-            return
+def _sweep_2d(
+    time: Floats,
+    crossing: Floats,
+    low: Ints,
+    high: Ints,
+    shape: tuple[int, int, int],
+    stored: tuple[int, int],
+    tolerance: float,
+) -> int:
+    moved = 0
+    for way in (1, -1):
+        moved |= _sweep_plane(time, crossing, low, high, shape, stored, tolerance, 0, way, 0)
+    return moved
 
 
 @kernel
-def _sweep_3d(time: Floats, slowness: Floats, spacing: float, tolerance: float) -> None:
-    nx, ny, nz = time.shape
-    while True:
-        changed = False
-        for order in range(8):
-            down_x = order & 1
-            down_y = (order >> 1) & 1
-            down_z = order >> 2
-            for step_x in range(1, nx - 1):
-                i = nx - 1 - step_x if down_x else step_x
-                for step_y in range(1, ny - 1):
-                    j = ny - 1 - step_y if down_y else step_y
-                    for step_z in range(1, nz - 1):
-                        k = nz - 1 - step_z if down_z else step_z
-                        a = min(time[i - 1, j, k], time[i + 1, j, k])
-                        b = min(time[i, j - 1, k], time[i, j + 1, k])
-                        c = min(time[i, j, k - 1], time[i, j, k + 1])
-                        old = time[i, j, k]
-                        if a >= old and b >= old and c >= old:
-                            continue
-                        crossing = spacing * slowness[i, j, k]
-                        new = first_order_3d(a, b, c, crossing)
-                        if new < old:
-                            time[i, j, k] = new
-                            changed = changed or old - new > tolerance * crossing
-        if not changed:
-            return
+def _sweep_3d(
+    time: Floats,
+    crossing: Floats,
+    low: Ints,
+    high: Ints,
+    shape: tuple[int, int, int],
+    stored: tuple[int, int],
+    tolerance: float,
+) -> int:
+    moved = 0
+    for up in (1, -1):
+        for step in range(shape[0]):
+            plane = 2 + step if up > 0 else shape[0] + 1 - step
+            # Both ways while the plane is in the cache.
+            for way in (1, -1):
+                moved |= _sweep_plane(time, crossing, low, high, shape, stored, tolerance, plane, way, up)
+    return moved
+
+
+@kernel
+def _sweep_plane(
+    time: Floats,
+    crossing: Floats,
+    low: Ints,
+    high: Ints,
+    shape: tuple[int, int, int],
+    stored: tuple[int, int],
+    tolerance: float,
+    plane: int,
+    way: int,
+    up: int,
+) -> int:
+    """Update the diagonals of a plane that wait for it, in rising (``way`` 1) or falling (−1) order."""
+    _, nj, nk = shape
+    rows, width = stored
+    base = plane * rows * width
+    moved = 0
+    for step in range(nj + nk - 1):
+        s = 2 + step if way > 0 else nj + nk - step
+        if low[plane, s] > high[plane, s]:
+            continue
+        start = (low[plane, s] - 1) // RUN * RUN
+        count = (high[plane, s] - start + RUN - 1) // RUN * RUN
+        low[plane, s] = NONE
+        high[plane, s] = -1
+        column = base + start + FIRST
+        # Unsigned, or every index would be tested for counting from the end and no vectors be made.
+        at = np.uint64(s % rows * width + column)
+        before = np.uint64((s - 1) % rows * width + column - 1)
+        after = np.uint64((s + 1) % rows * width + column)
+        behind = np.uint64((s - 2 * way + rows) % rows * width + column - (2 if way > 0 else 0))
+        if up == 0:
+            outcome = _relax_2d(time, crossing, at, before, after, behind, count, tolerance)
+        else:
+            one = up * rows * width
+            here = s % rows * width + column
+            outcome = _relax_3d(
+                time,
+                crossing,
+                at,
+                before,
+                after,
+                behind,
+                np.uint64(here - one),
+                np.uint64(here + one),
+                np.uint64(here - 2 * one),
+                count,
+                tolerance,
+            )
+        first, last, first_behind, last_behind, first_below, last_below, more = outcome
+        moved |= more
+        k = start + 1
+        if last >= 0:
+            # Nodes before share their column or have the next lower one, nodes after the next higher one.
+            include(low, high, plane, s + way, k + first + min(way, 0), k + last + max(way, 0), shape)
+            if up != 0 and 2 <= plane + up <= shape[0] + 1:
+                include(low, high, plane + up, s, k + first, k + last, shape)
+        if last_behind >= 0:
+            include(
+                low,
+                high,
+                plane,
+                s - way,
+                k + first_behind - max(way, 0),
+                k + last_behind - min(way, 0),
+                shape,
+            )
+        if last_below >= 0 and 2 <= plane - up <= shape[0] + 1:
+            include(low, high, plane - up, s, k + first_below, k + last_below, shape)
+    return moved
+
+
+@kernel(inline="always")
+def _relax_2d(
+    time: Floats,
+    crossing: Floats,
+    at: np.uint64,
+    before: np.uint64,
+    after: np.uint64,
+    behind: np.uint64,
+    count: int,
+    tolerance: float,
+) -> Outcome:
+    """First-order time of ``count`` nodes from the earlier neighbour of each axis (Zhao 2005, equation 2.4).
+
+    Without branches, so that it compiles to vectors: a difference clamped to the crossing time gives the
+    time along one axis exactly, and where both are infinite the NaN compares as no improvement.
+    """
+    first, last, first_behind, last_behind, moved = NONE, -1, NONE, -1, 0
+    for x in range(np.uint64(count)):
+        a = _earlier(time[before + x], time[after + x + np.uint64(1)])
+        b = _earlier(time[before + x + np.uint64(1)], time[after + x])
+        rhs = crossing[at + x]
+        gap = _earlier(abs(a - b), rhs)
+        new = _earlier(a, b) + 0.5 * (gap + math.sqrt(2.0 * rhs * rhs - gap * gap))
+        old = time[at + x]
+        changed = new < old
+        # A neighbour that an opposite neighbour reached earlier has nothing to gain from this one.
+        heard = changed & (new < _later(time[behind + x], time[behind + x + np.uint64(2)]))
+        place = int(np.int64(x))
+        first = min(first, place if changed else NONE)
+        last = max(last, place if changed else -1)
+        first_behind = min(first_behind, place if heard else NONE)
+        last_behind = max(last_behind, place if heard else -1)
+        moved |= 1 if old - new > tolerance * rhs else 0
+        time[at + x] = new if changed else old
+    return first, last, first_behind, last_behind, NONE, -1, moved
+
+
+@kernel(inline="always")
+def _relax_3d(
+    time: Floats,
+    crossing: Floats,
+    at: np.uint64,
+    before: np.uint64,
+    after: np.uint64,
+    behind: np.uint64,
+    below: np.uint64,
+    above: np.uint64,
+    beneath: np.uint64,
+    count: int,
+    tolerance: float,
+) -> Outcome:
+    """As ``_relax_2d`` with three axes, taken in in the order of time while they are upwind."""
+    first, last, first_behind, last_behind, moved = NONE, -1, NONE, -1, 0
+    first_below, last_below = NONE, -1
+    for x in range(np.uint64(count)):
+        a = _earlier(time[before + x], time[after + x + np.uint64(1)])
+        b = _earlier(time[before + x + np.uint64(1)], time[after + x])
+        c = _earlier(time[below + x], time[above + x])
+        rhs = crossing[at + x]
+        less = _earlier(a, b)
+        more = _later(a, b)
+        low = _earlier(less, c)
+        high = _later(more, c)
+        middle = _later(less, _earlier(more, c))
+        square = rhs * rhs
+        near = _earlier(middle - low, rhs)
+        time_2 = 0.5 * (near + math.sqrt(2.0 * square - near * near))
+        far = high - low
+        total = near + far
+        time_3 = (total + math.sqrt(total * total - 3.0 * (near * near + far * far - square))) / 3.0
+        new = low + (time_3 if time_2 > far else time_2)
+        old = time[at + x]
+        changed = new < old
+        heard = changed & (new < _later(time[behind + x], time[behind + x + np.uint64(2)]))
+        heard_below = changed & (new < time[beneath + x])
+        place = int(np.int64(x))
+        first = min(first, place if changed else NONE)
+        last = max(last, place if changed else -1)
+        first_behind = min(first_behind, place if heard else NONE)
+        last_behind = max(last_behind, place if heard else -1)
+        first_below = min(first_below, place if heard_below else NONE)
+        last_below = max(last_below, place if heard_below else -1)
+        moved |= 1 if old - new > tolerance * rhs else 0
+        time[at + x] = new if changed else old
+    return first, last, first_behind, last_behind, first_below, last_below, moved
+
+
+@kernel(inline="always")
+def _earlier(a: float, b: float) -> float:
+    """The lower of two times, as one instruction: ``min`` would also sort out NaN and signs of zero."""
+    return a if a < b else b
+
+
+@kernel(inline="always")
+def _later(a: float, b: float) -> float:
+    return a if a > b else b

@@ -1,0 +1,199 @@
+"""Grids stored by their diagonals, so that a Gauss–Seidel sweep runs along contiguous, independent nodes.
+
+A sweep in the order (+,+) may update all nodes of a diagonal j + k = s at once, for each has its neighbours
+on s − 1 and s + 1 (Detrixhe, Gibou & Min 2013). Here row ``s % rows`` holds diagonal s, column by k:
+neighbours are then one or no columns off in the row before and after, and the compiler fills its vectors.
+The orders (+,−) and (−,+) are the same in a grid whose j is flipped. A third axis is a stack of such planes.
+
+Border nodes carry a crossing time of infinity, so that no update lowers them; slots that hold no node stay
+at −∞, which keeps them from asking for updates.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..compiled import kernel
+
+# Nodes a run of updates is rounded up to; a multiple of what a vector holds.
+RUN = 8
+
+# A row holds the diagonals s and s + rows; this many slots keep a rounded run of one off the other.
+GAP = 2 * RUN
+
+# Column of k = 1, the first of a run; the border and its border need two columns before it.
+FIRST = RUN
+
+# No column: above every column as a lowest one.
+NONE = 1 << 40
+
+# Nodes of j and k that are moved at once; diagonals of such a patch stay in the cache.
+PATCH = (32, 64)
+
+
+@dataclass(frozen=True)
+class Diagonals:
+    """How a padded grid of two or three axes lies in memory by diagonals.
+
+    Attributes:
+        shape: (planes, nj, nk) without the border; planes is 0 for a grid of two axes.
+    """
+
+    shape: tuple[int, int, int]
+
+    @classmethod
+    def of(cls, shape: tuple[int, ...]) -> Diagonals:
+        """For a grid of that shape, border not counted."""
+        return cls((shape[0] if len(shape) == 3 else 0, shape[-2], shape[-1]))
+
+    @property
+    def rows(self) -> int:
+        return self.shape[1] + GAP
+
+    @property
+    def width(self) -> int:
+        return FIRST + RUN * math.ceil(self.shape[2] / RUN) + RUN
+
+    @property
+    def size(self) -> int:
+        return self.planes * self.rows * self.width
+
+    @property
+    def planes(self) -> int:
+        """Planes stored: with their border and, beyond it, one that is never a neighbour."""
+        return self.shape[0] + 4 if self.shape[0] else 1
+
+    @property
+    def stored(self) -> tuple[int, int]:
+        return self.rows, self.width
+
+    def store(self, plain: Floats, into: Floats, flipped: bool, *, scale: float = 1.0, rim: int = 0) -> None:
+        """Copy a flat padded grid into its diagonals, times ``scale``; ``rim`` outer layers are left out."""
+        _move(plain, into, self.shape, self.stored, flipped, scale, rim, False)
+
+    def load(self, plain: Floats, source: Floats, flipped: bool) -> None:
+        """Copy the diagonals into a flat padded grid."""
+        _move(plain, source, self.shape, self.stored, flipped, 1.0, 0, True)
+
+    def turn(self, source: Floats, into: Floats) -> None:
+        """Copy the diagonals of a grid into those of the grid whose j is flipped."""
+        _turn(source, into, self.shape, self.stored)
+
+    def nobody(self) -> tuple[Ints, Ints]:
+        """Lowest and highest column per diagonal, (planes, diagonals), of an empty set of nodes."""
+        _, nj, nk = self.shape
+        return np.full((self.planes, nj + nk + 4), NONE), np.full((self.planes, nj + nk + 4), -1)
+
+    def neighbours(self, nodes: Ints) -> tuple[Ints, Ints]:
+        """Lowest and highest column per diagonal of the neighbours of flat padded ``nodes``."""
+        low, high = self.nobody()
+        _surround(nodes, self.shape, low, high)
+        return low, high
+
+    def flip(self, low: Ints, high: Ints) -> tuple[Ints, Ints]:
+        """The same columns, or more, in the grid whose j is flipped."""
+        turned = self.nobody()
+        _flip(low, high, self.shape, *turned)
+        return turned
+
+
+@kernel
+def _move(
+    plain: Floats,
+    diagonals: Floats,
+    shape: tuple[int, int, int],
+    stored: tuple[int, int],
+    flipped: bool,
+    scale: float,
+    rim: int,
+    back: bool,
+) -> None:
+    planes, nj, nk = shape
+    rows, width = stored
+    step = np.uint64(width + 1)
+    for plane in range(rim if planes else 0, planes + 2 - rim if planes else 1):
+        base = (plane + 1 if planes else 0) * rows * width
+        for some in range(rim, nj + 2 - rim, PATCH[0]):
+            for first in range(rim, nk + 2 - rim, PATCH[1]):
+                for j in range(some, min(some + PATCH[0], nj + 2 - rim)):
+                    k = first
+                    end = min(first + PATCH[1], nk + 2 - rim)
+                    while k < end:
+                        row = ((nj + 1 - j if flipped else j) + k) % rows
+                        here = np.uint64((plane * (nj + 2) + j) * (nk + 2) + k)
+                        there = np.uint64(base + row * width + k + FIRST - 1)
+                        # One step in k is one row and one column on, until the rows begin again.
+                        until = min(end - k, rows - row)
+                        if back:
+                            for x in range(np.uint64(until)):
+                                plain[here + x] = diagonals[there + x * step]
+                        else:
+                            for x in range(np.uint64(until)):
+                                diagonals[there + x * step] = scale * plain[here + x]
+                        k += until
+
+
+@kernel
+def _turn(source: Floats, into: Floats, shape: tuple[int, int, int], stored: tuple[int, int]) -> None:
+    planes, nj, nk = shape
+    rows, width = stored
+    step = np.uint64(width + 1)
+    for plane in range(planes + 2 if planes else 1):
+        base = (plane + 1 if planes else 0) * rows * width
+        for some in range(0, nj + 2, PATCH[0]):
+            for first in range(0, nk + 2, PATCH[1]):
+                for j in range(some, min(some + PATCH[0], nj + 2)):
+                    k = first
+                    end = min(first + PATCH[1], nk + 2)
+                    while k < end:
+                        old = (j + k) % rows
+                        new = (nj + 1 - j + k) % rows
+                        here = np.uint64(base + old * width + k + FIRST - 1)
+                        there = np.uint64(base + new * width + k + FIRST - 1)
+                        until = min(end - k, rows - max(old, new))
+                        for x in range(np.uint64(until)):
+                            into[there + x * step] = source[here + x * step]
+                        k += until
+
+
+@kernel(inline="always")
+def include(
+    low: Ints, high: Ints, plane: int, s: int, first: int, last: int, shape: tuple[int, int, int]
+) -> None:
+    """Widen the columns of a diagonal to take in ``first`` to ``last``, those of the border left out."""
+    first = max(first, max(1, s - shape[1]))
+    last = min(last, min(shape[2], s - 1))
+    if first <= last:
+        low[plane, s] = min(low[plane, s], first)
+        high[plane, s] = max(high[plane, s], last)
+
+
+@kernel
+def _surround(nodes: Ints, shape: tuple[int, int, int], low: Ints, high: Ints) -> None:
+    planes, nj, nk = shape
+    for node in nodes:
+        k = node % (nk + 2)
+        s = node // (nk + 2) % (nj + 2) + k
+        plane = node // ((nk + 2) * (nj + 2)) + 1 if planes else 0
+        if not planes or 2 <= plane <= planes + 1:
+            include(low, high, plane, s - 1, k - 1, k, shape)
+            include(low, high, plane, s + 1, k, k + 1, shape)
+        if planes and plane > 2:
+            include(low, high, plane - 1, s, k, k, shape)
+        if planes and plane < planes + 1:
+            include(low, high, plane + 1, s, k, k, shape)
+
+
+@kernel
+def _flip(low: Ints, high: Ints, shape: tuple[int, int, int], lower: Ints, higher: Ints) -> None:
+    _, nj, nk = shape
+    for plane in range(low.shape[0]):
+        for s in range(2, nj + nk + 1):
+            for k in range(low[plane, s], high[plane, s] + 1):
+                t = nj + 1 - s + 2 * k
+                lower[plane, t] = min(lower[plane, t], k)
+                higher[plane, t] = max(higher[plane, t], k)

@@ -1,0 +1,98 @@
+"""Grids stored by diagonals: nothing is lost on the way there, flipped, and back."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.eikonal.diagonals import FIRST, Diagonals
+
+SHAPES = st.one_of(
+    st.tuples(st.integers(1, 40), st.integers(1, 90)),
+    st.tuples(st.integers(1, 4), st.integers(1, 20), st.integers(1, 70)),
+)
+
+
+def numbered(shape):
+    """A padded grid whose values are its flat indices."""
+    return np.arange(np.prod([n + 2 for n in shape]), dtype=float)
+
+
+@given(shape=SHAPES, flipped=st.booleans())
+@settings(deadline=None)
+def test_a_grid_comes_back_whole(shape, flipped):
+    grid = Diagonals.of(shape)
+    plain = numbered(shape)
+    stored = np.full(grid.size, -1.0)
+    grid.store(plain, stored, flipped)
+    back = np.full(plain.size, -1.0)
+    grid.load(back, stored, flipped)
+    assert np.array_equal(back, plain)
+    assert np.count_nonzero(stored >= 0.0) == plain.size
+    turned = np.full(grid.size, -1.0)
+    grid.turn(stored, turned)
+    other = np.full(grid.size, -1.0)
+    grid.store(plain, other, not flipped)
+    assert np.array_equal(turned, other)
+
+
+def test_neighbours_lie_in_the_rows_before_and_after():
+    shape = (5, 6)
+    grid = Diagonals.of(shape)
+    stored = np.full(grid.size, np.nan)
+    grid.store(numbered(shape), stored, False)
+    rows = stored.reshape(grid.stored)
+    j, k = 3, 4
+    column = k - 1 + FIRST
+    assert rows[j + k, column] == j * 8 + k
+    assert rows[j + k - 1, [column - 1, column]].tolist() == [j * 8 + k - 1, (j - 1) * 8 + k]
+    assert rows[j + k + 1, [column, column + 1]].tolist() == [(j + 1) * 8 + k, j * 8 + k + 1]
+
+
+def test_the_rim_can_be_left_out_and_values_scaled():
+    grid = Diagonals.of((2, 3))
+    stored = np.full(grid.size, np.inf)
+    grid.store(np.ones(20), stored, False, scale=3.0, rim=1)
+    assert np.count_nonzero(stored == 3.0) == 6
+    assert np.count_nonzero(np.isfinite(stored)) == 6
+
+
+def members(grid, low, high):
+    """Flat padded indices of the nodes between the columns."""
+    _, nj, nk = grid.shape
+    return {
+        ((plane - 1 if grid.shape[0] else 0) * (nj + 2) + s - k) * (nk + 2) + k
+        for plane, s in zip(*np.nonzero(low <= high), strict=True)
+        for k in range(low[plane, s], high[plane, s] + 1)
+    }
+
+
+@pytest.mark.parametrize("shape", [(4, 5), (1, 3), (3, 4, 5)])
+def test_neighbours_of_a_node_are_those_of_the_grid(shape):
+    grid = Diagonals.of(shape)
+    padded = tuple(n + 2 for n in shape)
+    for node in np.ndindex(padded):
+        expected = set()
+        for axis in range(len(shape)):
+            for step in (-1, 1):
+                near = list(node)
+                near[axis] += step
+                if all(1 <= i <= n for i, n in zip(near, shape, strict=True)):
+                    expected.add(int(np.ravel_multi_index(near, padded)))
+        found = members(grid, *grid.neighbours(np.array([np.ravel_multi_index(node, padded)])))
+        assert found == expected
+
+
+@given(shape=SHAPES, seed=st.integers(0, 99))
+@settings(deadline=None)
+def test_flipping_keeps_every_node(shape, seed):
+    grid = Diagonals.of(shape)
+    rng = np.random.default_rng(seed)
+    nodes = rng.integers(0, numbered(shape).size, 5)
+    low, high = grid.neighbours(nodes)
+    _, nj, nk = grid.shape
+    turned = members(grid, *grid.flip(low, high))
+    for node in members(grid, low, high):
+        row, k = divmod(node, nk + 2)
+        plane, j = divmod(row, nj + 2)
+        assert (plane * (nj + 2) + nj + 1 - j) * (nk + 2) + k in turned
