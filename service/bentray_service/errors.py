@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import secrets
 from collections.abc import Mapping, Sequence
@@ -11,9 +12,11 @@ from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
+from fastapi.responses import Response
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.routing import Match
 
 from bentray_kernels.errors import InvalidInput
 
@@ -69,6 +72,7 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.NotReady: Kind(503, "not-ready", "The service cannot work now"),
 }
 INVALID_REQUEST = Kind(422, "invalid-request", "The request is not as it should be")
+UNREADABLE = Kind(400, "unreadable-body", "The body cannot be read")
 NOT_FOUND = Kind(404, "not-found", "There is nothing at this address")
 INTERNAL = Kind(500, "internal", "The service failed")
 FAILED = Kind(500, "job-failed", "The job failed")
@@ -108,6 +112,8 @@ def fault_of(error: Mapping[str, Any]) -> Fault:
         return Fault(field=".".join([*where, cause.field]), found=cause.value, accepted=cause.accepted)
     if error["type"] == "json_invalid":
         return Fault(field="body", found=f"no JSON ({cause})", accepted="a JSON object")
+    if error["type"] in ("model_attributes_type", "dataclass_type"):
+        return Fault(field=".".join(where), found=_short(error["input"]), accepted="a JSON object")
     if error["type"] == "missing":
         return Fault(field=".".join(where), found="nothing", accepted="a value; it is required")
     if error["type"] == "extra_forbidden":
@@ -121,49 +127,69 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(InvalidInput, _refused)
     app.add_exception_handler(refusals.NotReady, _not_ready)
     app.add_exception_handler(RequestValidationError, _invalid_request)
+    app.add_exception_handler(ClientDisconnect, _gone)
     app.add_exception_handler(HTTPException, _http)
     app.add_exception_handler(Exception, _unexpected)
 
 
-def _respond(problem: Problem, headers: Mapping[str, str] | None = None) -> JSONResponse:
-    body = problem.model_dump(exclude_none=True)
-    return JSONResponse(body, problem.status, headers=headers, media_type=MEDIA_TYPE)
+def _respond(problem: Problem, headers: Mapping[str, str] | None = None) -> Response:
+    # Escaped to ASCII: what was found may hold half characters, which UTF-8 cannot carry.
+    body = json.dumps(problem.model_dump(exclude_none=True))
+    return Response(body, problem.status, headers=headers, media_type=MEDIA_TYPE)
 
 
-def _refused(request: Request, error: Exception) -> JSONResponse:
+def _refused(request: Request, error: Exception) -> Response:
     assert isinstance(error, InvalidInput)
     return _respond(from_exception(error, request.url.path))
 
 
-def _not_ready(request: Request, error: Exception) -> JSONResponse:
+def _not_ready(request: Request, error: Exception) -> Response:
     assert isinstance(error, refusals.NotReady)
     faults = [Fault(field=part, found=found, accepted=needed) for part, found, needed in error.faults]
     problem = make(PROBLEMS[refusals.NotReady], str(error), faults, errors=faults, instance=request.url.path)
     return _respond(problem, {"Retry-After": "5"})
 
 
-def _invalid_request(request: Request, error: Exception) -> JSONResponse:
+def _invalid_request(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     faults = [fault_of(one) for one in error.errors()]
     words = "; ".join(f"{one.field}: found {one.found}; accepted: {one.accepted}" for one in faults)
     return _respond(make(INVALID_REQUEST, words, faults, errors=faults, instance=request.url.path))
 
 
-def _http(request: Request, error: Exception) -> JSONResponse:
+def _http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     path = request.url.path
     if error.status_code == NOT_FOUND.status:
         return _respond(make(NOT_FOUND, f"nothing is at {path}; /docs lists every address", instance=path))
+    if error.status_code == UNREADABLE.status:
+        fault = Fault(
+            field="body", found="no readable JSON", accepted="a JSON object in UTF-8, not nested deeply"
+        )
+        words = f"{fault.field}: found {fault.found}; accepted: {fault.accepted}"
+        return _respond(make(UNREADABLE, words, [fault], instance=path))
     phrase = HTTPStatus(error.status_code).phrase
     kind = Kind(error.status_code, phrase.lower().replace(" ", "-"), phrase)
-    allowed = (error.headers or {}).get("Allow")
-    detail = (
-        f"{request.method} is not possible at {path}; accepted: {allowed}" if allowed else str(error.detail)
-    )
-    return _respond(make(kind, detail, instance=path), error.headers)
+    if error.status_code != HTTPStatus.METHOD_NOT_ALLOWED:
+        return _respond(make(kind, str(error.detail), instance=path), error.headers)
+    allowed = ", ".join(_methods(request))
+    detail = f"{request.method} is not possible at {path}; accepted: {allowed}"
+    return _respond(make(kind, detail, instance=path), {"Allow": allowed})
 
 
-def _unexpected(request: Request, error: Exception) -> JSONResponse:
+def _methods(request: Request) -> list[str]:
+    """What can be asked of this address; the router itself names the first route alone."""
+    routes = [route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE]
+    return sorted({method for route in routes for method in getattr(route, "methods", None) or ()})
+
+
+def _gone(request: Request, error: Exception) -> Response:
+    """Nobody is left to read an answer; it is no fault of the service either."""
+    log.info("%s %s was broken off by the client", request.method, request.url.path)
+    return Response(status_code=UNREADABLE.status)
+
+
+def _unexpected(request: Request, error: Exception) -> Response:
     number = secrets.token_hex(8)
     log.error("%s %s failed [%s]", request.method, request.url.path, number, exc_info=error)
     detail = f"an error of the service, not of the request; it is in the log under {number}"

@@ -6,6 +6,7 @@ import re
 import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
+from starlette.requests import ClientDisconnect
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service import errors, refusals
@@ -23,6 +24,18 @@ def http():
     @app.get("/full")
     def full():
         raise refusals.StorageFull("body", "no space", "less")
+
+    @app.post("/refused")
+    def sent(body: dict[str, int]):
+        return body
+
+    @app.get("/half")
+    def half():
+        raise InvalidInput("\ud800", 1, "a whole character")
+
+    @app.get("/gone")
+    def gone():
+        raise ClientDisconnect
 
     @app.get("/bug")
     def bug():
@@ -65,11 +78,37 @@ def test_every_wrong_parameter_is_listed(http):
 
 
 def test_router_errors_are_problems_too(http):
-    missing, wrong = http.get("/nowhere"), http.post("/refused")
+    missing, wrong = http.get("/nowhere"), http.put("/refused")
     assert (missing.status_code, missing.json()["type"]) == (404, "/problems/not-found")
     assert (wrong.status_code, wrong.json()["type"]) == (405, "/problems/method-not-allowed")
-    assert wrong.headers["allow"] == "GET"
-    assert "accepted: GET" in wrong.json()["detail"]
+    assert wrong.headers["allow"] == "GET, POST"
+    assert "accepted: GET, POST" in wrong.json()["detail"]
+
+
+@pytest.mark.parametrize("body", [b"\xff", b"[" * 50_000, b"9" * 5000], ids=["bytes", "nesting", "digits"])
+def test_a_body_that_is_no_readable_json_is_named(http, body):
+    answer = http.post("/refused", content=body, headers={"Content-Type": "application/json"})
+    assert (answer.status_code, answer.json()["type"]) == (400, "/problems/unreadable-body")
+    assert (answer.json()["field"], answer.json()["found"]) == ("body", "no readable JSON")
+
+
+@pytest.mark.parametrize("body", [b"[]", b"null", b'"x"'])
+def test_a_body_of_another_kind_is_told_in_words_of_json(http, body):
+    answer = http.post("/refused", content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 422
+    assert answer.json()["field"] == "body"
+
+
+def test_half_characters_come_back_escaped(http):
+    answer = http.get("/half")
+    assert answer.status_code == 422
+    assert "\\ud800" in answer.text
+
+
+def test_a_client_that_leaves_is_no_error_of_the_service(http, caplog):
+    with caplog.at_level(logging.WARNING, "bentray.errors"):
+        http.get("/gone")
+    assert caplog.records == []
 
 
 def test_a_surprise_stays_in_the_log(http, caplog):

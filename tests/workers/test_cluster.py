@@ -1,5 +1,8 @@
 """The cluster provider: an embedded cluster, a given scheduler, and what is refused."""
 
+import socket
+import threading
+
 import pytest
 
 from bentray_kernels.errors import InvalidInput
@@ -47,6 +50,26 @@ def test_missing_scheduler_is_named(address):
     with pytest.raises(InvalidInput, match="scheduler_address") as refusal:
         open_cluster(address, connect_timeout_s=0.5)
     assert "a running Dask scheduler" in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    "answer", [b"", b"HTTP/1.1 400 Bad Request\r\n\r\n"], ids=["silence", "a web server"]
+)
+def test_what_is_no_scheduler_is_refused_in_time(answer):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def listen():
+            with server.accept()[0] as connection:
+                connection.sendall(answer)
+                while connection.recv(1000):
+                    pass
+
+        thread = threading.Thread(target=listen)
+        thread.start()
+        with pytest.raises(InvalidInput, match="scheduler_address"):
+            open_cluster(f"tcp://127.0.0.1:{server.getsockname()[1]}", connect_timeout_s=0.5)
+        thread.join(10.0)
+    assert not thread.is_alive()
 
 
 def test_no_workers_is_refused():

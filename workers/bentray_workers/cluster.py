@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 from pathlib import Path
 from types import TracebackType
@@ -9,6 +10,8 @@ from typing import Any
 
 import dask
 from distributed import Client, LocalCluster
+from distributed.core import rpc
+from distributed.security import Security
 
 from bentray_kernels.errors import InvalidInput
 
@@ -18,6 +21,9 @@ PRELOAD = "bentray_workers.warmup"
 
 # A queue without workers fails its tasks after this long instead of waiting for ever.
 NO_WORKERS_TIMEOUT = "60s"
+
+# What tells that nothing, or something else, is at an address; other protocols look like huge messages.
+NO_SCHEDULER = (OSError, TimeoutError, ValueError, MemoryError)
 
 
 class Cluster:
@@ -83,11 +89,13 @@ def open_cluster(
     """
     if scheduler_address is not None:
         try:
+            asyncio.run(_answers(scheduler_address, connect_timeout_s))
             return Cluster(Client(scheduler_address, timeout=connect_timeout_s, set_as_default=False))
-        except (OSError, TimeoutError, ValueError) as error:
+        except NO_SCHEDULER as error:
+            reason = f"no answer in {connect_timeout_s:g} s" if isinstance(error, TimeoutError) else error
             raise InvalidInput(
                 "scheduler_address",
-                f"{scheduler_address} ({error})",
+                f"{scheduler_address} ({reason})",
                 "the address of a running Dask scheduler",
             ) from error
     count = workers if workers is not None else len(os.sched_getaffinity(0))
@@ -104,3 +112,11 @@ def open_cluster(
             local_directory=None if local_directory is None else str(local_directory),
         )
     return Cluster(Client(local, set_as_default=False), local)
+
+
+async def _answers(address: str, timeout_s: float) -> None:
+    """Ask the scheduler who it is. A ``Client`` would wait for ever for one that accepts and stays silent."""
+    async with asyncio.timeout(timeout_s):
+        secrets = Security().get_connection_args("client")
+        async with rpc(address, connection_args=secrets, timeout=timeout_s) as scheduler:
+            await scheduler.identity(n_workers=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import ipaddress
 import json
 import os
@@ -82,7 +83,7 @@ def _listen(host: str, port: int) -> socket.socket:
     # and port 0 is known by its real number.
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-    except socket.gaierror as error:
+    except (socket.gaierror, UnicodeError) as error:
         raise InvalidInput("host", repr(host), "an address of this machine, as 127.0.0.1") from error
     listening = socket.socket(family, kind, protocol)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -90,6 +91,8 @@ def _listen(host: str, port: int) -> socket.socket:
         listening.bind(address)
     except OSError as error:
         listening.close()
+        if error.errno == errno.EADDRNOTAVAIL:
+            raise InvalidInput("host", repr(host), "an address of this machine, as 127.0.0.1") from error
         raise InvalidInput(
             "port", f"{port} on {host} ({error.strerror})", "a free port of this machine; 0 picks one"
         ) from error

@@ -60,8 +60,6 @@ def submit(
         raise InvalidInput(
             "output", f"{output} with --no-wait", "one of the two: there is no result to fetch yet"
         )
-    if not url.startswith(("http://", "https://")):
-        raise InvalidInput("url", repr(url), "an address that begins with http:// or https://")
     source = input_file(file)
     folder = None if output is None else output_folder(output)
     settings = settings_from(

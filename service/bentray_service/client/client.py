@@ -12,6 +12,8 @@ from typing import Any, Literal, Self
 
 import httpx
 
+from bentray_kernels.errors import InvalidInput
+
 from .errors import ClientError, from_problem, from_response
 
 CHUNK_BYTES = 1024 * 1024
@@ -22,10 +24,13 @@ class Client:
     """A connection to one service; use it as a context manager.
 
     Every method raises :class:`ClientError` when the service refuses or does not answer.
+
+    Raises:
+        InvalidInput: for a ``url`` that is no web address.
     """
 
     def __init__(self, url: str, *, timeout_s: float = 300.0, poll_s: float = 0.3) -> None:
-        self.url = url.rstrip("/")
+        self.url = _checked(url).rstrip("/")
         self._poll_s = poll_s
         # The answer to an upload comes after the service has read the whole file.
         timeout = httpx.Timeout(timeout_s, connect=10.0)
@@ -142,6 +147,16 @@ class Client:
                 yield response
         except httpx.TransportError as error:
             raise ClientError(f"no answer from {self.url}: {error}") from error
+
+
+def _checked(url: str) -> str:
+    try:
+        parsed = httpx.URL(url)
+    except httpx.InvalidURL:
+        parsed = httpx.URL()
+    if parsed.scheme not in ("http", "https") or not parsed.host:
+        raise InvalidInput("url", repr(url), "a web address, such as http://127.0.0.1:8000")
+    return url
 
 
 def _chunks(

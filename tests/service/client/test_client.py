@@ -95,3 +95,9 @@ def test_nobody_there():
         pytest.raises(ClientError, match=r"no answer from http://127.0.0.1:9"),
     ):
         client.job("x")
+
+
+@pytest.mark.parametrize("url", ["", "lab:8000", "http://", "ftp://lab", "http://lab:port"])
+def test_what_is_no_web_address_is_refused(url):
+    with pytest.raises(InvalidInput, match="url: found"):
+        Client(url)
