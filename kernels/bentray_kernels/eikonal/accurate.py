@@ -8,24 +8,26 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
-from .fast_sweeping import sweep_until_settled
+from .fast_sweeping import Sweeper
 from .problem import PointSource
 from .updates import factored_update
 
 # The order of arrival is all that the first-order times are for; they need not settle to rounding.
 ORDER_TOLERANCE = 1e-3
 
-# Near the source first-order times order the nodes badly; those of one factored pass order them as the
-# heap would, and the second pass then has the heap's accuracy (8 times the first's in a gradient, 257²).
-PASSES = 2
+# First-order times order the nodes near the source badly, and all that follow inherit it. So where the speed
+# varies by no more than CONTRAST within RADIUS nodes (transducers stand in water), straight lines give the
+# times there; elsewhere the times of one factored pass order a second. Either has the heap's accuracy.
+RADIUS = 8
+CONTRAST = 1.2
 
 
 def accurate(problem: PointSource) -> Floats:
     """Factored second-order travel time without a heap.
 
-    Fast sweeping gives the order in which the front arrives, a counting sort puts the nodes into
-    that order, and a pass of the update of ``hafmm`` follows it; its times order the second
-    pass. Where two fronts meet, a wrong order costs no more than the first-order error at those nodes.
+    Fast sweeping gives the order in which the front arrives, a counting sort puts the nodes into that
+    order, and a pass of the update of ``hafmm`` follows it. Where two fronts meet, a wrong order
+    costs no more than the first-order error at those nodes.
 
     Returns:
         (nx, ny[, nz]), s.
@@ -33,8 +35,9 @@ def accurate(problem: PointSource) -> Floats:
     seeds, times = problem.seeds()
     squares = problem.reference_squares()
     limit = 4.0 * (problem.source_slowness() * problem.spacing) ** 2
-    time = sweep_until_settled(problem, ORDER_TOLERANCE)
-    for _ in range(PASSES):
+    near = problem.surroundings(RADIUS, CONTRAST)
+    time = _first_order(problem, *(near if near is not None else (seeds, times)))
+    for _ in range(1 if near is not None else 2):
         time = _pass(
             _by_arrival(time, problem.slowness.size),
             problem.padded_slowness,
@@ -46,6 +49,15 @@ def accurate(problem: PointSource) -> Floats:
             times,
         )
     return problem.interior(time)
+
+
+def _first_order(problem: PointSource, nodes: Ints, times: Floats) -> Floats:
+    """First-order times from given ones, flat and padded, s."""
+    time = np.full(problem.padded_slowness.size, math.inf)
+    time[nodes] = times
+    sweeper = Sweeper(problem.slowness.shape)
+    sweeper.settle(time, problem.padded_slowness, problem.spacing, ORDER_TOLERANCE, nodes)
+    return time
 
 
 @kernel

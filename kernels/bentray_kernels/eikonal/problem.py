@@ -110,6 +110,22 @@ class PointSource:
             times.append(float(np.linalg.norm(offset)) * 0.5 * (at_source + self.slowness[node]))
         return np.array(nodes, dtype=np.int64), np.array(times)
 
+    def surroundings(self, radius: int, contrast: float) -> tuple[Ints, Floats] | None:
+        """As ``seeds``, for the box of nodes up to ``radius`` from the source, all along straight lines.
+
+        None where the slowness in the box varies by more than the factor ``contrast``: there the lines bend.
+        """
+        nearest = np.rint(self.source / self.spacing).astype(np.int64)
+        low = np.maximum(nearest - radius, 0)
+        high = np.minimum(nearest + radius + 1, self.slowness.shape)
+        box = self.slowness[tuple(slice(a, b) for a, b in zip(low, high, strict=True))]
+        if box.max() > contrast * box.min():
+            return None
+        places = np.indices(box.shape).reshape(box.ndim, -1) + low[:, None]
+        distance = np.linalg.norm(places * self.spacing - self.source[:, None], axis=0)
+        nodes = ((places + 1) * np.array(self.strides)[:, None]).sum(axis=0)
+        return nodes, distance * 0.5 * (self.source_slowness() + box.ravel())
+
     def _cell(self) -> list[tuple[tuple[int, ...], float]]:
         """The nodes around the source with their multilinear weights, those of weight 0 left out."""
         corners: list[tuple[tuple[int, ...], float]] = [((), 1.0)]
