@@ -6,17 +6,23 @@ from typing import Any
 
 import numpy as np
 
-from bentray_kernels.eikonal import methods, solve
-from bentray_kernels.rays import trace
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation import Ring
+from bentray_kernels.eikonal import methods
+from bentray_kernels.tomography import Settings, reconstruct
 
 
 def warm_up() -> None:
-    """Run every solver and both kinds of ray once, on a tiny grid."""
-    speed = np.full((8, 8), 1500.0)
+    """Reconstruct eight elements in water with every solver but OpenCL and with both kinds of ray.
+
+    OpenCL devices are tried when first asked for: a trial takes seconds, and few jobs want one.
+    """
+    elements = np.arange(8)
+    water = Dataset(Ring(8, 0.01).positions(), elements, elements, 1500.0, delta_tof_s=np.zeros((8, 8)))
     for method in methods():
-        tof = solve(speed, 1e-3, (1e-3, 1e-3), method)
-    for kind in ("curved", "straight"):
-        trace(tof, 1e-3, [[6e-3, 6e-3]], (1e-3, 1e-3), kind=kind)
+        if "opencl" not in method:
+            reconstruct(water, Settings(eikonal=method, nodes=16, sweeps=1))
+    reconstruct(water, Settings(rays="straight", nodes=16, sweeps=1))
 
 
 def dask_setup(worker: Any) -> None:
