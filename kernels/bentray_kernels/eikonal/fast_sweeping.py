@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -40,6 +41,18 @@ def fast_sweeping(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
     if not tolerance >= 0.0:
         raise InvalidInput("tolerance", tolerance, "a number >= 0")
     return problem.interior(sweep_until_settled(problem, tolerance))
+
+
+def fast_sweeping_many(problems: Sequence[PointSource], *, tolerance: float = 1e-12) -> Floats:
+    """As ``fast_sweeping`` for problems of one shape, in the same working arrays one after the other.
+
+    Sixteen solves in lockstep, with a lane of the vectors for each, took twice the time at 256²: their arrays
+    leave the cache, and no lane can skip what only another has to update.
+    """
+    if not tolerance >= 0.0:
+        raise InvalidInput("tolerance", tolerance, "a number >= 0")
+    sweeper = Sweeper(problems[0].slowness.shape)
+    return np.stack([p.interior(sweeper.solve(p, tolerance)) for p in problems])
 
 
 def sweep_until_settled(problem: PointSource, tolerance: float) -> Floats:

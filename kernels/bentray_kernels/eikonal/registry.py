@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -17,7 +18,7 @@ from .accurate import accurate
 from .fast_iterative import fast_iterative
 from .fast_iterative_opencl import fast_iterative_opencl, fast_iterative_opencl_many
 from .fast_marching import fast_marching, high_accuracy_fast_marching
-from .fast_sweeping import fast_sweeping
+from .fast_sweeping import fast_sweeping, fast_sweeping_many
 from .problem import PointSource
 
 
@@ -33,6 +34,7 @@ class Method:
         summary: one line for help texts.
         run_many: as ``run`` for a sequence of problems of one shape and spacing, with the batch as the
             first axis; None where the method has nothing better than one after the other.
+        on_device: whether ``run_many`` spreads the batch itself, so that threads must not share it.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Method:
     factored: bool
     summary: str
     run_many: Callable[..., Floats] | None = None
+    on_device: bool = False
 
     def options(self) -> tuple[str, ...]:
         """Names of the keyword options that ``run`` takes."""
@@ -89,7 +92,16 @@ METHODS = (
     )
     .register(Method("fmm", fast_marching, 2, False, "fast marching, binary heap; option order=1 or 2"))
     .register(Method("hafmm", high_accuracy_fast_marching, 2, True, "fast marching, factored second order"))
-    .register(Method("fsm", fast_sweeping, 1, False, "fast sweeping, first order; option tolerance"))
+    .register(
+        Method(
+            "fsm",
+            fast_sweeping,
+            1,
+            False,
+            "fast sweeping, first order; option tolerance",
+            fast_sweeping_many,
+        )
+    )
     .register(Method("fim", fast_iterative, 1, False, "fast iterative, first order; option tolerance"))
     .register(
         Method(
@@ -99,6 +111,7 @@ METHODS = (
             False,
             "fim in blocks on an OpenCL device (BENTRAY_OPENCL_DEVICE); option tolerance",
             fast_iterative_opencl_many,
+            on_device=True,
         )
     )
 )
@@ -133,7 +146,13 @@ def solve(
 
 
 def solve_many(
-    speeds: ArrayLike, spacing: float, sources: ArrayLike, method: str = "accurate", **options: Any
+    speeds: ArrayLike,
+    spacing: float,
+    sources: ArrayLike,
+    method: str = "accurate",
+    *,
+    threads: int = 1,
+    **options: Any,
 ) -> Floats:
     """Travel times of several problems in one call.
 
@@ -142,6 +161,8 @@ def solve_many(
         spacing: node spacing, m.
         sources: (batch, ndim), m; a batch of 1 serves every speed.
         method: one of ``methods()``.
+        threads: threads that share the batch; the times do not depend on their number. A method on
+            a device takes the whole batch at once, whatever their number.
         options: keyword options of that method.
 
     Returns:
@@ -159,15 +180,29 @@ def solve_many(
         raise InvalidInput("sources", f"shape {points.shape}", "(batch, ndim)")
     if len(fields) != len(points) and 1 not in (len(fields), len(points)):
         raise InvalidInput("sources", f"a batch of {len(points)}", f"1 or as many as speeds, {len(fields)}")
+    if threads < 1:
+        raise InvalidInput("threads", threads, "a number >= 1")
     batch = max(len(fields), len(points)) if len(fields) and len(points) else 0
-    problems = (
-        PointSource.checked(fields[k % len(fields)], spacing, points[k % len(points)]) for k in range(batch)
-    )
-    if chosen.run_many is not None and batch:
-        return chosen.run_many(list(problems), **options)
     times = np.empty((batch, *fields.shape[1:]))
-    for k, problem in enumerate(problems):
-        times[k] = chosen.run(problem, **options)
+
+    def solve_part(part: range) -> None:
+        problems = (
+            PointSource.checked(fields[k % len(fields)], spacing, points[k % len(points)]) for k in part
+        )
+        if chosen.run_many is not None:
+            times[part.start : part.stop] = chosen.run_many(list(problems), **options)
+        else:
+            for k, problem in zip(part, problems, strict=True):
+                times[k] = chosen.run(problem, **options)
+
+    count = min(batch, 1 if chosen.on_device else threads)
+    parts = [range(batch * k // count, batch * (k + 1) // count) for k in range(count)]
+    if count == 1:
+        solve_part(parts[0])
+    elif count > 1:
+        with ThreadPoolExecutor(count) as pool:
+            # Reading the results raises what a thread raised, the first of the batch first.
+            list(pool.map(solve_part, parts))
     return times
 
 
