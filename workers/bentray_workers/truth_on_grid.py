@@ -1,11 +1,10 @@
-"""The truth read at the nodes of a reconstruction, where the two can be laid on each other."""
+"""What is known on the nodes of the truth, read at the nodes of a reconstruction."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RegularGridInterpolator
-from scipy.ndimage import binary_fill_holes
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction
@@ -15,43 +14,49 @@ Floats = NDArray[np.float64]
 # Orders of axes that can be brought to x, y[, z]; any other text means that the truth needs registration.
 ORDERS = {"x,y": (0, 1), "y,x": (1, 0), "x,y,z": (0, 1, 2), "z,y,x": (2, 1, 0), "y,x,z": (1, 0, 2)}
 
-# A true speed within this of the water's is water, m/s.
-WATER_TOLERANCE_MPS = 1.0
+
+class NotComparable(Exception):  # noqa: N818 - a fact about the truth, not a fault of the input
+    """The truth cannot be laid on the image; the text says why, in words to show."""
 
 
-def truth_on_grid(truth: Truth | None, result: Reconstruction, index: int) -> Floats | None:
-    """True speed at the nodes of one slice, (nx, ny), m/s, by linear interpolation; NaN beyond the truth.
+def on_grid(values: ArrayLike, truth: Truth, result: Reconstruction) -> Floats:
+    """Values known at the truth's nodes, at the image's nodes, by linear interpolation.
 
-    None where there is no truth, its axes are not known, or it has no such slice.
+    Args:
+        values: of the shape of ``truth.sound_speed_mps``.
+        truth: says where the values lie.
+        result: says where to read them.
+
+    Returns:
+        An array of the shape of ``result.speed``; NaN beyond the truth.
+
+    Raises:
+        NotComparable: where the axes of the two do not tell how they lie on each other.
     """
-    if truth is None or truth.axes.replace(" ", "") not in ORDERS:
-        return None
-    order = ORDERS[truth.axes.replace(" ", "")]
-    if len(order) != truth.sound_speed_mps.ndim or len(order) != result.speed.ndim:
-        return None
+    order = ORDERS.get(truth.axes.replace(" ", ""))
+    if order is None:
+        raise NotComparable("the truth must be registered with the image first")
+    if not len(order) == truth.sound_speed_mps.ndim == result.speed.ndim:
+        raise NotComparable(
+            f"the truth has axes {truth.axes} and {truth.sound_speed_mps.ndim} dimensions, "
+            f"the image {result.speed.ndim}"
+        )
     if not np.isfinite(result.spacing_m).all():
-        return None
+        raise NotComparable("the slices of the image are not evenly spaced")
     # Spacing and origin are listed in the order of the axes, too.
     lines = [
         truth.origin_m[a] + truth.spacing_m[a] * np.arange(truth.sound_speed_mps.shape[a]) for a in order
     ]
-    nodes = [
+    x, y, *z = (
         o + h * np.arange(n)
         for o, h, n in zip(result.origin_m, result.spacing_m, result.speed.shape, strict=True)
-    ]
-    if len(nodes) == 3:
-        nodes[2] = nodes[2][index : index + 1]
-    read = RegularGridInterpolator(
-        lines, truth.sound_speed_mps.transpose(order), bounds_error=False, fill_value=np.nan
     )
-    points = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1)
-    return np.asarray(read(points).reshape(result.speed.shape[:2]))
-
-
-def object_in(true_speed: Floats, water_speed_mps: float) -> NDArray[np.bool_]:
-    """Nodes inside the outline of what is not water; every node of the truth if all of it is water."""
-    known = np.isfinite(true_speed)
-    other = known & (
-        np.abs(np.where(known, true_speed, water_speed_mps) - water_speed_mps) > WATER_TOLERANCE_MPS
-    )
-    return np.asarray(binary_fill_holes(other) & known if other.any() else known)
+    known = np.asarray(values, np.float64).transpose(order)
+    read = RegularGridInterpolator(lines, known, bounds_error=False, fill_value=np.nan)
+    if not z:
+        return np.asarray(read(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)))
+    found = np.empty(result.speed.shape)
+    # Slice by slice, so that the coordinates of all nodes are never in memory at once.
+    for k, place in enumerate(z[0]):
+        found[..., k] = read(np.stack(np.meshgrid(x, y, place, indexing="ij"), axis=-1))[..., 0]
+    return found

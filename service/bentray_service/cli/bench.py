@@ -12,9 +12,9 @@ from typing import Annotated
 import typer
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.atomic import write_bytes
 
 from .endings import WorkFailed
-from .paths import replace_file
 from .row import Row
 from .terminal import Step, print_lines, print_table, progress_bar, without_nan
 
@@ -38,7 +38,7 @@ def bench(
     with progress_bar(f"Measuring {name}") as step:
         rows = list(measure(quick, step))
     text = json.dumps(without_nan([row.to_dict() for row in rows]), indent=2, allow_nan=False)
-    replace_file(json_file, (text + "\n").encode())
+    write_bytes(json_file, (text + "\n").encode())
     columns = ("target", "value", "", "goal", "unit", "met", "detail")
     print_table(
         f"{name}, quick" if quick else name, columns, [_cells(row) for row in rows], ("value", "goal")

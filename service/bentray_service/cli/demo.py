@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from bentray_workers.atomic import write_bytes
+
 from .endings import WorkFailed, service_answers
-from .paths import output_folder, replace_file
+from .paths import output_folder
 from .service_process import running_service
 from .submit import show_job
 from .terminal import AsJson, print_json, print_lines, print_table, progress_bar, remark
@@ -73,7 +75,7 @@ def demo(
     assert dataset.truth is not None
     found = {name: figures(result, dataset, seconds[name]) for name, result in results.items()}
     picture = folder / "comparison.png"
-    replace_file(picture, comparison_png(dataset.truth, results))
+    write_bytes(picture, comparison_png(dataset.truth, results, dataset.roi))
     _show(found, picture, time.perf_counter() - started, as_json)
     straight, bent = (found[name]["truth"]["mean_absolute_error_of_range"] for name in JOBS)
     if not bent < straight:

@@ -1,8 +1,7 @@
-"""The files a command is given and leaves: checked before the work starts, replaced whole when it is done."""
+"""The paths a command is given: checked before the work starts."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from bentray_kernels.errors import InvalidInput
@@ -48,13 +47,3 @@ def output_file(path: Path, *, force: bool) -> Path:
     if not path.parent.is_dir():
         raise InvalidInput("output", f"{path} (its folder is absent)", "a path in a folder that exists")
     return path
-
-
-def replace_file(path: Path, content: bytes) -> None:
-    """Write ``content`` so that a reader sees the old file or the new one, never a part."""
-    partial = path.with_name(path.name + ".partial")
-    with partial.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    partial.replace(path)

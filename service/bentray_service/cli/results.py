@@ -6,7 +6,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .paths import replace_file
+from bentray_workers.atomic import write_bytes
+
 from .terminal import print_json, print_lines, print_table, without_nan
 
 if TYPE_CHECKING:
@@ -30,8 +31,8 @@ def write_results(
         "outputs": {kind: str(path) for kind, path in paths.items()},
     }
     write_reconstruction(paths["h5"], result)
-    replace_file(paths["png"], report_png(result, dataset.truth))
-    replace_file(paths["json"], (json.dumps(without_nan(found), indent=2, allow_nan=False) + "\n").encode())
+    write_bytes(paths["png"], report_png(result, dataset.truth, dataset.roi))
+    write_bytes(paths["json"], (json.dumps(without_nan(found), indent=2, allow_nan=False) + "\n").encode())
     return found
 
 

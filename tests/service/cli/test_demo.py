@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import Result
@@ -16,13 +17,16 @@ SMALL = ("--nodes", 48, "--elements", 48)
 
 @pytest.mark.slow
 def test_the_whole_path_ends_with_bent_rays_ahead_and_a_picture(
-    bentray: Callable[..., Result], tmp_path: Path
+    bentray: Callable[..., Result], tmp_path: Path, drawn: Any
 ) -> None:
     result = bentray("demo", *SMALL, "-o", tmp_path / "out", "--json")
     assert result.exit_code == 0, result.stderr
     said = json.loads(result.stdout)
     errors = {name: found["truth"]["mean_absolute_error_of_range"] for name, found in said["jobs"].items()}
     assert errors["bent"] < errors["straight"]
+    for name, found in said["jobs"].items():
+        shown = f"{100 * errors[name]:.1f} % of range, {found['truth']['rmse_mps']:.1f} m/s rms"
+        assert f"{name.capitalize()}: {shown}" in drawn.words(), "picture and figures agree"
     assert said["jobs"]["straight"]["settings"]["rays"] == "straight"
     assert said["picture"] == str(tmp_path / "out" / "comparison.png")
     assert Path(said["picture"]).read_bytes().startswith(b"\x89PNG\r\n")

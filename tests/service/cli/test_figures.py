@@ -1,18 +1,19 @@
-"""The figures of a result: errors against a known truth, and an honest word on where they were read."""
+"""The figures of a result: plain values, and the same errors as in the pictures."""
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.tomography import Reconstruction, Settings, Sweep
 from bentray_service.cli.figures import errors, figures, summary
+from bentray_workers.images import comparison_png, report_png
 
 WATER = 1500.0
 STEP = 1e-3
@@ -41,71 +42,44 @@ def disc(nodes: int = 17) -> np.ndarray:
     return speed
 
 
-@given(st.floats(-40.0, 40.0))
-def test_a_constant_error_is_read_as_it_is(offset: float) -> None:
-    found = errors(image(disc() + offset), truth(disc()))
-    assert found["rmse_mps"] == pytest.approx(abs(offset), abs=1e-9)
-    assert found["mean_absolute_error_of_range"] == pytest.approx(abs(offset) / 100.0, abs=1e-9)
-    assert found["true_range_mps"] == [1450.0, 1550.0]
-    assert found["region_nodes"] == 81
-
-
-def test_errors_in_the_water_do_not_count() -> None:
-    speed = disc()
-    speed[0, 0] += 500.0
-    assert errors(image(speed), truth(disc()))["rmse_mps"] == 0.0
-
-
-def test_the_region_of_the_file_is_used_and_named() -> None:
-    roi = np.zeros((17, 17), dtype=bool)
-    roi[0:2, 0:2] = True
-    found = errors(image(disc() + 3.0), truth(disc()), roi)
-    assert found["region"] == "mask/roi of the file"
-    assert found["region_nodes"] == 4
-    assert found["mean_absolute_error_of_range"] is None, "water alone has no range to divide by"
-    assert found["rmse_mps"] == pytest.approx(3.0)
-
-
-def test_a_truth_that_is_water_throughout_is_compared_everywhere() -> None:
-    found = errors(image(np.full((17, 17), WATER + 2.0)), truth(np.full((17, 17), WATER)))
-    assert found["region"] == "every node that the truth covers"
-    assert found["region_nodes"] == 17 * 17
-
-
-def test_a_finer_truth_is_read_at_the_nodes_of_the_image() -> None:
-    ramp = 1500.0 + np.add.outer(np.arange(33), 2 * np.arange(33)) * 5.0
-    found = errors(image(ramp[::2, ::2]), truth(ramp, STEP / 2))
-    assert found["rmse_mps"] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_x_and_y_are_not_exchanged() -> None:
-    assert errors(image(disc().T), truth(disc()))["rmse_mps"] > 10.0
-
-
-def test_a_truth_on_axes_y_x_is_turned() -> None:
-    turned = replace(truth(disc().T), axes="y,x")
-    assert errors(image(disc()), turned)["rmse_mps"] == 0.0
-
-
-def test_several_slices_are_compared_with_a_solid_truth() -> None:
-    solid = np.stack([disc(), np.full((17, 17), WATER), disc()[::-1]], axis=-1)
-    found = errors(image(solid + 2.0, (0.0,) * 3), truth(solid))
-    assert found["rmse_mps"] == pytest.approx(2.0)
-    assert errors(image(solid[..., ::-1], (0.0,) * 3), truth(solid))["rmse_mps"] > 10.0
+def test_the_errors_are_those_of_compare_as_plain_values() -> None:
+    found = errors(image(disc() + 10.0), truth(disc()))
+    assert json.loads(json.dumps(found)) == {
+        "region": "the outline of what is not water in the truth",
+        "region_nodes": 81,
+        "true_range_mps": [1450.0, 1550.0],
+        "mean_absolute_error_of_range": pytest.approx(0.1),
+        "rmse_mps": pytest.approx(10.0),
+        "registration": "none",
+        "axes": "x,y",
+    }
 
 
 def test_what_cannot_be_compared_is_said() -> None:
-    away = errors(image(disc(), origin=(1.0, 1.0)), truth(disc()))
-    assert away["region"] == "not compared: no node of the image lies within the truth"
-    solid = errors(image(np.full((17, 17, 2), WATER), (0.0,) * 3), truth(disc()))
-    assert solid["region"].startswith("not compared: the truth, on axes 'x,y', must be registered")
-    display = replace(truth(disc()), axes="as displayed")
-    assert errors(image(disc()), display) == {
-        "region": "not compared: the truth, on axes 'as displayed', must be registered with the image first",
+    assert errors(image(disc()), replace(truth(disc()), axes="as displayed")) == {
+        "region": "not compared: the truth must be registered with the image first",
         "region_nodes": 0,
+        "axes": "as displayed",
     }
-    uneven = replace(image(np.full((17, 17, 2), WATER), (0.0,) * 3), spacing_m=(STEP, STEP, math.nan))
-    assert "rmse_mps" not in errors(uneven, truth(np.full((17, 17, 2), WATER)))
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_table_and_pictures_tell_the_same_errors(drawn: Any, wide: bool) -> None:
+    """Fat as fast as the water lies in the region of the file and outside the outline."""
+    roi = np.zeros((17, 17), dtype=bool)
+    roi[2:15, 2:15] = True
+    speed = disc() + 7.0
+    speed[2:4] += 30.0
+    scan = replace(dataset(truth(disc())), roi=roi if wide else None)
+    rows = dict(summary(figures(image(speed), scan, 1.0)))
+    shown = f"{rows['mean absolute error'].removesuffix(' the range')} range, {rows['rms error']} rms"
+    assert scan.truth is not None
+    comparison_png(scan.truth, {"bent": image(speed)}, scan.roi)
+    assert f"Bent: {shown}" in drawn.words()
+    assert f"Errors read: {rows['errors read']}" in drawn.words()
+    report_png(image(speed), scan.truth, scan.roi)
+    assert f"Difference: {shown}" in drawn.words()
+    assert rows["errors read"].startswith("mask/roi" if wide else "the outline")
 
 
 def dataset(known: Truth | None) -> Dataset:

@@ -1,4 +1,4 @@
-"""Paths are refused before work starts, and files are replaced whole."""
+"""Paths are refused before work starts."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.cli.paths import input_file, output_file, output_folder, replace_file
+from bentray_service.cli.paths import input_file, output_file, output_folder
 
 
 def test_an_input_must_be_a_file(tmp_path: Path) -> None:
@@ -45,24 +45,3 @@ def test_an_output_file_needs_a_folder_and_is_none(tmp_path: Path) -> None:
         output_file(tmp_path / "absent" / "scan.h5", force=True)
     with pytest.raises(InvalidInput, match=r"\(a folder\)"):
         output_file(tmp_path, force=True)
-
-
-def test_replacing_leaves_the_new_content_and_nothing_else(tmp_path: Path) -> None:
-    path = tmp_path / "figures.json"
-    path.write_text("old")
-    replace_file(path, b"new")
-    assert path.read_bytes() == b"new"
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_write_that_fails_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "figures.json"
-    path.write_text("old")
-
-    def full(descriptor: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(OSError, match="No space"):
-        replace_file(path, b"new")
-    assert path.read_text() == "old"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -17,7 +18,7 @@ QUICK = ("--nodes", 32, "--sweeps", 2)
 
 
 def test_it_writes_volume_picture_and_figures(
-    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
+    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path, drawn: Any
 ) -> None:
     result = bentray(
         "reconstruct", scan_file, "-o", tmp_path / "new" / "out", *QUICK, "--rays", "straight", "--json"
@@ -39,6 +40,11 @@ def test_it_writes_volume_picture_and_figures(
     assert said["history"][1]["residual_rms_s"] < said["history"][0]["residual_rms_s"]
     assert said["truth"]["region"] == "mask/roi of the file"
     assert 0 < said["truth"]["rmse_mps"] < 60
+    assert f"Difference: {caption(said['truth'])}" in drawn.words(), "picture and figures agree"
+
+
+def caption(errors: dict[str, Any]) -> str:
+    return f"{100 * errors['mean_absolute_error_of_range']:.1f} % of range, {errors['rmse_mps']:.1f} m/s rms"
 
 
 def test_without_json_it_ends_with_a_table_and_the_paths(

@@ -1,31 +1,19 @@
-"""Pictures: right size and colours, up is up, and bad arguments are named."""
+"""The picture of a slice: right colours, up is up, and bad arguments are named."""
 
 from __future__ import annotations
 
-import io
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.images import COLORMAPS, comparison_png, report_png, slice_png
+from bentray_workers.images import COLORMAPS, slice_png
 from bentray_workers.reconstruction_file import write_reconstruction
 
-from .reconstructions import made, truth
-
-
-def pixels(png: bytes) -> np.ndarray:
-    with Image.open(io.BytesIO(png)) as image:
-        assert image.format == "PNG"
-        return np.asarray(image.convert("RGB")).astype(int)
-
-
-def near(picture: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
-    return (np.abs(picture - np.array(colour)).sum(axis=-1) < 12).nonzero()
-
+from ..reconstructions import made
+from .pixels import near, pixels
 
 YELLOW = (253, 231, 37)
 
@@ -113,30 +101,3 @@ def test_pictures_drawn_in_threads_are_those_drawn_alone(file):
     alone = [slice_png(file, **job) for job in jobs]
     with ThreadPoolExecutor(4) as pool:
         assert list(pool.map(lambda job: slice_png(file, **job), jobs)) == alone
-
-
-def test_reports_grow_with_what_is_known():
-    plain = pixels(report_png(made())).shape
-    with_truth = pixels(report_png(made(), truth())).shape
-    unregistered = pixels(report_png(made(), truth(axes="needs registration"))).shape
-    assert with_truth[0] > 1.5 * plain[0]
-    assert with_truth[1] == plain[1] > unregistered[1]
-    assert pixels(report_png(made(slices=3))).shape == plain
-    assert pixels(report_png(replace(made(), history=()))).shape == plain
-
-
-def test_the_comparison_has_a_column_a_result():
-    one = pixels(comparison_png(truth(), {"straight": made()}))
-    two = pixels(comparison_png(truth(), {"straight": made(height_mps=20.0), "bent": made()}))
-    assert two.shape[0] == one.shape[0]
-    assert two.shape[1] == pytest.approx(1.5 * one.shape[1], rel=0.01)
-
-
-@pytest.mark.parametrize(
-    ("results", "shown", "field"),
-    [({}, truth(), "results"), ({"bent": made()}, truth(axes="as displayed"), "truth@axes")],
-)
-def test_a_comparison_needs_results_and_a_truth_that_fits(results, shown, field):
-    with pytest.raises(InvalidInput) as refused:
-        comparison_png(shown, results)
-    assert refused.value.field == field

@@ -1,0 +1,61 @@
+"""The comparison: a column a result, common colour bars, and the errors of `compare`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.contour import ContourSet
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.comparison import compare
+from bentray_workers.images import comparison_png
+
+from ..reconstructions import made, truth
+from .pixels import pixels
+
+
+def two():
+    return {"straight": made(height_mps=20.0), "bent": made()}
+
+
+def test_it_has_a_column_a_result():
+    one, both = pixels(comparison_png(truth(), {"bent": made()})), pixels(comparison_png(truth(), two()))
+    assert abs(both.shape[0] - one.shape[0]) < 0.05 * one.shape[0]
+    assert 1.3 * one.shape[1] < both.shape[1] < 1.7 * one.shape[1]
+
+
+def test_the_titles_tell_the_errors_of_compare_in_the_region_of_the_file(drawn):
+    known = truth()
+    roi = np.zeros(known.sound_speed_mps.shape, bool)
+    roi[4:22, 4:20] = True
+    for given in (None, roi):
+        comparison_png(known, two(), given)
+        for name, result in two().items():
+            assert f"{name.capitalize()}: {compare(result, known, given)}" in drawn.words()
+        choice = compare(made(), known, given).region_choice
+        assert f"Errors read: {choice}" in drawn.words()
+
+
+def test_speeds_share_one_bar_and_differences_another(drawn):
+    comparison_png(truth(), two())
+    assert drawn.words().count("sound speed (m/s)") == 1
+    assert drawn.words().count("difference (m/s)") == 1
+    limits = {axes.get_title(loc="left"): axes.images[0].get_clim() for axes in drawn[-1].axes if axes.images}
+    assert len(limits) == 5
+    assert len(set(limits.values())) == 2
+
+
+def test_the_region_is_outlined_in_every_map(drawn):
+    comparison_png(truth(), two())
+    outlined = [axes for axes in drawn[-1].axes if axes.images and axes.findobj(ContourSet)]
+    assert len(outlined) == 5
+
+
+@pytest.mark.parametrize(
+    ("results", "shown", "field"),
+    [({}, truth(), "results"), ({"bent": made()}, truth(axes="as displayed"), "truth")],
+)
+def test_it_needs_results_and_a_truth_that_fits(results, shown, field):
+    with pytest.raises(InvalidInput) as refused:
+        comparison_png(shown, results)
+    assert refused.value.field == field

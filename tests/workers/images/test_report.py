@@ -1,0 +1,88 @@
+"""The report: its panels, the middle slice, the errors and what is said where there are none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Truth
+from bentray_kernels.tomography import Reconstruction
+from bentray_workers.comparison import compare
+from bentray_workers.images import report_png
+
+from ..reconstructions import SPACING_M, made, truth
+from .pixels import pixels
+
+
+def panels(drawn) -> list[str]:
+    return [axes.get_title(loc="left") for axes in drawn[-1].axes if axes.get_title(loc="left")]
+
+
+def test_without_a_truth_it_shows_speed_coverage_and_convergence(drawn):
+    assert pixels(report_png(made())).shape[1] > 1000
+    assert panels(drawn) == ["Reconstruction", "Coverage", "Convergence"]
+    report_png(replace(made(), history=()))
+    assert panels(drawn) == ["Reconstruction", "Coverage", "Convergence"]
+
+
+def test_the_errors_in_the_title_are_those_of_compare_with_their_region(drawn):
+    result, known = made(height_mps=20.0), truth()
+    corner = np.zeros(known.sound_speed_mps.shape, bool)
+    corner[8:20, 4:12] = True
+    for roi in (None, corner):
+        report_png(result, known, roi)
+        found = compare(result, known, roi)
+        assert f"Difference: {found}" in panels(drawn)
+        assert any(found.region_choice in words for words in drawn.words())
+    assert str(compare(result, known, corner)) != str(compare(result, known))
+
+
+def test_reconstruction_and_truth_share_a_colour_bar(drawn):
+    report_png(made(), truth())
+    assert drawn.words().count("sound speed (m/s)") == 2, "one bar, one profile"
+
+
+def test_a_truth_that_needs_registration_is_shown_with_the_reason(drawn):
+    report_png(made(), truth(axes="as $displayed$; rotate"))
+    assert panels(drawn) == ["Reconstruction", "Truth", "Coverage", "Convergence"]
+    assert "x (mm)\nnot compared: the truth must be registered with the image first" in drawn.words()
+
+
+def volume() -> Reconstruction:
+    step = (SPACING_M, SPACING_M, 0.003)
+    return replace(made(slices=3), spacing_m=step)
+
+
+def test_of_several_slices_the_middle_one_is_shown_and_named(drawn):
+    first = report_png(volume())
+    assert "Sound speed, slice index 1 (0 to 2), z = 13.0 mm" in drawn.words()
+    assert "Convergence, all 3 slices" in panels(drawn)
+    for k, same in ((0, True), (1, False), (2, True)):
+        speed = volume().speed
+        speed[:12, :12, k] += 30.0
+        assert (report_png(replace(volume(), speed=speed)) == first) is same
+
+
+def test_the_errors_of_a_volume_are_those_of_all_its_slices(drawn):
+    solid = Truth(
+        np.repeat(truth().sound_speed_mps[..., None], 3, axis=2),
+        volume().spacing_m,
+        volume().origin_m,
+        axes="x,y,z",
+    )
+    speed = volume().speed
+    speed[..., 0] += 50.0
+    result = replace(volume(), speed=speed)
+    report_png(result, solid)
+    assert f"Difference: {compare(result, solid)}" in panels(drawn)
+    assert compare(result, solid).rmse_mps > 20.0
+
+
+@pytest.mark.parametrize("empty", [True, False])
+def test_a_middle_slice_without_a_node_in_the_region_is_drawn(empty):
+    solid = Truth(np.full((24, 24, 3), 1500.0), volume().spacing_m, volume().origin_m, axes="x,y,z")
+    roi = np.zeros((24, 24, 3), bool)
+    roi[5:9, 5:9, 0 if empty else 1] = True
+    assert pixels(report_png(volume(), solid, roi)).shape[0] > 500

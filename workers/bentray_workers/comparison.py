@@ -1,0 +1,102 @@
+"""A reconstruction against the truth: region, true speed and errors, as tables and pictures show them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_fill_holes
+
+from bentray_kernels.acquisition import Truth
+from bentray_kernels.tomography import Reconstruction, mean_absolute_error, rmse
+
+from .truth_on_grid import NotComparable, on_grid
+
+__all__ = ["Comparison", "NotComparable", "compare"]
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+# A true speed within this of the water's is water, m/s.
+WATER_TOLERANCE_MPS = 1.0
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How far an image is from the truth, over all its slices.
+
+    Attributes:
+        true_speed_mps: at the image's nodes, of the image's shape; NaN beyond the truth.
+        region: the nodes that count, of that shape, at least one.
+        region_choice: in words, how the region was chosen.
+        true_range_mps: lowest and highest true speed in the region.
+        mean_absolute_error_of_range: as a part of that range (chapter 6.4); None where it is 0.
+        rmse_mps: root mean square error.
+    """
+
+    true_speed_mps: Floats
+    region: Bools
+    region_choice: str
+    true_range_mps: tuple[float, float]
+    mean_absolute_error_of_range: float | None
+    rmse_mps: float
+
+    def __str__(self) -> str:
+        """The errors as a caption."""
+        rms = f"{self.rmse_mps:.1f} m/s rms"
+        if self.mean_absolute_error_of_range is None:
+            return rms
+        return f"{100.0 * self.mean_absolute_error_of_range:.1f} % of range, {rms}"
+
+
+def compare(result: Reconstruction, truth: Truth, roi: Bools | None = None) -> Comparison:
+    """Read the errors at the image's own nodes, without any registration.
+
+    The region is ``roi`` where it is on the truth's grid and marks a node; else the outline of what is
+    not water in the truth; else every node that the truth covers.
+
+    Args:
+        result: the image.
+        truth: what is really there.
+        roi: the nodes that count, on the truth's grid.
+
+    Raises:
+        NotComparable: where the truth cannot be laid on the image, or lies beside it.
+    """
+    true_speed = on_grid(truth.sound_speed_mps, truth, result)
+    covered = np.isfinite(true_speed)
+    if not covered.any():
+        raise NotComparable("no node of the image lies within the truth")
+    choice, region = "every node that the truth covers", covered
+    marked = _marked(roi, truth, result) & covered
+    outline = _outline(true_speed, covered, result.water_speed_mps)
+    if marked.any():
+        choice, region = "mask/roi of the file", marked
+    elif outline.any():
+        choice, region = "the outline of what is not water in the truth", outline
+    low, high = float(true_speed[region].min()), float(true_speed[region].max())
+    return Comparison(
+        true_speed_mps=true_speed,
+        region=region,
+        region_choice=choice,
+        true_range_mps=(low, high),
+        mean_absolute_error_of_range=(
+            mean_absolute_error(result.speed, true_speed, region, high - low) if high > low else None
+        ),
+        rmse_mps=rmse(result.speed, true_speed, region),
+    )
+
+
+def _marked(roi: Bools | None, truth: Truth, result: Reconstruction) -> Bools:
+    if roi is None or roi.shape != truth.sound_speed_mps.shape:
+        return np.zeros(result.speed.shape, np.bool_)
+    return np.asarray(on_grid(roi, truth, result) > 0.5)
+
+
+def _outline(true_speed: Floats, covered: Bools, water_speed_mps: float) -> Bools:
+    """What is not water and, slice by slice, what it encloses."""
+    off = np.abs(np.where(covered, true_speed, water_speed_mps) - water_speed_mps)
+    other = np.atleast_3d(off > WATER_TOLERANCE_MPS)
+    filled = [binary_fill_holes(other[..., k]) for k in range(other.shape[2])]
+    return np.asarray(np.stack(filled, axis=-1).reshape(true_speed.shape) & covered)
