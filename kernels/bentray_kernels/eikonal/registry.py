@@ -18,6 +18,7 @@ from .accurate import accurate
 from .fast_iterative import fast_iterative
 from .fast_iterative_opencl import fast_iterative_opencl, fast_iterative_opencl_many
 from .fast_marching import fast_marching, high_accuracy_fast_marching
+from .fast_marching_untidy import fast_marching_untidy
 from .fast_sweeping import fast_sweeping, fast_sweeping_many
 from .problem import PointSource
 
@@ -112,6 +113,15 @@ METHODS = (
             "fim in blocks on an OpenCL device (BENTRAY_OPENCL_DEVICE); option tolerance",
             fast_iterative_opencl_many,
             on_device=True,
+        )
+    )
+    .register(
+        Method(
+            "fmm-untidy",
+            fast_marching_untidy,
+            2,
+            False,
+            "fast marching, O(N), error bounded; options order=1 or 2, width of a bucket",
         )
     )
 )

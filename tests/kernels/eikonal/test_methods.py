@@ -117,13 +117,15 @@ def test_flips_transposes_and_units_change_nothing(seed, axis):
         mirrored = source.copy()
         mirrored[axis] = 1.0 - source[axis]
         flipped = eikonal.solve(np.flip(speed, axis), 0.1, mirrored, method)
-        # Ties of the first-order sweep may fall the other way round in a mirror: second-order size.
-        close = 2e-3 if method == "accurate" else 1e-9
+        # Ties of the first-order sweep may fall the other way round in a mirror: second-order size. So may
+        # the nodes of an untidy bucket, whose edges rounding moves in other units too.
+        close = 2e-3 if method in ("accurate", "fmm-untidy") else 1e-9
+        units = 2e-3 if method == "fmm-untidy" else 1e-9
         assert np.allclose(np.flip(flipped, axis), tof, rtol=close, atol=1e-12)
         assert np.allclose(eikonal.solve(speed.T, 0.1, source[::-1], method).T, tof, rtol=close, atol=1e-12)
         millimetres = eikonal.solve(speed * 1e3, 0.1 * 1e3, source * 1e3, method)
-        assert np.allclose(millimetres, tof, rtol=1e-9, atol=1e-13)
-        assert np.allclose(eikonal.solve(2.0 * speed, 0.1, source, method), 0.5 * tof, rtol=1e-9, atol=1e-13)
+        assert np.allclose(millimetres, tof, rtol=units, atol=1e-13)
+        assert np.allclose(eikonal.solve(2.0 * speed, 0.1, source, method), 0.5 * tof, rtol=units, atol=1e-13)
 
 
 @given(seed=st.integers(0, 2**32 - 1))
