@@ -62,8 +62,8 @@ def untidy_error_bound(problem: PointSource, *, width: float = 0.01) -> float:
     least 1/√ndim: the untidy time is no later than the exact one in a medium slower by 1 + δ·√ndim/f, and
     that is the exact time, longer by this factor. The least f bounds it everywhere.
 
-    At order 2 the same δ moves a node between second- and first-order differences, so that the bound
-    holds in smooth media only.
+    At order 2 an early node also changes between second- and first-order differences. There the bound was met
+    in smooth media only, and not beside a source in the middle of its cell, whose nodes tie.
 
     Raises:
         InvalidInput: for a width that is not above 0 and at most 1.

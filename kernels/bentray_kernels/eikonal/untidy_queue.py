@@ -1,10 +1,9 @@
 """A circular queue of buckets that nodes wait in by time, untidy within a bucket (Yatziv et al. 2006).
 
-Bucket ``int(time / width) % buckets`` is a doubly linked list, so that a node moves when its time falls. Nodes
-come out in the order of buckets, not of times, at a cost that does not depend on how many wait. Arrays:
-``heads`` holds the last entered node of each bucket, ``links`` the nodes before and after each, ``place`` the
-bucket a node waits in, or ``FAR`` or ``DONE`` as in ``heap``. Node 0 lies in the border, never waits, and
-ends a list.
+Bucket ``int(time / width) % buckets`` is a doubly linked list, so that a node moves when its time falls.
+Nodes come out by bucket, not by time, at a cost that does not depend on how many wait. Arrays: ``heads`` has
+the last entered node of each bucket, ``links`` the nodes before and after each, ``place`` the bucket a node
+waits in, or ``FAR`` or ``DONE`` as in ``heap``. Node 0 lies in the border, never waits, and ends a list.
 """
 
 from __future__ import annotations

@@ -1,0 +1,157 @@
+"""Fast sweeping in blocks that trade their faces until they agree, for tasks that share no memory."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import InvalidInput
+from .fast_sweeping import Sweeper
+from .problem import PointSource
+
+# The sides of a block in the order of Faces: axis, and whether its high end.
+Side = tuple[int, bool]
+
+# A block's neighbouring nodes beyond each side, s: (low x, high x, low y, high y[, low z, high z]), each in
+# the block's shape without that axis; None at the rim of the grid.
+Faces = Sequence[Floats | None]
+
+
+@dataclass(frozen=True)
+class BlockSweep:
+    """What ``sweep_block`` found.
+
+    Attributes:
+        times: (nx, ny[, nz]), s.
+        faces: the block's own outermost times on each side, s, in the order of ``Faces``, for its neighbours.
+        changed: for each side, whether its face has become earlier by more than the tolerance.
+    """
+
+    times: Floats
+    faces: tuple[Floats, ...]
+    changed: tuple[bool, ...]
+
+
+def sweep_block(
+    slowness: Floats, times: Floats, faces: Faces, spacing: float, tolerance: float = 1e-12
+) -> BlockSweep:
+    """Settle one block, given what its neighbours know; pure, so that a task can do it again.
+
+    Args:
+        slowness: (nx, ny[, nz]), s/m.
+        times: same shape, s; infinity where nothing is known yet. They may only be too late.
+        faces: what lies beyond each side.
+        spacing: node spacing, m.
+        tolerance: as for ``fast_sweeping``.
+
+    Raises:
+        InvalidInput: for shapes that do not match.
+    """
+    if times.shape != slowness.shape:
+        raise InvalidInput("times", f"shape {times.shape}", f"the block's shape, {slowness.shape}")
+    padded = np.pad(times, 1, constant_values=math.inf)
+    for number, (given, (axis, high)) in enumerate(zip(faces, _sides(times.ndim), strict=True)):
+        if given is None:
+            continue
+        expected = times.shape[:axis] + times.shape[axis + 1 :]
+        if given.shape != expected:
+            raise InvalidInput(f"faces[{number}]", f"shape {given.shape}", f"{expected}")
+        inside: list[slice | int] = [slice(1, -1)] * times.ndim
+        inside[axis] = -1 if high else 0
+        padded[tuple(inside)] = given
+    flat = padded.ravel()
+    Sweeper(times.shape).settle(
+        flat, np.pad(slowness, 1).ravel(), spacing, tolerance, np.flatnonzero(flat < math.inf)
+    )
+    new = np.ascontiguousarray(padded[(slice(1, -1),) * times.ndim])
+    changed = []
+    for side in _sides(times.ndim):
+        before, after = _face(times, side), _face(new, side)
+        earlier = after < before
+        drop = before[earlier] - after[earlier]
+        changed.append(bool((drop > tolerance * spacing * _face(slowness, side)[earlier]).any()))
+    return BlockSweep(new, tuple(_face(new, side).copy() for side in _sides(times.ndim)), tuple(changed))
+
+
+def solve_by_blocks(problem: PointSource, blocks: Sequence[int], *, tolerance: float = 1e-12) -> Floats:
+    """The driver that a scheduler of tasks follows: all waiting blocks at once, then the faces they sent.
+
+    Args:
+        problem: the checked problem.
+        blocks: number of blocks along each axis, from 1 to the nodes there.
+        tolerance: as for ``fast_sweeping``, for every block.
+
+    Returns:
+        (nx, ny[, nz]), s; equal to ``fast_sweeping`` of the whole to rounding.
+
+    Raises:
+        InvalidInput: for numbers of blocks that do not fit the grid.
+    """
+    shape = problem.slowness.shape
+    if len(blocks) != len(shape) or not all(1 <= b <= n for b, n in zip(blocks, shape, strict=True)):
+        raise InvalidInput("blocks", tuple(blocks), f"a number from 1 along each axis, at most {shape}")
+    cuts = [[n * k // b for k in range(b + 1)] for n, b in zip(shape, blocks, strict=True)]
+    boxes = {
+        place: tuple(slice(c[k], c[k + 1]) for c, k in zip(cuts, place, strict=True))
+        for place in itertools.product(*(range(b) for b in blocks))
+    }
+    start = np.full(problem.padded_slowness.size, math.inf)
+    seeds, times = problem.seeds()
+    start[seeds] = times
+    time = problem.interior(start)
+    held: dict[tuple[int, ...], list[Floats | None]] = {}
+    for place in boxes:
+        held[place] = [None for _ in _sides(len(shape))]
+    seeded = [place for place, box in boxes.items() if (time[box] < math.inf).any()]
+    waiting = set(seeded)
+    # Seeds at a face are news to the block beyond.
+    for place in seeded:
+        for side, beyond in _neighbours(place, boxes):
+            held[beyond][_opposite(side)] = _face(time[boxes[place]], _sides(len(shape))[side]).copy()
+            waiting.add(beyond)
+    while waiting:
+        sent = {
+            place: sweep_block(
+                problem.slowness[boxes[place]], time[boxes[place]], held[place], problem.spacing, tolerance
+            )
+            for place in sorted(waiting)
+        }
+        waiting = set()
+        for place, swept in sent.items():
+            time[boxes[place]] = swept.times
+            for side, beyond in _neighbours(place, boxes):
+                if swept.changed[side]:
+                    held[beyond][_opposite(side)] = swept.faces[side]
+                    waiting.add(beyond)
+    return time
+
+
+def _sides(axes: int) -> list[Side]:
+    return [(axis, high) for axis in range(axes) for high in (False, True)]
+
+
+def _opposite(side: int) -> int:
+    return side ^ 1
+
+
+def _face(block: Floats, side: Side) -> Floats:
+    axis, high = side
+    face: Floats = np.take(block, -1 if high else 0, axis)
+    return face
+
+
+def _neighbours(
+    place: tuple[int, ...], boxes: dict[tuple[int, ...], tuple[slice, ...]]
+) -> list[tuple[int, tuple[int, ...]]]:
+    """Numbers of the sides that have a block beyond, and where it is."""
+    found = []
+    for side, (axis, high) in enumerate(_sides(len(place))):
+        beyond = (*place[:axis], place[axis] + (1 if high else -1), *place[axis + 1 :])
+        if beyond in boxes:
+            found.append((side, beyond))
+    return found
