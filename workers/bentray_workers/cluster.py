@@ -19,8 +19,12 @@ from .lanes import OFFERED, THREADS
 
 PRELOAD = "bentray_workers.warmup"
 
-# A queue without workers fails its tasks after this long instead of waiting for ever.
-NO_WORKERS_TIMEOUT = "60s"
+EMBEDDED = {
+    # A queue without workers fails its tasks after this long instead of waiting for ever.
+    "distributed.scheduler.no-workers-timeout": "60s",
+    # Dask's sampling profiler wakes every process a hundred times a second, work or no work.
+    "distributed.worker.profile.enabled": False,
+}
 
 # What tells that nothing, or something else, is at an address; other protocols look like huge messages.
 NO_SCHEDULER = (OSError, TimeoutError, ValueError, MemoryError)
@@ -101,7 +105,7 @@ def open_cluster(
     count = workers if workers is not None else len(os.sched_getaffinity(0))
     if count < 1:
         raise InvalidInput("workers", workers, "at least 1")
-    with dask.config.set({"distributed.scheduler.no-workers-timeout": NO_WORKERS_TIMEOUT}):
+    with dask.config.set(EMBEDDED):
         local = LocalCluster(
             n_workers=count,
             threads_per_worker=THREADS,
