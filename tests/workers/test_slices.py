@@ -1,5 +1,6 @@
 """Slices on a cluster: the same bits as in one process, progress, stopping, failure."""
 
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -52,6 +53,23 @@ def test_stop_ends_within_a_task(cluster, path, embedded):
     with pytest.raises(Cancelled):
         slices.reconstruct(cluster.client if embedded else None, path, replace(PLAN, sweeps=500), stop=stop)
     assert len(calls) == 3
+
+
+def test_stop_does_not_wait_for_the_picker(cluster, path, monkeypatch):
+    done = threading.Event()
+    # The workers are threads of this process, so they meet what is put in place here.
+    monkeypatch.setattr(slices, "read_dataset", lambda path: done.wait(30.0))
+    with pytest.raises(Cancelled):
+        slices.reconstruct(cluster.client, path, PLAN, stop=lambda: True)
+    assert not done.is_set()
+    done.set()
+
+
+def test_a_file_that_was_rewritten_is_read_again(cluster, scan, path):
+    before = slices.reconstruct(cluster.client, path, PLAN)
+    write_dataset(path, replace(scan, delta_tof_s=0.5 * scan.delta_tof_s))
+    after = slices.reconstruct(cluster.client, path, PLAN)
+    assert not np.array_equal(before.speed, after.speed)
 
 
 def test_bad_input_crosses_the_cluster_as_itself(cluster, path):

@@ -63,7 +63,7 @@ def reconstruct(
         dataset_path: a file in the upload format, readable by every worker.
         settings: see ``Settings``.
         on_progress: called after each batch.
-        stop: polled between batches; true ends with ``Cancelled``.
+        stop: polled between batches, and while a cluster picks; true ends with ``Cancelled``.
         work_dir: where picked travel times are kept while it runs, readable by every worker; None: a
             temporary folder of this machine.
 
@@ -74,10 +74,21 @@ def reconstruct(
     if client is None:
         return _reconstruct_here(dataset_path, settings, on_progress, stop)
     with _folder(work_dir) as folder:
-        path = client.submit(
-            prepare, dataset_path, settings, Path(folder), resources=RECONSTRUCTION, pure=False
-        ).result()
+        path = _prepared(client, dataset_path, settings, Path(folder), stop)
         return _drive(client, path, settings, on_progress, stop)
+
+
+def _prepared(
+    client: Client, dataset_path: Path, settings: Settings, folder: Path, stop: Callable[[], bool] | None
+) -> Path:
+    """What ``prepare`` gives; picking may take a while, and a stop does not wait for its end."""
+    picking = client.submit(prepare, dataset_path, settings, folder, resources=RECONSTRUCTION, pure=False)
+    while not _finished(client, [picking]):
+        if stop is not None and stop():
+            picking.cancel()
+            raise Cancelled
+    path: Path = picking.result()
+    return path
 
 
 def prepare(dataset_path: Path, settings: Settings, folder: Path) -> Path:
@@ -141,7 +152,7 @@ def _drive(
                     pure=False,
                 )
                 running[future] = (k, batch)
-            for future in _finished(client, running):
+            for future in _finished(client, list(running)):
                 k, batch = running.pop(future)
                 before = states[k]
                 states[k], seconds = future.result()
@@ -157,11 +168,11 @@ def _drive(
     return assemble(dataset, settings, problems, states)
 
 
-def _finished(client: Client, running: dict[Future, tuple[int, int]]) -> list[Future]:
+def _finished(client: Client, running: list[Future]) -> list[Future]:
     # The client is nobody's default, so ``wait`` must be told which it is.
     with client.as_current():
         try:
-            return list(wait(list(running), timeout=POLL_S, return_when="FIRST_COMPLETED").done)
+            return list(wait(running, timeout=POLL_S, return_when="FIRST_COMPLETED").done)
         except TimeoutError:
             return []
 

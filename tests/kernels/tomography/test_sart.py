@@ -20,7 +20,7 @@ from bentray_kernels.tomography import (
     reconstruct,
     rmse,
 )
-from bentray_kernels.tomography.sart import propagation_speed
+from bentray_kernels.tomography.sart import emitter_order, propagation_speed
 
 NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
 PHANTOM = table6(WATER)
@@ -87,6 +87,13 @@ def test_same_seed_same_bits_other_seed_other_order(scan):
     c = reconstruct(scan, plan(sweeps=1, seed=1))
     assert np.array_equal(a.speed, b.speed)
     assert not np.array_equal(a.speed, c.speed)
+
+
+def test_every_pass_slice_and_seed_has_an_order_of_its_own(scan):
+    problem = SliceProblem.of(scan, plan())
+    orders = [emitter_order(problem, *which) for which in ((0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0))]
+    assert len({tuple(order) for order in orders}) == 4
+    assert all(sorted(order) == list(range(RING.elements)) for order in orders)
 
 
 def test_numbering_of_the_elements_does_not_matter(scan):

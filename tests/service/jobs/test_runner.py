@@ -22,6 +22,14 @@ def test_at_most_so_many_at_a_time(start, uploaded, submitted, until, work):
     assert [until(http, job_id)["state"] for job_id in made] == ["succeeded"] * 4
 
 
+def test_a_new_job_wakes_the_runner(start, uploaded, submitted, until, work, monkeypatch):
+    monkeypatch.setattr("bentray_service.jobs.runner.IDLE_SECONDS", 600.0)
+    http = start(jobs_at_once=1)
+    dataset = uploaded(http)
+    time.sleep(0.1)  # by now it has looked and waits
+    assert until(http, submitted(http, dataset)["id"])["state"] == "succeeded"
+
+
 def test_cancel_a_running_job(start, uploaded, submitted, until, work):
     http = start()
     work.hold.clear()
