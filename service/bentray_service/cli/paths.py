@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from bentray_kernels.errors import InvalidInput
 
@@ -23,14 +24,19 @@ def output_folder(path: Path) -> Path:
     """``path`` as a folder, made if it is absent.
 
     Raises:
-        InvalidInput: where a file is in the way.
+        InvalidInput: where a file is in the way, or nothing can be written.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
+        # Found out now, not when the work is done; permissions alone do not tell.
+        with TemporaryFile(dir=path):
+            pass
     except (FileExistsError, NotADirectoryError) as error:
         raise InvalidInput(
             "output", f"{path} (a file is in the way)", "a folder, or where one can be made"
         ) from error
+    except OSError as error:
+        raise InvalidInput("output", f"{path} ({error.strerror})", "a folder that can be written") from error
     return path
 
 

@@ -45,3 +45,8 @@ def test_an_output_file_needs_a_folder_and_is_none(tmp_path: Path) -> None:
         output_file(tmp_path / "absent" / "scan.h5", force=True)
     with pytest.raises(InvalidInput, match=r"\(a folder\)"):
         output_file(tmp_path, force=True)
+
+
+def test_a_folder_that_takes_no_file_is_refused_before_the_work() -> None:
+    with pytest.raises(InvalidInput, match="a folder that can be written"):
+        output_folder(Path("/proc/self"))
