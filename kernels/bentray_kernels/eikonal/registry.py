@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -33,9 +33,9 @@ class Method:
         order: order of accuracy away from shocks.
         factored: whether the source's singularity is factored out.
         summary: one line for help texts.
-        run_many: as ``run`` for a sequence of problems of one shape and spacing, with the batch as the
-            first axis; None where the method has nothing better than one after the other.
-        on_device: whether ``run_many`` spreads the batch itself, so that threads must not share it.
+        run_many: as ``run`` for problems of one shape and spacing, one result after the other; None where
+            the method has nothing better than ``run`` for each.
+        on_device: whether ``run_many`` takes a sequence and spreads it itself; threads must not share it.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Method:
     order: int
     factored: bool
     summary: str
-    run_many: Callable[..., Floats] | None = None
+    run_many: Callable[..., Iterable[Floats]] | None = None
     on_device: bool = False
 
     def options(self) -> tuple[str, ...]:
@@ -199,11 +199,13 @@ def solve_many(
         problems = (
             PointSource.checked(fields[k % len(fields)], spacing, points[k % len(points)]) for k in part
         )
-        if chosen.run_many is not None:
-            times[part.start : part.stop] = chosen.run_many(list(problems), **options)
+        solved: Iterable[Floats]
+        if chosen.run_many is None:
+            solved = (chosen.run(problem, **options) for problem in problems)
         else:
-            for k, problem in zip(part, problems, strict=True):
-                times[k] = chosen.run(problem, **options)
+            solved = chosen.run_many(list(problems) if chosen.on_device else problems, **options)
+        for k, tof in zip(part, solved, strict=True):
+            times[k] = tof
 
     count = min(batch, 1 if chosen.on_device else threads)
     parts = [range(batch * k // count, batch * (k + 1) // count) for k in range(count)]
