@@ -24,6 +24,10 @@ EMBEDDED = {
     "distributed.scheduler.no-workers-timeout": "60s",
     # Dask's sampling profiler wakes every process a hundred times a second, work or no work.
     "distributed.worker.profile.enabled": False,
+    # Dask lets workers hand back every 64 KiB they free, and glibc then maps each array above 128 KiB anew:
+    # two thirds of a reconstruction went into page faults. These are glibc's own limits, in bytes.
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**25,
 }
 
 # What tells that nothing, or something else, is at an address; other protocols look like huge messages.
