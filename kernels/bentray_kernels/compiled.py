@@ -47,7 +47,7 @@ def kernel(function: Callable[..., Any] | None = None, *, inline: str = "never")
 
 def _compiled(function: Callable[..., Any], inner: bool) -> Any:
     # Inner functions are inlined by LLVM and built without reference counts. Inlined by numba instead, each
-    # would count its array arguments up and down, atomically: that made fast marching four times slower.
+    # would count its array arguments up and down, atomically: factored marching took four times as long.
     dispatcher = njit(cache=True, nogil=True, error_model="numpy", forceinline=inner, _nrt=not inner)(
         function
     )

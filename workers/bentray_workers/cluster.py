@@ -25,7 +25,7 @@ EMBEDDED = {
     # Dask's sampling profiler wakes every process a hundred times a second, work or no work.
     "distributed.worker.profile.enabled": False,
     # Dask lets workers hand back every 64 KiB they free, and glibc then maps each array above 128 KiB anew:
-    # two thirds of a reconstruction went into page faults. These are glibc's own limits, in bytes.
+    # page faults took nearly half of a straight-ray reconstruction. These are glibc's own limits, in bytes.
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**25,
 }
