@@ -124,10 +124,13 @@ def curved_ray(
     gradient: Floats,
     shape: tuple[int, ...],
     strides: tuple[int, ...],
+    step: float,
     path: Floats,
     scratch: Floats,
 ) -> int:
     """Fill ``path`` (room, ndim) from receiver to source by RK2 descent; returns the number of points.
+
+    Steps are ``step`` nodes long.
 
     A descent that has not arrived when the room is used up has been caught where the discrete gradient
     has no downhill (a shock, a rough model). It is traced anew from node to lower node, which always
@@ -140,18 +143,18 @@ def curved_ray(
     room = len(path) - 1
     for count in range(1, room):
         here = path[count - 1]
-        if _distance(here, source, axes) <= ARRIVED:
+        if _distance(here, source, axes) <= max(ARRIVED, step):
             for axis in range(axes):
                 path[count, axis] = source[axis]
             return count + 1
         if not _direction(here, gradient, shape, strides, part, slope):
             break
         for axis in range(axes):
-            middle[axis] = min(max(here[axis] + 0.5 * STEP * slope[axis], 0.0), shape[axis] - 1.0)
+            middle[axis] = min(max(here[axis] + 0.5 * step * slope[axis], 0.0), shape[axis] - 1.0)
         if not _direction(middle, gradient, shape, strides, part, slope):
             break
         for axis in range(axes):
-            path[count, axis] = min(max(here[axis] + STEP * slope[axis], 0.0), shape[axis] - 1.0)
+            path[count, axis] = min(max(here[axis] + step * slope[axis], 0.0), shape[axis] - 1.0)
     return _node_descent(source, tof, shape, strides, path, scratch)
 
 

@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
-from .descent import curved_ray, straight_ray, walk
+from .descent import STEP, curved_ray, straight_ray, walk
 from .fan import Fan, Kind
 
 
@@ -61,7 +61,7 @@ def _rows(
     filled = 0
     for row in range(len(receivers)):
         if curved:
-            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, path, scratch)
+            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, STEP, path, scratch)
         else:
             count = straight_ray(receivers[row], source, axes, path)
         entries = walk(path, count, shape, strides, nodes, lengths, scratch)

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats
 from ..compiled import kernel
-from .descent import curved_ray, straight_ray
+from .descent import STEP, curved_ray, straight_ray
 from .fan import Fan, Kind
 
 
@@ -57,5 +57,5 @@ def _one(
     scratch: Floats,
 ) -> int:
     if curved:
-        return curved_ray(receiver, source, tof, gradient, shape, strides, path, scratch)
+        return curved_ray(receiver, source, tof, gradient, shape, strides, STEP, path, scratch)
     return straight_ray(receiver, source, len(shape), path)

@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 from ..arrays import Flags, Floats, Ints
 from ..compiled import kernel
 from ..eikonal import solve
-from ..rays.descent import curved_ray, straight_ray, walk
+from ..rays.descent import STEP, curved_ray, straight_ray, walk
 from ..rays.fan import Fan
 from .problem import SliceProblem
 from .result import Sweep
@@ -201,7 +201,7 @@ def _back_project(
     squares = 0.0
     for row in range(len(receivers)):
         if curved:
-            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, path, scratch)
+            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, STEP, path, scratch)
         else:
             count = straight_ray(receivers[row], source, axes, path)
         entries = walk(path, count, shape, strides, nodes, lengths, scratch)

@@ -1,0 +1,81 @@
+"""Travel times read as the integral of the slowness along bent rays."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats
+from ..compiled import kernel
+from ..errors import InvalidInput
+from ..splines import coefficients
+from .bending import bend, bending
+from .descent import curved_ray
+from .fan import Fan
+
+# Steps of the descent, nodes. Bending mends what a longer step than that of ``trace`` spoils.
+STRIDE = 1.5
+
+
+def travel_times(
+    tof: ArrayLike, speed: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike
+) -> Floats:
+    """Travel times to receivers, several times as accurate as those of the grid that guides the rays.
+
+    Each ray is traced down ``tof`` as by ``trace`` and then bent until its time is stationary (Fermat), in
+    the cubic spline through the slowness. The error of ``tof`` counts only in that it must lead each ray
+    to the right valley; what remains is that of the spline: fourth order where the medium is smooth.
+
+    Args:
+        tof: (nx, ny[, nz]), s, as ``eikonal.solve`` gives it for ``source``.
+        speed: as ``tof``, m/s.
+        spacing: node spacing, m.
+        receivers: (k, ndim), m, in the grid; node 0 lies at 0.
+        source: (ndim,), m.
+
+    Returns:
+        (k,), s.
+
+    Raises:
+        InvalidInput: as ``trace``, and for speeds that are not of the shape of ``tof``, finite and > 0.
+    """
+    fan = Fan.checked(tof, spacing, receivers, source, "curved")
+    speeds = np.asarray(speed, dtype=np.float64)
+    if speeds.shape != fan.shape:
+        raise InvalidInput("speed", f"shape {speeds.shape}", f"the shape of tof, {fan.shape}")
+    bad = ~(np.isfinite(speeds) & (speeds > 0.0))
+    if bad.any():
+        place = tuple(int(i) for i in np.argwhere(bad)[0])
+        raise InvalidInput("speed", f"{speeds[place]:g} at node {place}", "finite speeds > 0 m/s")
+    times = _bent_times(
+        fan.receivers,
+        fan.source,
+        fan.tof,
+        fan.gradient,
+        fan.shape,
+        fan.strides,
+        coefficients(1.0 / speeds),
+        fan.room,
+    )
+    return np.asarray(times * spacing)
+
+
+@kernel
+def _bent_times(
+    receivers: Floats,
+    source: Floats,
+    tof: Floats,
+    gradient: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    spline: Floats,
+    room: int,
+) -> Floats:
+    path = np.empty((room, len(shape)))
+    scratch = np.empty((3, len(shape)))
+    space = bending(room, shape)
+    times = np.empty(len(receivers))
+    for k in range(len(receivers)):
+        count = curved_ray(receivers[k], source, tof, gradient, shape, strides, STRIDE, path, scratch)
+        times[k] = bend(path, count, spline, shape, space)
+    return times

@@ -1,0 +1,159 @@
+"""The cubic B-spline through all nodes of a grid, with the derivatives that bending a ray asks for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats
+from ..compiled import kernel
+
+# Pole of the recursive filter (Unser, Aldroubi & Eden 1993).
+POLE = math.sqrt(3.0) - 2.0
+
+# |POLE|^HORIZON is below double precision: farther nodes do not reach the start of the recursion.
+HORIZON = 28
+
+# Nodes added by mirroring before the first and after the last one, so that four lie about every point.
+BEFORE, AFTER = 1, 2
+
+
+def coefficients(values: ArrayLike) -> Floats:
+    """B-spline coefficients of a grid, mirrored at its rim and with the border that the jets read.
+
+    Args:
+        values: (nx, ny[, nz]), any unit.
+
+    Returns:
+        (nx + 3, ny + 3[, nz + 3]), C order; node 0 lies at index 1.
+    """
+    filtered = np.array(values, dtype=np.float64, order="C")
+    for axis, n in enumerate(filtered.shape):
+        if n > 1:
+            _prefilter(filtered.reshape(math.prod(filtered.shape[:axis]), n, -1))
+    mirrored = [(BEFORE, AFTER)] * filtered.ndim
+    # numpy mirrors a single node onto itself.
+    return np.ascontiguousarray(np.pad(filtered, mirrored, mode="reflect"))
+
+
+@kernel
+def _prefilter(lines: Floats) -> None:
+    """Along the middle axis of (outer, n, inner), in place."""
+    outer, n, inner = lines.shape
+    period = 2 * n - 2
+    for o in range(outer):
+        line = lines[o]
+        start = np.zeros(inner)
+        power = 1.0
+        if period > HORIZON:
+            terms, whole = HORIZON, 1.0
+        else:
+            terms, whole = period, 1.0 - POLE**period
+        for k in range(terms):
+            mirrored = k if k < n else period - k
+            for x in range(inner):
+                start[x] += power * line[mirrored, x]
+            power *= POLE
+        for x in range(inner):
+            line[0, x] = 6.0 * start[x] / whole
+        for k in range(1, n):
+            for x in range(inner):
+                line[k, x] = 6.0 * line[k, x] + POLE * line[k - 1, x]
+        for x in range(inner):
+            line[n - 1, x] = POLE / (POLE * POLE - 1.0) * (line[n - 1, x] + POLE * line[n - 2, x])
+        for k in range(n - 2, -1, -1):
+            for x in range(inner):
+                line[k, x] = POLE * (line[k + 1, x] - line[k, x])
+
+
+@kernel(inline="always")
+def _weights(t: float) -> tuple[float, float, float, float]:
+    """The B-spline at the four nodes about a point, ``t`` of a cell after the second."""
+    u = 1.0 - t
+    return (
+        u * u * u / 6.0,
+        2.0 / 3.0 - 0.5 * t * t * (2.0 - t),
+        2.0 / 3.0 - 0.5 * u * u * (2.0 - u),
+        t * t * t / 6.0,
+    )
+
+
+@kernel(inline="always")
+def _slopes(t: float) -> tuple[float, float, float, float]:
+    u = 1.0 - t
+    return -0.5 * u * u, t * (1.5 * t - 2.0), u * (2.0 - 1.5 * u), 0.5 * t * t
+
+
+@kernel(inline="always")
+def _bends(t: float) -> tuple[float, float, float, float]:
+    u = 1.0 - t
+    return u, 3.0 * t - 2.0, 3.0 * u - 2.0, t
+
+
+@kernel(inline="always")
+def _cell(place: float, stored: int) -> int:
+    """Index of the first of the four coefficients about a place, nodes."""
+    return min(max(int(place), 0), stored - BEFORE - AFTER - 1)
+
+
+@kernel(inline="always")
+def jet_2d(spline: Floats, x: float, y: float) -> tuple[float, float, float, float, float, float]:
+    """Value, x and y slope, and xx, xy, yy second derivative at a point, in nodes."""
+    i, j = _cell(x, spline.shape[0]), _cell(y, spline.shape[1])
+    wx, dx, bx = _weights(x - i), _slopes(x - i), _bends(x - i)
+    wy, dy, by = _weights(y - j), _slopes(y - j), _bends(y - j)
+    value = slope_x = slope_y = xx = xy = yy = 0.0
+    for p in range(4):
+        level = slope = bend = 0.0
+        for q in range(4):
+            c = spline[i + p, j + q]
+            level += wy[q] * c
+            slope += dy[q] * c
+            bend += by[q] * c
+        value += wx[p] * level
+        slope_x += dx[p] * level
+        xx += bx[p] * level
+        slope_y += wx[p] * slope
+        xy += dx[p] * slope
+        yy += wx[p] * bend
+    return value, slope_x, slope_y, xx, xy, yy
+
+
+@kernel(inline="always")
+def jet_3d(
+    spline: Floats, x: float, y: float, z: float
+) -> tuple[float, float, float, float, float, float, float, float, float, float]:
+    """Value, the slopes, and xx, xy, xz, yy, yz, zz second derivative at a point, in nodes."""
+    i, j, k = _cell(x, spline.shape[0]), _cell(y, spline.shape[1]), _cell(z, spline.shape[2])
+    wx, dx, bx = _weights(x - i), _slopes(x - i), _bends(x - i)
+    wy, dy, by = _weights(y - j), _slopes(y - j), _bends(y - j)
+    wz, dz, bz = _weights(z - k), _slopes(z - k), _bends(z - k)
+    value = slope_x = slope_y = slope_z = xx = xy = xz = yy = yz = zz = 0.0
+    for p in range(4):
+        level = in_y = in_z = in_yy = in_yz = in_zz = 0.0
+        for q in range(4):
+            line = slope = bend = 0.0
+            for r in range(4):
+                c = spline[i + p, j + q, k + r]
+                line += wz[r] * c
+                slope += dz[r] * c
+                bend += bz[r] * c
+            level += wy[q] * line
+            in_y += dy[q] * line
+            in_yy += by[q] * line
+            in_z += wy[q] * slope
+            in_yz += dy[q] * slope
+            in_zz += wy[q] * bend
+        value += wx[p] * level
+        slope_x += dx[p] * level
+        xx += bx[p] * level
+        slope_y += wx[p] * in_y
+        xy += dx[p] * in_y
+        slope_z += wx[p] * in_z
+        xz += dx[p] * in_z
+        yy += wx[p] * in_yy
+        yz += wx[p] * in_yz
+        zz += wx[p] * in_zz
+    return value, slope_x, slope_y, slope_z, xx, xy, xz, yy, yz, zz
