@@ -56,7 +56,7 @@ def _first_order(problem: PointSource, nodes: Ints, times: Floats) -> Floats:
     time = np.full(problem.padded_slowness.size, math.inf)
     time[nodes] = times
     sweeper = Sweeper(problem.slowness.shape)
-    sweeper.settle(time, problem.padded_slowness, problem.spacing, ORDER_TOLERANCE, nodes)
+    sweeper.settle(time, problem.slowness, problem.spacing, ORDER_TOLERANCE, nodes)
     return time
 
 

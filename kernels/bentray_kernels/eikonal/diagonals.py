@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,8 +32,25 @@ FIRST = RUN
 # No column: above every column as a lowest one.
 NONE = 1 << 40
 
+# Fewer nodes than one in so many are copied one by one.
+FEW = 3
+
 # Nodes of j and k that are moved at once; diagonals of such a patch stay in the cache.
 PATCH = (32, 64)
+
+
+class Columns(NamedTuple):
+    """A set of nodes: the lowest and the highest column of each diagonal, (planes, diagonals)."""
+
+    low: Ints
+    high: Ints
+
+    def clear(self) -> None:
+        self.low.fill(NONE)
+        self.high.fill(-1)
+
+    def any(self) -> bool:
+        return bool((self.low <= self.high).any())
 
 
 @dataclass(frozen=True)
@@ -71,34 +89,45 @@ class Diagonals:
     def stored(self) -> tuple[int, int]:
         return self.rows, self.width
 
-    def store(self, plain: Floats, into: Floats, flipped: bool, *, scale: float = 1.0, rim: int = 0) -> None:
-        """Copy a flat padded grid into its diagonals, times ``scale``; ``rim`` outer layers are left out."""
-        _move(plain, into, self.shape, self.stored, flipped, scale, rim, False)
+    def store(
+        self, plain: Floats, into: Floats, flipped: bool, *, scale: float = 1.0, border: bool = True
+    ) -> None:
+        """Copy a flat grid into its diagonals, times ``scale``; with its border, or without one."""
+        _move(plain, into, self.shape, self.stored, flipped, scale, border, False)
 
-    def load(self, plain: Floats, source: Floats, flipped: bool) -> None:
-        """Copy the diagonals into a flat padded grid."""
-        _move(plain, source, self.shape, self.stored, flipped, 1.0, 0, True)
+    def load(self, plain: Floats, source: Floats, flipped: bool, *, border: bool = True) -> None:
+        """Copy the diagonals into a flat grid with or without its border."""
+        _move(plain, source, self.shape, self.stored, flipped, 1.0, border, True)
+
+    def put(self, nodes: Ints, values: Floats, into: Floats) -> None:
+        """Set the values of flat padded ``nodes``."""
+        _put(nodes, values, self.shape, self.stored, into)
 
     def turn(self, source: Floats, into: Floats) -> None:
         """Copy the diagonals of a grid into those of the grid whose j is flipped."""
         _turn(source, into, self.shape, self.stored)
 
-    def nobody(self) -> tuple[Ints, Ints]:
-        """Lowest and highest column per diagonal, (planes, diagonals), of an empty set of nodes."""
+    def turn_changed(self, source: Floats, into: Floats, changed: Columns) -> None:
+        """As ``turn`` where no other nodes than ``changed`` differ."""
+        # Copied one by one, nodes cost more than patches of them do.
+        if _turn_some(source, into, changed.low, changed.high, self.shape, self.stored, self.size // FEW):
+            return
+        self.turn(source, into)
+
+    def nobody(self) -> Columns:
+        """An empty set of nodes."""
         _, nj, nk = self.shape
-        return np.full((self.planes, nj + nk + 4), NONE), np.full((self.planes, nj + nk + 4), -1)
+        return Columns(np.full((self.planes, nj + nk + 4), NONE), np.full((self.planes, nj + nk + 4), -1))
 
-    def neighbours(self, nodes: Ints) -> tuple[Ints, Ints]:
-        """Lowest and highest column per diagonal of the neighbours of flat padded ``nodes``."""
-        low, high = self.nobody()
-        _surround(nodes, self.shape, low, high)
-        return low, high
+    def neighbours(self, nodes: Ints, into: Columns) -> None:
+        """The neighbours of flat padded ``nodes``."""
+        into.clear()
+        _surround(nodes, self.shape, into.low, into.high)
 
-    def flip(self, low: Ints, high: Ints) -> tuple[Ints, Ints]:
-        """The same columns, or more, in the grid whose j is flipped."""
-        turned = self.nobody()
-        _flip(low, high, self.shape, *turned)
-        return turned
+    def flip(self, columns: Columns, into: Columns) -> None:
+        """The same nodes, or more, in the grid whose j is flipped."""
+        into.clear()
+        _flip(columns.low, columns.high, self.shape, into.low, into.high)
 
 
 @kernel
@@ -109,12 +138,17 @@ def _move(
     stored: tuple[int, int],
     flipped: bool,
     scale: float,
-    rim: int,
+    border: bool,
     back: bool,
 ) -> None:
     planes, nj, nk = shape
     rows, width = stored
     step = np.uint64(width + 1)
+    rim = 0 if border else 1
+    # Flat distances between rows and planes of the plain grid, and where node 0 of the border would be.
+    line = nk + 2 - 2 * rim
+    layer = line * (nj + 2 - 2 * rim)
+    origin = -rim * (line + 1 + (layer if planes else 0))
     for plane in range(rim if planes else 0, planes + 2 - rim if planes else 1):
         base = (plane + 1 if planes else 0) * rows * width
         for some in range(rim, nj + 2 - rim, PATCH[0]):
@@ -124,7 +158,7 @@ def _move(
                     end = min(first + PATCH[1], nk + 2 - rim)
                     while k < end:
                         row = ((nj + 1 - j if flipped else j) + k) % rows
-                        here = np.uint64((plane * (nj + 2) + j) * (nk + 2) + k)
+                        here = np.uint64(origin + plane * layer + j * line + k)
                         there = np.uint64(base + row * width + k + FIRST - 1)
                         # One step in k is one row and one column on, until the rows begin again.
                         until = min(end - k, rows - row)
@@ -158,6 +192,47 @@ def _turn(source: Floats, into: Floats, shape: tuple[int, int, int], stored: tup
                         for x in range(np.uint64(until)):
                             into[there + x * step] = source[here + x * step]
                         k += until
+
+
+@kernel
+def _turn_some(
+    source: Floats,
+    into: Floats,
+    low: Ints,
+    high: Ints,
+    shape: tuple[int, int, int],
+    stored: tuple[int, int],
+    most: int,
+) -> bool:
+    """Copy the columns ``low`` to ``high``; returns False, having done nothing, for more than ``most``."""
+    _, nj, nk = shape
+    rows, width = stored
+    count = 0
+    for plane in range(low.shape[0]):
+        for s in range(2, nj + nk + 1):
+            count += max(0, high[plane, s] - low[plane, s] + 1)
+    if count > most:
+        return False
+    for plane in range(low.shape[0]):
+        base = plane * rows * width + FIRST - 1
+        for s in range(2, nj + nk + 1):
+            for k in range(low[plane, s], high[plane, s] + 1):
+                there = base + (nj + 1 - s + 2 * k) % rows * width + k
+                into[there] = source[base + s % rows * width + k]
+    return True
+
+
+@kernel
+def _put(
+    nodes: Ints, values: Floats, shape: tuple[int, int, int], stored: tuple[int, int], into: Floats
+) -> None:
+    planes, nj, nk = shape
+    rows, width = stored
+    for which, node in enumerate(nodes):
+        k = node % (nk + 2)
+        s = node // (nk + 2) % (nj + 2) + k
+        plane = node // ((nk + 2) * (nj + 2)) + 1 if planes else 0
+        into[plane * rows * width + s % rows * width + k + FIRST - 1] = values[which]
 
 
 @kernel(inline="always")

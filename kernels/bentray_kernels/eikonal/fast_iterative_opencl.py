@@ -28,15 +28,20 @@ def fast_iterative_opencl(problem: PointSource, *, tolerance: float = 1e-12) -> 
     Warns:
         OpenCLFallbackWarning: once, where no device passes its trial and ``fim`` computes instead.
     """
-    times: Floats = fast_iterative_opencl_many([problem], tolerance=tolerance)[0]
-    return times
+    times = np.empty((1, *problem.slowness.shape))
+    fast_iterative_opencl_many([problem], times, tolerance=tolerance)
+    return np.asarray(times[0])
 
 
-def fast_iterative_opencl_many(problems: Sequence[PointSource], *, tolerance: float = 1e-12) -> Floats:
+def fast_iterative_opencl_many(
+    problems: Sequence[PointSource], times: Floats, *, tolerance: float = 1e-12
+) -> None:
     """As ``fast_iterative_opencl`` for several problems of one shape and spacing, in the same launches.
 
-    Returns:
-        (batch, nx, ny[, nz]), s; each bit for bit as if alone.
+    Args:
+        problems: as many as ``times`` has room for; each is solved bit for bit as if alone.
+        times: (batch, nx, ny[, nz]), s, C order; filled.
+        tolerance: as in ``fim``.
     """
     if not tolerance >= 0.0:
         raise InvalidInput("tolerance", tolerance, "a number >= 0")
@@ -46,14 +51,19 @@ def fast_iterative_opencl_many(problems: Sequence[PointSource], *, tolerance: fl
 
     session = session_or_warning(instead="fim")
     if session is None:
-        return np.stack([fast_iterative(problem, tolerance=tolerance) for problem in problems])
+        for problem, into in zip(problems, times, strict=True):
+            into[...] = fast_iterative(problem, tolerance=tolerance)
+        return
     first = problems[0]
-    same = all(np.array_equal(problem.slowness, first.slowness) for problem in problems[1:])
+    same = all(
+        problem.medium is first.medium or np.array_equal(problem.slowness, first.slowness)
+        for problem in problems[1:]
+    )
     fields = [first] if same else problems
     crossings = np.stack([problem.spacing * problem.slowness for problem in fields])
     seeds = []
     for problem in problems:
-        nodes, times = problem.seeds()
+        nodes, starts = problem.seeds()
         places = np.array(np.unravel_index(nodes, problem.padded_shape)) - 1
-        seeds.append((np.ravel_multi_index(tuple(places), problem.slowness.shape), times))
-    return travel_times(session, crossings, seeds, tolerance)
+        seeds.append((np.ravel_multi_index(tuple(places), problem.slowness.shape), starts))
+    times[...] = travel_times(session, crossings, seeds, tolerance)

@@ -18,22 +18,20 @@ ON_NODE = 1e-9
 
 
 @dataclass(frozen=True)
-class PointSource:
-    """|∇T| = slowness on a regular grid, T = 0 at ``source``.
+class Medium:
+    """A regular grid of slowness, which many sources may share.
 
     Attributes:
         slowness: (nx, ny[, nz]), s/m, float64, C order.
         spacing: node spacing, m.
-        source: (ndim,), m, node 0 at 0.
     """
 
     slowness: Floats
     spacing: float
-    source: Floats
 
     @classmethod
-    def checked(cls, speed: ArrayLike, spacing: float, source: ArrayLike | Sequence[float]) -> PointSource:
-        """The problem of ``solve``, refused with the first bad value's place.
+    def checked(cls, speed: ArrayLike, spacing: float) -> Medium:
+        """The medium of ``solve``, refused with the first bad value's place.
 
         Raises:
             InvalidInput: see ``bentray_kernels.eikonal.solve``.
@@ -41,26 +39,67 @@ class PointSource:
         speeds = np.asarray(speed, dtype=np.float64)
         if speeds.ndim not in (2, 3) or speeds.size == 0:
             raise InvalidInput("speed", f"shape {speeds.shape}", "a non-empty 2-D or 3-D array")
-        bad = ~(np.isfinite(speeds) & (speeds > 0.0))
-        if bad.any():
-            place = tuple(int(i) for i in np.argwhere(bad)[0])
+        # NaN fails the first comparison.
+        if not (speeds.min() > 0.0 and speeds.max() < math.inf):
+            place = tuple(int(i) for i in np.argwhere(~(np.isfinite(speeds) & (speeds > 0.0)))[0])
             raise InvalidInput("speed", f"{speeds[place]:g} at node {place}", "finite speeds > 0 m/s")
         step = float(spacing)
         if not (math.isfinite(step) and step > 0.0):
             raise InvalidInput("spacing", spacing, "a finite node spacing > 0 m")
-        position = np.asarray(source, dtype=np.float64)
-        if position.shape != (speeds.ndim,):
-            raise InvalidInput("source", f"shape {position.shape}", f"{speeds.ndim} coordinates in metres")
-        extent = step * (np.array(speeds.shape) - 1)
-        slack = ON_NODE * step
-        if not np.all((position >= -slack) & (position <= extent + slack)):
-            raise InvalidInput("source", position.tolist(), f"a point in the grid, 0 to {extent.tolist()} m")
-        return cls(1.0 / speeds, step, np.clip(position, 0.0, extent))
+        return cls(np.ascontiguousarray(1.0 / speeds), step)
 
     @cached_property
     def padded_slowness(self) -> Floats:
         """Flat slowness with a border of one node, whose value is never used."""
         return np.pad(self.slowness, 1, constant_values=1.0).ravel()
+
+    def source(self, position: ArrayLike) -> PointSource:
+        """The problem of a source at ``position``, (ndim,), m.
+
+        Raises:
+            InvalidInput: for a source that is not in the grid.
+        """
+        point = np.asarray(position, dtype=np.float64)
+        shape = self.slowness.shape
+        if point.shape != (len(shape),):
+            raise InvalidInput("source", f"shape {point.shape}", f"{len(shape)} coordinates in metres")
+        extent = self.spacing * (np.array(shape) - 1)
+        slack = ON_NODE * self.spacing
+        if not np.all((point >= -slack) & (point <= extent + slack)):
+            raise InvalidInput("source", point.tolist(), f"a point in the grid, 0 to {extent.tolist()} m")
+        return PointSource(self, np.clip(point, 0.0, extent))
+
+
+@dataclass(frozen=True)
+class PointSource:
+    """|∇T| = slowness in a medium, T = 0 at ``source``, (ndim,), m, node 0 at 0."""
+
+    medium: Medium
+    source: Floats
+
+    @classmethod
+    def checked(cls, speed: ArrayLike, spacing: float, source: ArrayLike | Sequence[float]) -> PointSource:
+        """The problem of ``solve``.
+
+        Raises:
+            InvalidInput: see ``bentray_kernels.eikonal.solve``.
+        """
+        return Medium.checked(speed, spacing).source(source)
+
+    @property
+    def slowness(self) -> Floats:
+        """(nx, ny[, nz]), s/m."""
+        return self.medium.slowness
+
+    @property
+    def spacing(self) -> float:
+        """Node spacing, m."""
+        return self.medium.spacing
+
+    @property
+    def padded_slowness(self) -> Floats:
+        """Flat slowness with a border of one node, whose value is never used."""
+        return self.medium.padded_slowness
 
     @property
     def padded_shape(self) -> tuple[int, ...]:
@@ -95,7 +134,7 @@ class PointSource:
 
     def source_slowness(self) -> float:
         """Slowness at the source, multilinear between its cell's nodes, s/m."""
-        return float(sum(weight * self.slowness[node] for node, weight in self._cell()))
+        return float(sum(weight * self.slowness[node] for node, weight in self._cell))
 
     def seeds(self) -> tuple[Ints, Floats]:
         """Nodes of the source's cell: flat padded indices and travel times along straight lines, s.
@@ -104,10 +143,11 @@ class PointSource:
         """
         at_source = self.source_slowness()
         nodes, times = [], []
-        for node, _ in self._cell():
-            offset = np.array(node) * self.spacing - self.source
-            nodes.append(sum((i + 1) * stride for i, stride in zip(node, self.strides, strict=True)))
-            times.append(float(np.linalg.norm(offset)) * 0.5 * (at_source + self.slowness[node]))
+        strides = self.strides
+        for node, _ in self._cell:
+            distance = math.dist([i * self.spacing for i in node], self.source)
+            nodes.append(sum((i + 1) * stride for i, stride in zip(node, strides, strict=True)))
+            times.append(distance * 0.5 * (at_source + self.slowness[node]))
         return np.array(nodes, dtype=np.int64), np.array(times)
 
     def surroundings(self, radius: int, contrast: float) -> tuple[Ints, Floats] | None:
@@ -126,11 +166,12 @@ class PointSource:
         nodes = ((places + 1) * np.array(self.strides)[:, None]).sum(axis=0)
         return nodes, distance * 0.5 * (self.source_slowness() + box.ravel())
 
+    @cached_property
     def _cell(self) -> list[tuple[tuple[int, ...], float]]:
         """The nodes around the source with their multilinear weights, those of weight 0 left out."""
         corners: list[tuple[tuple[int, ...], float]] = [((), 1.0)]
         for axis, n in enumerate(self.slowness.shape):
-            place = self.source[axis] / self.spacing
+            place = float(self.source[axis]) / self.spacing
             low = min(int(place), n - 1)
             part = place - low
             if part < ON_NODE or part > 1.0 - ON_NODE or low + 1 >= n:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -20,7 +20,7 @@ from .fast_iterative_opencl import fast_iterative_opencl, fast_iterative_opencl_
 from .fast_marching import fast_marching, high_accuracy_fast_marching
 from .fast_marching_untidy import fast_marching_untidy
 from .fast_sweeping import fast_sweeping, fast_sweeping_many
-from .problem import PointSource
+from .problem import Medium, PointSource
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Method:
         order: order of accuracy away from shocks.
         factored: whether the source's singularity is factored out.
         summary: one line for help texts.
-        run_many: as ``run`` for problems of one shape and spacing, one result after the other; None where
-            the method has nothing better than ``run`` for each.
+        run_many: as ``run`` for problems of one shape and spacing, into an array (batch, nx, ny[, nz]); None
+            where the method has nothing better than ``run`` for each.
         on_device: whether ``run_many`` takes a sequence and spreads it itself; threads must not share it.
     """
 
@@ -43,7 +43,7 @@ class Method:
     order: int
     factored: bool
     summary: str
-    run_many: Callable[..., Iterable[Floats]] | None = None
+    run_many: Callable[..., None] | None = None
     on_device: bool = False
 
     def options(self) -> tuple[str, ...]:
@@ -195,17 +195,21 @@ def solve_many(
     batch = max(len(fields), len(points)) if len(fields) and len(points) else 0
     times = np.empty((batch, *fields.shape[1:]))
 
+    # One medium checked and laid out once serves all its sources.
+    shared = Medium.checked(fields[0], spacing) if len(fields) == 1 else None
+
+    def problem(k: int) -> PointSource:
+        medium = shared or Medium.checked(fields[k], spacing)
+        return medium.source(points[k % len(points)])
+
     def solve_part(part: range) -> None:
-        problems = (
-            PointSource.checked(fields[k % len(fields)], spacing, points[k % len(points)]) for k in part
-        )
-        solved: Iterable[Floats]
         if chosen.run_many is None:
-            solved = (chosen.run(problem, **options) for problem in problems)
+            for k in part:
+                times[k] = chosen.run(problem(k), **options)
         else:
-            solved = chosen.run_many(list(problems) if chosen.on_device else problems, **options)
-        for k, tof in zip(part, solved, strict=True):
-            times[k] = tof
+            problems = map(problem, part)
+            into = times[part.start : part.stop]
+            chosen.run_many(list(problems) if chosen.on_device else problems, into, **options)
 
     count = min(batch, 1 if chosen.on_device else threads)
     parts = [range(batch * k // count, batch * (k + 1) // count) for k in range(count)]

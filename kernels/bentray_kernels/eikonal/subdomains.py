@@ -66,7 +66,7 @@ def sweep_block(
         padded[tuple(inside)] = given
     flat = padded.ravel()
     Sweeper(times.shape).settle(
-        flat, np.pad(slowness, 1).ravel(), spacing, tolerance, np.flatnonzero(flat < math.inf)
+        flat, np.ascontiguousarray(slowness), spacing, tolerance, np.flatnonzero(flat < math.inf)
     )
     new = np.ascontiguousarray(padded[(slice(1, -1),) * times.ndim])
     changed = []

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.eikonal.diagonals import FIRST, Diagonals
+from bentray_kernels.eikonal.diagonals import FIRST, Diagonals, include
 
 SHAPES = st.one_of(
     st.tuples(st.integers(1, 40), st.integers(1, 90)),
@@ -49,12 +49,58 @@ def test_neighbours_lie_in_the_rows_before_and_after():
     assert rows[j + k + 1, [column, column + 1]].tolist() == [(j + 1) * 8 + k, j * 8 + k + 1]
 
 
-def test_the_rim_can_be_left_out_and_values_scaled():
-    grid = Diagonals.of((2, 3))
+@given(shape=SHAPES, flipped=st.booleans())
+@settings(deadline=None)
+def test_the_border_can_be_left_out_and_values_scaled(shape, flipped):
+    grid = Diagonals.of(shape)
+    inside = np.arange(np.prod(shape), dtype=float)
     stored = np.full(grid.size, np.inf)
-    grid.store(np.ones(20), stored, False, scale=3.0, rim=1)
-    assert np.count_nonzero(stored == 3.0) == 6
-    assert np.count_nonzero(np.isfinite(stored)) == 6
+    grid.store(inside, stored, flipped, scale=3.0, border=False)
+    assert np.count_nonzero(np.isfinite(stored)) == inside.size
+    whole = np.full(numbered(shape).size, -1.0)
+    grid.load(whole, stored, flipped)
+    assert np.array_equal(
+        whole.reshape([n + 2 for n in shape])[(slice(1, -1),) * len(shape)].ravel(), 3 * inside
+    )
+    back = np.empty(inside.size)
+    grid.load(back, stored, flipped, border=False)
+    assert np.array_equal(back, 3 * inside)
+
+
+@given(shape=SHAPES, seed=st.integers(0, 99))
+@settings(deadline=None)
+def test_nodes_are_put_where_storing_puts_them(shape, seed):
+    grid = Diagonals.of(shape)
+    plain = numbered(shape)
+    nodes = np.random.default_rng(seed).integers(0, plain.size, 7)
+    stored, put = np.full((2, grid.size), -1.0)
+    only = np.full(plain.size, -1.0)
+    only[nodes] = plain[nodes]
+    grid.store(only, stored, False)
+    grid.put(nodes, plain[nodes], put)
+    assert np.array_equal(put, stored)
+
+
+@given(shape=SHAPES, seed=st.integers(0, 99), many=st.booleans())
+@settings(deadline=None)
+def test_turning_what_changed_turns_the_whole(shape, seed, many):
+    grid = Diagonals.of(shape)
+    rng = np.random.default_rng(seed)
+    stored, turned, expected = np.full((3, grid.size), -1.0)
+    grid.store(numbered(shape), stored, False)
+    grid.turn(stored, turned)
+    inside = np.flatnonzero(np.pad(np.ones(shape), 1).ravel())
+    nodes = rng.choice(inside, inside.size if many else 1, replace=False)
+    grid.put(nodes, rng.uniform(0.0, 1.0, nodes.size), stored)
+    changed = grid.nobody()
+    _, nj, nk = grid.shape
+    for node in nodes:
+        row, k = divmod(int(node), nk + 2)
+        plane, j = divmod(row, nj + 2)
+        include(*changed, plane + 1 if grid.shape[0] else 0, j + k, k, k, grid.shape)
+    grid.turn_changed(stored, turned, changed)
+    grid.turn(stored, expected)
+    assert np.array_equal(turned, expected)
 
 
 def members(grid, low, high):
@@ -71,6 +117,7 @@ def members(grid, low, high):
 def test_neighbours_of_a_node_are_those_of_the_grid(shape):
     grid = Diagonals.of(shape)
     padded = tuple(n + 2 for n in shape)
+    found = grid.nobody()
     for node in np.ndindex(padded):
         expected = set()
         for axis in range(len(shape)):
@@ -79,8 +126,8 @@ def test_neighbours_of_a_node_are_those_of_the_grid(shape):
                 near[axis] += step
                 if all(1 <= i <= n for i, n in zip(near, shape, strict=True)):
                     expected.add(int(np.ravel_multi_index(near, padded)))
-        found = members(grid, *grid.neighbours(np.array([np.ravel_multi_index(node, padded)])))
-        assert found == expected
+        grid.neighbours(np.array([np.ravel_multi_index(node, padded)]), found)
+        assert members(grid, *found) == expected
 
 
 @given(shape=SHAPES, seed=st.integers(0, 99))
@@ -89,10 +136,12 @@ def test_flipping_keeps_every_node(shape, seed):
     grid = Diagonals.of(shape)
     rng = np.random.default_rng(seed)
     nodes = rng.integers(0, numbered(shape).size, 5)
-    low, high = grid.neighbours(nodes)
+    near, flipped = grid.nobody(), grid.nobody()
+    grid.neighbours(nodes, near)
+    grid.flip(near, flipped)
     _, nj, nk = grid.shape
-    turned = members(grid, *grid.flip(low, high))
-    for node in members(grid, low, high):
+    turned = members(grid, *flipped)
+    for node in members(grid, *near):
         row, k = divmod(node, nk + 2)
         plane, j = divmod(row, nj + 2)
         assert (plane * (nj + 2) + nj + 1 - j) * (nk + 2) + k in turned

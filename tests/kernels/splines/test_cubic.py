@@ -13,7 +13,7 @@ from bentray_kernels.splines.cubic import coefficients, jet_2d, jet_3d
 def jet(spline, point):
     if spline.ndim == 2:
         value = jet_2d(spline, point[0], point[1])
-        return value + (0.0, 0.0, 0.0, 0.0)
+        return (*value, 0.0, 0.0, 0.0, 0.0)
     return jet_3d(spline, point[0], point[1], point[2])
 
 
