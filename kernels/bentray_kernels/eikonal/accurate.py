@@ -8,8 +8,10 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
+from ..errors import InvalidInput
+from ..splines import refined
 from .fast_sweeping import Sweeper
-from .problem import PointSource
+from .problem import Medium, PointSource
 from .updates import factored_update
 
 # The order of arrival is all that the first-order times are for; they need not settle to rounding.
@@ -21,17 +23,33 @@ ORDER_TOLERANCE = 1e-3
 RADIUS = 8
 CONTRAST = 1.2
 
+# A grid finer than this many times is a typing error.
+FINEST = 8
 
-def accurate(problem: PointSource) -> Floats:
+
+def accurate(problem: PointSource, *, supersample: int = 1) -> Floats:
     """Factored second-order travel time without a heap.
 
     Fast sweeping gives the order in which the front arrives, a counting sort puts the nodes into that
     order, and a pass of the update of ``hafmm`` follows it. Where two fronts meet, a wrong order
     costs no more than the first-order error at those nodes.
 
+    Args:
+        problem: the checked problem.
+        supersample: the medium is read off its cubic spline on a grid this many times as fine, and solved
+            there: with 2 the error falls to about a quarter for four (2-D) or eight (3-D) times the work.
+
     Returns:
         (nx, ny[, nz]), s.
+
+    Raises:
+        InvalidInput: for a ``supersample`` that is no whole number from 1 to 8.
     """
+    if not (isinstance(supersample, int) and 1 <= supersample <= FINEST):
+        raise InvalidInput("supersample", supersample, f"a whole number from 1 to {FINEST}")
+    if supersample > 1:
+        every = (slice(None, None, supersample),) * problem.slowness.ndim
+        return np.ascontiguousarray(accurate(_supersampled(problem, supersample))[every])
     seeds, times = problem.seeds()
     squares = problem.reference_squares()
     limit = 4.0 * (problem.source_slowness() * problem.spacing) ** 2
@@ -49,6 +67,13 @@ def accurate(problem: PointSource) -> Floats:
             times,
         )
     return problem.interior(time)
+
+
+def _supersampled(problem: PointSource, times: int) -> PointSource:
+    """The same source in the medium's cubic spline, which may overshoot but not leave the medium's range."""
+    slowness = problem.slowness
+    fine = np.clip(refined(slowness, times), slowness.min(), slowness.max())
+    return PointSource(Medium(fine, problem.spacing / times), problem.source)
 
 
 def _first_order(problem: PointSource, nodes: Ints, times: Floats) -> Floats:

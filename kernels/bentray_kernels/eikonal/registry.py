@@ -88,7 +88,7 @@ METHODS = (
             accurate,
             2,
             True,
-            "factored second order in the order of a first-order sweep (default)",
+            "factored second order in the order of a first-order sweep (default); option supersample",
         )
     )
     .register(Method("fmm", fast_marching, 2, False, "fast marching, binary heap; option order=1 or 2"))

@@ -102,6 +102,7 @@ def bend(path: Floats, count: int, spline: Floats, shape: tuple[int, ...], at: B
         at: from ``bending``.
     """
     axes = len(shape)
+    count = _without_stub(path, count, axes)
     time = _expand(path, count, spline, shape, at)
     promise = 0.0
     for _ in range(MOST):
@@ -127,7 +128,23 @@ def bend(path: Floats, count: int, spline: Floats, shape: tuple[int, ...], at: B
             break
         time = after
     # What is left to gain is below the tolerance and known to its square.
-    return time - min(promise, PROMISE * time) + _sagitta(count, shape, at)
+    return time - min(promise, PROMISE * time) + _fourth_order(count, shape, at)
+
+
+@kernel(inline="always")
+def _without_stub(path: Floats, count: int, axes: int) -> int:
+    """Let the last step and what it fell short of the source be one piece where the latter is the shorter."""
+    if count < 3:
+        return count
+    step = rest = 0.0
+    for a in range(axes):
+        step += (path[count - 2, a] - path[count - 3, a]) ** 2
+        rest += (path[count - 1, a] - path[count - 2, a]) ** 2
+    if rest > 0.25 * step:
+        return count
+    for a in range(axes):
+        path[count - 2, a] = path[count - 1, a]
+    return count - 1
 
 
 @kernel(inline="always")
@@ -336,22 +353,42 @@ def _shift(path: Floats, count: int, shape: tuple[int, ...], at: Bending) -> Non
 
 
 @kernel(inline="always")
-def _sagitta(count: int, shape: tuple[int, ...], at: Bending) -> float:
-    """Time that the arcs through the points take more than their chords: l·θ²/24 for a turn by θ."""
+def _fourth_order(count: int, shape: tuple[int, ...], at: Bending) -> float:
+    """What the trapezoids over chords leave out: the arcs, and the change of the slope along each piece.
+
+    A piece of length l that turns by θ is l·θ²/24 longer than its chord. The trapezoid of a function f over
+    it is too large by l²/12·(f'(end) − f'(start)) (Euler and Maclaurin); here f' is the slope of the
+    slowness along the path.
+    """
     axes = len(shape)
     more = 0.0
-    before = 0.0
-    for k in range(count - 1):
-        turn = 0.0
-        if k < count - 2:
-            lengths = at.length[k] * at.length[k + 1]
-            if lengths > 0.0:
-                dot = 0.0
-                for a in range(axes):
-                    dot += at.vector[k, a] * at.vector[k + 1, a]
-                # 2 − 2·cos θ = θ² for small turns.
-                turn = math.sqrt(max(2.0 - 2.0 * dot / lengths, 0.0))
-        angle = 0.5 * (before + turn) if 0 < k < count - 2 else before + turn
-        more += at.tension[k] * at.length[k] ** 2 * angle * angle / 24.0
-        before = turn
+    slope_before, turn_before = 0.0, 0.0
+    for k in range(count):
+        # Tangent: along both pieces at a point between them, and half a turn back or on at either end.
+        first, second = max(k - 1, 0), min(k, count - 2)
+        if k == 0:
+            second = min(1, count - 2)
+        elif k == count - 1:
+            first = max(count - 3, 0)
+        slope = dot = square = 0.0
+        for a in range(axes):
+            u = at.vector[first, a] / max(at.length[first], SHORTEST)
+            v = at.vector[second, a] / max(at.length[second], SHORTEST)
+            dot += u * v
+            tangent = u + v
+            if k == 0:
+                tangent = 3.0 * u - v
+            elif k == count - 1:
+                tangent = 3.0 * v - u
+            square += tangent * tangent
+            slope += at.slope[k, a] * tangent
+        slope /= math.sqrt(max(square, SHORTEST))
+        # 2 − 2·cos θ = θ² for small turns.
+        turn = math.sqrt(max(2.0 - 2.0 * dot, 0.0)) if 0 < k < count - 1 else 0.0
+        if k > 0:
+            length = at.length[k - 1]
+            angle = 0.5 * (turn_before + turn) if 1 < k < count - 1 else turn_before + turn
+            more += at.tension[k - 1] * length * length * angle * angle / 24.0
+            more -= length * length / 12.0 * (slope - slope_before)
+        slope_before, turn_before = slope, turn
     return more

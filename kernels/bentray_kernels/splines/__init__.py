@@ -1,5 +1,5 @@
 """Splines through the nodes of a grid."""
 
-from .cubic import coefficients
+from .cubic import coefficients, refined
 
-__all__ = ["coefficients"]
+__all__ = ["coefficients", "refined"]

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import spline_filter
 
 from bentray_kernels.compiled import kernel
-from bentray_kernels.splines.cubic import coefficients, jet_2d, jet_3d
+from bentray_kernels.splines.cubic import coefficients, jet_2d, jet_3d, refined
 
 
 @kernel
@@ -68,3 +68,17 @@ def test_spline_passes_through_the_nodes():
     spline = coefficients(values)
     for node in np.ndindex(values.shape):
         assert abs(jet(spline, np.array(node, float))[0] - values[node]) < 1e-13
+
+
+@given(
+    shape=st.tuples(st.integers(1, 9), st.integers(1, 9)), times=st.integers(1, 4), seed=st.integers(0, 99)
+)
+@settings(max_examples=40, deadline=None)
+def test_a_refined_grid_is_the_spline_read_between_the_nodes(shape, times, seed):
+    values = np.random.default_rng(seed).uniform(0.0, 1.0, shape)
+    fine = refined(values, times)
+    assert fine.shape == tuple(times * (n - 1) + 1 for n in shape)
+    assert np.allclose(fine[::times, ::times], values, atol=1e-12)
+    spline = coefficients(values)
+    for node in np.ndindex(fine.shape):
+        assert abs(fine[node] - jet(spline, np.array(node) / times)[0]) < 1e-12
