@@ -5,27 +5,31 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
 from .heap import DONE, FAR, Nodes, change, enter, take
 from .problem import PointSource
-from .updates import factored_update, plain_update
+from .stopping import awaited, passed
+from .updates import TIE, factored_update, plain_update
 
 
-def fast_marching(problem: PointSource, *, order: int = 2) -> Floats:
+def fast_marching(problem: PointSource, *, order: int = 2, stop_at: ArrayLike | None = None) -> Floats:
     """Travel time by one pass in order of arrival, O(N log N).
 
     Args:
         problem: the checked problem.
         order: 1 or 2; second order falls back to first where a second neighbour is not upwind.
+        stop_at: (k, ndim), m; the march ends when it has the times and gradients at these points.
 
     Returns:
-        (nx, ny[, nz]), s. The source's singularity limits the accuracy near it; see ``hafmm``.
+        (nx, ny[, nz]), s; infinite where a march that was to stop did not come. The source's singularity
+        limits the accuracy near it; see ``hafmm``.
 
     Raises:
-        InvalidInput: for another order.
+        InvalidInput: for another order, or points that are not in the grid.
     """
     if order not in (1, 2):
         raise InvalidInput("order", order, "1 or 2")
@@ -38,18 +42,26 @@ def fast_marching(problem: PointSource, *, order: int = 2) -> Floats:
         seeds,
         times,
         order == 2,
+        awaited(problem, stop_at),
     )
     return problem.interior(time)
 
 
-def high_accuracy_fast_marching(problem: PointSource) -> Floats:
+def high_accuracy_fast_marching(problem: PointSource, *, stop_at: ArrayLike | None = None) -> Floats:
     """Second-order fast marching that is accurate at the source too (HAFMM, chapter 6.2.2).
 
     The dissertation starts the second-order scheme from exact times around the source. Here the
     factor T/T0 is marched instead, which needs no start region: see ``updates.factored_update``.
 
+    Args:
+        problem: the checked problem.
+        stop_at: as for ``fast_marching``.
+
     Returns:
-        (nx, ny[, nz]), s.
+        (nx, ny[, nz]), s; infinite where a march that was to stop did not come.
+
+    Raises:
+        InvalidInput: for points that are not in the grid.
     """
     seeds, times = problem.seeds()
     time = _march_factored(
@@ -61,6 +73,7 @@ def high_accuracy_fast_marching(problem: PointSource) -> Floats:
         4.0 * (problem.source_slowness() * problem.spacing) ** 2,
         seeds,
         times,
+        awaited(problem, stop_at),
     )
     return problem.interior(time)
 
@@ -74,28 +87,43 @@ def _march(
     seeds: Ints,
     seed_times: Floats,
     second_order: bool,
+    goals: Ints,
 ) -> Floats:
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
     settled = np.full(slowness.size, math.inf)
     heap = np.empty(slowness.size, np.int32)
     keys = np.empty(slowness.size)
+    group = np.empty(slowness.size, np.int32)
     length = 0
+    reached = 0
     for k in range(seeds.size):
         length = enter(heap, keys, place, length, seeds[k], seed_times[k])
     while length > 0:
-        node = heap[0]
-        settled[node] = keys[0]
-        length = take(heap, keys, place, length)
-        for axis in range(3):
-            stride = steps[axis]
-            for neighbour in (node - stride, node + stride):
-                here = place[neighbour]
-                if here == DONE:
-                    continue
-                trial = plain_update(neighbour, steps, spacing * slowness[neighbour], settled, second_order)
-                if here == FAR or trial < keys[here]:
-                    length = enter(heap, keys, place, length, neighbour, trial)
+        # Nodes that tie are accepted together, or the second differences would depend on their order.
+        latest = keys[0] * (1.0 + TIE)
+        members = 0
+        while length > 0 and keys[0] <= latest:
+            group[members] = heap[0]
+            members += 1
+            settled[heap[0]] = keys[0]
+            length = take(heap, keys, place, length)
+        reached = passed(goals, place, reached)
+        if 0 < goals.size == reached:
+            break
+        for k in range(members):
+            node = group[k]
+            for axis in range(3):
+                stride = steps[axis]
+                for neighbour in (node - stride, node + stride):
+                    here = place[neighbour]
+                    if here == DONE:
+                        continue
+                    trial = plain_update(
+                        neighbour, steps, spacing * slowness[neighbour], settled, second_order
+                    )
+                    if here == FAR or trial < keys[here]:
+                        length = enter(heap, keys, place, length, neighbour, trial)
     return settled
 
 
@@ -109,6 +137,7 @@ def _march_factored(
     limit: float,
     seeds: Ints,
     seed_times: Floats,
+    goals: Ints,
 ) -> Floats:
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
@@ -116,21 +145,39 @@ def _march_factored(
     tau = np.ones(slowness.size)
     heap = np.empty(slowness.size, np.int32)
     keys = np.empty(slowness.size)
+    group = np.empty(slowness.size, np.int32)
     length = 0
-    for k in range(seeds.size):
-        length = enter(heap, keys, place, length, seeds[k], seed_times[k])
-    while length > 0:
-        node = heap[0]
-        settled[node] = keys[0]
-        length = take(heap, keys, place, length)
-        if squares[node] > 0.0:
-            tau[node] = settled[node] / math.sqrt(squares[node])
-        for axis in range(3):
-            stride = steps[axis]
-            for neighbour in (node - stride, node + stride):
-                if place[neighbour] == DONE:
-                    continue
-                # A neighbour more can make the time later: it replaces what fewer neighbours gave.
-                trial = factored_update(neighbour, steps, spacing, slowness, squares, tau, settled, limit)
-                length = change(heap, keys, place, length, neighbour, trial)
+    reached = 0
+    # No difference is better than the straight lines from the source: the seeds' times are final.
+    members = seeds.size
+    for k in range(members):
+        group[k] = seeds[k]
+        settled[seeds[k]] = seed_times[k]
+        place[seeds[k]] = DONE
+        if squares[seeds[k]] > 0.0:
+            tau[seeds[k]] = seed_times[k] / math.sqrt(squares[seeds[k]])
+    while members > 0:
+        for k in range(members):
+            node = group[k]
+            for axis in range(3):
+                stride = steps[axis]
+                for neighbour in (node - stride, node + stride):
+                    if place[neighbour] == DONE:
+                        continue
+                    # A neighbour more can make the time later: it replaces what fewer neighbours gave.
+                    trial = factored_update(neighbour, steps, spacing, slowness, squares, tau, settled, limit)
+                    length = change(heap, keys, place, length, neighbour, trial)
+        reached = passed(goals, place, reached)
+        if 0 < goals.size == reached:
+            break
+        # Nodes that tie are accepted together, or the second differences would depend on their order.
+        latest = keys[0] * (1.0 + TIE)
+        members = 0
+        while length > 0 and keys[0] <= latest:
+            node = heap[0]
+            group[members] = node
+            members += 1
+            settled[node] = keys[0]
+            tau[node] = keys[0] / math.sqrt(squares[node])
+            length = take(heap, keys, place, length)
     return settled

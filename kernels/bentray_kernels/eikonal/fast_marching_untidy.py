@@ -5,38 +5,45 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
 from .heap import DONE, FAR, Nodes
 from .problem import PointSource
+from .stopping import awaited, passed
 from .untidy_queue import leave, wait
-from .updates import plain_update
+from .updates import TIE, plain_update
 
 # Buckets in the queue at most; media of great contrast get wider ones instead.
 BUCKETS = 1 << 16
 
 
-def fast_marching_untidy(problem: PointSource, *, order: int = 2, width: float = 0.01) -> Floats:
-    """As ``fast_marching``, but nodes within ``width`` of each other leave the queue in any order.
+def fast_marching_untidy(
+    problem: PointSource, *, order: int = 2, width: float = 0.01, stop_at: ArrayLike | None = None
+) -> Floats:
+    """As ``fast_marching``, but nodes within ``width`` of each other leave the queue together.
 
     Args:
         problem: the checked problem.
         order: 1 or 2.
         width: bucket width as a part of the smallest crossing time, spacing times lowest slowness.
+        stop_at: as for ``fast_marching``.
 
     Returns:
-        (nx, ny[, nz]), s; at order 1 between the time T of ``fast_marching`` and T·(1 + bound), the bound
-        being that of ``untidy_error_bound``.
+        (nx, ny[, nz]), s; infinite where a march that was to stop did not come. At order 1 between the
+        time T of ``fast_marching`` and T·(1 + bound), the bound being that of ``untidy_error_bound``.
 
     Raises:
-        InvalidInput: for another order, or a width that is not above 0 and at most 1.
+        InvalidInput: for another order, a width that is not above 0 and at most 1, or points that are not
+            in the grid.
     """
     if order not in (1, 2):
         raise InvalidInput("order", order, "1 or 2")
     seeds, times = problem.seeds()
-    bucket = _bucket_width(problem, width)
+    # A little narrower, so that times that tie on an edge, as half a crossing does, are on one side of it.
+    bucket = _bucket_width(problem, width) * (1.0 - TIE)
     # At order 1 no time in the queue is later than the current one by more than a crossing; the seeds, which
     # lie in one cell, and order 2 get twice the room.
     buckets = int(2.0 * problem.spacing * problem.slowness.max() / bucket) + 3
@@ -50,6 +57,7 @@ def fast_marching_untidy(problem: PointSource, *, order: int = 2, width: float =
         order == 2,
         bucket,
         buckets,
+        awaited(problem, stop_at),
     )
     return problem.interior(time)
 
@@ -63,7 +71,7 @@ def untidy_error_bound(problem: PointSource, *, width: float = 0.01) -> float:
     that is the exact time, longer by this factor. The least f bounds it everywhere.
 
     At order 2 an early node also changes between second- and first-order differences. There the bound was met
-    in smooth media only, and not beside a source in the middle of its cell, whose nodes tie.
+    in smooth media only.
 
     Raises:
         InvalidInput: for a width that is not above 0 and at most 1.
@@ -91,6 +99,7 @@ def _march(
     second_order: bool,
     width: float,
     buckets: int,
+    goals: Ints,
 ) -> Floats:
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
@@ -98,7 +107,9 @@ def _march(
     trials = np.full(slowness.size, math.inf)
     heads = np.zeros(buckets, np.int32)
     links = np.zeros((slowness.size, 2), np.int32)
+    group = np.empty(slowness.size, np.int32)
     waiting = 0
+    reached = 0
     for k in range(seeds.size):
         trials[seeds[k]] = seed_times[k]
         waiting += wait(heads, links, place, width, seeds[k], seed_times[k])
@@ -107,18 +118,30 @@ def _march(
     while waiting > 0:
         while heads[bucket] == 0:
             bucket = bucket + 1 if bucket + 1 < buckets else 0
-        node = leave(heads, links, place, bucket)
-        waiting -= 1
-        settled[node] = trials[node]
-        latest = max(latest, trials[node])
-        for axis in range(3):
-            stride = steps[axis]
-            for neighbour in (node - stride, node + stride):
-                if place[neighbour] == DONE:
-                    continue
-                trial = plain_update(neighbour, steps, spacing * slowness[neighbour], settled, second_order)
-                if trial < trials[neighbour]:
-                    trials[neighbour] = trial
-                    # A second-order time may fall behind the bucket that is being emptied.
-                    waiting += wait(heads, links, place, width, neighbour, max(trial, latest))
+        # What waits together is accepted together, so that the order within a bucket does not matter.
+        members = 0
+        while heads[bucket] != 0:
+            node = leave(heads, links, place, bucket)
+            group[members] = node
+            members += 1
+            settled[node] = trials[node]
+            latest = max(latest, trials[node])
+        waiting -= members
+        reached = passed(goals, place, reached)
+        if 0 < goals.size == reached:
+            break
+        for k in range(members):
+            node = group[k]
+            for axis in range(3):
+                stride = steps[axis]
+                for neighbour in (node - stride, node + stride):
+                    if place[neighbour] == DONE:
+                        continue
+                    trial = plain_update(
+                        neighbour, steps, spacing * slowness[neighbour], settled, second_order
+                    )
+                    if trial < trials[neighbour]:
+                        trials[neighbour] = trial
+                        # A second-order time may fall behind the bucket that was emptied.
+                        waiting += wait(heads, links, place, width, neighbour, max(trial, latest))
     return settled

@@ -12,8 +12,11 @@ import math
 from ..arrays import Floats
 from ..compiled import kernel
 
-# Two nodes at one distance either side of the source differ by rounding; neither is later.
+# Two nodes at one distance from the source differ by rounding; neither is later.
 TIE = 1e-12
+
+# A source on the next line of nodes is not beside a node, whichever way the squares of its times round.
+ON_LINE = 1e-6
 
 # An axis of the plain scheme: T at the base of the difference, its weight, time of the nearest neighbour.
 PlainAxis = tuple[float, float, float]
@@ -37,7 +40,7 @@ def plain_axis(node: int, stride: int, settled: Floats, second_order: bool) -> P
         first, second = left, (settled[node - 2 * stride] if left < math.inf else math.inf)
     else:
         first, second = right, settled[node + 2 * stride]
-    if second_order and second <= first and first < math.inf:
+    if second_order and second <= first * (1.0 + TIE) and first < math.inf:
         return (4.0 * first - second) / 3.0, 2.25, first
     return first, 1.0, first
 
@@ -98,7 +101,8 @@ def factored_axis(
     # h·s0²·x from the squares of T0 either side, exactly: no coordinates need to be kept.
     difference = squares[node + stride] - squares[node - stride]
     if first == math.inf:
-        return (abs(difference) * curl if abs(difference) < limit else 0.0), 0.0, math.inf, 0
+        beside = abs(difference) < limit * (1.0 - ON_LINE)
+        return (abs(difference) * curl if beside else 0.0), 0.0, math.inf, 0
     offset = -stride if left <= right else stride
     along = difference if left <= right else -difference
     second = settled[node + 2 * offset]
