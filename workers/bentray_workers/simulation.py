@@ -1,41 +1,40 @@
-"""A phantom scan as a dataset, its emitters shared out over the workers or over this machine's cores."""
+"""A scan of the Table 6 phantom as a dataset, its emitters shared out over workers or cores."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
-from distributed import Client, as_completed
-from numpy.typing import NDArray
+from distributed import Client
 
 from bentray_kernels.acquisition import Dataset, Truth
+from bentray_kernels.acquisition.fine_medium import FineMedium
+from bentray_kernels.acquisition.noise import with_noise
 from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Progress
 from bentray_kernels.tomography.problem import MARGIN_NODES
 
-from .lanes import RECONSTRUCTION
-
-# Emitters a task: about a second of work on the default grid.
-BATCH = 8
+from .emitter_batches import arrivals
 
 
 @dataclass(frozen=True)
 class SimulationSettings:
-    """A travel-time scan of the Table 6 phantom.
+    """A scan of the Table 6 phantom.
 
     Attributes:
         nodes: nodes along a side of the truth image, and of the reconstruction it is meant for.
         elements: of the ring, each emitter and receiver.
         coupling_mps: speed of the medium around the breast, m/s.
-        refinement: how many times finer the travel times are made; at least 4.
+        refinement: how many times finer the data are made; at least 4.
         noise_s: standard deviation of Gaussian noise on the travel times, s.
         seed: of the noise.
+        attenuation: whether to record amplitudes beside the travel times.
+        snr: root mean square of the data over the standard deviation of Gaussian noise on them, travel
+            times and amplitudes alike; None: no such noise.
     """
 
     nodes: int = 128
@@ -44,6 +43,8 @@ class SimulationSettings:
     refinement: int = 4
     noise_s: float = 0.0
     seed: int = 0
+    attenuation: bool = False
+    snr: float | None = None
 
     def __post_init__(self) -> None:
         if not 16 <= self.nodes <= 1024:
@@ -52,13 +53,34 @@ class SimulationSettings:
             raise InvalidInput("noise_s", self.noise_s, "seconds, 0 or more and less than 1")
         if not 3 <= self.elements <= 4096:
             raise InvalidInput("elements", self.elements, "3 to 4096")
+        if self.snr is not None:
+            if not 0.0 < self.snr < np.inf:
+                raise InvalidInput("snr", self.snr, "a finite ratio > 0")
+            if self.noise_s > 0.0:
+                raise InvalidInput("snr", self.snr, "nothing where noise_s is given")
         self.scan()
 
     def scan(self) -> TravelTimeScan:
         """The scan; the ring leaves the margin that a reconstruction of as many nodes leaves."""
-        radius = 0.5 * TABLE6_SIDE_M * (1.0 - 2.0 * MARGIN_NODES / (self.nodes - 1))
-        ring = Ring(self.elements, radius)
+        ring = Ring(self.elements, ring_radius(TABLE6_SIDE_M, self.nodes))
         return TravelTimeScan(table6(self.coupling_mps), ring, TABLE6_SIDE_M, self.nodes, self.refinement)
+
+    def medium_number(self, scan: int) -> int:
+        """As ``Scans``: there is one scan and one medium."""
+        return scan
+
+    def medium(self, number: int) -> FineMedium:
+        """As ``Scans``."""
+        return self.scan().medium(attenuation=self.attenuation)
+
+    def elements_in_medium(self, scan: int) -> Floats:
+        """As ``Scans``."""
+        return self.scan().elements()
+
+
+def ring_radius(side_m: float, nodes: int) -> float:
+    """Radius, m, of a ring in a square of ``nodes`` with the margin that a reconstruction leaves."""
+    return 0.5 * side_m * (1.0 - 2.0 * MARGIN_NODES / (nodes - 1))
 
 
 def simulate(
@@ -72,20 +94,30 @@ def simulate(
         on_progress: called after each batch, with emitters done of all.
 
     Returns:
-        A dataset with ``delta_tof_s``, ``truth`` and the object's outline as ``roi``.
+        A dataset with ``delta_tof_s``, ``truth`` and the object's outline as ``roi``; with ``log_ratio_np``
+        where ``settings.attenuation`` asks for it.
     """
     scan = settings.scan()
-    batches = np.array_split(np.arange(settings.elements), -(-settings.elements // BATCH))
     delta = np.empty((settings.elements, settings.elements))
+    ratio = np.empty_like(delta) if settings.attenuation else None
     done = 0
-    for batch, rows in _run(client, settings, batches):
-        delta[batch] = rows
+    for (_, batch), (times, amplitudes) in arrivals(client, settings, 1, settings.elements):
+        delta[batch] = times
+        if ratio is not None:
+            ratio[batch] = amplitudes
         done += len(batch)
         if on_progress is not None:
             on_progress(Progress(done, settings.elements))
+    random = np.random.default_rng(settings.seed)
+    sigma_s = settings.noise_s
+    pairs = ~np.eye(settings.elements, dtype=bool)
     if settings.noise_s > 0.0:
-        delta += np.random.default_rng(settings.seed).normal(0.0, settings.noise_s, delta.shape)
+        delta += random.normal(0.0, settings.noise_s, delta.shape)
         np.fill_diagonal(delta, 0.0)
+    elif settings.snr is not None:
+        delta, sigma_s = with_noise(delta, settings.snr, random, pairs)
+        if ratio is not None:
+            ratio, _ = with_noise(ratio, settings.snr, random, pairs)
     spacing = scan.side_m / (scan.nodes - 1)
     phantom = scan.phantom
     return Dataset(
@@ -93,8 +125,10 @@ def simulate(
         tx=np.arange(settings.elements),
         rx=np.arange(settings.elements),
         water_speed_mps=settings.coupling_mps,
+        water_attenuation_np_m=phantom.coupling_np_m if settings.attenuation else None,
         delta_tof_s=delta,
-        sigma_s=np.full(delta.shape, settings.noise_s) if settings.noise_s > 0.0 else None,
+        sigma_s=np.full(delta.shape, sigma_s) if sigma_s > 0.0 else None,
+        log_ratio_np=ratio,
         roi=phantom.inside(scan.nodes, scan.side_m),
         truth=Truth(
             sound_speed_mps=phantom.speed(scan.nodes, scan.side_m),
@@ -108,31 +142,3 @@ def simulate(
         source="made by bentray simulate",
         license="CC0-1.0",
     )
-
-
-def _run(
-    client: Client | None, settings: SimulationSettings, batches: list[NDArray[np.int64]]
-) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64]]]:
-    if client is None:
-        _fine_speed(settings)
-        with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-            yield from zip(
-                batches, pool.map(lambda batch: simulate_emitters(settings, batch), batches), strict=True
-            )
-        return
-    futures = {
-        client.submit(simulate_emitters, settings, batch, resources=RECONSTRUCTION, pure=False): batch
-        for batch in batches
-    }
-    for future, rows in as_completed(futures, loop=client.loop, with_results=True):
-        yield futures[future], rows
-
-
-def simulate_emitters(settings: SimulationSettings, emitters: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Task: differential travel times of some emitters, (k, elements), s."""
-    return settings.scan().delta_tof(emitters, _fine_speed(settings))
-
-
-@lru_cache(maxsize=2)
-def _fine_speed(settings: SimulationSettings) -> NDArray[np.float64]:
-    return settings.scan().fine_speed()

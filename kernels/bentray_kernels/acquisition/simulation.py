@@ -1,4 +1,4 @@
-"""Travel times of a phantom scan, made on a finer grid with another scheme than any inversion here uses."""
+"""Ring scans of a phantom, made on a finer grid with another scheme than any inversion here uses."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..eikonal import solve
 from ..errors import InvalidInput
-from ..phantoms.ellipses import EllipsePhantom
+from ..phantoms import EllipsePhantom, PhantomSlice
+from .fine_medium import FineMedium
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class TravelTimeScan:
             discretisation cannot hide in the data.
     """
 
-    phantom: EllipsePhantom
+    phantom: EllipsePhantom | PhantomSlice
     ring: Ring
     side_m: float
     nodes: int = 128
@@ -65,53 +65,28 @@ class TravelTimeScan:
                 "radius_m", self.ring.radius_m, f"at most half the side, {0.5 * self.side_m:g} m"
             )
 
-    def fine_speed(self) -> Floats:
-        """Speed on the fine grid, (fine nodes, fine nodes), m/s."""
-        return self.phantom.speed(self.fine_nodes, self.side_m)
-
     @property
     def fine_nodes(self) -> int:
+        """Nodes along the side of the fine grid."""
         return self.refinement * (self.nodes - 1) + 1
 
-    def delta_tof(self, emitters: Ints, fine_speed: Floats | None = None) -> Floats:
-        """Object minus water travel time from some emitters to every element.
+    def elements(self) -> Floats:
+        """Elements in the fine grid's coordinates, (elements, 2), m."""
+        return self.ring.positions() + 0.5 * self.side_m
 
-        The wave front marches by the heap (``hafmm``) and is read off the grid itself; inversions
-        here sweep and integrate along rays.
+    def medium(self, *, attenuation: bool = False) -> FineMedium:
+        """The phantom on the fine grid, with its attenuation or without."""
+        return FineMedium(
+            speed=self.phantom.speed(self.fine_nodes, self.side_m),
+            spacing=self.side_m / (self.fine_nodes - 1),
+            coupling_mps=self.phantom.coupling_mps,
+            attenuation=self.phantom.attenuation(self.fine_nodes, self.side_m) if attenuation else None,
+            coupling_np_m=self.phantom.coupling_np_m,
+        )
 
-        Args:
-            emitters: (k,) element numbers.
-            fine_speed: ``fine_speed()``, for callers that keep it between calls.
+    def delta_tof(self, emitters: Ints) -> Floats:
+        """Object minus water travel time from some emitters to every element, (k, elements), s.
 
-        Returns:
-            (k, elements), s; 0 from an element to itself.
+        Several calls cost less through ``medium().arrivals``, which samples the phantom once.
         """
-        speed = self.fine_speed() if fine_speed is None else fine_speed
-        spacing = self.side_m / (self.fine_nodes - 1)
-        positions = self.ring.positions() + 0.5 * self.side_m
-        delta = np.empty((len(emitters), self.ring.elements))
-        for row, emitter in enumerate(emitters):
-            source = positions[emitter]
-            tof = solve(speed, spacing, source, "hafmm")
-            distance = np.linalg.norm(positions - source, axis=1)
-            delta[row] = _read(tof, spacing, source, positions) - distance / self.phantom.coupling_mps
-            delta[row, emitter] = 0.0
-        return delta
-
-
-def _read(tof: Floats, spacing: float, source: Floats, points: Floats) -> Floats:
-    """Travel time between the nodes: T divided by the distance is smooth, so that is what is interpolated."""
-    low = np.clip((points / spacing).astype(np.int64), 0, np.array(tof.shape) - 2)
-    part = points / spacing - low
-    mean_slowness = np.zeros(len(points))
-    weight_sum = np.zeros(len(points))
-    for dx in (0, 1):
-        for dy in (0, 1):
-            node = low + np.array((dx, dy))
-            distance = np.linalg.norm(node * spacing - source, axis=1)
-            weight = np.where(dx, part[:, 0], 1.0 - part[:, 0]) * np.where(dy, part[:, 1], 1.0 - part[:, 1])
-            weight = np.where(distance > 0.0, weight, 0.0)
-            mean_slowness += weight * tof[node[:, 0], node[:, 1]] / np.where(distance > 0.0, distance, 1.0)
-            weight_sum += weight
-    away = np.linalg.norm(points - source, axis=1)
-    return np.asarray(away * mean_slowness / np.where(weight_sum > 0.0, weight_sum, 1.0))
+        return self.medium().arrivals(self.elements(), emitters)[0]
