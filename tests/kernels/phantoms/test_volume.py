@@ -26,7 +26,7 @@ def test_grids_and_slices_have_their_axes_in_order():
     assert volume[10, 10, 1] < 60.0
     assert volume[0, 0].tolist() == [0.5, 0.5, 0.5]
     assert PHANTOM.at(0.0).attenuation(21, 0.2)[10, 10] == 60.0
-    assert PHANTOM.inside(21, 0.2, z).sum(axis=(0, 1)).tolist() == [9, 81, 9]
+    assert PHANTOM.inside(21, 0.2, z).sum(axis=(0, 1)).tolist() == [9, 89, 9]
 
 
 @pytest.mark.parametrize(
