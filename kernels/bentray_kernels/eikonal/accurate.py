@@ -31,8 +31,8 @@ def accurate(problem: PointSource, *, supersample: int = 1) -> Floats:
     """Factored second-order travel time without a heap.
 
     Fast sweeping gives the order in which the front arrives, a counting sort puts the nodes into that
-    order, and a pass of the update of ``hafmm`` follows it. Where two fronts meet, a wrong order
-    costs no more than the first-order error at those nodes.
+    order, and a pass of the update of ``hafmm`` follows it. A node that the order put before an earlier
+    neighbour is updated again as soon as that neighbour is settled: the accuracy is the heap's.
 
     Args:
         problem: the checked problem.
@@ -131,6 +131,8 @@ def _pass(
 ) -> Floats:
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
+    # The seeds lie within the source's cell.
+    near = 0.25 * len(strides) * limit
     settled = np.full(slowness.size, math.inf)
     tau = np.ones(slowness.size)
     for k in range(seeds.size):
@@ -140,6 +142,15 @@ def _pass(
     for node in order:
         if settled[node] < math.inf:
             continue
-        settled[node] = factored_update(node, steps, spacing, slowness, squares, tau, settled, limit)
-        tau[node] = settled[node] / math.sqrt(squares[node])
+        time = factored_update(node, steps, spacing, slowness, squares, tau, settled, limit)
+        settled[node] = time
+        tau[node] = time / math.sqrt(squares[node])
+        for axis in range(len(strides)):
+            for neighbour in (node - steps[axis], node + steps[axis]):
+                # It came too soon in the order, for this node is earlier and upwind of it.
+                if time < settled[neighbour] < math.inf and squares[neighbour] > near:
+                    settled[neighbour] = factored_update(
+                        neighbour, steps, spacing, slowness, squares, tau, settled, limit
+                    )
+                    tau[neighbour] = settled[neighbour] / math.sqrt(squares[neighbour])
     return settled

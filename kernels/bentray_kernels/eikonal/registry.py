@@ -91,8 +91,8 @@ METHODS = (
             "factored second order in the order of a first-order sweep (default); option supersample",
         )
     )
-    .register(Method("fmm", fast_marching, 2, False, "fast marching, binary heap; option order=1 or 2"))
-    .register(Method("hafmm", high_accuracy_fast_marching, 2, True, "fast marching, factored second order"))
+    .register(Method("fmm", fast_marching, 2, False, "fast marching, binary heap; options order=1 or 2, stop_at"))
+    .register(Method("hafmm", high_accuracy_fast_marching, 2, True, "fast marching, factored second order; option stop_at"))
     .register(
         Method(
             "fsm",
@@ -121,7 +121,7 @@ METHODS = (
             fast_marching_untidy,
             2,
             False,
-            "fast marching, O(N), error bounded; options order=1 or 2, width of a bucket",
+            "fast marching, O(N), error bounded; options order=1 or 2, width of a bucket, stop_at",
         )
     )
 )
@@ -142,7 +142,9 @@ def solve(
         spacing: node spacing, m, the same along every axis.
         source: (ndim,), m, anywhere in the grid; node 0 lies at 0.
         method: one of ``methods()``.
-        options: keyword options of that method.
+        options: keyword options of that method. The marching methods take ``stop_at``, (k, ndim) m: they
+            end once time and gradient can be read there, and leave infinity elsewhere. ``accurate`` takes
+            ``supersample``: 2 or more solves on a grid that many times as fine.
 
     Returns:
         (nx, ny[, nz]), s, float64.
@@ -173,7 +175,7 @@ def solve_many(
         method: one of ``methods()``.
         threads: threads that share the batch; the times do not depend on their number. A method on
             a device takes the whole batch at once, whatever their number.
-        options: keyword options of that method.
+        options: keyword options of that method, the same for every solve.
 
     Returns:
         (batch, nx, ny[, nz]), s; each equal to ``solve`` of its own speed and source.
