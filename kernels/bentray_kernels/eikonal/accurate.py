@@ -18,10 +18,10 @@ from .updates import factored_update
 ORDER_TOLERANCE = 1e-3
 
 # First-order times order the nodes near the source badly, and all that follow inherit it. So where the speed
-# varies by no more than CONTRAST within RADIUS nodes (transducers stand in water), straight lines give the
-# times there; elsewhere the times of one factored pass order a second. Either has the heap's accuracy.
+# varies by no more than CONTRAST within RADIUS nodes, straight lines give the times there; elsewhere, and
+# where straight lines contradict the sweeps, the times of one factored pass order a second.
 RADIUS = 8
-CONTRAST = 1.2
+CONTRAST = 1.5
 
 # A grid finer than this many times is a typing error.
 FINEST = 8
@@ -53,11 +53,10 @@ def accurate(problem: PointSource, *, supersample: int = 1) -> Floats:
     seeds, times = problem.seeds()
     squares = problem.reference_squares()
     limit = 4.0 * (problem.source_slowness() * problem.spacing) ** 2
-    near = problem.surroundings(RADIUS, CONTRAST)
-    time = _first_order(problem, *(near if near is not None else (seeds, times)))
-    for _ in range(1 if near is not None else 2):
-        time = _pass(
-            _by_arrival(time, problem.slowness.size),
+
+    def passed(first: Floats) -> tuple[Floats, bool]:
+        return _pass(
+            _by_arrival(first, problem.slowness.size),
             problem.padded_slowness,
             problem.strides,
             problem.spacing,
@@ -66,6 +65,16 @@ def accurate(problem: PointSource, *, supersample: int = 1) -> Floats:
             seeds,
             times,
         )
+
+    near = problem.surroundings(RADIUS, CONTRAST)
+    if near is not None:
+        time, complete = passed(_first_order(problem, *near))
+        if complete:
+            return problem.interior(time)
+    time, _ = passed(_first_order(problem, seeds, times))
+    again, complete = passed(time)
+    # Times that tie but for rounding can be out of order too.
+    time = again if complete else time
     return problem.interior(time)
 
 
@@ -94,13 +103,13 @@ def _by_arrival(time: Floats, count: int) -> Ints:
             last = t
     buckets = count
     scale = (buckets - 1) / last if last > 0.0 else 0.0
-    start = np.zeros(buckets + 1, np.int64)
+    start = np.zeros(buckets + 1, np.int32)
     for t in time:
         if t < math.inf:
             start[int(t * scale) + 1] += 1
     for b in range(buckets):
         start[b + 1] += start[b]
-    order = np.empty(count, np.int64)
+    order = np.empty(count, np.int32)
     for node in range(time.size):
         if time[node] < math.inf:
             b = int(time[node] * scale)
@@ -128,7 +137,8 @@ def _pass(
     limit: float,
     seeds: Ints,
     seed_times: Floats,
-) -> Floats:
+) -> tuple[Floats, bool]:
+    """Times of all nodes, and True; False where the order puts a node before all of its neighbours."""
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
     # The seeds lie within the source's cell.
@@ -143,6 +153,8 @@ def _pass(
         if settled[node] < math.inf:
             continue
         time = factored_update(node, steps, spacing, slowness, squares, tau, settled, limit)
+        if time == math.inf:
+            return settled, False
         settled[node] = time
         tau[node] = time / math.sqrt(squares[node])
         for axis in range(len(strides)):
@@ -153,4 +165,4 @@ def _pass(
                         neighbour, steps, spacing, slowness, squares, tau, settled, limit
                     )
                     tau[neighbour] = settled[neighbour] / math.sqrt(squares[neighbour])
-    return settled
+    return settled, True

@@ -91,8 +91,18 @@ METHODS = (
             "factored second order in the order of a first-order sweep (default); option supersample",
         )
     )
-    .register(Method("fmm", fast_marching, 2, False, "fast marching, binary heap; options order=1 or 2, stop_at"))
-    .register(Method("hafmm", high_accuracy_fast_marching, 2, True, "fast marching, factored second order; option stop_at"))
+    .register(
+        Method("fmm", fast_marching, 2, False, "fast marching, binary heap; options order=1 or 2, stop_at")
+    )
+    .register(
+        Method(
+            "hafmm",
+            high_accuracy_fast_marching,
+            2,
+            True,
+            "fast marching, factored second order; option stop_at",
+        )
+    )
     .register(
         Method(
             "fsm",

@@ -22,6 +22,9 @@ from ..arrays import Floats
 from ..compiled import kernel
 from ..splines.cubic import jet_2d, jet_3d
 
+# Steps of the descent that bending begins with, nodes; it mends what longer ones than ``STEP`` spoil.
+STRIDE = 1.5
+
 # A step that promises to lower the time by less than this part ends the bending.
 PROMISE = 1e-6
 
@@ -89,8 +92,8 @@ def bending(room: int, shape: tuple[int, ...]) -> Bending:
 
 
 @kernel(inline="always")
-def bend(path: Floats, count: int, spline: Floats, shape: tuple[int, ...], at: Bending) -> float:
-    """Move the inner points of ``path`` (count, ndim), in nodes; returns the time along it, spacing 1.
+def bend(path: Floats, count: int, spline: Floats, shape: tuple[int, ...], at: Bending) -> tuple[float, int]:
+    """Move the inner points of ``path``, in nodes; returns the time along it, spacing 1, and its points.
 
     The time never rises: a step that would is halved, and given up when that does not help. Where the
     Hessian is not positive (a maximum of slowness, a shock), the path's tension alone stands in for it.
@@ -128,7 +131,7 @@ def bend(path: Floats, count: int, spline: Floats, shape: tuple[int, ...], at: B
             break
         time = after
     # What is left to gain is below the tolerance and known to its square.
-    return time - min(promise, PROMISE * time) + _fourth_order(count, shape, at)
+    return time - min(promise, PROMISE * time) + _fourth_order(count, shape, at), count
 
 
 @kernel(inline="always")

@@ -221,28 +221,31 @@ def walk(
     count: int,
     shape: tuple[int, ...],
     strides: tuple[int, ...],
+    parts: int,
     nodes: Ints,
     lengths: Floats,
     scratch: Floats,
 ) -> int:
     """Nodes that a path weighs on and by how much; returns the number of entries.
 
-    Each piece of the path gives its length to the corners of the cell at its middle, multilinearly,
-    so that Σ lengths·slowness is the midpoint rule for the slowness integral. A node appears once for
-    every piece near it.
+    Each of ``parts`` equal parts of a piece gives its length to the corners of the cell at its middle,
+    multilinearly, so that Σ lengths·slowness is the midpoint rule for the slowness integral. A node appears
+    once for every part near it.
     """
     axes = len(shape)
     part, middle = scratch[0], scratch[1]
     entries = 0
     for k in range(1, count):
-        length = _distance(path[k], path[k - 1], axes)
-        for axis in range(axes):
-            middle[axis] = 0.5 * (path[k, axis] + path[k - 1, axis])
-        node = locate(middle, shape, strides, part)
-        for which in range(1 << axes):
-            neighbour, weight = corner(which, node, shape, strides, part)
-            if weight != 0.0:
-                nodes[entries] = neighbour
-                lengths[entries] = weight * length
-                entries += 1
+        length = _distance(path[k], path[k - 1], axes) / parts
+        for q in range(parts):
+            along = (q + 0.5) / parts
+            for axis in range(axes):
+                middle[axis] = path[k - 1, axis] + along * (path[k, axis] - path[k - 1, axis])
+            node = locate(middle, shape, strides, part)
+            for which in range(1 << axes):
+                neighbour, weight = corner(which, node, shape, strides, part)
+                if weight != 0.0:
+                    nodes[entries] = neighbour
+                    lengths[entries] = weight * length
+                    entries += 1
     return entries

@@ -64,7 +64,7 @@ def _rows(
             count = curved_ray(receivers[row], source, tof, gradient, shape, strides, STEP, path, scratch)
         else:
             count = straight_ray(receivers[row], source, axes, path)
-        entries = walk(path, count, shape, strides, nodes, lengths, scratch)
+        entries = walk(path, count, shape, strides, 1, nodes, lengths, scratch)
         distinct = 0
         for k in range(entries):
             if total[nodes[k]] == 0.0 and lengths[k] > 0.0:

@@ -9,12 +9,9 @@ from ..arrays import Floats
 from ..compiled import kernel
 from ..errors import InvalidInput
 from ..splines import coefficients
-from .bending import bend, bending
+from .bending import STRIDE, bend, bending
 from .descent import curved_ray
 from .fan import Fan
-
-# Steps of the descent, nodes. Bending mends what a longer step than that of ``trace`` spoils.
-STRIDE = 1.5
 
 
 def travel_times(
@@ -77,5 +74,5 @@ def _bent_times(
     times = np.empty(len(receivers))
     for k in range(len(receivers)):
         count = curved_ray(receivers[k], source, tof, gradient, shape, strides, STRIDE, path, scratch)
-        times[k] = bend(path, count, spline, shape, space)
+        times[k], _ = bend(path, count, spline, shape, space)
     return times

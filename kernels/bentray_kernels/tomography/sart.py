@@ -204,7 +204,7 @@ def _back_project(
             count = curved_ray(receivers[row], source, tof, gradient, shape, strides, STEP, path, scratch)
         else:
             count = straight_ray(receivers[row], source, axes, path)
-        entries = walk(path, count, shape, strides, nodes, lengths, scratch)
+        entries = walk(path, count, shape, strides, 1, nodes, lengths, scratch)
         predicted = 0.0
         length = 0.0
         for k in range(entries):
