@@ -15,8 +15,11 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 
-# Length of a step, nodes. Half a node keeps the error of RK2 below that of the interpolation.
-STEP = 0.5
+# Length of a step, nodes: the error of RK2 is then still below that of the interpolation.
+STEP = 1.0
+
+# Parts of a step that are read for themselves: longer ones would pass nodes by.
+PARTS = 2
 
 # A ray this near its source, nodes, goes straight to it.
 ARRIVED = 1.0

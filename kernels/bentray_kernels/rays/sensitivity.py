@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
-from .descent import STEP, curved_ray, straight_ray, walk
+from .descent import PARTS, STEP, curved_ray, straight_ray, walk
 from .fan import Fan, Kind
 
 
@@ -24,7 +24,8 @@ def sensitivities(
         tof, spacing, receivers, source, kind: as ``trace``.
 
     Returns:
-        (receivers, nodes), m; columns are nodes in C order. Rows sum to the length of the ray.
+        (receivers, nodes), m; columns are nodes in C order. Rows sum to the length of the ray; each node
+        appears once in a row, in the order in which the ray passes.
 
     Raises:
         InvalidInput: as ``trace``.
@@ -50,10 +51,9 @@ def _rows(
     axes = len(shape)
     path = np.empty((room, axes))
     scratch = np.empty((3, axes))
-    nodes = np.empty(room << axes, np.int64)
-    lengths = np.empty(room << axes)
+    nodes = np.empty((PARTS * room) << axes, np.int64)
+    lengths = np.empty((PARTS * room) << axes)
     total = np.zeros(tof.size)
-    touched = np.empty(room << axes, np.int64)
     pointers = np.zeros(len(receivers) + 1, np.int64)
     capacity = max(16, len(receivers) * 4 * sum(shape))
     columns = np.empty(capacity, np.int64)
@@ -64,22 +64,19 @@ def _rows(
             count = curved_ray(receivers[row], source, tof, gradient, shape, strides, STEP, path, scratch)
         else:
             count = straight_ray(receivers[row], source, axes, path)
-        entries = walk(path, count, shape, strides, 1, nodes, lengths, scratch)
-        distinct = 0
-        for k in range(entries):
-            if total[nodes[k]] == 0.0 and lengths[k] > 0.0:
-                touched[distinct] = nodes[k]
-                distinct += 1
-            total[nodes[k]] += lengths[k]
-        while filled + distinct > capacity:
+        entries = walk(path, count, shape, strides, PARTS, nodes, lengths, scratch)
+        while filled + entries > capacity:
             columns = np.concatenate((columns, np.empty(capacity, np.int64)))
             values = np.concatenate((values, np.empty(capacity)))
             capacity *= 2
-        ordered = np.sort(touched[:distinct])
-        for node in ordered:
-            columns[filled] = node
-            values[filled] = total[node]
-            total[node] = 0.0
-            filled += 1
+        start = filled
+        for k in range(entries):
+            if total[nodes[k]] == 0.0 and lengths[k] > 0.0:
+                columns[filled] = nodes[k]
+                filled += 1
+            total[nodes[k]] += lengths[k]
+        for k in range(start, filled):
+            values[k] = total[columns[k]]
+            total[columns[k]] = 0.0
         pointers[row + 1] = filled
     return pointers, columns[:filled], values[:filled]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..compiled import kernel
 from .descent import STEP, curved_ray, straight_ray
 from .fan import Fan, Kind
@@ -33,29 +33,38 @@ def trace(
         InvalidInput: naming the argument: shapes, travel times that are not finite, points outside the grid.
     """
     fan = Fan.checked(tof, spacing, receivers, source, kind)
-    path = np.empty((fan.room, len(fan.shape)))
-    scratch = np.empty((3, len(fan.shape)))
-    paths = []
-    for receiver in fan.receivers:
-        count = _one(
-            receiver, fan.source, fan.tof, fan.gradient, fan.shape, fan.strides, fan.curved, path, scratch
-        )
-        paths.append(path[:count] * spacing)
-    return paths
+    points, counts = _all(
+        fan.receivers, fan.source, fan.tof, fan.gradient, fan.shape, fan.strides, fan.curved, fan.room
+    )
+    return np.split(points * spacing, np.cumsum(counts)[:-1]) if len(counts) else []
 
 
 @kernel
-def _one(
-    receiver: Floats,
+def _all(
+    receivers: Floats,
     source: Floats,
     tof: Floats,
     gradient: Floats,
     shape: tuple[int, ...],
     strides: tuple[int, ...],
     curved: bool,
-    path: Floats,
-    scratch: Floats,
-) -> int:
-    if curved:
-        return curved_ray(receiver, source, tof, gradient, shape, strides, STEP, path, scratch)
-    return straight_ray(receiver, source, len(shape), path)
+    room: int,
+) -> tuple[Floats, Ints]:
+    """Points of all paths one after the other, (points, ndim), nodes, and how many each path has."""
+    axes = len(shape)
+    path = np.empty((room, axes))
+    scratch = np.empty((3, axes))
+    counts = np.empty(len(receivers), np.int64)
+    points = np.empty((len(receivers) * max(16, sum(shape) // 2), axes))
+    filled = 0
+    for k in range(len(receivers)):
+        if curved:
+            count = curved_ray(receivers[k], source, tof, gradient, shape, strides, STEP, path, scratch)
+        else:
+            count = straight_ray(receivers[k], source, axes, path)
+        while filled + count > len(points):
+            points = np.concatenate((points, np.empty_like(points)))
+        points[filled : filled + count] = path[:count]
+        filled += count
+        counts[k] = count
+    return points[:filled], counts

@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 from ..arrays import Flags, Floats, Ints
 from ..compiled import kernel
 from ..eikonal import solve
-from ..rays.descent import STEP, curved_ray, straight_ray, walk
+from ..rays.descent import PARTS, STEP, curved_ray, straight_ray, walk
 from ..rays.fan import Fan
 from .problem import SliceProblem
 from .result import Sweep
@@ -194,8 +194,8 @@ def _back_project(
     axes = len(shape)
     path = np.empty((room, axes))
     scratch = np.empty((3, axes))
-    nodes = np.empty(room << axes, np.int64)
-    lengths = np.empty(room << axes)
+    nodes = np.empty((PARTS * room) << axes, np.int64)
+    lengths = np.empty((PARTS * room) << axes)
     corrections = np.zeros(tof.size)
     weights = np.zeros(tof.size)
     squares = 0.0
@@ -204,7 +204,7 @@ def _back_project(
             count = curved_ray(receivers[row], source, tof, gradient, shape, strides, STEP, path, scratch)
         else:
             count = straight_ray(receivers[row], source, axes, path)
-        entries = walk(path, count, shape, strides, 1, nodes, lengths, scratch)
+        entries = walk(path, count, shape, strides, PARTS, nodes, lengths, scratch)
         predicted = 0.0
         length = 0.0
         for k in range(entries):
