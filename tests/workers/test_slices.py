@@ -14,6 +14,7 @@ from bentray_workers.dataset_file import write_dataset
 from bentray_workers.slices import Cancelled
 
 PLAN = Settings(nodes=32, sweeps=2)
+METHODS = [PLAN, replace(PLAN, method="gauss-newton", sweeps=3)]
 
 
 @pytest.fixture
@@ -23,27 +24,30 @@ def path(scan, tmp_path):
     return target
 
 
-def test_cluster_and_one_process_give_the_same_bits(cluster, scan, path):
-    expected = reconstruct_here(scan, PLAN)
+@pytest.mark.parametrize("plan", METHODS, ids=lambda plan: plan.method)
+def test_cluster_and_one_process_give_the_same_bits(cluster, scan, path, plan):
+    expected = reconstruct_here(scan, plan)
     for client in (cluster.client, None):
-        result = slices.reconstruct(client, path, PLAN)
+        result = slices.reconstruct(client, path, plan)
         assert np.array_equal(result.speed, expected.speed)
         assert np.array_equal(result.coverage, expected.coverage)
         assert result.history == expected.history
         assert result.spacing_m == expected.spacing_m
 
 
-def test_progress_rises_to_the_end(cluster, path):
+@pytest.mark.parametrize("plan", METHODS, ids=lambda plan: plan.method)
+def test_progress_rises_to_the_end(cluster, path, plan):
     seen = []
-    slices.reconstruct(cluster.client, path, PLAN, seen.append)
+    slices.reconstruct(cluster.client, path, plan, seen.append)
     done = [p.done for p in seen]
     assert done == sorted(done)
-    assert done[-1] == seen[-1].total == 3 * 2 * 24
+    assert done[-1] == seen[-1].total == 3 * plan.sweeps * 24
     assert len(done) > 6
 
 
+@pytest.mark.parametrize("plan", METHODS, ids=lambda plan: plan.method)
 @pytest.mark.parametrize("embedded", [True, False])
-def test_stop_ends_within_a_task(cluster, path, embedded):
+def test_stop_ends_within_a_task(cluster, path, embedded, plan):
     calls = []
 
     def stop():
@@ -51,7 +55,7 @@ def test_stop_ends_within_a_task(cluster, path, embedded):
         return len(calls) > 2
 
     with pytest.raises(Cancelled):
-        slices.reconstruct(cluster.client if embedded else None, path, replace(PLAN, sweeps=500), stop=stop)
+        slices.reconstruct(cluster.client if embedded else None, path, replace(plan, sweeps=500), stop=stop)
     assert len(calls) == 3
 
 
@@ -82,19 +86,8 @@ def test_missing_file_is_named(cluster, tmp_path):
         slices.reconstruct(cluster.client, tmp_path / "nothing.h5", PLAN)
 
 
-def test_nothing_is_left_on_the_cluster(cluster, path):
+@pytest.mark.parametrize("plan", METHODS, ids=lambda plan: plan.method)
+def test_nothing_is_left_on_the_cluster(cluster, path, plan):
     before = set(cluster.client.futures)
-    slices.reconstruct(cluster.client, path, PLAN)
+    slices.reconstruct(cluster.client, path, plan)
     assert set(cluster.client.futures) <= before
-
-
-def test_batches_aim_at_the_time_of_a_task():
-    from bentray_kernels.tomography import State
-
-    state = State(np.ones((2, 2)), np.ones((2, 2)))
-    after = replace(state, emitter=8)
-    assert slices._next_batch(8, state, after, 0.5) == 8
-    assert slices._next_batch(8, state, after, 0.25) == 16
-    assert slices._next_batch(8, state, after, 0.001) == 32
-    assert slices._next_batch(8, state, after, 60.0) == 1
-    assert slices._next_batch(8, state, replace(state, sweep=1, emitter=0), 0.1) == 8

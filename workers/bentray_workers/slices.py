@@ -1,39 +1,25 @@
-"""Slice-decomposed reconstruction: each slice is a chain of short tasks, a batch of emitters each."""
+"""Slice-decomposed reconstruction: each slice is a chain of short tasks that a cluster shares."""
 
 from __future__ import annotations
 
 import tempfile
-import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import nullcontext
-from functools import lru_cache
 from pathlib import Path
 
 from distributed import Client, Future, wait
 
-from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.picking import pick
-from bentray_kernels.tomography import (
-    Progress,
-    Reconstruction,
-    Settings,
-    SliceProblem,
-    State,
-    advance,
-    begin,
-)
+from bentray_kernels.tomography import Progress, Reconstruction, Settings
 from bentray_kernels.tomography import (
     reconstruct as reconstruct_here,
 )
-from bentray_kernels.tomography.reconstruction import assemble, measure
+from bentray_kernels.tomography.reconstruction import assemble, begin, measure, problem_of
 
+from .chains import Call, Chain, Scan, chain
 from .dataset_file import read_dataset, write_dataset
 from .lanes import RECONSTRUCTION
-
-# Long enough that scheduling costs nothing, short enough to show progress and to stop soon.
-TASK_S = 0.5
-FIRST_BATCH = 8
 
 # Tasks in flight for each worker: one at work and one ready.
 IN_FLIGHT = 2
@@ -101,27 +87,6 @@ def prepare(dataset_path: Path, settings: Settings, folder: Path) -> Path:
     return picked
 
 
-def advance_slice(
-    path: Path, stamp: int, settings: Settings, index: int, state: State | None, emitters: int
-) -> tuple[State, float]:
-    """Task: use more emitters of one slice; returns the new state and the seconds it took."""
-    problem = _problem(path, stamp, settings, index)
-    start = time.perf_counter()
-    state = advance(problem, settings, begin(problem) if state is None else state, emitters, index)
-    return state, time.perf_counter() - start
-
-
-@lru_cache(maxsize=8)
-def _problem(path: Path, stamp: int, settings: Settings, index: int) -> SliceProblem:
-    """One slice's problem, read once a process; ``stamp`` tells a rewritten file from the old one."""
-    return SliceProblem.of(_dataset(path, stamp), settings, index)
-
-
-@lru_cache(maxsize=2)
-def _dataset(path: Path, stamp: int) -> Dataset:
-    return read_dataset(path, traces=False)
-
-
 def _drive(
     client: Client,
     path: Path,
@@ -129,43 +94,32 @@ def _drive(
     on_progress: Callable[[Progress], None] | None,
     stop: Callable[[], bool] | None,
 ) -> Reconstruction:
-    stamp = path.stat().st_mtime_ns
+    scan = Scan(path, path.stat().st_mtime_ns, settings)
     dataset = read_dataset(path, traces=False)
-    problems = [SliceProblem.of(dataset, settings, k) for k in range(dataset.slices)]
-    states = [begin(problem) for problem in problems]
-    ready = deque((k, FIRST_BATCH) for k in range(dataset.slices))
-    running: dict[Future, tuple[int, int]] = {}
+    problems = [problem_of(dataset, settings, k) for k in range(dataset.slices)]
+    chains = [chain(scan, k, begin(settings, problem)) for k, problem in enumerate(problems)]
+    ready = deque((slice_chain, call) for slice_chain in chains for call in slice_chain.first())
+    running: dict[Future, tuple[Chain, Call]] = {}
     window = IN_FLIGHT * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
     try:
         while ready or running:
             while ready and len(running) < window:
-                k, batch = ready.popleft()
-                future = client.submit(
-                    advance_slice,
-                    path,
-                    stamp,
-                    settings,
-                    k,
-                    states[k],
-                    batch,
-                    resources=RECONSTRUCTION,
-                    pure=False,
-                )
-                running[future] = (k, batch)
+                slice_chain, call = ready.popleft()
+                future = client.submit(call.function, *call.arguments, resources=RECONSTRUCTION, pure=False)
+                running[future] = slice_chain, call
             for future in _finished(client, list(running)):
-                k, batch = running.pop(future)
-                before = states[k]
-                states[k], seconds = future.result()
-                if not states[k].done:
-                    ready.append((k, _next_batch(batch, before, states[k], seconds)))
+                slice_chain, call = running.pop(future)
+                # Before other slices begin: what an iteration keeps is freed by its end.
+                ready.extendleft((slice_chain, later) for later in reversed(slice_chain.after(call, future)))
                 if on_progress is not None:
-                    on_progress(measure(problems, settings, states))
+                    looked = sum(slice_chain.looked for slice_chain in chains)
+                    on_progress(measure(problems, settings, [c.state for c in chains], looked))
             if stop is not None and stop():
                 raise Cancelled
     finally:
         for future in running:
             future.cancel()
-    return assemble(dataset, settings, problems, states)
+    return assemble(dataset, settings, problems, [slice_chain.state for slice_chain in chains])
 
 
 def _finished(client: Client, running: list[Future]) -> list[Future]:
@@ -175,14 +129,6 @@ def _finished(client: Client, running: list[Future]) -> list[Future]:
             return list(wait(running, timeout=POLL_S, return_when="FIRST_COMPLETED").done)
         except TimeoutError:
             return []
-
-
-def _next_batch(batch: int, before: State, after: State, seconds: float) -> int:
-    """Emitters that take about ``TASK_S``; a batch that ended with its sweep tells too little."""
-    used = after.emitter - before.emitter
-    if used != batch or seconds <= 0.0:
-        return batch
-    return max(1, min(4 * batch, int(batch * TASK_S / seconds)))
 
 
 def _reconstruct_here(

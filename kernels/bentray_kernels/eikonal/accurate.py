@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
@@ -95,7 +96,7 @@ def _first_order(problem: PointSource, nodes: Ints, times: Floats) -> Floats:
 
 
 @kernel
-def _by_arrival(time: Floats, count: int) -> Ints:
+def _by_arrival(time: Floats, count: int) -> NDArray[np.int32]:
     """Indices of the ``count`` finite times in rising order: counting sort, then insertion."""
     last = 0.0
     for t in time:
@@ -129,7 +130,7 @@ def _by_arrival(time: Floats, count: int) -> Ints:
 
 @kernel
 def _pass(
-    order: Ints,
+    order: NDArray[np.int32],
     slowness: Floats,
     strides: tuple[int, ...],
     spacing: float,

@@ -4,7 +4,6 @@ from .problem import SliceProblem
 from .quality import mean_absolute_error, rmse
 from .reconstruction import reconstruct
 from .result import Progress, Reconstruction, Sweep
-from .sart import State, advance, begin
 from .settings import Settings
 
 __all__ = [
@@ -12,10 +11,7 @@ __all__ = [
     "Reconstruction",
     "Settings",
     "SliceProblem",
-    "State",
     "Sweep",
-    "advance",
-    "begin",
     "mean_absolute_error",
     "reconstruct",
     "rmse",

@@ -9,13 +9,16 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from ..acquisition import Dataset
+from ..arrays import Ints
+from . import gauss_newton, sart
 from .problem import SliceProblem
 from .result import Progress, Reconstruction
-from .sart import State, advance, begin, emitter_order
 from .settings import Settings
 
 # Emitters between two reports of progress.
 BATCH = 16
+
+State = sart.State | gauss_newton.Iterate
 
 
 def reconstruct(
@@ -34,21 +37,61 @@ def reconstruct(
     Raises:
         InvalidInput: from the dataset or a setting that does not fit it.
     """
-    problems = [SliceProblem.of(dataset, settings, k) for k in range(dataset.slices)]
-    states = [begin(problem) for problem in problems]
+    problems = [problem_of(dataset, settings, k) for k in range(dataset.slices)]
+    states = [begin(settings, problem) for problem in problems]
+    report = progress or (lambda _: None)
     while not all(state.done for state in states):
         for k, problem in enumerate(problems):
-            states[k] = advance(problem, settings, states[k], BATCH, k)
-            if progress is not None:
-                progress(measure(problems, settings, states))
+            state = states[k]
+            if isinstance(state, sart.State):
+                states[k] = sart.advance(problem, settings, state, BATCH, k)
+            elif not state.done:
+                rows = []
+                for emitters in batches(problem):
+                    rows.append(gauss_newton.look(problem, settings, state.slowness, state.sweep, emitters))
+                    looked = sum(part.emitters for part in rows)
+                    report(measure(problems, settings, states, looked))
+                states[k] = gauss_newton.step(problem, settings, state, rows, k)
+            report(measure(problems, settings, states))
     return assemble(dataset, settings, problems, states)
 
 
-def measure(problems: Sequence[SliceProblem], settings: Settings, states: Sequence[State]) -> Progress:
-    """Progress over all slices; a slice that stopped early counts as whole."""
-    done = total = 0
-    for k, (problem, state) in enumerate(zip(problems, states, strict=True)):
-        emitters = len(emitter_order(problem, settings.seed, k, 0))
+def problem_of(dataset: Dataset, settings: Settings, index: int) -> SliceProblem:
+    """One slice's problem as the settings' method wants it.
+
+    Raises:
+        InvalidInput: as ``SliceProblem.of``.
+    """
+    problem = SliceProblem.of(dataset, settings, index)
+    if settings.method == "gauss-newton" and settings.reciprocity:
+        return gauss_newton.each_pair_once(problem)
+    return problem
+
+
+def begin(settings: Settings, problem: SliceProblem) -> State:
+    """Where the settings' method begins."""
+    return gauss_newton.begin(problem) if settings.method == "gauss-newton" else sart.begin(problem)
+
+
+def batches(problem: SliceProblem) -> list[Ints]:
+    """The emitters with data, ``BATCH`` at a time."""
+    heard = np.flatnonzero(np.isfinite(problem.delta_tof).any(axis=1))
+    return [heard[k : k + BATCH] for k in range(0, len(heard), BATCH)]
+
+
+def measure(
+    problems: Sequence[SliceProblem], settings: Settings, states: Sequence[State], looked: int = 0
+) -> Progress:
+    """Progress over all slices; a slice that stopped early counts as whole.
+
+    Args:
+        problems, states: one a slice.
+        settings: of the reconstruction.
+        looked: emitters whose rows are there, of iterations that have not made their step.
+    """
+    done, total = looked, 0
+    for problem, state in zip(problems, states, strict=True):
+        emitters = int(np.isfinite(problem.delta_tof).any(axis=1).sum())
         total += emitters * settings.sweeps
         done += emitters * settings.sweeps if state.done else emitters * state.sweep + state.emitter
     history = sorted((s for state in states for s in state.history), key=lambda s: (s.sweep, s.slice))

@@ -10,6 +10,7 @@ from ..acquisition.dataset import PLAUSIBLE_SPEED_MPS
 from ..eikonal import methods
 from ..errors import InvalidInput
 
+METHODS = ("sart", "gauss-newton")
 RAYS = ("curved", "straight")
 SPEED_UPDATES = ("fixed", "data-driven")
 PICKERS = ("aic", "threshold")
@@ -20,6 +21,8 @@ class Settings:
     """How to reconstruct the speed image.
 
     Attributes:
+        method: ``sart`` uses one emitter after the other (chapter 6); ``gauss-newton`` all at once, with bent
+            rays and total variation.
         rays: ``curved`` traces down the travel time of the current image; ``straight`` ignores refraction.
         eikonal: the wave-front method for curved rays; see ``bentray_kernels.eikonal.methods()``.
         speed_update: ``fixed`` propagates in the reconstructed speed as it is (chapter 6, equation 5);
@@ -28,9 +31,11 @@ class Settings:
         speed_bounds_mps: (lowest, highest) speed a node may take, m/s.
         nodes: nodes along each side of the square image.
         side_m: side of the image, m; None: the array with a margin.
-        sweeps: how often every emitter is used.
+        sweeps: how often every emitter is used; ``gauss-newton`` ends sooner once nothing is gained.
         relaxation: the λ of SART (chapter 6, equation 1), in (0, 2).
-        smoothing_nodes: standard deviation, nodes, of the Gaussian applied to each emitter's update; 0: none.
+        smoothing_nodes: standard deviation, nodes, of the Gaussian applied to each emitter's update of SART;
+            0: none.
+        edge_cost: strength of the total variation of ``gauss-newton`` over the rms misfit; 0: none.
         stop_rms_s: stop once the rms of the receiver misfit is below this, s.
         reciprocity: use a missing pair's reverse (emitter and receiver exchanged) in its place.
         picker: how travel times are read where only traces were uploaded.
@@ -42,6 +47,7 @@ class Settings:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
+    method: Literal["sart", "gauss-newton"] = "sart"
     rays: Literal["curved", "straight"] = "curved"
     eikonal: str = "accurate"
     speed_update: Literal["fixed", "data-driven"] = "fixed"
@@ -52,12 +58,14 @@ class Settings:
     sweeps: int = 5
     relaxation: float = 0.1
     smoothing_nodes: float = 1.0
+    edge_cost: float = 0.3
     stop_rms_s: float = 0.0
     reciprocity: bool = True
     picker: Literal["aic", "threshold"] = "aic"
     seed: int = 0
 
     def __post_init__(self) -> None:
+        _one_of("method", self.method, METHODS)
         _one_of("rays", self.rays, RAYS)
         _one_of("eikonal", self.eikonal, methods())
         _one_of("speed_update", self.speed_update, SPEED_UPDATES)
@@ -76,6 +84,7 @@ class Settings:
         if not 0.0 < self.relaxation < 2.0:
             raise InvalidInput("relaxation", self.relaxation, "a number between 0 and 2")
         _within("smoothing_nodes", self.smoothing_nodes, 0.0, 32.0)
+        _within("edge_cost", self.edge_cost, 0.0, 100.0)
         _within("stop_rms_s", self.stop_rms_s, 0.0, 1.0)
         _within("seed", self.seed, 0, 2**63 - 1)
 

@@ -13,7 +13,9 @@ import typer
 from .paths import input_file, output_folder
 from .results import show_results, write_results
 from .settings_options import (
+    EdgeCost,
     Eikonal,
+    Method,
     Nodes,
     Picker,
     Rays,
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
 def reconstruct(
     file: Annotated[Path, typer.Argument(help="Dataset file (HDF5, format uct-transmission).")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; made if absent.")],
+    method: Method = None,
     rays: Rays = None,
     eikonal: Eikonal = None,
     sweeps: Sweeps = None,
@@ -45,6 +48,7 @@ def reconstruct(
     speed_update: SpeedUpdate = None,
     speed_range: SpeedRange = None,
     smoothing: Smoothing = None,
+    edge_cost: EdgeCost = None,
     picker: Picker = None,
     seed: Seed = None,
     workers: Annotated[
@@ -61,6 +65,7 @@ def reconstruct(
     """
     source, folder = input_file(file), output_folder(output)
     settings = settings_from(
+        method=method,
         rays=rays,
         eikonal=eikonal,
         sweeps=sweeps,
@@ -70,6 +75,7 @@ def reconstruct(
         speed_update=speed_update,
         speed_range_mps=speed_range,
         smoothing_nodes=smoothing,
+        edge_cost=edge_cost,
         picker=picker,
         seed=seed,
     )

@@ -10,6 +10,14 @@ if TYPE_CHECKING:
     from bentray_kernels.tomography import Settings
 
 # An option that is not given stays None and leaves the default to Settings, so that no command has its own.
+Method = Annotated[
+    str | None,
+    typer.Option(
+        "--method",
+        show_default="sart",
+        help="sart: one emitter after the other; gauss-newton: all at once, with total variation.",
+    ),
+]
 Rays = Annotated[
     str | None,
     typer.Option("--rays", show_default="curved", help="curved follows refraction, straight does not."),
@@ -48,6 +56,12 @@ Smoothing = Annotated[
     float | None,
     typer.Option(
         "--smoothing", show_default="1.0", help="Gaussian on each emitter's update, nodes; 0 is none."
+    ),
+]
+EdgeCost = Annotated[
+    float | None,
+    typer.Option(
+        "--edge-cost", show_default="0.3", help="Total variation of gauss-newton over the misfit; 0 is none."
     ),
 ]
 Picker = Annotated[

@@ -13,7 +13,9 @@ from .endings import service_answers
 from .paths import input_file, output_folder
 from .results import show_results, write_results
 from .settings_options import (
+    EdgeCost,
     Eikonal,
+    Method,
     Nodes,
     Picker,
     Rays,
@@ -39,6 +41,7 @@ def submit(
     wait: Annotated[
         bool, typer.Option("--wait/--no-wait", help="Wait for the end, or return at once.")
     ] = True,
+    method: Method = None,
     rays: Rays = None,
     eikonal: Eikonal = None,
     sweeps: Sweeps = None,
@@ -48,6 +51,7 @@ def submit(
     speed_update: SpeedUpdate = None,
     speed_range: SpeedRange = None,
     smoothing: Smoothing = None,
+    edge_cost: EdgeCost = None,
     picker: Picker = None,
     seed: Seed = None,
     as_json: AsJson = False,
@@ -63,6 +67,7 @@ def submit(
     source = input_file(file)
     folder = None if output is None else output_folder(output)
     settings = settings_from(
+        method=method,
         rays=rays,
         eikonal=eikonal,
         sweeps=sweeps,
@@ -72,6 +77,7 @@ def submit(
         speed_update=speed_update,
         speed_range_mps=speed_range,
         smoothing_nodes=smoothing,
+        edge_cost=edge_cost,
         picker=picker,
         seed=seed,
     )

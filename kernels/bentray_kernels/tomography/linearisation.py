@@ -1,0 +1,134 @@
+"""What some emitters say about an image: their rays as rows of a matrix, and the times that are left over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats, Ints
+from ..compiled import kernel
+from ..eikonal import solve
+from ..rays.bending import STRIDE, bend, bending
+from ..rays.descent import PARTS, curved_ray, straight_ray, walk
+from ..rays.fan import Fan, Kind
+from ..splines import coefficients
+from .problem import SliceProblem
+
+# A piece of a bent ray is STRIDE nodes long; its parts are as short as those of other rays.
+BENT_PARTS = 3
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The rays of some emitters, one row each, as a compressed sparse matrix over the nodes.
+
+    Attributes:
+        pointers: (rays + 1,), where each row begins.
+        columns: (entries,), flat node, C order.
+        lengths: (entries,), nodes of ray; multiplied by the spacing they are the sensitivities.
+        residual: (rays,), s, measured minus predicted travel time.
+        emitters: how many emitters the rays belong to.
+    """
+
+    pointers: Ints
+    columns: NDArray[np.int32]
+    lengths: NDArray[np.float32]
+    residual: Floats
+    emitters: int
+
+
+def linearise(problem: SliceProblem, slowness: Floats, emitters: Ints, *, rays: Kind, eikonal: str) -> Rows:
+    """Rows of some emitters' rays through an image.
+
+    Curved rays are bent to the stationary path in the image's cubic spline, and their times are the spline's
+    to fourth order. That matters more than how the resulting equations are solved: times read off unbent
+    rays by linear interpolation are off by 20 ns on Table 6, and a Gauss–Newton step that believes them puts
+    the error into the image (3.5 instead of 2.9 % of the range).
+
+    Args:
+        problem: the slice.
+        slowness: (nodes, nodes), s/m.
+        emitters: rows of the problem's data, at least one.
+        rays: ``curved`` or ``straight``.
+        eikonal: method of the wave front.
+    """
+    spline = coefficients(slowness) if rays == "curved" else np.empty((0, 0))
+    found = []
+    for emitter in emitters:
+        heard = np.flatnonzero(np.isfinite(problem.delta_tof[emitter]))
+        source, receivers = problem.emitters[emitter], problem.receivers[heard]
+        water = np.linalg.norm(receivers - source, axis=1) / problem.water_speed
+        tof = solve(1.0 / slowness, problem.spacing, source, eikonal) if rays == "curved" else slowness
+        fan = Fan.checked(tof, problem.spacing, receivers, source, rays)
+        counts, columns, lengths, predicted = _rows(
+            fan.receivers,
+            fan.source,
+            fan.tof,
+            fan.gradient,
+            fan.shape,
+            fan.strides,
+            fan.curved,
+            fan.room,
+            slowness.ravel(),
+            spline,
+        )
+        residual = problem.delta_tof[emitter, heard] + water - predicted * problem.spacing
+        found.append((counts, columns, lengths, residual))
+    counts, columns, lengths, residual = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return Rows(np.concatenate(([0], np.cumsum(counts))), columns, lengths, residual, len(emitters))
+
+
+@kernel
+def _rows(
+    receivers: Floats,
+    source: Floats,
+    tof: Floats,
+    gradient: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    curved: bool,
+    room: int,
+    slowness: Floats,
+    spline: Floats,
+) -> tuple[Ints, NDArray[np.int32], NDArray[np.float32], Floats]:
+    """Entries a ray, flat node and nodes of ray of each entry, and predicted times for a spacing of 1."""
+    axes = len(shape)
+    path = np.empty((room, axes))
+    scratch = np.empty((3, axes))
+    space = bending(room, shape)
+    nodes = np.empty((BENT_PARTS * room) << axes, np.int64)
+    weights = np.empty((BENT_PARTS * room) << axes)
+    total = np.zeros(tof.size)
+    counts = np.zeros(len(receivers), np.int64)
+    predicted = np.zeros(len(receivers))
+    capacity = max(16, len(receivers) * 4 * sum(shape))
+    columns = np.empty(capacity, np.int32)
+    lengths = np.empty(capacity, np.float32)
+    filled = 0
+    for row in range(len(receivers)):
+        if curved:
+            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, STRIDE, path, scratch)
+            predicted[row], count = bend(path, count, spline, shape, space)
+            entries = walk(path, count, shape, strides, BENT_PARTS, nodes, weights, scratch)
+        else:
+            count = straight_ray(receivers[row], source, axes, path)
+            entries = walk(path, count, shape, strides, PARTS, nodes, weights, scratch)
+            for k in range(entries):
+                predicted[row] += weights[k] * slowness[nodes[k]]
+        while filled + entries > capacity:
+            columns = np.concatenate((columns, np.empty(capacity, np.int32)))
+            lengths = np.concatenate((lengths, np.empty(capacity, np.float32)))
+            capacity *= 2
+        start = filled
+        for k in range(entries):
+            if total[nodes[k]] == 0.0 and weights[k] > 0.0:
+                columns[filled] = nodes[k]
+                filled += 1
+            total[nodes[k]] += weights[k]
+        for k in range(start, filled):
+            lengths[k] = total[columns[k]]
+            total[columns[k]] = 0.0
+        counts[row] = filled - start
+    return counts, columns[:filled].copy(), lengths[:filled].copy(), predicted

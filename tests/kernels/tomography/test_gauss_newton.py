@@ -1,0 +1,70 @@
+"""Gauss–Newton: each pair once, and an end that is never worse than the best image."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation import Ring
+from bentray_kernels.tomography import Settings, SliceProblem, gauss_newton
+from bentray_kernels.tomography.linearisation import Rows
+
+WATER = 1500.0
+PLAN = Settings(method="gauss-newton", nodes=24, sweeps=9)
+
+
+def problem(delta, tx=None, rx=None):
+    count = len(delta)
+    tx = np.arange(count) if tx is None else tx
+    rx = np.arange(count) if rx is None else rx
+    ring = Ring(max(tx.max(), rx.max()) + 1, 0.08)
+    dataset = Dataset(ring.positions(), tx, rx, WATER, delta_tof_s=delta)
+    return SliceProblem.of(dataset, replace(PLAN, reciprocity=False))
+
+
+def test_each_pair_is_kept_once():
+    rng = np.random.default_rng(1)
+    for count in (7, 8):
+        delta = rng.normal(size=(count, count))
+        delta[2, 5], delta[1, 3], delta[3, 1] = np.nan, np.nan, np.nan
+        np.fill_diagonal(delta, np.nan)
+        once = gauss_newton.each_pair_once(problem(delta)).delta_tof
+        kept = np.isfinite(once)
+        assert not (kept & kept.T).any()
+        whole = np.where(kept, once, once.T)
+        assert np.allclose(whole[0, 1], 0.5 * (delta[0, 1] + delta[1, 0]))
+        assert whole[2, 5] == delta[5, 2]
+        assert np.isnan(whole[1, 3])
+        assert kept.sum() == count * (count - 1) // 2 - 1
+        # No emitter has much more to do than another.
+        assert np.ptp(kept.sum(axis=1)) <= 2
+
+
+def test_emitters_that_do_not_receive_keep_all_pairs():
+    delta = np.random.default_rng(2).normal(size=(4, 4))
+    apart = problem(delta, tx=np.arange(4), rx=np.arange(4, 8))
+    assert np.array_equal(gauss_newton.each_pair_once(apart).delta_tof, delta)
+
+
+def rows(residual):
+    """One ray through one node."""
+    return Rows(np.array([0, 1]), np.array([300], np.int32), np.ones(1, np.float32), np.array([residual]), 1)
+
+
+def test_a_growing_misfit_ends_with_the_best_image():
+    of = problem(np.zeros((8, 8)))
+    states = [gauss_newton.begin(of)]
+    for misfit in (4e-7, 2e-7, 3e-7):
+        states.append(gauss_newton.step(of, PLAN, states[-1], [rows(misfit)]))
+    assert [state.done for state in states] == [False, False, False, True]
+    # The misfit of 2e-7 was measured on what the first step gave.
+    assert np.array_equal(states[-1].slowness, states[1].slowness)
+    assert [sweep.residual_rms_s for sweep in states[-1].history] == [4e-7, 2e-7, 3e-7]
+
+
+def test_nothing_gained_ends_too():
+    of = problem(np.zeros((8, 8)))
+    state = gauss_newton.begin(of)
+    for misfit in (4e-7, 2e-7, 1.99e-7):
+        state = gauss_newton.step(of, PLAN, state, [rows(misfit)])
+    assert state.done

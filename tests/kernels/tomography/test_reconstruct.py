@@ -1,0 +1,213 @@
+"""What every method of reconstruction must do; a new one inherits the suite by its name in the settings."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.tomography import Settings, mean_absolute_error, reconstruct, rmse
+from bentray_kernels.tomography.settings import METHODS
+
+NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
+PHANTOM = table6(WATER)
+RING = Ring(64, 0.09)
+
+
+@pytest.fixture(scope="module")
+def scan():
+    data = TravelTimeScan(PHANTOM, RING, SIDE, nodes=NODES)
+    everyone = np.arange(RING.elements)
+    return Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=data.delta_tof(everyone))
+
+
+@pytest.fixture(params=METHODS)
+def method(request):
+    return request.param
+
+
+def plan(method, **changes):
+    return Settings(method=method, nodes=NODES, side_m=SIDE, **changes)
+
+
+def test_bent_rays_beat_straight_ones(scan, method):
+    truth, inside = PHANTOM.speed(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+    bent = reconstruct(scan, plan(method))
+    straight = reconstruct(scan, plan(method, rays="straight"))
+    assert rmse(bent.speed, truth, inside) < 0.7 * rmse(straight.speed, truth, inside)
+    assert mean_absolute_error(bent.speed, truth, inside, 185.0) < 0.08
+    rms = [sweep.residual_rms_s for sweep in bent.history]
+    assert rms[-1] < 0.2 * rms[0]
+
+
+def test_uniform_medium_is_recovered_exactly(scan, method):
+    """A scan of nothing but water stays water; one of another speed inside the ring is found."""
+    nothing = replace(scan, delta_tof_s=np.zeros_like(scan.delta_tof_s))
+    for kind in ("curved", "straight"):
+        result = reconstruct(nothing, plan(method, rays=kind, sweeps=1))
+        assert np.allclose(result.speed, WATER, rtol=1e-9)
+    warmer = replace(scan, delta_tof_s=scan.distance_m() * (1 / (WATER + 5.0) - 1 / WATER))
+    result = reconstruct(warmer, plan(method, rays="straight", sweeps=8, relaxation=0.5))
+    middle = slice(NODES // 4, 3 * NODES // 4)
+    assert np.allclose(result.speed[middle, middle], WATER + 5.0, atol=1.5)
+
+
+def test_numbering_of_the_elements_does_not_matter(scan, method):
+    """Other numbers for the same elements give the same image, up to the random order of emitters."""
+    shuffle = np.random.default_rng(3).permutation(RING.elements)
+    renamed = replace(
+        scan,
+        element_position_m=scan.element_position_m[shuffle],
+        delta_tof_s=scan.delta_tof_s[np.ix_(shuffle, shuffle)],
+    )
+    a, b = reconstruct(scan, plan(method)), reconstruct(renamed, plan(method))
+    assert rmse(a.speed, b.speed, np.ones_like(a.speed, bool)) < 1.0
+
+
+def test_half_a_matrix_is_enough_with_reciprocity(scan, method):
+    truth, inside = PHANTOM.speed(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+    upper = np.where(np.triu(np.ones(scan.delta_tof_s.shape, bool), 1), scan.delta_tof_s, np.nan)
+    half = replace(scan, delta_tof_s=upper)
+    whole = rmse(reconstruct(scan, plan(method)).speed, truth, inside)
+    assert rmse(reconstruct(half, plan(method)).speed, truth, inside) < 1.1 * whole
+
+
+def test_missing_data_degrade_gracefully(scan, method):
+    truth, inside = PHANTOM.speed(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+    kept = np.random.default_rng(1).random(scan.delta_tof_s.shape) < 0.1
+    sparse = replace(scan, valid=kept)
+    nothing = rmse(np.full_like(truth, WATER), truth, inside)
+    assert rmse(reconstruct(sparse, plan(method)).speed, truth, inside) < 0.6 * nothing
+
+
+def test_water_outside_the_ring_stays_water(scan, method):
+    result = reconstruct(scan, plan(method, sweeps=1))
+    axis = (np.arange(NODES) / (NODES - 1) - 0.5) * SIDE
+    outside = np.hypot(axis[:, None], axis[None, :]) > RING.radius_m
+    assert np.allclose(result.speed[outside], WATER)
+
+
+def test_bounds_hold(scan, method):
+    result = reconstruct(scan, plan(method, sweeps=2, speed_bounds_mps=(1370.0, 1440.0)))
+    assert result.speed.min() >= 1370.0 - 1e-9
+    assert result.speed.max() <= 1440.0 + 1e-9
+
+
+def test_stopping_rule_ends_early(scan, method):
+    result = reconstruct(scan, plan(method, sweeps=50, stop_rms_s=3e-7))
+    assert len(result.history) < 50
+    assert result.history[-1].residual_rms_s <= 3e-7
+    assert result.history[-2].residual_rms_s > 3e-7
+
+
+def test_slices_equal_their_single_scans(scan, method):
+    stacked = replace(
+        scan,
+        delta_tof_s=np.stack([scan.delta_tof_s, 0.5 * scan.delta_tof_s]),
+        slice_z_m=np.array([0.0, 0.004]),
+    )
+    volume = reconstruct(stacked, plan(method, sweeps=1))
+    assert volume.speed.shape == (NODES, NODES, 2)
+    assert volume.spacing_m[2] == pytest.approx(0.004)
+    assert np.array_equal(volume.speed[..., 0], reconstruct(scan, plan(method, sweeps=1)).speed)
+    assert [(s.slice, s.sweep) for s in volume.history] == [(0, 1), (1, 1)]
+
+
+def test_absolute_times_are_the_same_scan(scan, method):
+    absolute = replace(scan, delta_tof_s=None, tof_s=scan.delta_tof_s + scan.distance_m() / WATER)
+    a, b = reconstruct(scan, plan(method, sweeps=1)), reconstruct(absolute, plan(method, sweeps=1))
+    assert np.allclose(a.speed, b.speed, atol=1e-6)
+
+
+def test_progress_rises_to_the_end(scan, method):
+    seen = []
+    reconstruct(scan, plan(method, sweeps=2), seen.append)
+    done = [p.done for p in seen]
+    assert done == sorted(done)
+    assert done[-1] == seen[-1].total == 2 * RING.elements
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"side_m": 0.1}, "side_m"),
+        ({"eikonal": "magic"}, "eikonal"),
+        ({"rays": "wavy"}, "rays"),
+        ({"relaxation": 2.0}, "relaxation"),
+        ({"relaxation": float("nan")}, "relaxation"),
+        ({"nodes": 4}, "nodes"),
+        ({"sweeps": 0}, "sweeps"),
+        ({"speed_update": "data-driven"}, "speed_range_mps"),
+        ({"speed_bounds_mps": (1600.0, 1500.0)}, "speed_bounds_mps"),
+        ({"speed_bounds_mps": (1e-300, 1e300)}, "speed_bounds_mps"),
+        ({"speed_bounds_mps": (1400.0, 1800.0)}, "speed_bounds_mps"),
+        ({"speed_range_mps": (1400.0, float("inf"))}, "speed_range_mps"),
+        ({"side_m": 20.0}, "geometry/element_position_m"),
+        ({"seed": -1}, "seed"),
+        ({"picker": "eye"}, "picker"),
+    ],
+)
+def test_bad_settings_are_named(scan, change, field):
+    with pytest.raises(InvalidInput) as refusal:
+        reconstruct(scan, Settings(**{"nodes": NODES, **change}))
+    assert refusal.value.field == field
+
+
+def test_scan_without_one_valid_pair_is_refused(scan, method):
+    with pytest.raises(InvalidInput, match="at least one finite travel time"):
+        reconstruct(replace(scan, valid=np.zeros(scan.delta_tof_s.shape, bool)), plan(method))
+
+
+def test_the_slice_without_a_valid_pair_is_named(scan, method):
+    times = np.stack([scan.delta_tof_s, np.full_like(scan.delta_tof_s, np.nan)])
+    stacked = replace(scan, delta_tof_s=times, slice_z_m=np.array([0.0, 0.004]))
+    with pytest.raises(InvalidInput, match="slice 1"):
+        reconstruct(stacked, plan(method))
+
+
+@pytest.mark.parametrize(
+    "position",
+    [
+        np.zeros((RING.elements, 2)),
+        np.column_stack((np.linspace(-0.05, 0.05, RING.elements), np.zeros(RING.elements))),
+        np.column_stack((RING.positions(), np.zeros(RING.elements))),
+    ],
+    ids=["one point", "a line", "three coordinates"],
+)
+def test_an_array_that_surrounds_no_image_is_refused(scan, position):
+    with pytest.raises(InvalidInput) as refusal:
+        reconstruct(replace(scan, element_position_m=position), Settings(nodes=32))
+    assert refusal.value.field == "geometry/element_position_m"
+
+
+def test_same_bits_again(scan, method):
+    a, b = (reconstruct(scan, plan(method, sweeps=2)) for _ in range(2))
+    assert np.array_equal(a.speed, b.speed)
+    assert np.array_equal(a.coverage, b.coverage)
+    assert a.history == b.history
+
+
+def test_a_dead_element_leaves_the_rest(scan, method):
+    truth, inside = PHANTOM.speed(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+    deaf = scan.delta_tof_s.copy()
+    deaf[7, :] = deaf[:, 7] = np.nan
+    whole = rmse(reconstruct(scan, plan(method)).speed, truth, inside)
+    assert (
+        rmse(reconstruct(replace(scan, delta_tof_s=deaf), plan(method)).speed, truth, inside) < 1.15 * whole
+    )
+
+
+def test_two_elements_in_one_place_do_no_harm(scan, method):
+    truth, inside = PHANTOM.speed(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+    position, delta = scan.element_position_m.copy(), scan.delta_tof_s.copy()
+    position[8] = position[7]
+    delta[8], delta[:, 8] = delta[7], delta[:, 7]
+    delta[8, 7] = delta[7, 8] = 0.0
+    twice = replace(scan, element_position_m=position, delta_tof_s=delta)
+    result = reconstruct(twice, plan(method))
+    assert np.isfinite(result.speed).all()
+    whole = rmse(reconstruct(scan, plan(method)).speed, truth, inside)
+    assert rmse(result.speed, truth, inside) < 1.15 * whole
