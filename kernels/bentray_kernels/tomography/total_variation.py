@@ -51,14 +51,16 @@ class Linearised:
         """
         image = self.image.copy()
         downhill = self._downhill()
+        # Without edges to cost anything, there is nothing to split.
+        penalty = PENALTY if self.strength > 0.0 else 0.0
         for _ in range(ROUNDS):
             slope = gradient(image) + dual
             edges = shrink(slope, self.strength / PENALTY)
             dual = slope - edges
             # Of the quadratic problem at the image as it is.
             change = image - self.image
-            steepest = downhill - self._curvature(change) - PENALTY * adjoint(gradient(image) - edges + dual)
-            image = np.clip(image + self._conjugate_gradients(steepest), *self.bounds)
+            steepest = downhill - self._curvature(change) - penalty * adjoint(gradient(image) - edges + dual)
+            image = np.clip(image + self._conjugate_gradients(steepest, penalty), *self.bounds)
         return image, dual
 
     def _downhill(self) -> Floats:
@@ -75,7 +77,7 @@ class Linearised:
             normal_product(part.pointers, part.columns, part.lengths, change.ravel(), into)
         return np.where(self.region, into.reshape(self.image.shape) / self.density, 0.0)
 
-    def _conjugate_gradients(self, steepest: Floats) -> Floats:
+    def _conjugate_gradients(self, steepest: Floats, penalty: float) -> Floats:
         """A change for which the gradient has nearly vanished, from ``STEPS`` steps."""
         residual = np.where(self.region, steepest, 0.0)
         change = np.zeros_like(residual)
@@ -85,7 +87,7 @@ class Linearised:
             if square <= 0.0:
                 break
             bent = self._curvature(direction)
-            bent = bent + PENALTY * np.where(self.region, adjoint(gradient(direction)), 0.0)
+            bent = bent + penalty * np.where(self.region, adjoint(gradient(direction)), 0.0)
             length = square / float((direction * bent).sum())
             change = change + length * direction
             residual = residual - length * bent

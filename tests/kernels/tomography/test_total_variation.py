@@ -63,7 +63,7 @@ def test_few_data_suffice_for_few_edges():
     """Half as many rays as nodes: least squares cannot know, total variation does."""
     blurred = settled(problem(0.0, TRUTH, rows=70))
     sharp = settled(problem(0.01, TRUTH, rows=70))
-    assert np.abs(sharp - TRUTH).mean() < 0.4 * np.abs(blurred - TRUTH).mean()
+    assert np.abs(sharp - TRUTH).mean() < 0.6 * np.abs(blurred - TRUTH).mean()
 
 
 def test_much_total_variation_leaves_no_edge():

@@ -109,7 +109,7 @@ def test_the_help_states_the_defaults_that_the_settings_have(command: Callable[.
         setting = NAMES.get(name, name)
         if isinstance(default, str) and hasattr(Settings, setting) and getattr(Settings, setting) is not None:
             stated[setting] = default
-    assert len(stated) == 9
+    assert len(stated) == 11
     assert stated == {name: str(getattr(Settings, name)) for name in stated}
     defaults = [
         p.default for n, p in inspect.signature(command).parameters.items() if NAMES.get(n, n) in stated
