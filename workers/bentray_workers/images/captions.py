@@ -27,18 +27,19 @@ def which_slice(result: Reconstruction, index: int) -> str:
 
 
 def facts(result: Reconstruction) -> str:
-    """Rays, sweeps, size, water and residual in one line."""
+    """Rays, method, sweeps, size, water and residual in one line."""
     settings = result.settings
     rays = "straight rays" if settings.rays == "straight" else f"curved rays ({settings.eikonal})"
     size = " by ".join(str(n) for n in result.speed.shape)
     found = [
         rays,
+        {"sart": "SART", "gauss-newton": "Gauss–Newton"}[settings.method],
         f"{size} nodes of {1e3 * result.spacing_m[0]:.2g} mm",
         f"water {result.water_speed_mps:.1f} m/s",
     ]
     if result.history:
         last = max(s.sweep for s in result.history)
         rms = math.sqrt(np.mean([s.residual_rms_s**2 for s in result.history if s.sweep == last]))
-        found.insert(1, f"{last} sweep{'s' if last != 1 else ''}")
+        found.insert(2, f"{last} sweep{'s' if last != 1 else ''}")
         found.append(f"residual {1e9 * rms:.0f} ns")
     return "  ·  ".join(found)
