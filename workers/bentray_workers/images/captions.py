@@ -33,7 +33,7 @@ def facts(result: Reconstruction) -> str:
     size = " by ".join(str(n) for n in result.speed.shape)
     found = [
         rays,
-        {"sart": "SART", "gauss-newton": "Gauss–Newton"}[settings.method],
+        {"sart": "SART", "gauss-newton": "Gauss-Newton"}[settings.method],
         f"{size} nodes of {1e3 * result.spacing_m[0]:.2g} mm",
         f"water {result.water_speed_mps:.1f} m/s",
     ]
