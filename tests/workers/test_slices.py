@@ -25,6 +25,21 @@ def path(scan, tmp_path):
 
 
 @pytest.mark.parametrize("plan", METHODS, ids=lambda plan: plan.method)
+def test_amplitudes_give_the_same_attenuation_everywhere(cluster, scan, tmp_path, plan):
+    loud = replace(scan, log_ratio_np=-1e6 * scan.delta_tof_s, water_attenuation_np_m=0.1)
+    path = tmp_path / "loud.h5"
+    write_dataset(path, loud)
+    expected = reconstruct_here(loud, plan)
+    assert expected.attenuation.shape == expected.speed.shape
+    assert expected.attenuation.max() > 1.0
+    seen = []
+    result = slices.reconstruct(cluster.client, path, plan, seen.append)
+    assert np.array_equal(result.attenuation, expected.attenuation)
+    assert seen[-1].done == seen[-1].total == 3 * (plan.sweeps + 1) * 24
+    assert slices.reconstruct(None, path, replace(plan, attenuation=False)).attenuation is None
+
+
+@pytest.mark.parametrize("plan", METHODS, ids=lambda plan: plan.method)
 def test_cluster_and_one_process_give_the_same_bits(cluster, scan, path, plan):
     expected = reconstruct_here(scan, plan)
     for client in (cluster.client, None):

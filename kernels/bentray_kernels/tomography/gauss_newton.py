@@ -36,6 +36,7 @@ class Iterate:
         best: the image with the least misfit measured so far, and that misfit, s.
         done: whether nothing is left to do.
         history: a record per iteration, of the misfit that it began with.
+        attenuation: (nodes, nodes), Np/m, once it is known; see ``attenuation``.
     """
 
     slowness: Floats
@@ -44,6 +45,7 @@ class Iterate:
     best: tuple[Floats, float]
     done: bool = False
     history: tuple[Sweep, ...] = ()
+    attenuation: Floats | None = None
 
     @property
     def sweep(self) -> int:
@@ -61,16 +63,21 @@ def each_pair_once(problem: SliceProblem) -> SliceProblem:
 
     Pairs measured both ways keep their mean. Each emitter keeps the half of the ring that follows it.
     """
-    delta, count = problem.delta_tof, len(problem.emitters)
+    count = len(problem.emitters)
     if problem.emitters.shape != problem.receivers.shape or (problem.emitters != problem.receivers).any():
         return problem
     ahead = (np.arange(count)[None, :] - np.arange(count)[:, None]) % count
     half = (2 * ahead < count) & (ahead > 0)
     if count % 2 == 0:
         half |= (2 * ahead == count) & np.triu(np.ones((count, count), dtype=np.bool_))
-    both = np.where(np.isfinite(delta), delta, delta.T)
-    mean = np.where(np.isfinite(delta.T), 0.5 * (both + delta.T), both)
-    return replace(problem, delta_tof=np.where(half, mean, np.nan))
+
+    def once(data: Floats) -> Floats:
+        both = np.where(np.isfinite(data), data, data.T)
+        mean = np.where(np.isfinite(data.T), 0.5 * (both + data.T), both)
+        return np.where(half, mean, np.nan)
+
+    ratio = None if problem.log_ratio is None else once(problem.log_ratio)
+    return replace(problem, delta_tof=once(problem.delta_tof), log_ratio=ratio)
 
 
 def begin(problem: SliceProblem) -> Iterate:

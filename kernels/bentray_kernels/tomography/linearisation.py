@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,12 +56,53 @@ def linearise(problem: SliceProblem, slowness: Floats, emitters: Ints, *, rays: 
         rays: ``curved`` or ``straight``.
         eikonal: method of the wave front.
     """
+
+    def lacking(emitter: int, heard: Ints, distance: Floats, predicted: Floats, _: Floats) -> Floats:
+        water = distance / problem.water_speed
+        return np.asarray(problem.delta_tof[emitter, heard] + water - predicted)
+
+    return _trace(problem, slowness, emitters, problem.delta_tof, lacking, rays, eikonal)
+
+
+def linearise_losses(
+    problem: SliceProblem, slowness: Floats, emitters: Ints, *, rays: Kind, eikonal: str
+) -> Rows:
+    """As ``linearise`` for the amplitudes: the residual, Np, is what water along the same rays does not take.
+
+    Raises:
+        ValueError: for a problem without amplitudes.
+    """
+    ratio, water = problem.log_ratio, problem.water_attenuation
+    if ratio is None:
+        raise ValueError("no amplitudes")
+
+    def lacking(emitter: int, heard: Ints, distance: Floats, _: Floats, length: Floats) -> Floats:
+        return np.asarray(ratio[emitter, heard] + water * (distance - length))
+
+    return _trace(problem, slowness, emitters, ratio, lacking, rays, eikonal)
+
+
+def _trace(
+    problem: SliceProblem,
+    slowness: Floats,
+    emitters: Ints,
+    data: Floats,
+    lacking: Callable[[int, Ints, Floats, Floats, Floats], Floats],
+    rays: Kind,
+    eikonal: str,
+) -> Rows:
+    """Rows of the pairs that have data.
+
+    Args:
+        lacking: residual from the emitter, the receivers heard, their distances, m, predicted times, s, and
+            the lengths of the rays, m.
+    """
     spline = coefficients(slowness) if rays == "curved" else np.empty((0, 0))
     found = []
     for emitter in emitters:
-        heard = np.flatnonzero(np.isfinite(problem.delta_tof[emitter]))
+        heard = np.flatnonzero(np.isfinite(data[emitter]))
         source, receivers = problem.emitters[emitter], problem.receivers[heard]
-        water = np.linalg.norm(receivers - source, axis=1) / problem.water_speed
+        distance = np.linalg.norm(receivers - source, axis=1)
         tof = solve(1.0 / slowness, problem.spacing, source, eikonal) if rays == "curved" else slowness
         fan = Fan.checked(tof, problem.spacing, receivers, source, rays)
         counts, columns, lengths, predicted = _rows(
@@ -74,7 +117,11 @@ def linearise(problem: SliceProblem, slowness: Floats, emitters: Ints, *, rays: 
             slowness.ravel(),
             spline,
         )
-        residual = problem.delta_tof[emitter, heard] + water - predicted * problem.spacing
+        ends = np.concatenate(([0], np.cumsum(counts)))
+        length = np.array([lengths[a:b].sum(dtype=np.float64) for a, b in itertools.pairwise(ends)])
+        residual = lacking(
+            int(emitter), heard, distance, predicted * problem.spacing, length * problem.spacing
+        )
         found.append((counts, columns, lengths, residual))
     counts, columns, lengths, residual = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return Rows(np.concatenate(([0], np.cumsum(counts))), columns, lengths, residual, len(emitters))

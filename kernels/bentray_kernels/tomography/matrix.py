@@ -10,6 +10,18 @@ from ..compiled import kernel
 
 
 @kernel
+def project(
+    pointers: Ints, columns: NDArray[np.int32], lengths: NDArray[np.float32], image: Floats, into: Floats
+) -> None:
+    """Write A·image to ``into``."""
+    for row in range(len(pointers) - 1):
+        total = 0.0
+        for k in range(pointers[row], pointers[row + 1]):
+            total += lengths[k] * image[columns[k]]
+        into[row] = total
+
+
+@kernel
 def back_project(
     pointers: Ints, columns: NDArray[np.int32], lengths: NDArray[np.float32], values: Floats, into: Floats
 ) -> None:

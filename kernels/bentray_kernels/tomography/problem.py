@@ -29,6 +29,8 @@ class SliceProblem:
         spacing: node spacing, m.
         origin: position of node 0 in the dataset's coordinates, m.
         water_speed: m/s.
+        log_ratio: as ``delta_tof``, ln(A_water / A_object), Np; None where no amplitudes were recorded.
+        water_attenuation: Np/m.
     """
 
     emitters: Floats
@@ -38,6 +40,8 @@ class SliceProblem:
     spacing: float
     origin: tuple[float, float]
     water_speed: float
+    log_ratio: Floats | None = None
+    water_attenuation: float = 0.0
 
     @classmethod
     def of(cls, dataset: Dataset, settings: Settings, index: int = 0) -> SliceProblem:
@@ -60,9 +64,14 @@ class SliceProblem:
                 settings.speed_bounds_mps,
                 f"bounds around the speed of the water, {dataset.water_speed_mps:g} m/s",
             )
-        delta = dataset.slice(index).differential_tof()
+        one = dataset.slice(index)
+        delta, ratio = one.differential_tof(), one.log_ratio_np
+        if ratio is not None and one.valid is not None:
+            ratio = np.where(one.valid, ratio, np.nan)
         emitters, receivers = dataset.tx, dataset.rx
         if settings.reciprocity:
+            if ratio is not None:
+                _, _, ratio = _with_reverses(emitters, receivers, ratio)
             emitters, receivers, delta = _with_reverses(emitters, receivers, delta)
         if not np.isfinite(delta).any():
             where = f" in slice {index}" if dataset.slices > 1 else ""
@@ -96,6 +105,8 @@ class SliceProblem:
             spacing=spacing,
             origin=(float(origin[0]), float(origin[1])),
             water_speed=dataset.water_speed_mps,
+            log_ratio=ratio,
+            water_attenuation=dataset.water_attenuation_np_m or 0.0,
         )
 
 

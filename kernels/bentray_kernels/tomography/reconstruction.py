@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
 from ..acquisition import Dataset
 from ..arrays import Ints
-from . import gauss_newton, sart
+from . import attenuation, gauss_newton, sart
 from .problem import SliceProblem
 from .result import Progress, Reconstruction
 from .settings import Settings
@@ -53,6 +54,14 @@ def reconstruct(
                     report(measure(problems, settings, states, looked))
                 states[k] = gauss_newton.step(problem, settings, state, rows, k)
             report(measure(problems, settings, states))
+    for k, problem in enumerate(problems):
+        losses = []
+        for emitters in batches_of_losses(problem, settings):
+            losses.append(attenuation.look(problem, settings, states[k].slowness, emitters))
+            report(measure(problems, settings, states, sum(part.emitters for part in losses)))
+        if losses:
+            found = attenuation.attenuation(problem, settings, losses)
+            states[k] = replace(states[k], attenuation=found)
     return assemble(dataset, settings, problems, states)
 
 
@@ -74,9 +83,17 @@ def begin(settings: Settings, problem: SliceProblem) -> State:
 
 
 def batches(problem: SliceProblem) -> list[Ints]:
-    """The emitters with data, ``BATCH`` at a time."""
-    heard = np.flatnonzero(np.isfinite(problem.delta_tof).any(axis=1))
-    return [heard[k : k + BATCH] for k in range(0, len(heard), BATCH)]
+    """The emitters with travel times, ``BATCH`` at a time."""
+    return _cut(np.flatnonzero(np.isfinite(problem.delta_tof).any(axis=1)))
+
+
+def batches_of_losses(problem: SliceProblem, settings: Settings) -> list[Ints]:
+    """The emitters with amplitudes, ``BATCH`` at a time; none where nobody wants the attenuation."""
+    return _cut(attenuation.heard(problem)) if settings.attenuation else []
+
+
+def _cut(emitters: Ints) -> list[Ints]:
+    return [emitters[k : k + BATCH] for k in range(0, len(emitters), BATCH)]
 
 
 def measure(
@@ -92,7 +109,9 @@ def measure(
     done, total = looked, 0
     for problem, state in zip(problems, states, strict=True):
         emitters = int(np.isfinite(problem.delta_tof).any(axis=1).sum())
-        total += emitters * settings.sweeps
+        losses = sum(len(part) for part in batches_of_losses(problem, settings))
+        total += emitters * settings.sweeps + losses
+        done += losses if state.attenuation is not None else 0
         done += emitters * settings.sweeps if state.done else emitters * state.sweep + state.emitter
     history = sorted((s for state in states for s in state.history), key=lambda s: (s.sweep, s.slice))
     return Progress(done, total, tuple(history))
@@ -104,11 +123,16 @@ def assemble(
     """The result of finished slices, (nx, ny) for one and (nx, ny, nz) for several."""
     speed = np.stack([1.0 / state.slowness for state in states], axis=-1)
     coverage = np.stack([state.coverage for state in states], axis=-1)
+    losses = [state.attenuation for state in states]
+    attenuations = None
+    if all(image is not None for image in losses):
+        attenuations = np.stack([image for image in losses if image is not None], axis=-1)
     first = problems[0]
     spacing: tuple[float, ...] = (first.spacing, first.spacing)
     origin: tuple[float, ...] = first.origin
     if dataset.slice_z_m is None:
         speed, coverage = speed[..., 0], coverage[..., 0]
+        attenuations = None if attenuations is None else attenuations[..., 0]
     else:
         steps = np.diff(dataset.slice_z_m)
         even = steps.size > 0 and np.allclose(steps, steps[0])
@@ -122,6 +146,7 @@ def assemble(
         water_speed_mps=dataset.water_speed_mps,
         settings=settings,
         history=measure(problems, settings, states).history,
+        attenuation=None if attenuations is None else np.ascontiguousarray(attenuations),
         provenance=provenance(),
     )
 

@@ -30,6 +30,7 @@ class State:
         squares, count: sum of squared residuals, s², and their number, in the pass under way.
         done: whether nothing is left to do.
         history: a record per finished pass.
+        attenuation: (nodes, nodes), Np/m, once it is known; see ``attenuation``.
     """
 
     slowness: Floats
@@ -40,6 +41,7 @@ class State:
     count: int = 0
     done: bool = False
     history: tuple[Sweep, ...] = ()
+    attenuation: Floats | None = None
 
 
 def begin(problem: SliceProblem) -> State:

@@ -40,6 +40,7 @@ class Settings:
         reciprocity: use a missing pair's reverse (emitter and receiver exchanged) in its place.
         picker: how travel times are read where only traces were uploaded.
         seed: seed of the random emitter order.
+        attenuation: reconstruct it too, where amplitudes were recorded.
 
     Raises:
         InvalidInput: naming the setting, its value and what is accepted.
@@ -63,6 +64,7 @@ class Settings:
     reciprocity: bool = True
     picker: Literal["aic", "threshold"] = "aic"
     seed: int = 0
+    attenuation: bool = True
 
     def __post_init__(self) -> None:
         _one_of("method", self.method, METHODS)

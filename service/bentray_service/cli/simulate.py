@@ -21,6 +21,10 @@ def simulate(
     refinement: Annotated[int, typer.Option(help="How many times finer the grid of the times is.")] = 4,
     noise_ns: Annotated[float, typer.Option(help="Standard deviation of the noise on the times, ns.")] = 0.0,
     seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
+    attenuation: Annotated[bool, typer.Option("--attenuation", help="Record amplitudes too.")] = False,
+    snr: Annotated[
+        float | None, typer.Option(help="Signal over noise of times and amplitudes, as 10; none without it.")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -33,7 +37,9 @@ def simulate(
     from bentray_workers import simulation
     from bentray_workers.dataset_file import write_dataset
 
-    settings = simulation.SimulationSettings(nodes, elements, coupling, refinement, noise_ns * 1e-9, seed)
+    settings = simulation.SimulationSettings(
+        nodes, elements, coupling, refinement, noise_ns * 1e-9, seed, attenuation, snr
+    )
     started = time.perf_counter()
     with progress_bar("Simulating") as step:
         dataset = simulation.simulate(
@@ -47,7 +53,7 @@ def simulate(
     rows = [
         ("elements", f"{elements} on a ring of {(dataset.radius_m or 0.0) * 1e3:.1f} mm radius"),
         ("coupling", f"{coupling:g} m/s"),
-        ("noise", f"{noise_ns:g} ns"),
+        ("noise", f"{noise_ns:g} ns" if snr is None else f"{noise_ns:g} ns, and 1/{snr:g} of the signal"),
         ("time", f"{seconds:.1f} s"),
     ]
     print_table(dataset.title, ("figure", "value"), rows)

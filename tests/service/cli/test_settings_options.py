@@ -114,4 +114,4 @@ def test_the_help_states_the_defaults_that_the_settings_have(command: Callable[.
     defaults = [
         p.default for n, p in inspect.signature(command).parameters.items() if NAMES.get(n, n) in stated
     ]
-    assert defaults == [None] * 9, "a default of its own would hide that of the settings"
+    assert defaults == [None] * 11, "a default of its own would hide that of the settings"

@@ -1,0 +1,75 @@
+"""Attenuation: line integrals give it back, gaps and water count as they should, nothing is below 0."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.tomography import Settings, reconstruct, rmse
+from bentray_kernels.tomography.settings import METHODS
+
+NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
+PHANTOM = table6(WATER)
+RING = Ring(64, 0.09)
+
+
+@pytest.fixture(scope="module")
+def scan():
+    travel = TravelTimeScan(PHANTOM, RING, SIDE, nodes=NODES)
+    everyone = np.arange(RING.elements)
+    delta, ratio = travel.medium(attenuation=True).arrivals(travel.elements(), everyone)
+    return Dataset(
+        RING.positions(),
+        everyone,
+        everyone,
+        WATER,
+        delta_tof_s=delta,
+        log_ratio_np=ratio,
+        water_attenuation_np_m=0.0,
+    )
+
+
+def plan(method="gauss-newton", **changes):
+    return Settings(method=method, nodes=NODES, side_m=SIDE, **changes)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_line_integrals_give_it_back(scan, method):
+    truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+    result = reconstruct(scan, plan(method))
+    assert result.attenuation.min() >= 0.0
+    assert rmse(result.attenuation, truth, inside) < 0.16 * (truth.max() - truth.min())
+
+
+def test_along_straight_rays_it_is_worse(scan):
+    truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+    bent, straight = (reconstruct(scan, plan(rays=rays)).attenuation for rays in ("curved", "straight"))
+    assert rmse(bent, truth, inside) < 0.9 * rmse(straight, truth, inside)
+
+
+def test_a_medium_like_its_water_is_found_to_be_so(scan):
+    """Ratios of 0 in lossy water mean that loss everywhere."""
+    same = replace(
+        scan,
+        delta_tof_s=np.zeros_like(scan.delta_tof_s),
+        log_ratio_np=np.zeros_like(scan.log_ratio_np),
+        water_attenuation_np_m=2.0,
+    )
+    assert np.allclose(reconstruct(same, plan()).attenuation, 2.0, atol=1e-3)
+
+
+def test_gaps_in_the_amplitudes_are_only_gaps(scan):
+    truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+    kept = np.random.default_rng(1).random(scan.log_ratio_np.shape) < 0.2
+    gaps = replace(scan, log_ratio_np=np.where(kept, scan.log_ratio_np, np.nan))
+    result = reconstruct(gaps, plan())
+    assert np.array_equal(result.speed, reconstruct(scan, plan()).speed)
+    assert rmse(result.attenuation, truth, inside) < 0.25 * (truth.max() - truth.min())
+
+
+def test_who_does_not_want_it_gets_none(scan):
+    assert reconstruct(scan, plan(attenuation=False, sweeps=1)).attenuation is None
+    assert reconstruct(replace(scan, log_ratio_np=None), plan(sweeps=1)).attenuation is None
