@@ -33,7 +33,8 @@ def accurate(problem: PointSource, *, supersample: int = 1) -> Floats:
 
     Fast sweeping gives the order in which the front arrives, a counting sort puts the nodes into that
     order, and a pass of the update of ``hafmm`` follows it. A node that the order put before an earlier
-    neighbour is updated again as soon as that neighbour is settled: the accuracy is the heap's.
+    neighbour is updated again as soon as that neighbour is settled. The accuracy is the heap's, but for media
+    whose speed varies over several decades.
 
     Args:
         problem: the checked problem.
@@ -46,11 +47,11 @@ def accurate(problem: PointSource, *, supersample: int = 1) -> Floats:
     Raises:
         InvalidInput: for a ``supersample`` that is no whole number from 1 to 8.
     """
-    if not (isinstance(supersample, int) and 1 <= supersample <= FINEST):
+    if isinstance(supersample, bool) or supersample not in range(1, FINEST + 1):
         raise InvalidInput("supersample", supersample, f"a whole number from 1 to {FINEST}")
     if supersample > 1:
         every = (slice(None, None, supersample),) * problem.slowness.ndim
-        return np.ascontiguousarray(accurate(_supersampled(problem, supersample))[every])
+        return np.ascontiguousarray(accurate(_supersampled(problem, int(supersample)))[every])
     seeds, times = problem.seeds()
     squares = problem.reference_squares()
     limit = 4.0 * (problem.source_slowness() * problem.spacing) ** 2

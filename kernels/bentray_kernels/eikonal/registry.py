@@ -153,7 +153,8 @@ def solve(
         source: (ndim,), m, anywhere in the grid; node 0 lies at 0.
         method: one of ``methods()``.
         options: keyword options of that method. The marching methods take ``stop_at``, (k, ndim) m: they
-            end once time and gradient can be read there, and leave infinity elsewhere. ``accurate`` takes
+            end once time and gradient can be read there, and leave infinity elsewhere; rays need whole
+            fields. ``accurate`` takes
             ``supersample``: 2 or more solves on a grid that many times as fine.
 
     Returns:

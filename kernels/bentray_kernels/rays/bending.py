@@ -7,7 +7,8 @@ one; here all move at once) takes the ray to the stationary path, and needs the 
 
 A path p_0 … p_m has the time F = Σ ½(s_k + s_k+1)·|p_k+1 − p_k|. Each inner point moves in the plane normal
 to the path, so that points cannot bunch where the quadrature likes them. The Hessian couples neighbours
-only: one factorisation of a block tridiagonal matrix a step. Lengths are in nodes and times are slowness
+only: one factorisation of a block tridiagonal matrix a step. Terms that mix the slope of the slowness at
+one point with the shift of another are left out. Lengths are in nodes and times are slowness
 times nodes.
 """
 
@@ -100,7 +101,7 @@ def bend(path: Floats, count: int, spline: Floats, shape: tuple[int, ...], at: B
 
     Args:
         path: (room, ndim); the first and the last of its ``count`` points stay.
-        spline: ``splines.coefficients`` of the slowness.
+        spline: ``splines.coefficients`` of the logarithm of the slowness, which no overshoot makes negative.
         shape: of the grid.
         at: from ``bending``.
     """
@@ -113,6 +114,8 @@ def bend(path: Floats, count: int, spline: Floats, shape: tuple[int, ...], at: B
         if promise < 0.0:
             promise = _factorise(count, shape, False, at)
         if promise <= PROMISE * time:
+            # A path folded back on itself has not even a positive tension; it stays as it is.
+            promise = max(promise, 0.0)
             break
         _shift(path, count, shape, at)
         part = 1.0
@@ -128,6 +131,7 @@ def bend(path: Floats, count: int, spline: Floats, shape: tuple[int, ...], at: B
             for k in range(1, count - 1):
                 for a in range(axes):
                     path[k, a] = at.kept[k, a]
+            time = _expand(path, count, spline, shape, at)
             break
         time = after
     # What is left to gain is below the tolerance and known to its square.
@@ -159,19 +163,26 @@ def _expand(path: Floats, count: int, spline: Floats, shape: tuple[int, ...], at
     axes = len(shape)
     for k in range(count):
         if axes == 2:
-            v, gx, gy, xx, xy, yy = jet_2d(spline, path[k, 0], path[k, 1])
-            at.slowness[k] = v
+            u, gx, gy, xx, xy, yy = jet_2d(spline, path[k, 0], path[k, 1])
+            at.slowness[k] = math.exp(u)
             at.slope[k, 0], at.slope[k, 1] = gx, gy
             at.second[k, 0, 0], at.second[k, 0, 1] = xx, xy
             at.second[k, 1, 0], at.second[k, 1, 1] = xy, yy
         else:
-            v, gx, gy, gz, xx, xy, xz, yy, yz, zz = jet_3d(spline, path[k, 0], path[k, 1], path[k, axes - 1])
+            u, gx, gy, gz, xx, xy, xz, yy, yz, zz = jet_3d(spline, path[k, 0], path[k, 1], path[k, axes - 1])
             last = axes - 1
-            at.slowness[k] = v
+            at.slowness[k] = math.exp(u)
             at.slope[k, 0], at.slope[k, 1], at.slope[k, last] = gx, gy, gz
             at.second[k, 0, 0], at.second[k, 0, 1], at.second[k, 0, last] = xx, xy, xz
             at.second[k, 1, 0], at.second[k, 1, 1], at.second[k, 1, last] = xy, yy, yz
             at.second[k, last, 0], at.second[k, last, 1], at.second[k, last, last] = xz, yz, zz
+        # From the logarithm u: ∇s = s·∇u and ∇∇s = s·(∇∇u + ∇u·∇uᵀ).
+        for a in range(axes):
+            for b in range(axes):
+                at.second[k, a, b] += at.slope[k, a] * at.slope[k, b]
+                at.second[k, a, b] *= at.slowness[k]
+        for a in range(axes):
+            at.slope[k, a] *= at.slowness[k]
     time = 0.0
     for k in range(count - 1):
         square = 0.0
@@ -240,6 +251,8 @@ def _factorise(count: int, shape: tuple[int, ...], curved: bool, at: Bending) ->
         half = 0.5 * (length_before + length_after)
         tension = before + after
         d00 = d01 = d11 = g0 = g1 = 0.0
+        mixed_before = before
+        mixed_after = after
         for i in range(normals):
             slope = along_before = along_after = 0.0
             for a in range(axes):
@@ -250,6 +263,8 @@ def _factorise(count: int, shape: tuple[int, ...], curved: bool, at: Bending) ->
             gradient = half * slope + before * along_before - after * along_after
             cos_before = along_before / max(length_before, SHORTEST)
             cos_after = along_after / max(length_after, SHORTEST)
+            mixed_before *= cos_before
+            mixed_after *= cos_after
             bend_ii = 0.0
             for a in range(axes):
                 for b in range(axes):
@@ -265,6 +280,7 @@ def _factorise(count: int, shape: tuple[int, ...], curved: bool, at: Bending) ->
             else:
                 g1, d11 = gradient, d_ii
         if normals == 2:
+            d01 -= mixed_before + mixed_after
             for a in range(axes):
                 for b in range(axes):
                     d01 += medium * half * at.normal[k, 0, a] * at.second[k, a, b] * at.normal[k, 1, b]
@@ -364,34 +380,35 @@ def _fourth_order(count: int, shape: tuple[int, ...], at: Bending) -> float:
     slowness along the path.
     """
     axes = len(shape)
+    last = count - 1
     more = 0.0
-    slope_before, turn_before = 0.0, 0.0
+    slope_before, curvature_before = 0.0, 0.0
     for k in range(count):
-        # Tangent: along both pieces at a point between them, and half a turn back or on at either end.
-        first, second = max(k - 1, 0), min(k, count - 2)
+        # The pieces whose directions give the tangent: those that meet here, at an end the two nearest.
+        first, second = max(min(k, last - 1) - 1, 0), min(max(k, 1), last - 1)
+        length_first, length_second = max(at.length[first], SHORTEST), max(at.length[second], SHORTEST)
+        # Of a circle through them; beyond 0 and 1 at the ends, where it is extrapolated.
+        share = length_first / (length_first + length_second)
         if k == 0:
-            second = min(1, count - 2)
-        elif k == count - 1:
-            first = max(count - 3, 0)
+            share = -share
+        elif k == last:
+            share = 2.0 - length_first / (length_first + length_second)
         slope = dot = square = 0.0
         for a in range(axes):
-            u = at.vector[first, a] / max(at.length[first], SHORTEST)
-            v = at.vector[second, a] / max(at.length[second], SHORTEST)
+            u = at.vector[first, a] / length_first
+            v = at.vector[second, a] / length_second
             dot += u * v
-            tangent = u + v
-            if k == 0:
-                tangent = 3.0 * u - v
-            elif k == count - 1:
-                tangent = 3.0 * v - u
+            tangent = (1.0 - share) * u + share * v
             square += tangent * tangent
             slope += at.slope[k, a] * tangent
         slope /= math.sqrt(max(square, SHORTEST))
         # 2 − 2·cos θ = θ² for small turns.
-        turn = math.sqrt(max(2.0 - 2.0 * dot, 0.0)) if 0 < k < count - 1 else 0.0
+        turn = math.sqrt(max(2.0 - 2.0 * dot, 0.0))
+        curvature = 2.0 * turn / (length_first + length_second)
         if k > 0:
             length = at.length[k - 1]
-            angle = 0.5 * (turn_before + turn) if 1 < k < count - 1 else turn_before + turn
+            angle = 0.5 * length * (curvature_before + curvature)
             more += at.tension[k - 1] * length * length * angle * angle / 24.0
             more -= length * length / 12.0 * (slope - slope_before)
-        slope_before, turn_before = slope, turn
+        slope_before, curvature_before = slope, curvature
     return more

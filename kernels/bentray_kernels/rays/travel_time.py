@@ -20,8 +20,10 @@ def travel_times(
     """Travel times to receivers, several times as accurate as those of the grid that guides the rays.
 
     Each ray is traced down ``tof`` as by ``trace`` and then bent until its time is stationary (Fermat), in
-    the cubic spline through the slowness. The error of ``tof`` counts only in that it must lead each ray
-    to the right valley; what remains is that of the spline: fourth order where the medium is smooth.
+    the cubic spline through the logarithm of the slowness. The error of ``tof`` counts only in that it must
+    lead each ray to the right valley. Where the medium is smooth the error falls with about the third to
+    fourth power of the spacing; rays near the rim, where the spline is mirrored, keep the second. From node
+    to node by factors of four and more, no spline is a good guess at the medium, and no better time is given.
 
     Args:
         tof: (nx, ny[, nz]), s, as ``eikonal.solve`` gives it for ``source``.
@@ -51,7 +53,7 @@ def travel_times(
         fan.gradient,
         fan.shape,
         fan.strides,
-        coefficients(1.0 / speeds),
+        coefficients(-np.log(speeds)),
         fan.room,
     )
     return np.asarray(times * spacing)

@@ -99,7 +99,10 @@ def look(problem: SliceProblem, settings: Settings, slowness: Floats, sweep: int
 def step(
     problem: SliceProblem, settings: Settings, state: Iterate, parts: Sequence[Rows], slice_index: int = 0
 ) -> Iterate:
-    """The next image from the rows of all emitters, in their order.
+    """The next image from the rows of all emitters, in their order; at the end, the best of those measured.
+
+    ``settings.sweeps`` passes make one image less, for the last one measures; a single pass makes one too,
+    which nothing measures.
 
     The strength of the total variation follows the misfit: strong while rays are still wrong, so that their
     errors do not become structure, and in the end as weak as the data are exact.
@@ -110,9 +113,10 @@ def step(
     record = Sweep(slice_index, len(state.history) + 1, rms, heard)
     history = (*state.history, record)
     best = (state.slowness, rms) if rms < state.best[1] else state.best
-    # The first misfit is that of straight rays, which does not compare.
-    stuck = len(history) > 2 and rms > LEAST_GAIN * state.best[1]
-    if stuck or (len(history) > 1 and rms <= settings.stop_rms_s):
+    stuck = len(history) > 1 and rms > LEAST_GAIN * state.best[1]
+    # The last pass only measures what the one before gave.
+    last = len(history) == settings.sweeps
+    if len(history) > 1 and (stuck or last or rms <= settings.stop_rms_s):
         return replace(state, slowness=best[0], best=best, history=history, done=True)
     lowest, highest = settings.speed_bounds_mps
     coverage = _coverage(problem, parts)
@@ -129,7 +133,7 @@ def step(
         dual,
         coverage,
         best,
-        len(history) >= settings.sweeps,
+        settings.sweeps == 1,
         history,
     )
 

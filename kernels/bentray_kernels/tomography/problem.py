@@ -20,7 +20,7 @@ RIM_NODES = 2
 
 @dataclass(frozen=True)
 class SliceProblem:
-    """What SART needs of a slice, once.
+    """What a reconstruction needs of a slice, once.
 
     Attributes:
         emitters: (ntx, 2), m, node 0 at 0; receivers: (nrx, 2), as well.

@@ -17,8 +17,8 @@ class Sweep:
     Attributes:
         slice: axial index, from 0.
         sweep: number of the pass, from 1.
-        residual_rms_s: root mean square of measured minus predicted differential travel time, s; read as
-            the pass met each emitter, before that emitter's own update.
+        residual_rms_s: root mean square of measured minus predicted travel time, s, before the update: of
+            each emitter as the pass met it (SART), of all at once (Gauss–Newton).
         emitters: how many emitters had data.
     """
 
@@ -43,7 +43,7 @@ class Reconstruction:
 
     Attributes:
         speed: (nx, ny), or (nx, ny, nz) for several slices, m/s.
-        coverage: as ``speed``: metres of ray seen by each node in the last sweep.
+        coverage: as ``speed``: metres of ray through each node in the last sweep that changed the image.
         attenuation: as ``speed``, Np/m, or None.
         spacing_m: node spacing (x, y[, z]), m; z is NaN when the slices are not evenly spaced.
         origin_m: position of node 0 (x, y[, z]), m.

@@ -25,8 +25,8 @@ class Settings:
             rays and total variation.
         rays: ``curved`` traces down the travel time of the current image; ``straight`` ignores refraction.
         eikonal: the wave-front method for curved rays; see ``bentray_kernels.eikonal.methods()``.
-        speed_update: ``fixed`` propagates in the reconstructed speed as it is (chapter 6, equation 5);
-            ``data-driven`` stretches it to ``speed_range_mps`` first (equation 6).
+        speed_update: for SART; ``fixed`` propagates in the reconstructed speed as it is (chapter 6,
+            equation 5); ``data-driven`` stretches it to ``speed_range_mps`` first (equation 6).
         speed_range_mps: (lowest, highest) speed known to be in the object, m/s; for ``data-driven``.
         speed_bounds_mps: (lowest, highest) speed a node may take, m/s.
         nodes: nodes along each side of the square image.
@@ -35,11 +35,12 @@ class Settings:
         relaxation: the λ of SART (chapter 6, equation 1), in (0, 2).
         smoothing_nodes: standard deviation, nodes, of the Gaussian applied to each emitter's update of SART;
             0: none.
-        edge_cost: strength of the total variation of ``gauss-newton`` over the rms misfit; 0: none.
+        edge_cost: strength of the total variation of ``gauss-newton`` and of the attenuation over the rms
+            misfit; 0: none.
         stop_rms_s: stop once the rms of the receiver misfit is below this, s.
         reciprocity: use a missing pair's reverse (emitter and receiver exchanged) in its place.
         picker: how travel times are read where only traces were uploaded.
-        seed: seed of the random emitter order.
+        seed: seed of the random emitter order of SART.
         attenuation: reconstruct it too, where amplitudes were recorded.
 
     Raises:
@@ -75,7 +76,9 @@ class Settings:
         _speeds("speed_bounds_mps", self.speed_bounds_mps)
         if self.speed_range_mps is not None:
             _speeds("speed_range_mps", self.speed_range_mps)
-        elif self.speed_update == "data-driven":
+        if self.method == "gauss-newton" and self.speed_update != "fixed":
+            raise InvalidInput("speed_update", repr(self.speed_update), "fixed, with method gauss-newton")
+        if self.speed_range_mps is None and self.speed_update == "data-driven":
             raise InvalidInput(
                 "speed_range_mps", None, "(lowest, highest) in m/s, since speed_update is data-driven"
             )
@@ -86,7 +89,7 @@ class Settings:
         if not 0.0 < self.relaxation < 2.0:
             raise InvalidInput("relaxation", self.relaxation, "a number between 0 and 2")
         _within("smoothing_nodes", self.smoothing_nodes, 0.0, 32.0)
-        _within("edge_cost", self.edge_cost, 0.0, 100.0)
+        _within("edge_cost", self.edge_cost, 0.0, 10.0)
         _within("stop_rms_s", self.stop_rms_s, 0.0, 1.0)
         _within("seed", self.seed, 0, 2**63 - 1)
 

@@ -15,7 +15,9 @@ from .matrix import back_project, normal_product
 # 0.3 to 1 converge alike; 0.1 and 3 need twice the rounds.
 PENALTY = 0.75
 
-# Rounds of splitting, and conjugate gradient steps in each, which begin at the last round's image.
+# Rounds of splitting, and conjugate gradient steps in each, which begin at the last round's image. They do
+# not reach the minimum; the next iteration goes on from the dual variable. A strength above every slope of
+# the image acts like one as large as the slopes.
 ROUNDS = 12
 STEPS = 6
 
@@ -41,7 +43,7 @@ class Linearised:
     strength: float
 
     def solve(self, dual: Floats) -> tuple[Floats, Floats]:
-        """The image that minimises it, and the dual variable that a later, similar problem may begin with.
+        """An image nearer its minimum, and the dual variable that a later, similar problem goes on from.
 
         The alternating direction method of multipliers (Boyd et al. 2011, section 6.4.1): a quadratic
         problem by conjugate gradients, then every gradient shrunk by itself. Bounds are kept by clipping.
@@ -49,6 +51,8 @@ class Linearised:
         Args:
             dual: (2, n, n), s; zeros at first.
         """
+        if not self.density > 0.0:
+            return self.image, dual
         image = self.image.copy()
         downhill = self._downhill()
         # Without edges to cost anything, there is nothing to split.

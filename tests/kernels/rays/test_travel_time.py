@@ -89,6 +89,22 @@ def test_a_poor_guide_leads_to_the_same_ray(seed):
     assert np.allclose(*guided, rtol=3e-6, atol=1e-12)
 
 
+@pytest.mark.parametrize("flat", [True, False])
+def test_blocks_of_twice_the_speed_leave_no_ray_behind(flat):
+    """Random blocks, as hard as bending can take: no time is far from that of the grid."""
+    rng = np.random.default_rng(4)
+    shape = (40, 40) if flat else (18, 18, 18)
+    last = np.array(shape) - 1.0
+    for _ in range(6 if flat else 3):
+        speed = rng.choice([1500.0, 3000.0], shape)
+        source, receivers = 0.1 * last, last * rng.uniform(0.3, 1.0, (80, len(shape)))
+        tof = eikonal.solve(speed, 1.0, source)
+        ratio = rays.travel_times(tof, speed, 1.0, np.rint(receivers), source)
+        ratio /= tof[tuple(np.rint(receivers).astype(int).T)]
+        assert ratio.min() > 0.7
+        assert ratio.max() < 1.1
+
+
 def test_reciprocal_to_the_tolerance():
     x = np.linspace(0.0, 1.0, 80)
     speed = 1500.0 + 60.0 * np.exp(-((x[:, None] - 0.5) ** 2 + (x[None, :] - 0.45) ** 2) / 0.02)

@@ -62,6 +62,27 @@ def test_a_growing_misfit_ends_with_the_best_image():
     assert [sweep.residual_rms_s for sweep in states[-1].history] == [4e-7, 2e-7, 3e-7]
 
 
+def test_the_last_pass_measures_and_the_best_image_is_given():
+    of = problem(np.zeros((8, 8)))
+    plan = replace(PLAN, sweeps=3)
+    states = [gauss_newton.begin(of)]
+    for misfit in (4e-7, 2e-7, 1e-7):
+        states.append(gauss_newton.step(of, plan, states[-1], [rows(misfit)]))
+    assert [state.done for state in states] == [False, False, False, True]
+    assert np.array_equal(states[-1].slowness, states[2].slowness)
+    assert states[-1].best[1] == 1e-7
+    once = gauss_newton.step(of, replace(PLAN, sweeps=1), states[0], [rows(4e-7)])
+    assert once.done
+    assert not np.array_equal(once.slowness, states[0].slowness)
+
+
+def test_no_ray_through_the_image_leaves_water():
+    of = problem(np.zeros((8, 8)))
+    outside = Rows(np.array([0, 1]), np.array([0], np.int32), np.ones(1, np.float32), np.array([1e-7]), 1)
+    state = gauss_newton.step(of, PLAN, gauss_newton.begin(of), [outside])
+    assert np.allclose(state.slowness, 1.0 / WATER)
+
+
 def test_nothing_gained_ends_too():
     of = problem(np.zeros((8, 8)))
     state = gauss_newton.begin(of)

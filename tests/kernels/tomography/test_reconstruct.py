@@ -141,6 +141,12 @@ def test_progress_rises_to_the_end(scan, method):
         ({"nodes": 4}, "nodes"),
         ({"sweeps": 0}, "sweeps"),
         ({"speed_update": "data-driven"}, "speed_range_mps"),
+        (
+            {"speed_update": "data-driven", "speed_range_mps": (1400.0, 1600.0), "method": "gauss-newton"},
+            "speed_update",
+        ),
+        ({"method": "guess"}, "method"),
+        ({"edge_cost": -1.0}, "edge_cost"),
         ({"speed_bounds_mps": (1600.0, 1500.0)}, "speed_bounds_mps"),
         ({"speed_bounds_mps": (1e-300, 1e300)}, "speed_bounds_mps"),
         ({"speed_bounds_mps": (1400.0, 1800.0)}, "speed_bounds_mps"),

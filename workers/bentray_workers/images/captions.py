@@ -39,7 +39,11 @@ def facts(result: Reconstruction) -> str:
     ]
     if result.history:
         last = max(s.sweep for s in result.history)
-        rms = math.sqrt(np.mean([s.residual_rms_s**2 for s in result.history if s.sweep == last]))
+        # Of each slice its least: Gauss–Newton gives the image that it belongs to.
+        least: dict[int, float] = {}
+        for sweep in result.history:
+            least[sweep.slice] = min(sweep.residual_rms_s, least.get(sweep.slice, math.inf))
+        rms = math.sqrt(np.mean(np.square(list(least.values()))))
         found.insert(2, f"{last} sweep{'s' if last != 1 else ''}")
         found.append(f"residual {1e9 * rms:.0f} ns")
     return "  ·  ".join(found)
