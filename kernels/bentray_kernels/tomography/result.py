@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -62,3 +63,19 @@ class Reconstruction:
     history: tuple[Sweep, ...] = ()
     attenuation: NDArray[np.float64] | None = None
     provenance: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def residual_rms_s(self) -> float | None:
+        """Root mean square of the misfit over all slices, s; None without a history.
+
+        Of each slice that of its last sweep, or with Gauss–Newton, which gives the best image that it
+        measured, its least.
+        """
+        of_slice: dict[int, float] = {}
+        for sweep in self.history:
+            known = of_slice.get(sweep.slice, math.inf)
+            least = self.settings.method == "gauss-newton" and known < sweep.residual_rms_s
+            of_slice[sweep.slice] = known if least else sweep.residual_rms_s
+        if not of_slice:
+            return None
+        return math.sqrt(sum(rms**2 for rms in of_slice.values()) / len(of_slice))

@@ -23,7 +23,6 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
     Returns:
         Settings, residual history, speed range, time and provenance; ``truth`` is None without a truth.
     """
-    last = [sweep for sweep in result.history if sweep.sweep == max(s.sweep for s in result.history)]
     return {
         "seconds": round(seconds, 3),
         "slices": dataset.slices,
@@ -32,7 +31,7 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         "origin_m": list(result.origin_m),
         "water_speed_mps": result.water_speed_mps,
         "speed_range_mps": [float(result.speed.min()), float(result.speed.max())],
-        "residual_rms_s": float(np.sqrt(np.mean([s.residual_rms_s**2 for s in last]))) if last else None,
+        "residual_rms_s": result.residual_rms_s,
         "history": [
             {"slice": s.slice, "sweep": s.sweep, "residual_rms_s": s.residual_rms_s, "emitters": s.emitters}
             for s in result.history
@@ -65,12 +64,13 @@ def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
     low, high = found["speed_range_mps"]
     rows = [
         ("rays", found["settings"]["rays"]),
+        ("method", found["settings"]["method"]),
         ("image", " by ".join(map(str, found["shape"])) + f" nodes of {found['spacing_m'][0] * 1e3:.3g} mm"),
         ("speed", f"{low:.0f} to {high:.0f} m/s"),
         ("time", f"{found['seconds']:.1f} s"),
     ]
     if found["residual_rms_s"] is not None:
-        rows.insert(3, ("residual, last sweep", f"{found['residual_rms_s'] * 1e9:.0f} ns rms"))
+        rows.insert(4, ("residual", f"{found['residual_rms_s'] * 1e9:.0f} ns rms"))
     truth = found["truth"]
     if truth is not None:
         if truth.get("mean_absolute_error_of_range") is not None:

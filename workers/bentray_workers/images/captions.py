@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from bentray_kernels.tomography import Reconstruction
 
 LABELS = {
@@ -37,13 +35,8 @@ def facts(result: Reconstruction) -> str:
         f"{size} nodes of {1e3 * result.spacing_m[0]:.2g} mm",
         f"water {result.water_speed_mps:.1f} m/s",
     ]
-    if result.history:
+    if result.residual_rms_s is not None:
         last = max(s.sweep for s in result.history)
-        # Of each slice its least: Gauss–Newton gives the image that it belongs to.
-        least: dict[int, float] = {}
-        for sweep in result.history:
-            least[sweep.slice] = min(sweep.residual_rms_s, least.get(sweep.slice, math.inf))
-        rms = math.sqrt(np.mean(np.square(list(least.values()))))
         found.insert(2, f"{last} sweep{'s' if last != 1 else ''}")
-        found.append(f"residual {1e9 * rms:.0f} ns")
+        found.append(f"residual {1e9 * result.residual_rms_s:.0f} ns")
     return "  ·  ".join(found)

@@ -1,0 +1,21 @@
+"""The residual of a result: that of the image it holds."""
+
+import numpy as np
+import pytest
+
+from bentray_kernels.tomography import Reconstruction, Settings, Sweep
+
+
+@pytest.mark.parametrize(("method", "first"), [("sart", 3e-7), ("gauss-newton", 2e-7)])
+def test_residual_of_slices_that_ended_at_different_sweeps(method, first):
+    history = (Sweep(0, 1, 4e-7, 8), Sweep(1, 1, 1e-7, 8), Sweep(0, 2, 2e-7, 8), Sweep(0, 3, 3e-7, 8))
+    image = np.full((4, 4), 1500.0)
+    result = Reconstruction(
+        image, image, (1e-3, 1e-3), (0.0, 0.0), 1500.0, Settings(method=method), history=history
+    )
+    assert result.residual_rms_s == pytest.approx(np.sqrt((first**2 + 1e-14) / 2))
+
+
+def test_no_history_no_residual():
+    image = np.full((4, 4), 1500.0)
+    assert Reconstruction(image, image, (1e-3, 1e-3), (0.0, 0.0), 1500.0, Settings()).residual_rms_s is None
