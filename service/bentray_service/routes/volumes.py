@@ -40,7 +40,10 @@ def slice_png(
     volume_id: str,
     service: Service,
     index: Annotated[int | None, Query(ge=0, description="Axial index; the middle slice without it.")] = None,
-    quantity: Annotated[Literal["speed", "coverage"], Query(description="What to show.")] = "speed",
+    quantity: Annotated[
+        Literal["speed", "coverage", "attenuation"],
+        Query(description="What to show; attenuation where the scan had amplitudes."),
+    ] = "speed",
     low: Annotated[float | None, Query(description="Value of the darkest colour; m/s for speed.")] = None,
     high: Annotated[float | None, Query(description="Value of the brightest colour.")] = None,
     colormap: Annotated[
