@@ -237,8 +237,8 @@ def _normals(k: int, axes: int, at: Bending) -> None:
 def _factorise(count: int, shape: tuple[int, ...], curved: bool, at: Bending) -> float:
     """Forward elimination of the Hessian H and the gradient g; returns ½·gᵀH⁻¹g, or −1 for an H not positive.
 
-    Without ``curved`` the medium's part of H is left out, and what remains is the path's tension, which is
-    always positive.
+    Without ``curved`` the medium's part of H is left out. What remains is the path's tension, which is
+    positive for every path that does not fold back on itself.
     """
     medium = 1.0 if curved else 0.0
     axes = len(shape)

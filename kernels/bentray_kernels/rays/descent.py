@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 
-# Length of a step, nodes: the error of RK2 is then still below that of the interpolation.
+# Length of a step, nodes. Half of it gives the same error on Table 6, 3.7 %, in more time.
 STEP = 1.0
 
 # Parts of a step that are read for themselves: longer ones would pass nodes by.
