@@ -9,8 +9,10 @@ linear and vanishes at the source alone, where ∇T would jump from one side to 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
@@ -252,3 +254,31 @@ def walk(
                     lengths[entries] = weight * length
                     entries += 1
     return entries
+
+
+@kernel(inline="always")
+def merge(
+    nodes: Ints,
+    weights: Floats,
+    entries: int,
+    total: Floats,
+    columns: NDArray[Any],
+    lengths: NDArray[Any],
+    filled: int,
+) -> int:
+    """Add what ``walk`` found to a sparse row, each node once; returns how far the row's arrays are filled.
+
+    Args:
+        total: zeros, one a node; zeros again afterwards.
+        columns, lengths: of the rows so far, integers and reals of any width, with room for ``entries`` more.
+    """
+    start = filled
+    for k in range(entries):
+        if total[nodes[k]] == 0.0 and weights[k] > 0.0:
+            columns[filled] = nodes[k]
+            filled += 1
+        total[nodes[k]] += weights[k]
+    for k in range(start, filled):
+        lengths[k] = total[columns[k]]
+        total[columns[k]] = 0.0
+    return filled

@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
-from .descent import PARTS, STEP, curved_ray, straight_ray, walk
+from .descent import PARTS, STEP, curved_ray, merge, straight_ray, walk
 from .fan import Fan, Kind
 
 
@@ -69,14 +69,6 @@ def _rows(
             columns = np.concatenate((columns, np.empty(capacity, np.int64)))
             values = np.concatenate((values, np.empty(capacity)))
             capacity *= 2
-        start = filled
-        for k in range(entries):
-            if total[nodes[k]] == 0.0 and lengths[k] > 0.0:
-                columns[filled] = nodes[k]
-                filled += 1
-            total[nodes[k]] += lengths[k]
-        for k in range(start, filled):
-            values[k] = total[columns[k]]
-            total[columns[k]] = 0.0
+        filled = merge(nodes, lengths, entries, total, columns, values, filled)
         pointers[row + 1] = filled
     return pointers, columns[:filled], values[:filled]

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats
 from ..compiled import kernel
+from ..eikonal.problem import Medium
 from ..errors import InvalidInput
 from ..splines import coefficients
 from .bending import STRIDE, bend, bending
@@ -39,13 +40,9 @@ def travel_times(
         InvalidInput: as ``trace``, and for speeds that are not of the shape of ``tof``, finite and > 0.
     """
     fan = Fan.checked(tof, spacing, receivers, source, "curved")
-    speeds = np.asarray(speed, dtype=np.float64)
-    if speeds.shape != fan.shape:
-        raise InvalidInput("speed", f"shape {speeds.shape}", f"the shape of tof, {fan.shape}")
-    bad = ~(np.isfinite(speeds) & (speeds > 0.0))
-    if bad.any():
-        place = tuple(int(i) for i in np.argwhere(bad)[0])
-        raise InvalidInput("speed", f"{speeds[place]:g} at node {place}", "finite speeds > 0 m/s")
+    if np.shape(speed) != fan.shape:
+        raise InvalidInput("speed", f"shape {np.shape(speed)}", f"the shape of tof, {fan.shape}")
+    medium = Medium.checked(speed, spacing)
     times = _bent_times(
         fan.receivers,
         fan.source,
@@ -53,7 +50,7 @@ def travel_times(
         fan.gradient,
         fan.shape,
         fan.strides,
-        coefficients(-np.log(speeds)),
+        coefficients(np.log(medium.slowness)),
         fan.room,
     )
     return np.asarray(times * spacing)

@@ -13,7 +13,7 @@ from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..eikonal import solve
 from ..rays.bending import STRIDE, bend, bending
-from ..rays.descent import PARTS, curved_ray, straight_ray, walk
+from ..rays.descent import PARTS, curved_ray, merge, straight_ray, walk
 from ..rays.fan import Fan, Kind
 from ..splines import coefficients
 from .problem import SliceProblem
@@ -168,13 +168,6 @@ def _rows(
             lengths = np.concatenate((lengths, np.empty(capacity, np.float32)))
             capacity *= 2
         start = filled
-        for k in range(entries):
-            if total[nodes[k]] == 0.0 and weights[k] > 0.0:
-                columns[filled] = nodes[k]
-                filled += 1
-            total[nodes[k]] += weights[k]
-        for k in range(start, filled):
-            lengths[k] = total[columns[k]]
-            total[columns[k]] = 0.0
+        filled = merge(nodes, weights, entries, total, columns, lengths, filled)
         counts[row] = filled - start
     return counts, columns[:filled].copy(), lengths[:filled].copy(), predicted
