@@ -99,7 +99,7 @@ def _weights(problem: PointSource, points: Floats, values: Floats) -> Floats:
 def _flow_back(
     latest_first: Ints, time: Floats, strides: tuple[int, ...], spacing: float, flow: Floats, seeds: Ints
 ) -> Floats:
-    """Let ``flow`` run, in place, from each node to its earlier neighbours; returns flow times crossing, m."""
+    """Let ``flow`` run, in place, from nodes to their earlier neighbours; returns flow times crossing, m."""
     crossed = np.zeros(time.size)
     seed = np.zeros(time.size, np.bool_)
     for node in seeds:
