@@ -40,9 +40,6 @@ def travel_times(
         InvalidInput: as ``trace``, and for speeds that are not of the shape of ``tof``, finite and > 0.
     """
     fan = Fan.checked(tof, spacing, receivers, source, "curved")
-    if np.shape(speed) != fan.shape:
-        raise InvalidInput("speed", f"shape {np.shape(speed)}", f"the shape of tof, {fan.shape}")
-    medium = Medium.checked(speed, spacing)
     times = _bent_times(
         fan.receivers,
         fan.source,
@@ -50,10 +47,21 @@ def travel_times(
         fan.gradient,
         fan.shape,
         fan.strides,
-        coefficients(np.log(medium.slowness)),
+        log_slowness(fan, speed, spacing),
         fan.room,
     )
     return np.asarray(times * spacing)
+
+
+def log_slowness(fan: Fan, speed: ArrayLike, spacing: float) -> Floats:
+    """Spline coefficients of the logarithm of the slowness that a fan's rays are bent in.
+
+    Raises:
+        InvalidInput: see ``travel_times``.
+    """
+    if np.shape(speed) != fan.shape:
+        raise InvalidInput("speed", f"shape {np.shape(speed)}", f"the shape of tof, {fan.shape}")
+    return coefficients(np.log(Medium.checked(speed, spacing).slowness))
 
 
 @kernel

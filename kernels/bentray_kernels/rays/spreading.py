@@ -1,0 +1,229 @@
+"""Geometrical spreading along bent rays, and what it does to the amplitude (dynamic ray tracing).
+
+A narrow tube of rays leaves the source; dx is how far a neighbour runs beside the ray, in a basis carried
+parallel along it. With Q = ∂dx/∂(take-off angles) and v the speed,
+
+    dQ/ds = v·P,  dP/ds = −v⁻²·V·Q,  Q = 0 and P = 1/v at the source,
+
+where V holds the second derivatives of v across the ray (V. Červený, Seismic Ray Theory, Cambridge 2001,
+section 4.1; the Jacobi equation of geodesics of the length ds/v). Q is a number in the plane and 2 × 2 in
+space, and |det Q| is the cross-section of the tube per unit of angle: r in homogeneous plane, r² in space.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats
+from ..compiled import kernel
+from ..splines.cubic import jet_2d, jet_3d
+from .bending import STRIDE, bend, bending
+from .descent import curved_ray
+from .fan import Fan
+from .travel_time import log_slowness
+
+# Parts of a piece of the path, which is STRIDE nodes long, each crossed by one leapfrog step.
+PARTS = 3
+
+
+def spreading(
+    tof: ArrayLike, speed: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike
+) -> Floats:
+    """Cross-section of the ray tube at each receiver over that in a homogeneous medium, |det Q|/r^(ndim−1).
+
+    Below 1 where rays focus, above where they spread. Between exchanged ends it differs by the factor
+    (v_receiver/v_source)^(ndim−1) (Snieder & Chapman, Geophys. J. Int. 132 (1998) 89–95).
+
+    Rays are those of ``travel_times``. Second derivatives of the speed decide, so a medium that jumps from
+    node to node must be smoothed first, over no less than two nodes and, against measured waves, over what
+    part of the Fresnel zone they average. A first arrival has passed no caustic (Jacobi's condition). Where
+    the path did, it is the wrong one, ray theory gives no amplitude, and the spreading is NaN.
+
+    Args:
+        tof: (nx, ny[, nz]), s, as ``eikonal.solve`` gives it for ``source``.
+        speed: as ``tof``, m/s.
+        spacing: node spacing, m.
+        receivers: (k, ndim), m, in the grid; node 0 lies at 0.
+        source: (ndim,), m.
+
+    Returns:
+        (k,), of no unit; 1 for a receiver on the source.
+
+    Raises:
+        InvalidInput: as ``travel_times``.
+    """
+    relative, _ = _followed(tof, speed, spacing, receivers, source)
+    return relative
+
+
+def log_amplitudes(
+    tof: ArrayLike, speed: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike
+) -> Floats:
+    """ln(A/A₀) of the pressure by refraction alone, −½·ln(spreading·v_source/v_receiver).
+
+    A₀ is the amplitude at the same distance in a homogeneous medium of the source's speed. At constant
+    density A²·|det Q|/v is the same all along a tube (the transport equation ∇·(A²∇T) = 0), and near a point
+    source of given strength A² is v/(8πωr) in the plane and 1/(4πr)² in space, so that the ratio is the
+    same for both. It is reciprocal but for A₀. Where both ends lie in water, −½·ln(spreading) is all.
+
+    Args:
+        tof, speed, spacing, receivers, source: as ``spreading``.
+
+    Returns:
+        (k,), Np, above 0 where rays focus; NaN where ``spreading`` is.
+
+    Raises:
+        InvalidInput: as ``travel_times``.
+    """
+    relative, ends = _followed(tof, speed, spacing, receivers, source)
+    return np.asarray(-0.5 * np.log(relative * ends))
+
+
+def _followed(
+    tof: ArrayLike, speed: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike
+) -> tuple[Floats, Floats]:
+    """Relative spreading, and speed at the source over that at the receiver."""
+    fan = Fan.checked(tof, spacing, receivers, source, "curved")
+    return _tubes(
+        fan.receivers,
+        fan.source,
+        fan.tof,
+        fan.gradient,
+        fan.shape,
+        fan.strides,
+        log_slowness(fan, speed, spacing),
+        fan.room,
+    )
+
+
+@kernel
+def _tubes(
+    receivers: Floats,
+    source: Floats,
+    tof: Floats,
+    gradient: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    spline: Floats,
+    room: int,
+) -> tuple[Floats, Floats]:
+    axes = len(shape)
+    path = np.empty((room, axes))
+    scratch = np.empty((3, axes))
+    space = bending(room, shape)
+    relative = np.ones(len(receivers))
+    ends = np.ones(len(receivers))
+    for k in range(len(receivers)):
+        square = 0.0
+        for a in range(axes):
+            square += (receivers[k, a] - source[a]) ** 2
+        if square == 0.0:
+            continue
+        count = curved_ray(receivers[k], source, tof, gradient, shape, strides, STRIDE, path, scratch)
+        _, count = bend(path, count, spline, shape, space)
+        start = space.slowness[count - 1]
+        ends[k] = space.slowness[0] / start
+        if axes == 2:
+            relative[k] = _width(path, count, start, spline) / math.sqrt(square)
+        else:
+            relative[k] = _area(path, count, start, spline) / square
+    return relative, ends
+
+
+@kernel(inline="always")
+def _width(path: Floats, count: int, start: float, spline: Floats) -> float:
+    """q at ``path[0]``, nodes, of a tube from the path's last point; NaN beyond a caustic.
+
+    Args:
+        start: slowness at the source, in the unit of the spline.
+    """
+    q, p = 0.0, start
+    for k in range(count - 1, 0, -1):
+        dx, dy = path[k - 1, 0] - path[k, 0], path[k - 1, 1] - path[k, 1]
+        length = math.sqrt(dx * dx + dy * dy)
+        if length == 0.0:
+            continue
+        nx, ny = -dy / length, dx / length
+        for part in range(PARTS):
+            along = (part + 0.5) / PARTS
+            u, gx, gy, xx, xy, yy = jet_2d(spline, path[k, 0] + along * dx, path[k, 1] + along * dy)
+            slowness = math.exp(u)
+            across = gx * nx + gy * ny
+            # A ray's curvature is the slope of u across it. The arc is longer than the chord.
+            step = (length + length**3 * across * across / 24.0) / PARTS
+            # From v = exp(−u): V = v·(∂u·∂u − ∂∂u).
+            force = step * slowness * (across * across - xx * nx * nx - 2.0 * xy * nx * ny - yy * ny * ny)
+            half = 0.5 * step / slowness
+            q += half * p
+            p -= force * q
+            q += half * p
+            if not q > 0.0:
+                return np.nan
+    return q
+
+
+@kernel(inline="always")
+def _area(path: Floats, count: int, start: float, spline: Floats) -> float:
+    """As ``_width`` in space: det Q, nodes²."""
+    q00 = q01 = q10 = q11 = p01 = p10 = 0.0
+    p00 = p11 = start
+    det = 0.0
+    tx = ty = tz = ex = ey = ez = 0.0
+    for k in range(count - 1, 0, -1):
+        dx, dy, dz = path[k - 1, 0] - path[k, 0], path[k - 1, 1] - path[k, 1], path[k - 1, 2] - path[k, 2]
+        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        if length == 0.0:
+            continue
+        x, y, z = dx / length, dy / length, dz / length
+        if tx == ty == tz == 0.0:
+            ex, ey, ez = _across(x, y, z)
+        else:
+            # The least rotation that takes the old direction to the new one.
+            share = (ex * x + ey * y + ez * z) / (1.0 + tx * x + ty * y + tz * z)
+            ex, ey, ez = ex - share * (tx + x), ey - share * (ty + y), ez - share * (tz + z)
+        tx, ty, tz = x, y, z
+        fx, fy, fz = y * ez - z * ey, z * ex - x * ez, x * ey - y * ex
+        for part in range(PARTS):
+            along = (part + 0.5) / PARTS
+            u, gx, gy, gz, xx, xy, xz, yy, yz, zz = jet_3d(
+                spline, path[k, 0] + along * dx, path[k, 1] + along * dy, path[k, 2] + along * dz
+            )
+            slowness = math.exp(u)
+            across0, across1 = gx * ex + gy * ey + gz * ez, gx * fx + gy * fy + gz * fz
+            step = (length + length**3 * (across0 * across0 + across1 * across1) / 24.0) / PARTS
+            # ∂∂u times each vector of the basis.
+            hx, hy, hz = xx * ex + xy * ey + xz * ez, xy * ex + yy * ey + yz * ez, xz * ex + yz * ey + zz * ez
+            ix, iy, iz = xx * fx + xy * fy + xz * fz, xy * fx + yy * fy + yz * fz, xz * fx + yz * fy + zz * fz
+            force00 = step * slowness * (across0 * across0 - hx * ex - hy * ey - hz * ez)
+            force01 = step * slowness * (across0 * across1 - hx * fx - hy * fy - hz * fz)
+            force11 = step * slowness * (across1 * across1 - ix * fx - iy * fy - iz * fz)
+            half = 0.5 * step / slowness
+            a00, a01, a10, a11 = q00 + half * p00, q01 + half * p01, q10 + half * p10, q11 + half * p11
+            p00 -= force00 * a00 + force01 * a10
+            p01 -= force00 * a01 + force01 * a11
+            p10 -= force01 * a00 + force11 * a10
+            p11 -= force01 * a01 + force11 * a11
+            a00, a01, a10, a11 = a00 + half * p00, a01 + half * p01, a10 + half * p10, a11 + half * p11
+            det = a00 * a11 - a01 * a10
+            # Trace of (new Q)·(old Q)⁻¹ times the old determinant: below 0 where both widths changed sign.
+            both = a00 * q11 - a01 * q10 - a10 * q01 + a11 * q00
+            if not (det > 0.0 and both >= 0.0):
+                return np.nan
+            q00, q01, q10, q11 = a00, a01, a10, a11
+    return det
+
+
+@kernel(inline="always")
+def _across(x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A unit vector across another one."""
+    if abs(x) <= abs(y) and abs(x) <= abs(z):
+        u, v, w = 1.0 - x * x, -x * y, -x * z
+    elif abs(y) <= abs(z):
+        u, v, w = -x * y, 1.0 - y * y, -y * z
+    else:
+        u, v, w = -x * z, -y * z, 1.0 - z * z
+    scale = 1.0 / math.sqrt(u * u + v * v + w * w)
+    return u * scale, v * scale, w * scale
