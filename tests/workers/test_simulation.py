@@ -53,10 +53,10 @@ def test_noise_by_its_ratio_to_the_signal():
 
 
 def test_default_reconstruction_grid_is_the_grid_of_the_truth():
-    from bentray_kernels.tomography import Settings, SliceProblem
+    from bentray_kernels.tomography import Problem, Settings
 
     dataset = simulate(None, SMALL)
-    problem = SliceProblem.of(dataset, Settings(nodes=32))
+    problem = Problem.of(dataset, Settings(nodes=32))
     assert problem.origin == pytest.approx(dataset.truth.origin_m)
     assert problem.spacing == pytest.approx(dataset.truth.spacing_m[0])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography import Reconstruction, Settings, Sweep
+from bentray_kernels.tomography import RESIDUAL_EDGES_S, Reconstruction, Settings, Sweep, Trial
 
 from .dataset_writing import write_array
 from .hdf5_reading import Limits, Reader, opened
@@ -19,16 +19,28 @@ from .hdf5_writing import creating
 
 FORMAT = "bentray-reconstruction"
 VERSION = "1.0"
-HISTORY = {"slice": np.int64, "sweep": np.int64, "residual_rms_s": np.float64, "emitters": np.int64}
-IMAGES = {"speed": "speed_mps", "coverage": "coverage_m", "attenuation": "attenuation_np_m"}
+HISTORY = {
+    "slice": np.int64,
+    "sweep": np.int64,
+    "residual_rms_s": np.float64,
+    "emitters": np.int64,
+    "stage": np.int64,
+}
+IMAGES = {
+    "speed": "speed_mps",
+    "coverage": "coverage_m",
+    "attenuation": "attenuation_np_m",
+    "recovery": "recovery",
+}
 
 
 def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
     """Write a reconstruction; ``path`` is replaced whole or not touched.
 
-    The file holds ``speed_mps``, ``coverage_m`` and, where there is one, ``attenuation_np_m``, each (nx, ny)
-    or (nx, ny, nz); ``history`` with a column a field of ``Sweep``; and root attributes ``spacing_m``,
-    ``origin_m``, ``axes``, ``water_speed_mps``, ``settings`` and ``provenance``, the last two JSON.
+    The file holds ``speed_mps``, ``coverage_m`` and, where there are such, ``attenuation_np_m`` and
+    ``recovery``, each (nx, ny) or (nx, ny, nz); ``history`` with a column a field of ``Sweep``; ``residuals``
+    with ``count`` and the ``edge_s`` of its bins; and root attributes ``spacing_m``, ``origin_m``, ``axes``,
+    ``water_speed_mps``, ``settings``, ``trials`` and ``provenance``, the last three JSON.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
@@ -41,6 +53,7 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
         file.attrs["origin_m"] = reconstruction.origin_m
         file.attrs["water_speed_mps"] = reconstruction.water_speed_mps
         file.attrs["settings"] = json.dumps(reconstruction.settings.to_dict())
+        file.attrs["trials"] = json.dumps([asdict(trial) for trial in reconstruction.trials])
         file.attrs["provenance"] = json.dumps(reconstruction.provenance)
         for name, place in IMAGES.items():
             if getattr(reconstruction, name) is not None:
@@ -49,6 +62,10 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
         for column, dtype in HISTORY.items():
             rows = np.array([getattr(sweep, column) for sweep in reconstruction.history], dtype=dtype)
             write_array(history, column, rows)
+        if reconstruction.residuals is not None:
+            residuals = file.create_group("residuals")
+            write_array(residuals, "count", reconstruction.residuals)
+            write_array(residuals, "edge_s", RESIDUAL_EDGES_S)
 
 
 def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstruction:
@@ -63,21 +80,24 @@ def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstr
                 raise InvalidInput(f"@{name}", repr(found), f'"{expected}"')
         speed = _image(reader, "speed_mps", None)
         coverage = _image(reader, "coverage_m", speed.shape)
-        attenuation = (
-            _image(reader, "attenuation_np_m", speed.shape) if reader.has("attenuation_np_m") else None
-        )
+        extra = {
+            name: _image(reader, IMAGES[name], speed.shape) if reader.has(IMAGES[name]) else None
+            for name in ("attenuation", "recovery")
+        }
         water = reader.number("", "water_speed_mps", "m/s")
         if water is None:
             raise InvalidInput("@water_speed_mps", "nothing", "a speed in m/s")
         return Reconstruction(
             speed=speed,
             coverage=coverage,
-            attenuation=attenuation,
+            **extra,
             spacing_m=_per_axis(reader, "spacing_m", speed.ndim),
             origin_m=_per_axis(reader, "origin_m", speed.ndim),
             water_speed_mps=water,
             settings=_settings(_json(reader, "settings")),
             history=_history(reader),
+            residuals=_residuals(reader),
+            trials=_trials(reader),
             provenance={str(k): str(v) for k, v in _json(reader, "provenance").items()},
         )
 
@@ -111,6 +131,30 @@ def _history(reader: Reader) -> tuple[Sweep, ...]:
     if len({len(column) for column in columns.values()}) != 1:
         raise InvalidInput("history", "columns of different lengths", "columns of one length")
     return tuple(Sweep(*row) for row in zip(*(columns[f.name] for f in fields(Sweep)), strict=True))
+
+
+def _residuals(reader: Reader) -> NDArray[np.int64] | None:
+    if not reader.has("residuals/count"):
+        return None
+    accepted = f"{len(RESIDUAL_EDGES_S) - 1} counts"
+    found = reader.array("residuals/count", "i", accepted)
+    if found is None or found.shape != (len(RESIDUAL_EDGES_S) - 1,):
+        raise InvalidInput(
+            "residuals/count", "nothing" if found is None else f"shape {found.shape}", accepted
+        )
+    return np.asarray(found, dtype=np.int64)
+
+
+def _trials(reader: Reader) -> tuple[Trial, ...]:
+    try:
+        found = json.loads(reader.text("", "trials") or "[]")
+        return tuple(
+            Trial(dict(one["settings"]), float(one["held_out_rms_s"]), float(one["shown_rms_s"]))
+            for one in found
+        )
+    except (ValueError, TypeError, KeyError, RecursionError):
+        accepted = "a JSON list of trials by this version"
+        raise InvalidInput("@trials", repr((reader.text("", "trials") or "")[:60]), accepted) from None
 
 
 def _json(reader: Reader, name: str) -> dict[str, Any]:

@@ -1,10 +1,10 @@
-"""Slice-decomposed reconstruction: each slice is a chain of short tasks that a cluster shares."""
+"""Reconstruction on a cluster: each slice, or the volume, is a chain of short tasks."""
 
 from __future__ import annotations
 
 import tempfile
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -15,11 +15,12 @@ from bentray_kernels.tomography import Progress, Reconstruction, Settings
 from bentray_kernels.tomography import (
     reconstruct as reconstruct_here,
 )
-from bentray_kernels.tomography.reconstruction import assemble, begin, measure, problem_of
+from bentray_kernels.tomography.chains import Call, Chain
+from bentray_kernels.tomography.reconstruction import carried_out, measured
 
-from .chains import Call, Chain, Scan, chain
 from .dataset_file import read_dataset, write_dataset
 from .lanes import RECONSTRUCTION
+from .scan import FileScan
 
 # Tasks in flight for each worker: one at work and one ready.
 IN_FLIGHT = 2
@@ -61,7 +62,7 @@ def reconstruct(
         return _reconstruct_here(dataset_path, settings, on_progress, stop)
     with _folder(work_dir) as folder:
         path = _prepared(client, dataset_path, settings, Path(folder), stop)
-        return _drive(client, path, settings, on_progress, stop)
+        return _carried_out(client, path, settings, on_progress, stop)
 
 
 def _prepared(
@@ -87,39 +88,55 @@ def prepare(dataset_path: Path, settings: Settings, folder: Path) -> Path:
     return picked
 
 
-def _drive(
+def _carried_out(
     client: Client,
     path: Path,
     settings: Settings,
     on_progress: Callable[[Progress], None] | None,
     stop: Callable[[], bool] | None,
 ) -> Reconstruction:
-    scan = Scan(path, path.stat().st_mtime_ns, settings)
-    dataset = read_dataset(path, traces=False)
-    problems = [problem_of(dataset, settings, k) for k in range(dataset.slices)]
-    chains = [chain(scan, k, begin(settings, problem)) for k, problem in enumerate(problems)]
-    ready = deque((slice_chain, call) for slice_chain in chains for call in slice_chain.first())
+    stamp = path.stat().st_mtime_ns
+
+    def drive(chains: Sequence[Chain]) -> None:
+        _drive(client, chains, on_progress, stop)
+
+    return carried_out(
+        read_dataset(path, traces=False),
+        settings,
+        lambda plan, part: FileScan(path, stamp, plan, part),
+        drive,
+    )
+
+
+def _drive(
+    client: Client,
+    chains: Sequence[Chain],
+    on_progress: Callable[[Progress], None] | None,
+    stop: Callable[[], bool] | None,
+) -> None:
+    """Run chains to their end, a few calls at a time."""
+    ready = deque((chain, call) for chain in chains for call in chain.first())
     running: dict[Future, tuple[Chain, Call]] = {}
     window = IN_FLIGHT * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
     try:
         while ready or running:
             while ready and len(running) < window:
-                slice_chain, call = ready.popleft()
+                chain, call = ready.popleft()
                 future = client.submit(call.function, *call.arguments, resources=RECONSTRUCTION, pure=False)
-                running[future] = slice_chain, call
+                running[future] = chain, call
             for future in _finished(client, list(running)):
-                slice_chain, call = running.pop(future)
+                chain, call = running.pop(future)
+                failed = future.status != "finished"
+                given = future if call.keep and not failed else future.result()
                 # Before other slices begin: what an iteration keeps is freed by its end.
-                ready.extendleft((slice_chain, later) for later in reversed(slice_chain.after(call, future)))
+                ready.extendleft((chain, later) for later in reversed(chain.after(call, given)))
                 if on_progress is not None:
-                    looked = sum(slice_chain.looked for slice_chain in chains)
-                    on_progress(measure(problems, settings, [c.state for c in chains], looked))
+                    on_progress(measured(chains))
             if stop is not None and stop():
                 raise Cancelled
     finally:
         for future in running:
             future.cancel()
-    return assemble(dataset, settings, problems, [slice_chain.state for slice_chain in chains])
 
 
 def _finished(client: Client, running: list[Future]) -> list[Future]:

@@ -1,17 +1,19 @@
-"""Sound speed (and later attenuation) from travel times, along straight or bent rays."""
+"""Sound speed and attenuation from travel times, along straight or bent rays."""
 
-from .problem import SliceProblem
+from .problem import Problem
 from .quality import mean_absolute_error, rmse
 from .reconstruction import reconstruct
-from .result import Progress, Reconstruction, Sweep
+from .result import RESIDUAL_EDGES_S, Progress, Reconstruction, Sweep, Trial
 from .settings import Settings
 
 __all__ = [
+    "RESIDUAL_EDGES_S",
+    "Problem",
     "Progress",
     "Reconstruction",
     "Settings",
-    "SliceProblem",
     "Sweep",
+    "Trial",
     "mean_absolute_error",
     "reconstruct",
     "rmse",

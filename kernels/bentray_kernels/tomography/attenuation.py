@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Floats, Ints
+from .linear import Linearised
 from .linearisation import Rows, linearise_losses
 from .matrix import back_project, project
-from .problem import SliceProblem
+from .problem import Problem
 from .settings import Settings
-from .total_variation import Linearised
 
 # Solutions, each with the total variation that the misfit of the one before asks for.
 PASSES = 3
@@ -21,26 +21,33 @@ PASSES = 3
 MOST_NP_M = 500.0
 
 
-def heard(problem: SliceProblem) -> Ints:
+def heard(problem: Problem) -> Ints:
     """Emitters with amplitudes."""
     if problem.log_ratio is None:
         return np.empty(0, np.int64)
     return np.flatnonzero(np.isfinite(problem.log_ratio).any(axis=1))
 
 
-def look(problem: SliceProblem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
+def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
     """Rows of some emitters along the rays of the finished image; any split gives the same."""
-    return linearise_losses(problem, slowness, emitters, rays=settings.rays, eikonal=settings.eikonal)
+    return linearise_losses(
+        problem,
+        slowness,
+        emitters,
+        rays=settings.rays,
+        eikonal=settings.eikonal,
+        front=settings.front_smoothing_nodes,
+    )
 
 
-def attenuation(problem: SliceProblem, settings: Settings, parts: Sequence[Rows]) -> Floats:
+def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats:
     """The attenuation from the rows of all emitters, in their order.
 
     The rays are fixed, so the problem is linear: log ratios are integrals of the attenuation. Amplitudes
     also change by focusing, which is not corrected here.
 
     Returns:
-        (nodes, nodes), Np/m, at least 0; that of the water outside the array.
+        of the region's shape, Np/m, at least 0; that of the water outside the array.
     """
     shape = problem.region.shape
     water = np.full(shape, problem.water_attenuation * problem.spacing)
@@ -48,7 +55,7 @@ def attenuation(problem: SliceProblem, settings: Settings, parts: Sequence[Rows]
     for part in parts:
         back_project(part.pointers, part.columns, part.lengths, np.ones(part.residual.size), passed)
     density = passed.reshape(shape)[problem.region].mean()
-    image, dual = water, np.zeros((2, *shape))
+    image, dual = water, np.zeros((len(shape), *shape))
     for _ in range(PASSES):
         left = [
             Rows(p.pointers, p.columns, p.lengths, p.residual - _along(p, image - water), p.emitters)
@@ -57,7 +64,9 @@ def attenuation(problem: SliceProblem, settings: Settings, parts: Sequence[Rows]
         squares = sum(float((part.residual**2).sum()) for part in left)
         rms = math.sqrt(squares / max(sum(part.residual.size for part in left), 1))
         bounds = (0.0, MOST_NP_M * problem.spacing)
-        problem_now = Linearised(left, image, density, problem.region, bounds, settings.edge_cost * rms)
+        problem_now = Linearised(
+            left, image, density, problem.region, bounds, settings.penalty_strength * rms
+        )
         image, dual = problem_now.solve(dual)
     return image / problem.spacing
 

@@ -14,15 +14,30 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..rays.fan import Kind
+from .linear import Linearised
 from .linearisation import Rows, linearise
 from .matrix import back_project
-from .problem import SliceProblem
-from .result import Sweep
+from .problem import Problem
+from .result import Sweep, residual_counts
 from .settings import Settings
-from .total_variation import Linearised
 
 # A misfit above this part of the one before ends the iteration: nothing is left to gain.
 LEAST_GAIN = 0.98
+
+
+@dataclass(frozen=True)
+class Measured:
+    """An image that has been measured.
+
+    Attributes:
+        slowness: of the region's shape, s/m.
+        rms: of its misfit, s.
+        residuals: how many of them fall between two of ``RESIDUAL_EDGES_S``.
+    """
+
+    slowness: Floats
+    rms: float
+    residuals: Ints
 
 
 @dataclass(frozen=True)
@@ -30,22 +45,22 @@ class Iterate:
     """Where an iteration stands; all that is needed to go on, to the bit.
 
     Attributes:
-        slowness: (nodes, nodes), s/m.
-        dual: (2, nodes, nodes), s, of the last linear problem.
-        coverage: (nodes, nodes), metres of ray through each node.
-        best: the image with the least misfit measured so far, and that misfit, s.
+        slowness: of the region's shape, s/m.
+        begun: the image that the iteration began with.
+        dual: (ndim, ...), s, of the last linear problem.
+        coverage: as ``slowness``, metres of ray through each node.
+        best: the image with the least misfit so far.
         done: whether nothing is left to do.
         history: a record per iteration, of the misfit that it began with.
-        attenuation: (nodes, nodes), Np/m, once it is known; see ``attenuation``.
     """
 
     slowness: Floats
+    begun: Floats
     dual: Floats
     coverage: Floats
-    best: tuple[Floats, float]
+    best: Measured
     done: bool = False
     history: tuple[Sweep, ...] = ()
-    attenuation: Floats | None = None
 
     @property
     def sweep(self) -> int:
@@ -57,47 +72,33 @@ class Iterate:
         """Emitters done in the iteration under way: none, for an iteration is one step."""
         return 0
 
-
-def each_pair_once(problem: SliceProblem) -> SliceProblem:
-    """The same problem without reverses, where every element is emitter and receiver: half the rays.
-
-    Pairs measured both ways keep their mean. Each emitter keeps the half of the ring that follows it.
-    """
-    count = len(problem.emitters)
-    if problem.emitters.shape != problem.receivers.shape or (problem.emitters != problem.receivers).any():
-        return problem
-    ahead = (np.arange(count)[None, :] - np.arange(count)[:, None]) % count
-    half = (2 * ahead < count) & (ahead > 0)
-    if count % 2 == 0:
-        half |= (2 * ahead == count) & np.triu(np.ones((count, count), dtype=np.bool_))
-
-    def once(data: Floats) -> Floats:
-        both = np.where(np.isfinite(data), data, data.T)
-        mean = np.where(np.isfinite(data.T), 0.5 * (both + data.T), both)
-        return np.where(half, mean, np.nan)
-
-    ratio = None if problem.log_ratio is None else once(problem.log_ratio)
-    return replace(problem, delta_tof=once(problem.delta_tof), log_ratio=ratio)
+    @property
+    def residuals(self) -> Ints:
+        """Of the best image; see ``Measured``."""
+        return self.best.residuals
 
 
-def begin(problem: SliceProblem) -> Iterate:
-    """Water everywhere."""
-    shape = problem.region.shape
-    slowness = np.full(shape, 1.0 / problem.water_speed)
-    return Iterate(slowness, np.zeros((2, *shape)), np.zeros(shape), (slowness, math.inf))
+def begin(slowness: Floats) -> Iterate:
+    """An image to begin with, of the region's shape, s/m."""
+    best = Measured(slowness, math.inf, residual_counts(np.empty(0)))
+    return Iterate(
+        slowness, slowness, np.zeros((slowness.ndim, *slowness.shape)), np.zeros_like(slowness), best
+    )
 
 
-def look(problem: SliceProblem, settings: Settings, slowness: Floats, sweep: int, emitters: Ints) -> Rows:
+def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
     """Rows of some emitters through an image; any split of the emitters gives the same.
 
-    The first iteration (``sweep`` 0) goes along straight rays, which are those of the water it begins with.
+    In an image without contrast, as the water that the first iteration begins with, rays are straight.
     """
-    rays: Kind = settings.rays if sweep else "straight"
-    return linearise(problem, slowness, emitters, rays=rays, eikonal=settings.eikonal)
+    rays: Kind = settings.rays if slowness.min() < slowness.max() else "straight"
+    return linearise(
+        problem, slowness, emitters, rays=rays, eikonal=settings.eikonal, front=settings.front_smoothing_nodes
+    )
 
 
 def step(
-    problem: SliceProblem, settings: Settings, state: Iterate, parts: Sequence[Rows], slice_index: int = 0
+    problem: Problem, settings: Settings, state: Iterate, parts: Sequence[Rows], slice_index: int = 0
 ) -> Iterate:
     """The next image from the rows of all emitters, in their order; at the end, the best of those measured.
 
@@ -109,36 +110,43 @@ def step(
     """
     residual = np.concatenate([part.residual for part in parts])
     rms = math.sqrt(float((residual**2).mean()))
-    heard = int(np.isfinite(problem.delta_tof).any(axis=1).sum())
-    record = Sweep(slice_index, len(state.history) + 1, rms, heard)
+    record = Sweep(slice_index, len(state.history) + 1, rms, len(problem.sounding))
     history = (*state.history, record)
-    best = (state.slowness, rms) if rms < state.best[1] else state.best
-    stuck = len(history) > 1 and rms > LEAST_GAIN * state.best[1]
+    best = state.best
+    if rms < best.rms:
+        best = Measured(state.slowness, rms, residual_counts(residual))
+    stuck = len(history) > 1 and rms > LEAST_GAIN * state.best.rms
     # The last pass only measures what the one before gave.
     last = len(history) == settings.sweeps
     if len(history) > 1 and (stuck or last or rms <= settings.stop_rms_s):
-        return replace(state, slowness=best[0], best=best, history=history, done=True)
+        return replace(state, slowness=best.slowness, best=best, history=history, done=True)
     lowest, highest = settings.speed_bounds_mps
     coverage = _coverage(problem, parts)
+    # Total variation is told the misfit, s; quadratic penalties are weighed against the data themselves.
+    unit = rms if settings.penalty == "total-variation" else 1.0
     image, dual = Linearised(
         parts,
         state.slowness * problem.spacing,
         coverage[problem.region].mean() / problem.spacing,
         problem.region,
         (problem.spacing / highest, problem.spacing / lowest),
-        settings.edge_cost * rms,
+        settings.penalty_strength * unit,
+        settings.penalty,
+        settings.huber_s or math.inf,
+        state.begun * problem.spacing,
     ).solve(state.dual)
-    return Iterate(
-        np.where(problem.region, image / problem.spacing, state.slowness),
-        dual,
-        coverage,
-        best,
-        settings.sweeps == 1,
-        history,
+    return replace(
+        state,
+        slowness=np.where(problem.region, image / problem.spacing, state.slowness),
+        dual=dual,
+        coverage=coverage,
+        best=best,
+        done=settings.sweeps == 1,
+        history=history,
     )
 
 
-def _coverage(problem: SliceProblem, parts: Sequence[Rows]) -> Floats:
+def _coverage(problem: Problem, parts: Sequence[Rows]) -> Floats:
     """Metres of ray through each node."""
     nodes = np.zeros(problem.region.size)
     for part in parts:

@@ -16,7 +16,8 @@ from ..rays.bending import STRIDE, bend, bending
 from ..rays.descent import PARTS, curved_ray, merge, straight_ray, walk
 from ..rays.fan import Fan, Kind
 from ..splines import coefficients
-from .problem import SliceProblem
+from .problem import Problem
+from .sart import smoothed
 
 # A piece of a bent ray is STRIDE nodes long; its parts are as short as those of other rays.
 BENT_PARTS = 3
@@ -41,7 +42,9 @@ class Rows:
     emitters: int
 
 
-def linearise(problem: SliceProblem, slowness: Floats, emitters: Ints, *, rays: Kind, eikonal: str) -> Rows:
+def linearise(
+    problem: Problem, slowness: Floats, emitters: Ints, *, rays: Kind, eikonal: str, front: float = 0.0
+) -> Rows:
     """Rows of some emitters' rays through an image.
 
     Curved rays are bent to the stationary path in the image's cubic spline, and their times are the spline's.
@@ -49,22 +52,24 @@ def linearise(problem: SliceProblem, slowness: Floats, emitters: Ints, *, rays: 
     step that believes them puts the error into the image.
 
     Args:
-        problem: the slice.
-        slowness: (nodes, nodes), s/m.
+        problem: the slice or volume.
+        slowness: of the region's shape, s/m.
         emitters: rows of the problem's data, at least one.
         rays: ``curved`` or ``straight``.
         eikonal: method of the wave front.
+        front: standard deviation, nodes, of the Gaussian on the speed that rays bend in; with one, times are
+            integrals of the image along those rays.
     """
 
     def lacking(emitter: int, heard: Ints, distance: Floats, predicted: Floats, _: Floats) -> Floats:
         water = distance / problem.water_speed
         return np.asarray(problem.delta_tof[emitter, heard] + water - predicted)
 
-    return _trace(problem, slowness, emitters, problem.delta_tof, lacking, rays, eikonal)
+    return _trace(problem, slowness, emitters, problem.delta_tof, lacking, rays, eikonal, front)
 
 
 def linearise_losses(
-    problem: SliceProblem, slowness: Floats, emitters: Ints, *, rays: Kind, eikonal: str
+    problem: Problem, slowness: Floats, emitters: Ints, *, rays: Kind, eikonal: str, front: float = 0.0
 ) -> Rows:
     """As ``linearise`` for the amplitudes: the residual, Np, is what water along the same rays does not take.
 
@@ -78,17 +83,18 @@ def linearise_losses(
     def lacking(emitter: int, heard: Ints, distance: Floats, _: Floats, length: Floats) -> Floats:
         return np.asarray(ratio[emitter, heard] + water * (distance - length))
 
-    return _trace(problem, slowness, emitters, ratio, lacking, rays, eikonal)
+    return _trace(problem, slowness, emitters, ratio, lacking, rays, eikonal, front)
 
 
 def _trace(
-    problem: SliceProblem,
+    problem: Problem,
     slowness: Floats,
     emitters: Ints,
     data: Floats,
     lacking: Callable[[int, Ints, Floats, Floats, Floats], Floats],
     rays: Kind,
     eikonal: str,
+    front: float,
 ) -> Rows:
     """Rows of the pairs that have data.
 
@@ -96,13 +102,24 @@ def _trace(
         lacking: residual from the emitter, the receivers heard, their distances, m, predicted times, s, and
             the lengths of the rays, m.
     """
-    spline = coefficients(np.log(slowness)) if rays == "curved" else np.empty((0, 0))
-    found = []
+    speed = smoothed(1.0 / slowness, front)
+    found, splines = [], {}
     for emitter in emitters:
         heard = np.flatnonzero(np.isfinite(data[emitter]))
-        source, receivers = problem.emitters[emitter], problem.receivers[heard]
+        slab = problem.slab(int(emitter))
+        foot = np.zeros(slowness.ndim)
+        foot[-1] = slab.start * problem.spacing
+        source = problem.emitters[emitter] - foot
+        receivers = problem.receivers_of(int(emitter))[heard] - foot
         distance = np.linalg.norm(receivers - source, axis=1)
-        tof = solve(1.0 / slowness, problem.spacing, source, eikonal) if rays == "curved" else slowness
+        inside, tof = np.ascontiguousarray(slowness[..., slab]), np.ascontiguousarray(speed[..., slab])
+        spline = np.empty((0,) * slowness.ndim)
+        if rays == "curved":
+            # Emitters of one height share a slab.
+            if (slab.start, slab.stop) not in splines:
+                splines = {(slab.start, slab.stop): coefficients(-np.log(tof))}
+            spline = splines[slab.start, slab.stop]
+            tof = solve(tof, problem.spacing, source, eikonal)
         fan = Fan.checked(tof, problem.spacing, receivers, source, rays)
         counts, columns, lengths, predicted = _rows(
             fan.receivers,
@@ -112,10 +129,14 @@ def _trace(
             fan.shape,
             fan.strides,
             fan.curved,
+            front > 0.0,
             fan.room,
-            slowness.ravel(),
+            inside.ravel(),
             spline,
         )
+        if inside.shape != slowness.shape:
+            column, height = np.divmod(columns, inside.shape[-1])
+            columns = (column * slowness.shape[-1] + height + slab.start).astype(np.int32)
         ends = np.concatenate(([0], np.cumsum(counts)))
         length = np.array([lengths[a:b].sum(dtype=np.float64) for a, b in itertools.pairwise(ends)])
         residual = lacking(
@@ -135,6 +156,7 @@ def _rows(
     shape: tuple[int, ...],
     strides: tuple[int, ...],
     curved: bool,
+    smooth: bool,
     room: int,
     slowness: Floats,
     spline: Floats,
@@ -161,6 +183,9 @@ def _rows(
         else:
             count = straight_ray(receivers[row], source, axes, path)
             entries = walk(path, count, shape, strides, PARTS, nodes, weights, scratch)
+        if smooth or not curved:
+            # The spline is not that of the image.
+            predicted[row] = 0.0
             for k in range(entries):
                 predicted[row] += weights[k] * slowness[nodes[k]]
         while filled + entries > capacity:

@@ -1,31 +1,32 @@
-"""Whole reconstructions in this process, and the assembly that every runner shares."""
+"""Whole reconstructions: in this process, or by whatever drives the chains; and their assembly."""
 
 from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
 from ..acquisition import Dataset
-from ..arrays import Ints
-from . import attenuation, gauss_newton, sart
-from .problem import SliceProblem
-from .result import Progress, Reconstruction
+from ..arrays import Floats
+from . import pairs
+from .advice import Part, advise, part_of
+from .chains import Chain, Scan, attenuate, recover
+from .problem import Problem
+from .result import Progress, Reconstruction, Trial
 from .settings import Settings
+from .stages import stages
 
-# Emitters between two reports of progress.
-BATCH = 16
-
-State = sart.State | gauss_newton.Iterate
+# Runs chains to their end, and tells the passes done of all after each call.
+Drive = Callable[[Sequence[Chain]], None]
 
 
 def reconstruct(
     dataset: Dataset, settings: Settings, progress: Callable[[Progress], None] | None = None
 ) -> Reconstruction:
-    """Reconstruct every slice of a dataset, one after the other.
+    """Reconstruct every slice of a dataset one after the other, or its volume.
 
     Args:
         dataset: with travel times; traces must have been picked.
@@ -38,115 +39,114 @@ def reconstruct(
     Raises:
         InvalidInput: from the dataset or a setting that does not fit it.
     """
-    problems = [problem_of(dataset, settings, k) for k in range(dataset.slices)]
-    states = [begin(settings, problem) for problem in problems]
-    report = progress or (lambda _: None)
-    while not all(state.done for state in states):
-        for k, problem in enumerate(problems):
-            state = states[k]
-            if isinstance(state, sart.State):
-                states[k] = sart.advance(problem, settings, state, BATCH, k)
-            elif not state.done:
-                rows = []
-                for emitters in batches(problem):
-                    rows.append(gauss_newton.look(problem, settings, state.slowness, state.sweep, emitters))
-                    looked = sum(part.emitters for part in rows)
-                    report(measure(problems, settings, states, looked))
-                states[k] = gauss_newton.step(problem, settings, state, rows, k)
-            report(measure(problems, settings, states))
-    for k, problem in enumerate(problems):
-        losses = []
-        for emitters in batches_of_losses(problem, settings):
-            losses.append(attenuation.look(problem, settings, states[k].slowness, emitters))
-            report(measure(problems, settings, states, sum(part.emitters for part in losses)))
-        if losses:
-            found = attenuation.attenuation(problem, settings, losses)
-            states[k] = replace(states[k], attenuation=found)
-    return assemble(dataset, settings, problems, states)
+
+    def drive(chains: Sequence[Chain]) -> None:
+        for chain in chains:
+            waiting = chain.first()
+            while waiting:
+                call = waiting.pop(0)
+                waiting = chain.after(call, call.function(*call.arguments)) + waiting
+                if progress is not None:
+                    progress(measured(chains))
+
+    return carried_out(dataset, settings, lambda plan, part: Here(dataset, plan, part), drive)
 
 
-def problem_of(dataset: Dataset, settings: Settings, index: int) -> SliceProblem:
+def carried_out(
+    dataset: Dataset, settings: Settings, scan_of: Callable[[Settings, Part], Scan], drive: Drive
+) -> Reconstruction:
+    """A reconstruction whose calls are run by ``drive``.
+
+    Args:
+        dataset: with travel times.
+        settings: see ``Settings``.
+        scan_of: makes what tells calls their data.
+        drive: runs chains to their end.
+
+    Raises:
+        InvalidInput: from the dataset or a setting that does not fit it, and what ``drive`` raises.
+    """
+    count = pairs.count(dataset, settings)
+    trials: tuple[Trial, ...] = ()
+    if settings.method == "auto":
+        settings, trials = advise(dataset, settings, count // 2, scan_of, drive)
+    scan = scan_of(settings, "all")
+    chains = [Chain(scan, index) for index in range(count)]
+    drive(chains)
+    return _assembled(dataset, settings, scan.problem(0), chains, trials)
+
+
+class Here:
+    """A scan in this process; see ``chains.Scan``."""
+
+    def __init__(self, dataset: Dataset, settings: Settings, part: Part) -> None:
+        plans = stages(dataset, settings)
+        shown = part_of(dataset, part)
+        self._plans = plans
+        self._made = cache(lambda index, stage: problem_of(shown, plans[stage], index))
+
+    def stages(self) -> tuple[Settings, ...]:
+        return self._plans
+
+    def problem(self, index: int, stage: int = -1) -> Problem:
+        found: Problem = self._made(index, stage % len(self._plans))
+        return found
+
+
+def problem_of(dataset: Dataset, settings: Settings, index: int) -> Problem:
     """One slice's problem as the settings' method wants it.
 
     Raises:
-        InvalidInput: as ``SliceProblem.of``.
+        InvalidInput: as ``Problem.of``.
     """
-    problem = SliceProblem.of(dataset, settings, index)
-    if settings.method == "gauss-newton" and settings.reciprocity:
-        return gauss_newton.each_pair_once(problem)
-    return problem
+    problem = Problem.of(dataset, settings, index)
+    once = settings.method == "gauss-newton" and settings.reciprocity
+    return problem.each_pair_once() if once else problem
 
 
-def begin(settings: Settings, problem: SliceProblem) -> State:
-    """Where the settings' method begins."""
-    return gauss_newton.begin(problem) if settings.method == "gauss-newton" else sart.begin(problem)
+def measured(chains: Sequence[Chain]) -> Progress:
+    """Progress over all chains; a stage that stopped early counts as whole."""
+    history = sorted((s for c in chains for s in c.history), key=lambda s: (s.stage, s.sweep, s.slice))
+    return Progress(sum(c.done for c in chains), sum(c.total for c in chains), tuple(history))
 
 
-def batches(problem: SliceProblem) -> list[Ints]:
-    """The emitters with travel times, ``BATCH`` at a time."""
-    return _cut(np.flatnonzero(np.isfinite(problem.delta_tof).any(axis=1)))
-
-
-def batches_of_losses(problem: SliceProblem, settings: Settings) -> list[Ints]:
-    """The emitters with amplitudes, ``BATCH`` at a time; none where nobody wants the attenuation."""
-    return _cut(attenuation.heard(problem)) if settings.attenuation else []
-
-
-def _cut(emitters: Ints) -> list[Ints]:
-    return [emitters[k : k + BATCH] for k in range(0, len(emitters), BATCH)]
-
-
-def measure(
-    problems: Sequence[SliceProblem], settings: Settings, states: Sequence[State], looked: int = 0
-) -> Progress:
-    """Progress over all slices; a slice that stopped early counts as whole.
-
-    Args:
-        problems, states: one a slice.
-        settings: of the reconstruction.
-        looked: emitters whose rows are there, of iterations that have not made their step.
-    """
-    done, total = looked, 0
-    for problem, state in zip(problems, states, strict=True):
-        emitters = int(np.isfinite(problem.delta_tof).any(axis=1).sum())
-        losses = sum(len(part) for part in batches_of_losses(problem, settings))
-        total += emitters * settings.sweeps + losses
-        done += losses if state.attenuation is not None else 0
-        done += emitters * settings.sweeps if state.done else emitters * state.sweep + state.emitter
-    history = sorted((s for state in states for s in state.history), key=lambda s: (s.sweep, s.slice))
-    return Progress(done, total, tuple(history))
-
-
-def assemble(
-    dataset: Dataset, settings: Settings, problems: Sequence[SliceProblem], states: Sequence[State]
+def _assembled(
+    dataset: Dataset,
+    settings: Settings,
+    first: Problem,
+    chains: Sequence[Chain],
+    trials: tuple[Trial, ...],
 ) -> Reconstruction:
-    """The result of finished slices, (nx, ny) for one and (nx, ny, nz) for several."""
-    speed = np.stack([1.0 / state.slowness for state in states], axis=-1)
-    coverage = np.stack([state.coverage for state in states], axis=-1)
-    losses = [state.attenuation for state in states]
-    attenuations = None
-    if all(image is not None for image in losses):
-        attenuations = np.stack([image for image in losses if image is not None], axis=-1)
-    first = problems[0]
-    spacing: tuple[float, ...] = (first.spacing, first.spacing)
-    origin: tuple[float, ...] = first.origin
-    if dataset.slice_z_m is None:
-        speed, coverage = speed[..., 0], coverage[..., 0]
-        attenuations = None if attenuations is None else attenuations[..., 0]
-    else:
-        steps = np.diff(dataset.slice_z_m)
+    """The result of finished chains: (nx, ny) for one slice, (nx, ny, nz) for several and for a volume."""
+    spacing: tuple[float, ...] = (first.spacing,) * first.region.ndim
+    origin = first.origin
+    z = pairs.heights(dataset)
+    stacked = first.region.ndim == 2 and z is not None
+    if stacked and z is not None:
+        steps = np.diff(z)
         even = steps.size > 0 and np.allclose(steps, steps[0])
         spacing = (*spacing, float(steps[0]) if even else float("nan"))
-        origin = (*origin, float(dataset.slice_z_m[0]))
+        origin = (*origin, float(z[0]))
+
+    def image(parts: Sequence[Floats]) -> Floats:
+        return np.ascontiguousarray(np.stack(parts, axis=-1)) if stacked else parts[0]
+
+    def wanted(then: Callable[..., Floats]) -> Floats | None:
+        parts = [chain.found(then) for chain in chains]
+        return None if any(part is None for part in parts) else image(parts)
+
     return Reconstruction(
-        speed=np.ascontiguousarray(speed),
-        coverage=np.ascontiguousarray(coverage),
+        speed=image([1.0 / chain.state.slowness for chain in chains]),
+        coverage=image([chain.state.coverage for chain in chains]),
         spacing_m=spacing,
         origin_m=origin,
         water_speed_mps=dataset.water_speed_mps,
         settings=settings,
-        history=measure(problems, settings, states).history,
-        attenuation=None if attenuations is None else np.ascontiguousarray(attenuations),
+        history=measured(chains).history,
+        attenuation=wanted(attenuate),
+        recovery=wanted(recover),
+        residuals=np.sum([chain.state.residuals for chain in chains], axis=0),
+        trials=trials,
         provenance=provenance(),
     )
 

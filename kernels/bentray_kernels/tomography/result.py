@@ -4,29 +4,42 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .settings import Settings
 
+# Edges of the bins of residuals, s: eight a decade from 0.1 ns to 0.1 ms, both signs, and one around zero.
+_DECADES = np.logspace(-10.0, -4.0, 49)
+RESIDUAL_EDGES_S = np.concatenate((-_DECADES[::-1], _DECADES))
+
+
+def residual_counts(residuals: NDArray[np.float64]) -> NDArray[np.int64]:
+    """How many residuals, s, fall between two of ``RESIDUAL_EDGES_S``; those beyond the ends count there."""
+    within = np.clip(residuals, RESIDUAL_EDGES_S[0], RESIDUAL_EDGES_S[-1])
+    return np.histogram(within, RESIDUAL_EDGES_S)[0].astype(np.int64)
+
 
 @dataclass(frozen=True)
 class Sweep:
-    """One pass over all emitters of one slice.
+    """One pass over all emitters of one slice, or of the volume.
 
     Attributes:
-        slice: axial index, from 0.
+        slice: axial index, from 0; 0 for a volume.
         sweep: number of the pass, from 1.
         residual_rms_s: root mean square of measured minus predicted travel time, s, before the update: of
             each emitter as the pass met it (SART), of all at once (Gauss–Newton).
         emitters: how many emitters had data.
+        stage: from 0: coarser grids and straight rays that come first are stages of their own.
     """
 
     slice: int
     sweep: int
     residual_rms_s: float
     emitters: int
+    stage: int = 0
 
 
 @dataclass(frozen=True)
@@ -39,18 +52,36 @@ class Progress:
 
 
 @dataclass(frozen=True)
+class Trial:
+    """One way to reconstruct, tried on part of the pairs.
+
+    Attributes:
+        settings: what differs from those that were asked for, by name.
+        held_out_rms_s: rms misfit of the pairs that it was not shown, s.
+        shown_rms_s: rms misfit of those that it was shown, s, in its last sweep.
+    """
+
+    settings: dict[str, Any]
+    held_out_rms_s: float
+    shown_rms_s: float
+
+
+@dataclass(frozen=True)
 class Reconstruction:
     """A reconstructed scan.
 
     Attributes:
-        speed: (nx, ny), or (nx, ny, nz) for several slices, m/s.
+        speed: (nx, ny), or (nx, ny, nz) for several slices or a volume, m/s.
         coverage: as ``speed``: metres of ray through each node in the last sweep that changed the image.
         attenuation: as ``speed``, Np/m, or None.
+        recovery: as ``speed``: how much of a checkerboard the rays bring back, 1 where all, or None.
         spacing_m: node spacing (x, y[, z]), m; z is NaN when the slices are not evenly spaced.
         origin_m: position of node 0 (x, y[, z]), m.
         water_speed_mps: speed of the coupling water, m/s.
-        history: a record per slice and sweep, in order of sweep then slice.
-        settings: the settings that were used.
+        history: a record per slice, stage and sweep, in order of stage, sweep, slice.
+        residuals: how many residuals of the last sweep fall between two of ``RESIDUAL_EDGES_S``.
+        settings: the settings that were used; never ``method`` auto.
+        trials: what ``auto`` tried, the best first.
         provenance: versions of what computed it.
     """
 
@@ -62,6 +93,9 @@ class Reconstruction:
     settings: Settings
     history: tuple[Sweep, ...] = ()
     attenuation: NDArray[np.float64] | None = None
+    recovery: NDArray[np.float64] | None = None
+    residuals: NDArray[np.int64] | None = None
+    trials: tuple[Trial, ...] = ()
     provenance: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -69,13 +103,14 @@ class Reconstruction:
         """Root mean square of the misfit over all slices, s; None without a history.
 
         Of each slice that of its last sweep, or with Gauss–Newton, which gives the best image that it
-        measured, its least.
+        measured, the least of its last stage.
         """
-        of_slice: dict[int, float] = {}
+        of_slice: dict[int, tuple[int, float]] = {}
         for sweep in self.history:
-            known = of_slice.get(sweep.slice, math.inf)
-            least = self.settings.method == "gauss-newton" and known < sweep.residual_rms_s
-            of_slice[sweep.slice] = known if least else sweep.residual_rms_s
+            stage, known = of_slice.get(sweep.slice, (0, math.inf))
+            least = self.settings.method == "gauss-newton" and stage == sweep.stage
+            rms = min(known, sweep.residual_rms_s) if least else sweep.residual_rms_s
+            of_slice[sweep.slice] = sweep.stage, rms
         if not of_slice:
             return None
-        return math.sqrt(sum(rms**2 for rms in of_slice.values()) / len(of_slice))
+        return math.sqrt(sum(rms**2 for _, rms in of_slice.values()) / len(of_slice))

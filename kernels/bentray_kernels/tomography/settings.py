@@ -10,10 +10,13 @@ from ..acquisition.dataset import PLAUSIBLE_SPEED_MPS
 from ..eikonal import methods
 from ..errors import InvalidInput
 
-METHODS = ("sart", "gauss-newton")
+METHODS = ("sart", "gauss-newton", "auto")
 RAYS = ("curved", "straight")
+DECOMPOSITIONS = ("slices", "volume")
+PENALTIES = ("total-variation", "laplacian", "tikhonov")
 SPEED_UPDATES = ("fixed", "data-driven")
 PICKERS = ("aic", "threshold")
+LEAST_NODES = 16
 
 
 @dataclass(frozen=True)
@@ -22,26 +25,39 @@ class Settings:
 
     Attributes:
         method: ``sart`` uses one emitter after the other (chapter 6); ``gauss-newton`` all at once, with bent
-            rays and total variation.
+            rays and a penalty; ``auto`` tries several on part of the pairs and takes the one that predicts
+            the others best, see ``advice``.
         rays: ``curved`` traces down the travel time of the current image; ``straight`` ignores refraction.
         eikonal: the wave-front method for curved rays; see ``bentray_kernels.eikonal.methods()``.
-        speed_update: for SART; ``fixed`` propagates in the reconstructed speed as it is (chapter 6,
-            equation 5); ``data-driven`` stretches it to ``speed_range_mps`` first (equation 6).
-        speed_range_mps: (lowest, highest) speed known to be in the object, m/s; for ``data-driven``.
-        speed_bounds_mps: (lowest, highest) speed a node may take, m/s.
+        decomposition: ``slices`` reconstructs each height of the ring by itself; ``volume`` all in space.
         nodes: nodes along each side of the square image.
         side_m: side of the image, m; None: the array with a margin.
         sweeps: how often every emitter is used; ``gauss-newton`` ends sooner once nothing is gained.
+        straight_sweeps: sweeps along straight rays that curved ones begin from.
+        coarser_grids: grids of half as many nodes each that are gone through first.
+        stop_rms_s: stop once the rms of the receiver misfit is below this, s (discrepancy principle).
+        speed_bounds_mps: (lowest, highest) speed a node may take, m/s.
+        speed_update: for SART; ``fixed`` propagates in the reconstructed speed as it is (chapter 6,
+            equation 5); ``data-driven`` stretches it to ``speed_range_mps`` first (equation 6).
+        speed_range_mps: (lowest, highest) speed known to be in the object, m/s; for ``data-driven``.
+        front_smoothing_nodes: standard deviation, nodes, of a Gaussian on the speed that the wave front runs
+            in, which bends rays as a band-limited wave would; 0: none.
         relaxation: the λ of SART (chapter 6, equation 1), in (0, 2).
-        smoothing_nodes: standard deviation, nodes, of the Gaussian applied to each emitter's update of SART;
+        relaxation_decay: what λ is multiplied by after each sweep, in (0, 1].
+        subset: emitters that make one update of SART together.
+        smoothing_nodes: standard deviation, nodes, of the Gaussian applied to each update of SART; 0: none.
+        seed: seed of the random emitter order of SART.
+        penalty: of ``gauss-newton``: ``total-variation`` keeps edges, ``laplacian`` prefers smooth images,
+            ``tikhonov`` ones near to the iteration's start.
+        penalty_strength: of the penalty, and of the attenuation's total variation, over the rms misfit;
             0: none.
-        edge_cost: strength of the total variation of ``gauss-newton`` and of the attenuation over the rms
-            misfit; 0: none.
-        stop_rms_s: stop once the rms of the receiver misfit is below this, s.
+        huber_s: residuals beyond this count in proportion to their size, not to its square, s; 0: all count
+            by their square.
+        roi: let only the dataset's region of interest change (``mask/roi``).
         reciprocity: use a missing pair's reverse (emitter and receiver exchanged) in its place.
         picker: how travel times are read where only traces were uploaded.
-        seed: seed of the random emitter order of SART.
         attenuation: reconstruct it too, where amplitudes were recorded.
+        resolution_check: also tell how much of a checkerboard the rays recover, node by node.
 
     Raises:
         InvalidInput: naming the setting, its value and what is accepted.
@@ -49,23 +65,33 @@ class Settings:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    method: Literal["sart", "gauss-newton"] = "sart"
+    method: Literal["sart", "gauss-newton", "auto"] = "sart"
     rays: Literal["curved", "straight"] = "curved"
     eikonal: str = "accurate"
-    speed_update: Literal["fixed", "data-driven"] = "fixed"
-    speed_range_mps: tuple[float, float] | None = None
-    speed_bounds_mps: tuple[float, float] = (1300.0, 1800.0)
+    decomposition: Literal["slices", "volume"] = "slices"
     nodes: int = 128
     side_m: float | None = None
     sweeps: int = 5
-    relaxation: float = 0.1
-    smoothing_nodes: float = 1.0
-    edge_cost: float = 0.3
+    straight_sweeps: int = 0
+    coarser_grids: int = 0
     stop_rms_s: float = 0.0
+    speed_bounds_mps: tuple[float, float] = (1300.0, 1800.0)
+    speed_update: Literal["fixed", "data-driven"] = "fixed"
+    speed_range_mps: tuple[float, float] | None = None
+    front_smoothing_nodes: float = 0.0
+    relaxation: float = 0.1
+    relaxation_decay: float = 1.0
+    subset: int = 1
+    smoothing_nodes: float = 1.0
+    seed: int = 0
+    penalty: Literal["total-variation", "laplacian", "tikhonov"] = "total-variation"
+    penalty_strength: float = 0.3
+    huber_s: float = 0.0
+    roi: bool = False
     reciprocity: bool = True
     picker: Literal["aic", "threshold"] = "aic"
-    seed: int = 0
     attenuation: bool = True
+    resolution_check: bool = False
 
     def __post_init__(self) -> None:
         _one_of("method", self.method, METHODS)
@@ -73,23 +99,35 @@ class Settings:
         _one_of("eikonal", self.eikonal, methods())
         _one_of("speed_update", self.speed_update, SPEED_UPDATES)
         _one_of("picker", self.picker, PICKERS)
+        _one_of("decomposition", self.decomposition, DECOMPOSITIONS)
+        _one_of("penalty", self.penalty, PENALTIES)
         _speeds("speed_bounds_mps", self.speed_bounds_mps)
         if self.speed_range_mps is not None:
             _speeds("speed_range_mps", self.speed_range_mps)
-        if self.method == "gauss-newton" and self.speed_update != "fixed":
-            raise InvalidInput("speed_update", repr(self.speed_update), "fixed, with method gauss-newton")
+        if self.method != "sart" and self.speed_update != "fixed":
+            raise InvalidInput("speed_update", repr(self.speed_update), f"fixed, with method {self.method}")
         if self.speed_range_mps is None and self.speed_update == "data-driven":
             raise InvalidInput(
                 "speed_range_mps", None, "(lowest, highest) in m/s, since speed_update is data-driven"
             )
-        _within("nodes", self.nodes, 16, 2048)
+        _within("nodes", self.nodes, LEAST_NODES, 2048)
         _within("sweeps", self.sweeps, 1, 1000)
         if self.side_m is not None:
             _within("side_m", self.side_m, 1e-4, 100.0)
         if not 0.0 < self.relaxation < 2.0:
             raise InvalidInput("relaxation", self.relaxation, "a number between 0 and 2")
         _within("smoothing_nodes", self.smoothing_nodes, 0.0, 32.0)
-        _within("edge_cost", self.edge_cost, 0.0, 10.0)
+        if not 0.0 < self.relaxation_decay <= 1.0:
+            raise InvalidInput("relaxation_decay", self.relaxation_decay, "a number above 0 and at most 1")
+        _within("straight_sweeps", self.straight_sweeps, 0, 1000)
+        _within("coarser_grids", self.coarser_grids, 0, 6)
+        if self.coarser_grids and self.nodes >> self.coarser_grids < LEAST_NODES:
+            accepted = f"few enough that the coarsest of {self.nodes} nodes has {LEAST_NODES}"
+            raise InvalidInput("coarser_grids", self.coarser_grids, accepted)
+        _within("front_smoothing_nodes", self.front_smoothing_nodes, 0.0, 32.0)
+        _within("subset", self.subset, 1, 4096)
+        _within("penalty_strength", self.penalty_strength, 0.0, 10.0)
+        _within("huber_s", self.huber_s, 0.0, 1.0)
         _within("stop_rms_s", self.stop_rms_s, 0.0, 1.0)
         _within("seed", self.seed, 0, 2**63 - 1)
 

@@ -13,10 +13,10 @@ import typer
 from .paths import input_file, output_folder
 from .results import show_results, write_results
 from .settings_options import (
-    EdgeCost,
     Eikonal,
     Method,
     Nodes,
+    PenaltyStrength,
     Picker,
     Rays,
     Relaxation,
@@ -48,7 +48,7 @@ def reconstruct(
     speed_update: SpeedUpdate = None,
     speed_range: SpeedRange = None,
     smoothing: Smoothing = None,
-    edge_cost: EdgeCost = None,
+    penalty_strength: PenaltyStrength = None,
     picker: Picker = None,
     seed: Seed = None,
     workers: Annotated[
@@ -75,7 +75,7 @@ def reconstruct(
         speed_update=speed_update,
         speed_range_mps=speed_range,
         smoothing_nodes=smoothing,
-        edge_cost=edge_cost,
+        penalty_strength=penalty_strength,
         picker=picker,
         seed=seed,
     )

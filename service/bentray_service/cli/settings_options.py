@@ -15,7 +15,7 @@ Method = Annotated[
     typer.Option(
         "--method",
         show_default="sart",
-        help="sart: one emitter after the other; gauss-newton: all at once, with total variation.",
+        help="sart: one emitter after the other; gauss-newton: all at once, with a penalty; auto tries both.",
     ),
 ]
 Rays = Annotated[
@@ -58,10 +58,12 @@ Smoothing = Annotated[
         "--smoothing", show_default="1.0", help="Gaussian on each emitter's update, nodes; 0 is none."
     ),
 ]
-EdgeCost = Annotated[
+PenaltyStrength = Annotated[
     float | None,
     typer.Option(
-        "--edge-cost", show_default="0.3", help="Total variation of gauss-newton over the misfit; 0 is none."
+        "--penalty-strength",
+        show_default="0.3",
+        help="Of gauss-newton's penalty, over the misfit; 0 is none.",
     ),
 ]
 Picker = Annotated[

@@ -9,7 +9,6 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings, reconstruct, rmse
-from bentray_kernels.tomography.settings import METHODS
 
 NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
 PHANTOM = table6(WATER)
@@ -36,7 +35,7 @@ def plan(method="gauss-newton", **changes):
     return Settings(method=method, nodes=NODES, side_m=SIDE, **changes)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["sart", "gauss-newton"])
 def test_line_integrals_give_it_back(scan, method):
     truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     result = reconstruct(scan, plan(method))

@@ -10,8 +10,9 @@ from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings, mean_absolute_error, reconstruct, rmse
-from bentray_kernels.tomography.settings import METHODS
 
+METHODS = ("sart", "gauss-newton")
+METHODS = ("sart", "gauss-newton")
 NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
 PHANTOM = table6(WATER)
 RING = Ring(64, 0.09)
@@ -146,7 +147,7 @@ def test_progress_rises_to_the_end(scan, method):
             "speed_update",
         ),
         ({"method": "guess"}, "method"),
-        ({"edge_cost": -1.0}, "edge_cost"),
+        ({"penalty_strength": -1.0}, "penalty_strength"),
         ({"speed_bounds_mps": (1600.0, 1500.0)}, "speed_bounds_mps"),
         ({"speed_bounds_mps": (1e-300, 1e300)}, "speed_bounds_mps"),
         ({"speed_bounds_mps": (1400.0, 1800.0)}, "speed_bounds_mps"),
@@ -179,9 +180,8 @@ def test_the_slice_without_a_valid_pair_is_named(scan, method):
     [
         np.zeros((RING.elements, 2)),
         np.column_stack((np.linspace(-0.05, 0.05, RING.elements), np.zeros(RING.elements))),
-        np.column_stack((RING.positions(), np.zeros(RING.elements))),
     ],
-    ids=["one point", "a line", "three coordinates"],
+    ids=["one point", "a line"],
 )
 def test_an_array_that_surrounds_no_image_is_refused(scan, position):
     with pytest.raises(InvalidInput) as refusal:

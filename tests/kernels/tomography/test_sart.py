@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
-from bentray_kernels.tomography import Settings, SliceProblem, reconstruct
+from bentray_kernels.tomography import Problem, Settings, reconstruct
 from bentray_kernels.tomography.sart import advance, begin, emitter_order, propagation_speed
+from bentray_kernels.tomography.stages import start
 
 NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
 PHANTOM = table6(WATER)
@@ -36,11 +37,11 @@ def test_cutting_the_work_changes_no_bit(cuts):
     delta = rng.normal(0.0, 2e-7, (16, 16))
     dataset = Dataset(ring.positions(), everyone, everyone, WATER, delta_tof_s=delta)
     wanted = Settings(nodes=24, sweeps=2)
-    problem = SliceProblem.of(dataset, wanted)
-    whole = begin(problem)
+    problem = Problem.of(dataset, wanted)
+    whole = begin(start(problem, None))
     while not whole.done:
         whole = advance(problem, wanted, whole, 10**6)
-    cut, k = begin(problem), 0
+    cut, k = begin(start(problem, None)), 0
     while not cut.done:
         cut = advance(problem, wanted, cut, cuts[k % len(cuts)])
         k += 1
@@ -57,7 +58,7 @@ def test_same_seed_same_bits_other_seed_other_order(scan):
 
 
 def test_every_pass_slice_and_seed_has_an_order_of_its_own(scan):
-    problem = SliceProblem.of(scan, plan())
+    problem = Problem.of(scan, plan())
     orders = [emitter_order(problem, *which) for which in ((0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0))]
     assert len({tuple(order) for order in orders}) == 4
     assert all(sorted(order) == list(range(RING.elements)) for order in orders)

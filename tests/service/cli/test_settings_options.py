@@ -27,7 +27,7 @@ CHOICES = [
     ("--side", ["0.25"], "side_m", 0.25),
     ("--speed-range", ["1350", "1600"], "speed_range_mps", (1350.0, 1600.0)),
     ("--smoothing", ["1.5"], "smoothing_nodes", 1.5),
-    ("--edge-cost", ["0.7"], "edge_cost", 0.7),
+    ("--penalty-strength", ["0.7"], "penalty_strength", 0.7),
     ("--picker", ["threshold"], "picker", "threshold"),
     ("--seed", ["5"], "seed", 5),
 ]

@@ -1,6 +1,6 @@
-"""The tasks of a slice: batches of SART grow to the length of a task."""
+"""The calls of a slice: batches of SART grow to the length of a task."""
 
-from bentray_workers.chains import next_batch
+from bentray_kernels.tomography.chains import next_batch
 
 
 def test_batches_aim_at_the_time_of_a_task():

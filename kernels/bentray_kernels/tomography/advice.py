@@ -1,0 +1,187 @@
+"""Which rays and method explain a scan best: each is shown part of the pairs and must predict the others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from ..acquisition import Dataset
+from ..acquisition.noise import noise_level
+from ..arrays import Floats
+from .chains import Chain, Gathering, Scan, cut
+from .gauss_newton import look
+from .linearisation import Rows
+from .result import Trial
+from .settings import Settings
+
+Part = Literal["all", "shown", "held-out"]
+
+# One pair in so many is held out, both directions together.
+HELD_OUT = 10
+
+# What is tried: bent rays lose where the picked times are not those of the Eikonal equation.
+CANDIDATES: tuple[dict[str, Any], ...] = (
+    {"rays": "straight", "method": "sart"},
+    {"rays": "straight", "method": "gauss-newton"},
+    {"rays": "curved", "method": "sart"},
+    {"rays": "curved", "method": "sart", "front_smoothing_nodes": 4.0},
+    {"rays": "curved", "method": "gauss-newton"},
+)
+
+# Trials use half the nodes, but not fewer than this.
+TRIAL_NODES = 64
+
+# Bent rays must predict held-out pairs this much better than straight ones, which ask for less belief.
+CLEARLY = 0.98
+
+# A misfit of this many times the noise explains the times (the factor of Morozov's principle).
+EXPLAINED = 1.1
+
+
+def part_of(dataset: Dataset, part: Part) -> Dataset:
+    """The dataset with the pairs of one part only, the others invalid.
+
+    A pair and its reverse belong to the same part, in all slices.
+    """
+    if part == "all":
+        return dataset
+    first = np.minimum(dataset.tx[:, None], dataset.rx[None, :]).astype(np.uint64)
+    second = np.maximum(dataset.tx[:, None], dataset.rx[None, :]).astype(np.uint64)
+    # A mix of both numbers, so that no direction or ring is held out as a whole.
+    mixed = (first * np.uint64(0x9E3779B1) + second * np.uint64(0x85EBCA77)) >> np.uint64(11)
+    held = (mixed % np.uint64(HELD_OUT)) == 0
+    kept = held if part == "held-out" else ~held
+    shape = kept.shape if dataset.slice_z_m is None else (dataset.slices, *kept.shape)
+    valid = np.broadcast_to(kept, shape)
+    return replace(dataset, valid=valid.copy() if dataset.valid is None else valid & dataset.valid)
+
+
+def tried(settings: Settings) -> list[Settings]:
+    """The settings of each trial: those of the candidates on a coarser grid."""
+    nodes = min(settings.nodes, max(TRIAL_NODES, -(-settings.nodes // 2)))
+    found = []
+    for changes in CANDIDATES:
+        plan = replace(settings, **changes, attenuation=False, resolution_check=False)
+        front = plan.front_smoothing_nodes * nodes / settings.nodes
+        found.append(replace(plan, nodes=nodes, coarser_grids=0, front_smoothing_nodes=front))
+    return found
+
+
+class TrialChain(Chain):
+    """A chain on the pairs that are shown, which ends with the misfit of those held out.
+
+    Args:
+        scan: of the shown pairs.
+        index: of the slice.
+        held_out: of the held-out pairs.
+    """
+
+    def __init__(self, scan: Scan, index: int, held_out: Scan) -> None:
+        self._held_out = held_out
+        super().__init__(scan, index)
+
+    def _gatherings(self) -> list[Gathering]:
+        return [HeldOut(self._held_out, self._index)]
+
+    @property
+    def held_out_rms_s(self) -> float:
+        """Misfit of the pairs that were held out, s."""
+        return float(self.found(misfit))
+
+
+class HeldOut(Gathering):
+    """The rays of the pairs that were held out."""
+
+    def __init__(self, scan: Scan, index: int) -> None:
+        self._scan = scan
+        super().__init__(look_held_out, misfit, scan.problem(index).sounding)
+
+    def first(self, scan: Scan, index: int, image: Floats) -> list[Any]:
+        return super().first(self._scan, index, image)
+
+
+def look_held_out(scan: Scan, index: int, slowness: Floats, part: int) -> Rows:
+    """Call: the rays of some held-out pairs through the finished image."""
+    problem = scan.problem(index)
+    return look(problem, scan.stages()[-1], slowness, cut(problem.sounding)[part])
+
+
+def misfit(_scan: Scan, _index: int, rows: Sequence[Rows]) -> float:
+    """Call: root mean square of the residuals, s."""
+    residual = np.concatenate([part.residual for part in rows])
+    return math.sqrt(float((residual**2).mean()))
+
+
+def advise(
+    dataset: Dataset,
+    settings: Settings,
+    index: int,
+    scan_of: Callable[[Settings, Part], Scan],
+    drive: Callable[[Sequence[Chain]], None],
+) -> tuple[Settings, tuple[Trial, ...]]:
+    """The settings that explain one slice best, and how all that were tried did.
+
+    What predicts held-out pairs best is chosen. Where that misfit is the noise of the times, the
+    reconstruction is told to stop there (Morozov's discrepancy principle): a closer fit would draw the noise.
+
+    Args:
+        dataset: for the noise of its times.
+        settings: with ``method`` auto.
+        index: the slice to try.
+        scan_of: makes a scan of a part of the pairs.
+        drive: runs chains to their end.
+
+    Returns:
+        The settings, and the trials, the chosen one first and the others by what they predict.
+    """
+    chains = [
+        TrialChain(scan_of(plan, "shown"), index, scan_of(plan, "held-out")) for plan in tried(settings)
+    ]
+    drive(chains)
+    trials = [
+        Trial(changes, chain.held_out_rms_s, chain.history[-1].residual_rms_s)
+        for changes, chain in zip(CANDIDATES, chains, strict=True)
+    ]
+    chosen = choose(trials)
+    others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
+    found = replace(settings, **chosen.settings)
+    return stopped(found, chosen, noise_of(dataset)), (chosen, *others)
+
+
+def stopped(settings: Settings, chosen: Trial, noise_s: float) -> Settings:
+    """The settings with the misfit to stop at, where noise explains what the chosen trial left over."""
+    if settings.stop_rms_s == 0.0 and noise_s <= EXPLAINED * chosen.held_out_rms_s:
+        return replace(settings, stop_rms_s=EXPLAINED * noise_s)
+    return settings
+
+
+def noise_of(dataset: Dataset) -> float:
+    """Standard deviation of the travel times, s: as the dataset tells it, or as their roughness does."""
+    if dataset.sigma_s is not None and np.isfinite(dataset.sigma_s).any():
+        return math.sqrt(float(np.nanmean(dataset.sigma_s**2)))
+    return noise_level(dataset.differential_tof())
+
+
+def choose(trials: Sequence[Trial]) -> Trial:
+    """The trial that predicts best; one with straight rays unless bent ones are clearly better."""
+    best = min(trials, key=lambda trial: trial.held_out_rms_s)
+    straight = min(
+        (trial for trial in trials if trial.settings["rays"] == "straight"),
+        key=lambda trial: trial.held_out_rms_s,
+    )
+    return best if best.held_out_rms_s < CLEARLY * straight.held_out_rms_s else straight
+
+
+def reason(trials: Sequence[Trial]) -> str:
+    """One sentence: what was chosen, and how well each trial predicted; empty without trials."""
+    if not trials:
+        return ""
+    told = [
+        f"{' '.join(str(value) for value in t.settings.values())} {1e9 * t.held_out_rms_s:.0f} ns"
+        for t in trials
+    ]
+    return f"auto chose {told[0]} (misfit of held-out pairs); the others: {', '.join(told[1:])}"

@@ -1,0 +1,306 @@
+"""What is to be done for one slice or volume, as calls that may run anywhere.
+
+A chain says which calls may run now, takes what they gave, and says which may follow. It never runs one: a
+loop in this process does, or a cluster.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, NamedTuple, Protocol
+
+from ..arrays import Floats, Ints
+from . import attenuation, gauss_newton, resolution, sart
+from .linearisation import Rows
+from .problem import Problem
+from .result import Sweep
+from .settings import Settings
+from .stages import start
+
+# Long enough that scheduling costs nothing, short enough to show progress and to stop soon.
+TASK_S = 0.5
+FIRST_BATCH = 8
+
+# Emitters whose rays are traced in one call of Gauss–Newton, and after the last image.
+BATCH = 16
+
+
+class Scan(Protocol):
+    """Where calls find their data; it travels with them, so it holds a path or the dataset itself."""
+
+    def stages(self) -> tuple[Settings, ...]:
+        """Settings of each stage, see ``stages``."""
+
+    def problem(self, index: int, stage: int = -1) -> Problem:
+        """The problem of one slice at a stage, the last by default; made once."""
+
+
+class Call(NamedTuple):
+    """A call that may run now.
+
+    Attributes:
+        keep: what it gives is needed by other calls only and may stay where it was made; ``Chain.after`` is
+            then given a handle, which stands for the value among the arguments of later calls.
+    """
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    keep: bool = False
+
+
+class Chain:
+    """All stages of one slice, then its attenuation and resolution where they are wanted.
+
+    Attributes:
+        total: emitter passes that it takes at most.
+    """
+
+    def __init__(self, scan: Scan, index: int) -> None:
+        self._scan, self._index = scan, index
+        self._plans = scan.stages()
+        self._history: tuple[Sweep, ...] = ()
+        self._over = 0
+        self._stage = self._staged(0, None)
+        self._finish = self._gatherings()
+        self.total = sum(
+            len(scan.problem(index, number).sounding) * plan.sweeps for number, plan in enumerate(self._plans)
+        )
+        self.total += sum(sum(part.sizes) for part in self._finish)
+
+    def _gatherings(self) -> list[Gathering]:
+        """What is read along the finished image's rays."""
+        settings, problem = self._plans[-1], self._scan.problem(self._index)
+        wanted = []
+        if settings.attenuation and problem.log_ratio is not None:
+            wanted.append(Gathering(look_losses, attenuate, attenuation.heard(problem)))
+        if settings.resolution_check:
+            wanted.append(Gathering(look_again, recover, problem.sounding))
+        return wanted
+
+    @property
+    def done(self) -> int:
+        """Emitter passes that are made, or that an early end made needless."""
+        return self._over + self._stage.done + sum(part.done for part in self._finish)
+
+    @property
+    def state(self) -> sart.State | gauss_newton.Iterate:
+        """Where the stage under way stands."""
+        return self._stage.state
+
+    def found(self, then: Callable[..., Any]) -> Any:
+        """What a call after the last stage gave; None before it has, and where it is not wanted."""
+        return next((part.value for part in self._finish if part.then is then), None)
+
+    @property
+    def history(self) -> tuple[Sweep, ...]:
+        """Of all stages so far."""
+        return self._history + self._stage.history
+
+    def first(self) -> list[Call]:
+        """Calls to begin with."""
+        return self._stage.first()
+
+    def after(self, call: Call, given: Any) -> list[Call]:
+        """Calls that may follow one that has finished.
+
+        Args:
+            call: the one that has finished.
+            given: what it gave, or its handle where ``call.keep``.
+        """
+        for part in self._finish:
+            if call.function in (part.look, part.then):
+                return part.after(call, given)
+        follow = self._stage.after(call, given)
+        if follow or not self._stage.state.done:
+            return follow
+        image = self._stage.state.slowness
+        if self._stage.number + 1 < len(self._plans):
+            self._history = self.history
+            self._over += self._stage.total
+            self._stage = self._staged(self._stage.number + 1, image)
+            return self._stage.first()
+        return [call for part in self._finish for call in part.first(self._scan, self._index, image)]
+
+    def _staged(self, number: int, before: Floats | None) -> Stage:
+        begun = start(self._scan.problem(self._index, number), before)
+        kind = GaussNewtonStage if self._plans[number].method == "gauss-newton" else SartStage
+        return kind(self._scan, self._index, number, begun)
+
+
+class Gathering:
+    """Rows of all emitters along the finished image, then one call that uses them all.
+
+    Attributes:
+        look, then: the two calls.
+        sizes: emitters of each part.
+        done: emitters looked at.
+        value: what ``then`` gave.
+    """
+
+    def __init__(self, look: Callable[..., Rows], then: Callable[..., Any], emitters: Ints) -> None:
+        self.look, self.then = look, then
+        self.sizes = [len(part) for part in cut(emitters)]
+        self.done = 0
+        self.value: Any = None
+        self._rows: dict[int, Any] = {}
+
+    def first(self, scan: Scan, index: int, image: Floats) -> list[Call]:
+        """Calls to begin with; none without emitters."""
+        return [Call(self.look, (scan, index, image, part), keep=True) for part in range(len(self.sizes))]
+
+    def after(self, call: Call, given: Any) -> list[Call]:
+        """Keep one part's rows; with the last part, the call that uses them all."""
+        if call.function is self.then:
+            self.value, self._rows = given, {}
+            return []
+        scan, index, _, part = call.arguments
+        self._rows[part] = given
+        self.done += self.sizes[part]
+        if len(self._rows) < len(self.sizes):
+            return []
+        return [Call(self.then, (scan, index, [rows for _, rows in sorted(self._rows.items())]))]
+
+
+class Stage(ABC):
+    """The calls of one stage.
+
+    Attributes:
+        number: from 0.
+        state: where it stands.
+        total: emitter passes that it takes at most.
+    """
+
+    state: sart.State | gauss_newton.Iterate
+
+    def __init__(self, scan: Scan, index: int, number: int) -> None:
+        self._at = scan, index, number
+        self.number = number
+        problem = scan.problem(index, number)
+        self._emitters = len(problem.sounding)
+        self.total = self._emitters * scan.stages()[number].sweeps
+
+    @property
+    def done(self) -> int:
+        """Emitter passes that are made, or that an early end made needless."""
+        if self.state.done:
+            return self.total
+        return self._emitters * self.state.sweep + self.state.emitter
+
+    @property
+    def history(self) -> tuple[Sweep, ...]:
+        """Of this stage."""
+        return tuple(replace(sweep, stage=self.number) for sweep in self.state.history)
+
+    @abstractmethod
+    def first(self) -> list[Call]:
+        """Calls to begin with."""
+
+    @abstractmethod
+    def after(self, call: Call, given: Any) -> list[Call]:
+        """As ``Chain.after``."""
+
+
+class SartStage(Stage):
+    """Batches of emitters, each used on the image that the one before left."""
+
+    _batch = FIRST_BATCH
+
+    def __init__(self, scan: Scan, index: int, number: int, image: Floats) -> None:
+        super().__init__(scan, index, number)
+        self.state: sart.State = sart.begin(image)
+
+    def first(self) -> list[Call]:
+        return [Call(advance, (*self._at, self.state, self._batch))]
+
+    def after(self, call: Call, given: Any) -> list[Call]:
+        used = -self.state.emitter
+        self.state, seconds = given
+        self._batch = next_batch(self._batch, used + self.state.emitter, seconds)
+        return [] if self.state.done else self.first()
+
+
+class GaussNewtonStage(Stage):
+    """The rays of all emitters in any order, then one step from all of them, again and again."""
+
+    def __init__(self, scan: Scan, index: int, number: int, image: Floats) -> None:
+        super().__init__(scan, index, number)
+        self.state: gauss_newton.Iterate = gauss_newton.begin(image)
+        self._sizes = [len(part) for part in cut(scan.problem(index, number).sounding)]
+        self._rows: dict[int, Any] = {}
+
+    @property
+    def done(self) -> int:
+        return super().done + (0 if self.state.done else sum(self._sizes[part] for part in self._rows))
+
+    def first(self) -> list[Call]:
+        # Without what only the step needs.
+        image = self.state.slowness
+        return [Call(look, (*self._at, image, part), keep=True) for part in range(len(self._sizes))]
+
+    def after(self, call: Call, given: Any) -> list[Call]:
+        if call.function is look:
+            self._rows[call.arguments[-1]] = given
+            if len(self._rows) < len(self._sizes):
+                return []
+            return [Call(step, (*self._at, self.state, [rows for _, rows in sorted(self._rows.items())]))]
+        self.state, self._rows = given, {}
+        return [] if self.state.done else self.first()
+
+
+def advance(scan: Scan, index: int, stage: int, state: sart.State, emitters: int) -> tuple[sart.State, float]:
+    """Call: use more emitters of one slice; returns the new state and the seconds it took."""
+    begun = time.perf_counter()
+    problem = scan.problem(index, stage)
+    state = sart.advance(problem, scan.stages()[stage], state, emitters, index)
+    return state, time.perf_counter() - begun
+
+
+def look(scan: Scan, index: int, stage: int, slowness: Floats, part: int) -> Rows:
+    """Call: the rays of one batch of emitters through an image."""
+    problem = scan.problem(index, stage)
+    return gauss_newton.look(problem, scan.stages()[stage], slowness, cut(problem.sounding)[part])
+
+
+def step(
+    scan: Scan, index: int, stage: int, state: gauss_newton.Iterate, rows: list[Rows]
+) -> gauss_newton.Iterate:
+    """Call: the next image."""
+    return gauss_newton.step(scan.problem(index, stage), scan.stages()[stage], state, rows, index)
+
+
+def look_losses(scan: Scan, index: int, slowness: Floats, part: int) -> Rows:
+    """Call: as ``look`` for the amplitudes, through the finished image."""
+    problem = scan.problem(index)
+    emitters = cut(attenuation.heard(problem))[part]
+    return attenuation.look(problem, scan.stages()[-1], slowness, emitters)
+
+
+def attenuate(scan: Scan, index: int, rows: list[Rows]) -> Floats:
+    """Call: the attenuation."""
+    return attenuation.attenuation(scan.problem(index), scan.stages()[-1], rows)
+
+
+def look_again(scan: Scan, index: int, slowness: Floats, part: int) -> Rows:
+    """Call: as ``look`` through the finished image."""
+    problem = scan.problem(index)
+    return resolution.look(problem, scan.stages()[-1], slowness, cut(problem.sounding)[part])
+
+
+def recover(scan: Scan, index: int, rows: list[Rows]) -> Floats:
+    """Call: the resolution check."""
+    return resolution.recovery(scan.problem(index), rows)
+
+
+def next_batch(batch: int, used: int, seconds: float) -> int:
+    """Emitters that take about ``TASK_S``; a batch that ended with its sweep tells too little."""
+    if used != batch or seconds <= 0.0:
+        return batch
+    return max(1, min(4 * batch, int(batch * TASK_S / seconds)))
+
+
+def cut(emitters: Ints) -> list[Ints]:
+    """``BATCH`` emitters at a time."""
+    return [emitters[k : k + BATCH] for k in range(0, len(emitters), BATCH)]

@@ -1,0 +1,157 @@
+"""Which emitters and receivers of a dataset make one problem: a slice, a ring among rings, or everything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..acquisition import Dataset
+from ..arrays import Floats, Ints
+from ..errors import InvalidInput
+from .settings import Settings
+
+# Elements whose heights differ by less than this, m, belong to one ring.
+SAME_HEIGHT_M = 1e-5
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Positions, m, and data of one problem.
+
+    Attributes:
+        emitters: (ntx, ndim).
+        receivers: (rings, nrx, ndim).
+        ring: (ntx,), which of the rings receives an emitter.
+        delta_tof: (ntx, nrx), s; NaN where there is none.
+        log_ratio: as ``delta_tof``, Np, or None.
+    """
+
+    emitters: Floats
+    receivers: Floats
+    ring: Ints
+    delta_tof: Floats
+    log_ratio: Floats | None
+
+
+def heights(dataset: Dataset) -> Floats | None:
+    """Heights of the rings of an array, or of the slices of a scan, m, rising; None for a plain 2-D scan.
+
+    Raises:
+        InvalidInput: for an array in space that is moved along z as well.
+    """
+    if dataset.element_position_m.shape[1] == 2:
+        return dataset.slice_z_m
+    if dataset.slice_z_m is not None:
+        raise InvalidInput(
+            "slice/z_m", f"{dataset.slices} slices of an array in space", "slices of an array in a plane"
+        )
+    z = np.sort(dataset.element_position_m[:, 2])
+    first = np.concatenate(([True], np.diff(z) > SAME_HEIGHT_M))
+    return np.asarray(z[first])
+
+
+def count(dataset: Dataset, settings: Settings) -> int:
+    """How many problems the dataset falls into.
+
+    Raises:
+        InvalidInput: as ``heights``, and for a volume where there is but one height.
+    """
+    z = heights(dataset)
+    if settings.decomposition == "slices":
+        return 1 if z is None else len(z)
+    if z is None or len(z) == 1:
+        raise InvalidInput("decomposition", "'volume'", "slices, for the scan has one height only")
+    return 1
+
+
+def of(dataset: Dataset, settings: Settings, index: int) -> Pairs:
+    """The pairs of one problem; ``index`` counts from 0.
+
+    Raises:
+        InvalidInput: for a problem without a travel time, and as ``count``.
+    """
+    if not 0 <= index < count(dataset, settings):
+        raise InvalidInput("slice", index, f"0 to {count(dataset, settings) - 1}")
+    plane = dataset.element_position_m.shape[1] == 2
+    if settings.decomposition == "slices":
+        found = _slice(dataset, settings, index) if plane else _ring(dataset, settings, index)
+    elif plane:
+        found = _moved(dataset, settings)
+    else:
+        found = _made(dataset, settings, dataset.tx, dataset.rx, np.arange(len(dataset.element_position_m)))
+    if not np.isfinite(found.delta_tof).any():
+        where = f" in slice {index}" if count(dataset, settings) > 1 else ""
+        raise InvalidInput(
+            "traveltime", f"no valid pair{where}", "at least one finite travel time between two elements"
+        )
+    return found
+
+
+def _slice(dataset: Dataset, settings: Settings, index: int) -> Pairs:
+    one = dataset.slice(index)
+    return _made(one, settings, one.tx, one.rx, np.arange(len(one.element_position_m)))
+
+
+def _ring(dataset: Dataset, settings: Settings, index: int) -> Pairs:
+    """A ring of an array in space, as if it were alone in its plane."""
+    z = heights(dataset)
+    height = dataset.element_position_m[:, 2]
+    nearest = np.abs(height[:, None] - np.asarray(z)[None, :]).argmin(axis=1)
+    whole = _made(dataset, settings, dataset.tx, dataset.rx, np.flatnonzero(nearest == index))
+    return Pairs(
+        whole.emitters[:, :2], whole.receivers[..., :2], whole.ring, whole.delta_tof, whole.log_ratio
+    )
+
+
+def _moved(dataset: Dataset, settings: Settings) -> Pairs:
+    """A ring at all its heights, each receiving itself."""
+    z = np.asarray(heights(dataset))
+    rings = [_slice(dataset, settings, k) for k in range(len(z))]
+
+    def lifted(points: Floats, height: float) -> Floats:
+        return np.column_stack((points, np.full(len(points), height)))
+
+    ratios = [ring.log_ratio for ring in rings]
+    known = [ratio for ratio in ratios if ratio is not None]
+    return Pairs(
+        np.concatenate([lifted(ring.emitters, h) for ring, h in zip(rings, z, strict=True)]),
+        np.stack([lifted(ring.receivers[0], h) for ring, h in zip(rings, z, strict=True)]),
+        np.repeat(np.arange(len(z)), [len(ring.emitters) for ring in rings]),
+        np.concatenate([ring.delta_tof for ring in rings]),
+        np.concatenate(known) if len(known) == len(ratios) else None,
+    )
+
+
+def _made(dataset: Dataset, settings: Settings, tx: Ints, rx: Ints, members: Ints) -> Pairs:
+    """The pairs between some elements, with reverses where the settings want them."""
+    delta, ratio = dataset.differential_tof(), dataset.log_ratio_np
+    if ratio is not None and dataset.valid is not None:
+        ratio = np.where(dataset.valid, ratio, np.nan)
+    sent, received = np.isin(tx, members), np.isin(rx, members)
+    if len(members) < len(dataset.element_position_m):
+        tx, rx = tx[sent], rx[received]
+        delta = delta[np.ix_(sent, received)]
+        ratio = None if ratio is None else ratio[np.ix_(sent, received)]
+    emitters, receivers = tx, rx
+    if settings.reciprocity and tx.size and rx.size:
+        if ratio is not None:
+            _, _, ratio = _with_reverses(tx, rx, ratio)
+        emitters, receivers, delta = _with_reverses(tx, rx, delta)
+    position = dataset.element_position_m
+    return Pairs(
+        position[emitters], position[receivers][None], np.zeros(len(emitters), np.int64), delta, ratio
+    )
+
+
+def _with_reverses(tx: Ints, rx: Ints, delta: Floats) -> tuple[Ints, Ints, Floats]:
+    """All elements as both emitters and receivers, missing pairs filled by their reverse.
+
+    Travel times are the same both ways, so a half matrix is as good as a whole one, and every
+    emitter then sees the object from all sides.
+    """
+    elements = np.union1d(tx, rx)
+    full = np.full((len(elements), len(elements)), np.nan)
+    # Duplicate entries of tx or rx keep their last value, as a dictionary would.
+    full[np.searchsorted(elements, tx)[:, None], np.searchsorted(elements, rx)[None, :]] = delta
+    return elements, elements, np.where(np.isfinite(full), full, full.T)

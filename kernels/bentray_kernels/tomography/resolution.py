@@ -1,0 +1,75 @@
+"""How much of a checkerboard the rays of a finished image bring back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from ..arrays import Floats, Ints
+from .gauss_newton import look as rows_of
+from .linear import Linearised
+from .linearisation import Rows
+from .matrix import back_project, project
+from .problem import Problem
+from .settings import Settings
+
+# Side of a field of the checkerboard, nodes.
+FIELD_NODES = 4
+
+# What a node's own curvature in the data must exceed to be seen, as a part of the average: noise and the
+# errors of the model hide less.
+DAMPING = 0.03
+
+# A field's contrast over that of the surroundings; any value gives the same recovery, for it is linear.
+CONTRAST = 0.01
+
+
+def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
+    """Rows of some emitters along the rays of the finished image; any split gives the same."""
+    return rows_of(problem, settings, slowness, emitters)
+
+
+def recovery(problem: Problem, parts: Sequence[Rows]) -> Floats:
+    """How much of a checkerboard comes back, node by node: 1 where all of it does, 0 where nothing.
+
+    A checkerboard with fields of ``FIELD_NODES`` nodes is projected along the rays and reconstructed from
+    those times by damped least squares (Lévêque et al. 1993 say what such a test shows and what not). The
+    answer at a node is the part of the board's contrast that its neighbourhood gets back.
+
+    Args:
+        problem: the slice or volume.
+        parts: rows of all emitters, in their order.
+
+    Returns:
+        Of the region's shape; 0 outside the region.
+    """
+    shape = problem.region.shape
+    crossing = problem.spacing / problem.water_speed
+    board = np.where(problem.region, _checkerboard(shape) * CONTRAST * crossing, 0.0)
+    passed, seen = np.zeros(board.size), []
+    for part in parts:
+        times = np.empty(part.residual.size)
+        project(part.pointers, part.columns, part.lengths, board.ravel(), times)
+        seen.append(replace(part, residual=times))
+        back_project(part.pointers, part.columns, part.lengths, np.ones(times.size), passed)
+    density = float(passed.reshape(shape)[problem.region].mean())
+    bounds = -crossing, crossing
+    empty = np.zeros(shape)
+    found, _ = Linearised(
+        seen, empty, density, problem.region, bounds, DAMPING, penalty="tikhonov", reference=empty
+    ).solve(empty)
+    near = gaussian_filter(board * board, FIELD_NODES)
+    alike = gaussian_filter(found * board, FIELD_NODES)
+    return np.where(problem.region, alike / np.maximum(near, 1e-300), 0.0)
+
+
+def _checkerboard(shape: tuple[int, ...]) -> Floats:
+    """+1 and −1 by turns, in fields of ``FIELD_NODES`` nodes."""
+    fields = np.zeros(shape, np.int64)
+    for axis, n in enumerate(shape):
+        along = np.arange(n) // FIELD_NODES
+        fields += along.reshape([-1 if a == axis else 1 for a in range(len(shape))])
+    return np.asarray(1.0 - 2.0 * (fields % 2))

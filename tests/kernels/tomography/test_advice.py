@@ -1,0 +1,106 @@
+"""Advice: pairs are held out both ways, the better model wins, noise says where to stop."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.tomography import Settings, Trial, reconstruct
+from bentray_kernels.tomography.advice import CANDIDATES, choose, noise_of, part_of, reason, stopped, tried
+from bentray_kernels.tomography.gauss_newton import look
+from bentray_kernels.tomography.reconstruction import Here
+
+WATER = 1375.0
+RING = Ring(48, 0.09)
+PLAN = Settings(method="auto", nodes=48)
+
+
+@pytest.fixture(scope="module")
+def scan():
+    data = TravelTimeScan(table6(WATER), RING, TABLE6_SIDE_M, nodes=48)
+    everyone = np.arange(RING.elements)
+    return Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=data.delta_tof(everyone))
+
+
+def test_the_parts_are_the_whole_and_share_no_pair(scan):
+    shown, held = (np.isfinite(part_of(scan, part).differential_tof()) for part in ("shown", "held-out"))
+    assert not (shown & held).any()
+    assert np.array_equal(shown | held, np.isfinite(scan.differential_tof()))
+    assert np.array_equal(held, held.T)
+    assert 0.05 < held.sum() / (shown | held).sum() < 0.2
+    # No element loses more than a few of its pairs.
+    assert held.sum(axis=1).max() < 0.4 * RING.elements
+
+
+def test_invalid_pairs_stay_so(scan):
+    valid = np.random.default_rng(0).random(scan.delta_tof_s.shape) < 0.5
+    held = part_of(replace(scan, valid=valid), "held-out").valid
+    assert not (held & ~valid).any()
+
+
+def test_eikonal_times_ask_for_bent_rays(scan):
+    result = reconstruct(scan, PLAN)
+    assert result.settings.rays == "curved"
+    assert result.settings.method in ("sart", "gauss-newton")
+    assert len(result.trials) == len(CANDIDATES)
+    assert reason(result.trials).startswith("auto chose curved")
+    # What was chosen gives the same bits when asked for by itself.
+    again = reconstruct(scan, result.settings)
+    assert np.array_equal(again.speed, result.speed)
+    assert again.trials == ()
+    assert reason(again.trials) == ""
+
+
+def test_straight_times_ask_for_straight_rays(scan):
+    """Times integrated along straight lines, as a picker of late arrivals gives them."""
+    straight = replace(PLAN, method="sart", rays="straight", sweeps=1)
+
+    problem = Here(scan, straight, "all").problem(0)
+    axis = np.arange(48) * problem.spacing
+    x, y = np.meshgrid(axis - axis.mean(), axis - axis.mean(), indexing="ij")
+    image = 1.0 / (WATER + 100.0 * (np.hypot(x, y) < 0.05) + 60.0 * (np.hypot(x - 0.02, y) < 0.01))
+    rows = look(problem, straight, image, problem.sounding)
+    delta = np.full(scan.delta_tof_s.shape, np.nan)
+    delta[np.isfinite(problem.delta_tof)] = problem.delta_tof[np.isfinite(problem.delta_tof)] - rows.residual
+    assert reconstruct(replace(scan, delta_tof_s=delta), PLAN).settings.rays == "straight"
+
+
+def trial(rays, held_out):
+    return Trial({"rays": rays}, held_out, held_out)
+
+
+def test_bent_rays_must_be_clearly_better():
+    straight, bent = trial("straight", 100e-9), trial("curved", 99e-9)
+    assert choose([straight, bent]) is straight
+    assert choose([straight, replace(bent, held_out_rms_s=90e-9)]).settings["rays"] == "curved"
+    assert choose([trial("straight", 110e-9), straight, bent]) is straight
+
+
+def test_noise_says_where_to_stop():
+    chosen = trial("straight", 100e-9)
+    assert stopped(PLAN, chosen, 90e-9).stop_rms_s == pytest.approx(99e-9)
+    # What predicts better than the noise estimate shows that there is less of it.
+    assert stopped(PLAN, chosen, 120e-9).stop_rms_s == 0.0
+    asked = replace(PLAN, stop_rms_s=5e-9)
+    assert stopped(asked, chosen, 90e-9) == asked
+
+
+def test_the_noise_is_told_or_estimated(scan):
+    clean = noise_of(scan)
+    random = np.random.default_rng(3)
+    noisy = replace(scan, delta_tof_s=scan.delta_tof_s + random.normal(0.0, 3e-7, scan.delta_tof_s.shape))
+    assert clean < 2.2e-7
+    assert 2.7e-7 < noise_of(noisy) < 4.5e-7
+    told = replace(scan, sigma_s=np.full(scan.delta_tof_s.shape, 5e-8))
+    assert noise_of(told) == pytest.approx(5e-8)
+
+
+def test_trials_are_coarser_and_speed_alone():
+    for plan, changes in zip(tried(replace(PLAN, nodes=200)), CANDIDATES, strict=True):
+        assert plan.nodes == 100
+        assert not plan.attenuation
+        assert plan.method == changes["method"]
+    assert {plan.nodes for plan in tried(PLAN)} == {48}

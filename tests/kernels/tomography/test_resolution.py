@@ -1,0 +1,66 @@
+"""The resolution check: a board comes back where rays cross, and not where they do not pass."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation import Ring
+from bentray_kernels.tomography import Settings, reconstruct
+
+RING, WATER = Ring(96, 0.08), 1500.0
+PLAN = Settings(nodes=48, sweeps=1, rays="straight", resolution_check=True)
+
+
+def scan(keep=None):
+    everyone = np.arange(RING.elements)
+    delta = np.zeros((RING.elements, RING.elements))
+    return Dataset(
+        RING.positions(),
+        everyone,
+        everyone,
+        WATER,
+        delta_tof_s=delta if keep is None else np.where(keep, delta, np.nan),
+    )
+
+
+@pytest.fixture(scope="module")
+def everywhere():
+    return reconstruct(scan(), PLAN)
+
+
+def test_many_rays_bring_most_of_it_back(everywhere):
+    recovery = everywhere.recovery
+    assert recovery.shape == everywhere.speed.shape
+    centre = recovery[18:30, 18:30]
+    assert centre.min() > 0.8
+    assert recovery.max() < 1.1
+    assert recovery[0, 0] == 0.0
+
+
+def test_few_rays_bring_little_back(everywhere):
+    few = np.zeros((RING.elements, RING.elements), bool)
+    few[::16, ::16] = True
+    sparse = reconstruct(scan(few), PLAN).recovery
+    assert sparse[18:30, 18:30].mean() < 0.5 * everywhere.recovery[18:30, 18:30].mean()
+
+
+def test_where_no_ray_passes_nothing_comes_back():
+    """Emitters and receivers on the left half only: the right rim is never crossed."""
+    left = RING.positions()[:, 0] < -0.01
+    recovery = reconstruct(scan(left[:, None] & left[None, :]), PLAN).recovery
+    assert np.abs(recovery[38:44, 20:28]).max() < 0.05
+    assert recovery[10:14, 20:28].mean() > 0.25
+
+
+def test_it_is_told_only_when_asked(everywhere):
+    plain = reconstruct(scan(), replace(PLAN, resolution_check=False))
+    assert plain.recovery is None
+    assert np.array_equal(plain.speed, everywhere.speed)
+
+
+def test_residuals_are_counted(everywhere):
+    assert everywhere.residuals.sum() == RING.elements * (RING.elements - 1)
+    middle = len(everywhere.residuals) // 2
+    assert everywhere.residuals[middle] == everywhere.residuals.sum()
