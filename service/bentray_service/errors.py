@@ -118,7 +118,8 @@ def fault_of(error: Mapping[str, Any]) -> Fault:
         return Fault(field=".".join(where), found="nothing", accepted="a value; it is required")
     if error["type"] == "extra_forbidden":
         return Fault(field=".".join(where), found=_short(error["input"]), accepted="no such field; see /docs")
-    accepted = str(context.get("expected") or error["msg"].removeprefix("Input should be "))
+    said = error["msg"].removeprefix("Input should be ").partition(", unable to parse")[0]
+    accepted = str(context.get("expected") or said)
     return Fault(field=".".join(where), found=_short(error["input"]), accepted=accepted)
 
 

@@ -12,22 +12,7 @@ import typer
 
 from .paths import input_file, output_folder
 from .results import show_results, write_results
-from .settings_options import (
-    Eikonal,
-    Method,
-    Nodes,
-    PenaltyStrength,
-    Picker,
-    Rays,
-    Relaxation,
-    Seed,
-    Side,
-    Smoothing,
-    SpeedRange,
-    SpeedUpdate,
-    Sweeps,
-    settings_from,
-)
+from .settings_options import Asked, settings_from, with_settings_options
 from .terminal import AsJson, progress_bar, residual_note
 
 if TYPE_CHECKING:
@@ -35,26 +20,17 @@ if TYPE_CHECKING:
     from bentray_kernels.tomography import Progress, Reconstruction, Settings
 
 
+@with_settings_options
 def reconstruct(
     file: Annotated[Path, typer.Argument(help="Dataset file (HDF5, format uct-transmission).")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; made if absent.")],
-    method: Method = None,
-    rays: Rays = None,
-    eikonal: Eikonal = None,
-    sweeps: Sweeps = None,
-    relaxation: Relaxation = None,
-    nodes: Nodes = None,
-    side: Side = None,
-    speed_update: SpeedUpdate = None,
-    speed_range: SpeedRange = None,
-    smoothing: Smoothing = None,
-    penalty_strength: PenaltyStrength = None,
-    picker: Picker = None,
-    seed: Seed = None,
+    asked: Asked,
     workers: Annotated[
         int | None,
         typer.Option(
-            min=1, show_default="one a slice, at most one a core", help="Worker processes; 1 uses none."
+            min=1,
+            show_default="what works side by side, at most one a core",
+            help="Worker processes; 1 uses none.",
         ),
     ] = None,
     as_json: AsJson = False,
@@ -64,21 +40,7 @@ def reconstruct(
     Example:  bentray reconstruct scan.h5 -o result --rays curved --sweeps 6
     """
     source, folder = input_file(file), output_folder(output)
-    settings = settings_from(
-        method=method,
-        rays=rays,
-        eikonal=eikonal,
-        sweeps=sweeps,
-        relaxation=relaxation,
-        nodes=nodes,
-        side_m=side,
-        speed_update=speed_update,
-        speed_range_mps=speed_range,
-        smoothing_nodes=smoothing,
-        penalty_strength=penalty_strength,
-        picker=picker,
-        seed=seed,
-    )
+    settings = settings_from(asked)
 
     from bentray_workers.dataset_file import read_dataset
 
@@ -100,10 +62,26 @@ def _run(
 ) -> Reconstruction:
     from bentray_workers.slices import reconstruct as reconstruct_slices
 
-    count = workers or min(dataset.slices, os.cpu_count() or 1)
+    count = workers or useful_workers(dataset, settings)
     if count == 1:
         return reconstruct_slices(None, file, settings, show)
     from bentray_workers.cluster import open_cluster
 
     with open_cluster(workers=count) as cluster:
         return reconstruct_slices(cluster.client, file, settings, show)
+
+
+def useful_workers(dataset: Dataset, settings: Settings) -> int:
+    """Worker processes that have work to do at the same time, at most one a core.
+
+    SART uses its emitters one after the other, so only slices run side by side; the other methods trace the
+    rays of many emitters at once.
+
+    Raises:
+        InvalidInput: for a volume of a scan that has one height only.
+    """
+    from bentray_kernels.tomography.pairs import count
+
+    cores = len(os.sched_getaffinity(0))
+    problems = count(dataset, settings)
+    return min(problems, cores) if settings.method == "sart" else cores

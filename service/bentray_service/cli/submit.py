@@ -12,27 +12,14 @@ from bentray_kernels.errors import InvalidInput
 from .endings import service_answers
 from .paths import input_file, output_folder
 from .results import show_results, write_results
-from .settings_options import (
-    Eikonal,
-    Method,
-    Nodes,
-    PenaltyStrength,
-    Picker,
-    Rays,
-    Relaxation,
-    Seed,
-    Side,
-    Smoothing,
-    SpeedRange,
-    SpeedUpdate,
-    Sweeps,
-    settings_from,
-)
+from .settings_options import Asked, settings_from, with_settings_options
 from .terminal import AsJson, Step, print_json, print_lines, progress_bar, residual_note
 
 
+@with_settings_options
 def submit(
     file: Annotated[Path, typer.Argument(help="Dataset file (HDF5, format uct-transmission).")],
+    asked: Asked,
     url: Annotated[str, typer.Option(help="Address of the service.")] = "http://127.0.0.1:8000",
     output: Annotated[
         Path | None,
@@ -41,19 +28,6 @@ def submit(
     wait: Annotated[
         bool, typer.Option("--wait/--no-wait", help="Wait for the end, or return at once.")
     ] = True,
-    method: Method = None,
-    rays: Rays = None,
-    eikonal: Eikonal = None,
-    sweeps: Sweeps = None,
-    relaxation: Relaxation = None,
-    nodes: Nodes = None,
-    side: Side = None,
-    speed_update: SpeedUpdate = None,
-    speed_range: SpeedRange = None,
-    smoothing: Smoothing = None,
-    penalty_strength: PenaltyStrength = None,
-    picker: Picker = None,
-    seed: Seed = None,
     as_json: AsJson = False,
 ) -> None:
     """Upload a scan, reconstruct it on the service and download the result.
@@ -66,21 +40,7 @@ def submit(
         )
     source = input_file(file)
     folder = None if output is None else output_folder(output)
-    settings = settings_from(
-        method=method,
-        rays=rays,
-        eikonal=eikonal,
-        sweeps=sweeps,
-        relaxation=relaxation,
-        nodes=nodes,
-        side_m=side,
-        speed_update=speed_update,
-        speed_range_mps=speed_range,
-        smoothing_nodes=smoothing,
-        penalty_strength=penalty_strength,
-        picker=picker,
-        seed=seed,
-    )
+    settings = settings_from(asked)
 
     from ..client import Client
 

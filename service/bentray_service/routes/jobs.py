@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Query, Response, status
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.settings import Settings
 
+from ..asked_settings import known_only
 from ..errors import described
 from ..wiring import Service
 from .bodies import SmallBody, only
 from .records import JobList, JobRecord, job_record
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], route_class=SmallBody)
-
-
-def _known_only(given: Any) -> Any:
-    """Refuse a setting that does not exist with the list of those that do."""
-    known = [field.name for field in fields(Settings)]
-    for name in given if isinstance(given, dict) else ():
-        if name not in known:
-            raise InvalidInput(name, repr(given[name])[:80], "a known setting: " + ", ".join(known))
-    return given
 
 
 class JobRequest(BaseModel):
@@ -35,7 +25,7 @@ class JobRequest(BaseModel):
 
     kind: Literal["reconstruction"]
     dataset: str = Field(description="Id of an uploaded dataset.")
-    settings: Annotated[Settings, BeforeValidator(_known_only)] = Field(
+    settings: Annotated[Settings, BeforeValidator(known_only)] = Field(
         default_factory=Settings, description="What is left out takes its default."
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,10 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Settings
+from bentray_service.cli.reconstruct import useful_workers
 from bentray_workers.reconstruction_file import read_reconstruction
 
 QUICK = ("--nodes", 32, "--sweeps", 2)
@@ -67,6 +72,39 @@ def test_worker_processes_give_the_same_bits(
         assert done.exit_code == 0
     alone, shared = (read_reconstruction(tmp_path / str(n) / "reconstruction.h5") for n in (1, 2))
     np.testing.assert_array_equal(alone.speed, shared.speed)
+
+
+def heights(slices: int) -> Dataset:
+    """A scan of so many slices; 1 is a plain 2-D scan."""
+    ring, everyone = np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]]), np.arange(3)
+    if slices == 1:
+        return Dataset(ring, everyone, everyone, 1500.0, delta_tof_s=np.zeros((3, 3)))
+    z, delta = 1e-3 * np.arange(slices), np.zeros((slices, 3, 3))
+    return Dataset(ring, everyone, everyone, 1500.0, delta_tof_s=delta, slice_z_m=z)
+
+
+@pytest.mark.parametrize(
+    ("slices", "settings", "workers"),
+    [
+        (1, Settings(), 1),
+        (3, Settings(), 3),
+        (9, Settings(), 4),
+        (9, Settings(decomposition="volume"), 1),
+        (9, Settings(decomposition="volume", method="gauss-newton"), 4),
+        (1, Settings(method="gauss-newton"), 4),
+        (1, Settings(method="auto"), 4),
+    ],
+)
+def test_there_are_as_many_workers_as_have_work_and_cores(
+    monkeypatch: pytest.MonkeyPatch, slices: int, settings: Settings, workers: int
+) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: set(range(4)))
+    assert useful_workers(heights(slices), settings) == workers
+
+
+def test_a_volume_of_one_height_is_refused_before_any_worker_starts() -> None:
+    with pytest.raises(InvalidInput, match="decomposition"):
+        useful_workers(heights(1), Settings(decomposition="volume", method="gauss-newton"))
 
 
 def spoil(path: Path, change: Callable[[h5py.File], None]) -> Path:
