@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..errors import InvalidInput
+from .focusing import focusing
 from .linear import Linearised
 from .linearisation import Rows, linearise_losses
 from .matrix import back_project, project
@@ -29,7 +32,16 @@ def heard(problem: Problem) -> Ints:
 
 
 def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
-    """Rows of some emitters along the rays of the finished image; any split gives the same."""
+    """Rows of some emitters along the rays of the finished image; any split gives the same.
+
+    With ``settings.focusing`` the amplitudes lose what refraction did to them, and pairs whose ray has passed
+    a caustic are left out.
+
+    Raises:
+        InvalidInput: for ``focusing`` without a frequency.
+    """
+    if settings.focusing:
+        problem = _unfocused(problem, settings, slowness, emitters)
     return linearise_losses(
         problem,
         slowness,
@@ -40,11 +52,31 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
     )
 
 
+def _unfocused(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Problem:
+    """The problem with the log ratios of some emitters as absorption alone would have them."""
+    if problem.log_ratio is None:
+        return problem
+    if problem.wavelength_m is None:
+        raise InvalidInput("amplitude@frequency_hz", "nothing", "a frequency in Hz, for the setting focusing")
+    ratio = problem.log_ratio.copy()
+    for ring in np.unique(problem.ring[emitters]):
+        members = emitters[problem.ring[emitters] == ring]
+        ratio[members] -= focusing(
+            slowness,
+            problem.spacing,
+            problem.emitters[members],
+            problem.receivers[ring],
+            wavelength_m=problem.wavelength_m,
+            eikonal=settings.eikonal,
+        )
+    return replace(problem, log_ratio=ratio)
+
+
 def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats:
     """The attenuation from the rows of all emitters, in their order.
 
-    The rays are fixed, so the problem is linear: log ratios are integrals of the attenuation. Amplitudes
-    also change by focusing, which is not corrected here.
+    The rays are fixed, so the problem is linear: log ratios are integrals of the attenuation, once focusing
+    is taken off.
 
     Returns:
         of the region's shape, Np/m, at least 0; that of the water outside the array.

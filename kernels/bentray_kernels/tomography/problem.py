@@ -20,10 +20,6 @@ MARGIN_NODES = 3
 # Nodes nearer to the array than this are water and stay so.
 RIM_NODES = 2
 
-# A ray leaves the heights of its emitter and receivers by no more than this, nodes. On the Table 7 phantom
-# they leave them by two.
-AXIAL_ROOM_NODES = 6
-
 
 @dataclass(frozen=True)
 class Problem:
@@ -40,6 +36,8 @@ class Problem:
         water_speed: m/s.
         log_ratio: as ``delta_tof``, ln(A_water / A_object), Np; None where no amplitudes were recorded.
         water_attenuation: Np/m.
+        wavelength_m: in water, of the amplitudes; None where their frequency is not known.
+        axial_room: nodes that a ray may leave the heights of its emitter and receivers by; None: any.
     """
 
     emitters: Floats
@@ -52,6 +50,8 @@ class Problem:
     water_speed: float
     log_ratio: Floats | None = None
     water_attenuation: float = 0.0
+    wavelength_m: float | None = None
+    axial_room: int | None = None
 
     @classmethod
     def of(cls, dataset: Dataset, settings: Settings, index: int = 0) -> Problem:
@@ -94,6 +94,7 @@ class Problem:
             origin = np.append(origin, z.min() - MARGIN_NODES * spacing)
             region = np.repeat(region[:, :, None], count, axis=2)
         place = tuple(float(x) for x in origin)
+        frequency = dataset.amplitude_frequency_hz or dataset.center_frequency_hz
         if settings.roi:
             heights = pairs.heights(dataset)
             height = None if heights is None or len(place) == 3 else float(heights[index])
@@ -109,6 +110,8 @@ class Problem:
             water_speed=dataset.water_speed_mps,
             log_ratio=found.log_ratio,
             water_attenuation=dataset.water_attenuation_np_m or 0.0,
+            wavelength_m=None if frequency is None else dataset.water_speed_mps / frequency,
+            axial_room=settings.axial_room_nodes,
         )
 
     @property
@@ -123,11 +126,12 @@ class Problem:
     def slab(self, emitter: int) -> slice:
         """Heights, as nodes of the last axis, that the emitter's rays need; all there are of a slice."""
         nodes = self.region.shape[-1]
-        if self.region.ndim == 2:
+        if self.region.ndim == 2 or self.axial_room is None:
             return slice(0, nodes)
         z = np.append(self.receivers_of(emitter)[:, 2], self.emitters[emitter, 2]) / self.spacing
-        low = max(math.floor(z.min()) - AXIAL_ROOM_NODES, 0)
-        return slice(low, min(math.ceil(z.max()) + AXIAL_ROOM_NODES + 1, nodes))
+        # Rounding must not add a node to a height that lies on one.
+        low = max(math.floor(z.min() + 1e-6) - self.axial_room, 0)
+        return slice(low, min(math.ceil(z.max() - 1e-6) + self.axial_room + 1, nodes))
 
     def each_pair_once(self) -> Problem:
         """The same problem without reverses, where every element is emitter and receiver: half the rays.

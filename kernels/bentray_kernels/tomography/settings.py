@@ -30,6 +30,8 @@ class Settings:
         rays: ``curved`` traces down the travel time of the current image; ``straight`` ignores refraction.
         eikonal: the wave-front method for curved rays; see ``bentray_kernels.eikonal.methods()``.
         decomposition: ``slices`` reconstructs each height of the ring by itself; ``volume`` all in space.
+        axial_room_nodes: in a volume, how far above and below an emitter and its receivers the wave front is
+            tracked, nodes; None: everywhere. Fast skin can guide first arrivals far out of a ring's plane.
         nodes: nodes along each side of the square image.
         side_m: side of the image, m; None: the array with a margin.
         sweeps: how often every emitter is used; ``gauss-newton`` ends sooner once nothing is gained.
@@ -57,6 +59,8 @@ class Settings:
         reciprocity: use a missing pair's reverse (emitter and receiver exchanged) in its place.
         picker: how travel times are read where only traces were uploaded.
         attenuation: reconstruct it too, where amplitudes were recorded.
+        focusing: take off the amplitudes what refraction does to them, by the spreading of ray tubes in the
+            speed image; needs its frequency (``amplitude@frequency_hz``). Experimental.
         resolution_check: also tell how much of a checkerboard the rays recover, node by node.
 
     Raises:
@@ -69,6 +73,7 @@ class Settings:
     rays: Literal["curved", "straight"] = "curved"
     eikonal: str = "accurate"
     decomposition: Literal["slices", "volume"] = "slices"
+    axial_room_nodes: int | None = None
     nodes: int = 128
     side_m: float | None = None
     sweeps: int = 5
@@ -91,6 +96,7 @@ class Settings:
     reciprocity: bool = True
     picker: Literal["aic", "threshold"] = "aic"
     attenuation: bool = True
+    focusing: bool = False
     resolution_check: bool = False
 
     def __post_init__(self) -> None:
@@ -111,6 +117,8 @@ class Settings:
                 "speed_range_mps", None, "(lowest, highest) in m/s, since speed_update is data-driven"
             )
         _within("nodes", self.nodes, LEAST_NODES, 2048)
+        if self.axial_room_nodes is not None:
+            _within("axial_room_nodes", self.axial_room_nodes, 2, 4096)
         _within("sweeps", self.sweeps, 1, 1000)
         if self.side_m is not None:
             _within("side_m", self.side_m, 1e-4, 100.0)

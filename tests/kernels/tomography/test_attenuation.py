@@ -7,8 +7,11 @@ import pytest
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
-from bentray_kernels.tomography import Settings, reconstruct, rmse
+from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
+from bentray_kernels.tomography.attenuation import look
+from bentray_kernels.tomography.focusing import focusing
 
 NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
 PHANTOM = table6(WATER)
@@ -72,3 +75,31 @@ def test_gaps_in_the_amplitudes_are_only_gaps(scan):
 def test_who_does_not_want_it_gets_none(scan):
     assert reconstruct(scan, plan(attenuation=False, sweeps=1)).attenuation is None
     assert reconstruct(replace(scan, log_ratio_np=None), plan(sweeps=1)).attenuation is None
+
+
+def test_focusing_is_taken_off(scan):
+    """Amplitudes that a smooth lens focuses: without the correction they read as absorption or gain."""
+    problem = Problem.of(replace(scan, amplitude_frequency_hz=5e5), plan())
+    slowness = 1.0 / PHANTOM.speed(NODES, SIDE)
+    lens = focusing(
+        slowness,
+        problem.spacing,
+        problem.emitters,
+        problem.receivers[0],
+        wavelength_m=problem.wavelength_m,
+        eikonal="accurate",
+    )
+    bent = replace(problem, log_ratio=problem.log_ratio + lens)
+    some = np.arange(4)
+    plain = look(problem, plan(), slowness, some)
+    lensed = look(bent, plan(), slowness, some)
+    mended = look(bent, plan(focusing=True), slowness, some)
+    assert np.abs(lensed.residual - plain.residual).max() > 0.1
+    assert len(mended.residual) <= len(plain.residual)
+    assert np.isin(np.round(mended.residual, 9), np.round(plain.residual, 9)).all()
+
+
+def test_focusing_needs_a_frequency(scan):
+    with pytest.raises(InvalidInput) as refusal:
+        reconstruct(scan, plan("sart", sweeps=1, focusing=True))
+    assert refusal.value.field == "amplitude@frequency_hz"
