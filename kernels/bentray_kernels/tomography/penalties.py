@@ -36,10 +36,14 @@ def laplacian(image: Floats) -> Floats:
     return -adjoint(gradient(image))
 
 
-def shrink(slope: Floats, by: float) -> Floats:
-    """Each gradient shortened by ``by``, none below 0."""
-    size = np.sqrt((slope**2).sum(axis=0))
-    return np.asarray(slope * np.maximum(1.0 - by / np.maximum(size, 1e-300), 0.0))
+def length(slope: Floats) -> Floats:
+    """Of each gradient: shape from (ndim, *shape)."""
+    return np.asarray(np.sqrt((slope**2).sum(axis=0)))
+
+
+def shrink(slope: Floats, by: Floats | float) -> Floats:
+    """Each gradient shortened by ``by``, a number or one for each, none below 0."""
+    return np.asarray(slope * np.maximum(1.0 - by / np.maximum(length(slope), 1e-300), 0.0))
 
 
 def _upper(image: Floats, axis: int) -> Floats:

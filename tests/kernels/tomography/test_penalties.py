@@ -48,3 +48,8 @@ def test_gradient_looks_along_every_axis():
 def test_shrinking_takes_off_the_same_length_everywhere():
     slope = np.array([[[3.0, 0.0, 0.1]], [[4.0, 0.0, 0.0]]])
     assert np.allclose(shrink(slope, 1.0), [[[2.4, 0.0, 0.0]], [[3.2, 0.0, 0.0]]])
+
+
+def test_shrinking_by_lengths_of_their_own():
+    slope = np.array([[[3.0, 0.0, 0.1]], [[4.0, 0.0, 0.0]]])
+    assert np.allclose(shrink(slope, np.array([[2.5, 1.0, 0.05]])), [[[1.5, 0.0, 0.05]], [[2.0, 0.0, 0.0]]])
