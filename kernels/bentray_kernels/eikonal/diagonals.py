@@ -13,12 +13,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
+
+Reals = NDArray[np.floating[Any]]
 
 # Nodes a run of updates is rounded up to; a multiple of what a vector holds.
 RUN = 8
@@ -93,11 +96,11 @@ class Diagonals:
         self, plain: Floats, into: Floats, flipped: bool, *, scale: float = 1.0, border: bool = True
     ) -> None:
         """Copy a flat grid into its diagonals, times ``scale``; with its border, or without one."""
-        _move(plain, into, self.shape, self.stored, flipped, scale, border, False)
+        move(plain, into, self.shape, self.stored, flipped, scale, border, False)
 
     def load(self, plain: Floats, source: Floats, flipped: bool, *, border: bool = True) -> None:
         """Copy the diagonals into a flat grid with or without its border."""
-        _move(plain, source, self.shape, self.stored, flipped, 1.0, border, True)
+        move(plain, source, self.shape, self.stored, flipped, 1.0, border, True)
 
     def put(self, nodes: Ints, values: Floats, into: Floats) -> None:
         """Set the values of flat padded ``nodes``."""
@@ -105,7 +108,7 @@ class Diagonals:
 
     def turn(self, source: Floats, into: Floats) -> None:
         """Copy the diagonals of a grid into those of the grid whose j is flipped."""
-        _turn(source, into, self.shape, self.stored)
+        turn(source, into, self.shape, self.stored)
 
     def turn_changed(self, source: Floats, into: Floats, changed: Columns) -> None:
         """As ``turn`` where no other nodes than ``changed`` differ."""
@@ -131,16 +134,17 @@ class Diagonals:
 
 
 @kernel
-def _move(
-    plain: Floats,
-    diagonals: Floats,
+def move(
+    plain: Reals,
+    diagonals: Reals,
     shape: tuple[int, int, int],
     stored: tuple[int, int],
     flipped: bool,
-    scale: float,
+    scale: float | np.float32,
     border: bool,
     back: bool,
 ) -> None:
+    """As ``store`` or, with ``back``, ``load``, for numbers of any width."""
     planes, nj, nk = shape
     rows, width = stored
     step = np.uint64(width + 1)
@@ -172,7 +176,8 @@ def _move(
 
 
 @kernel
-def _turn(source: Floats, into: Floats, shape: tuple[int, int, int], stored: tuple[int, int]) -> None:
+def turn(source: Reals, into: Reals, shape: tuple[int, int, int], stored: tuple[int, int]) -> None:
+    """As ``Diagonals.turn``, for numbers of any width."""
     planes, nj, nk = shape
     rows, width = stored
     step = np.uint64(width + 1)
