@@ -99,12 +99,15 @@ class Waves:
 @pytest.mark.parametrize(("ndim", "n"), [(2, 129), (3, 65)])
 def test_neighbouring_rays_are_as_far_apart(ndim, n):
     """Shot with take-off angles that differ a little, without grid, bending or paraxial equations."""
-    medium, rng, tilt = Waves(5, ndim), np.random.default_rng(6), 1e-4
+    medium, rng, tilt = Waves(5, ndim, 0.02), np.random.default_rng(6), 1e-4
     source = np.full(ndim, 0.2)
     speed = medium.speed(nodes(n, ndim))
     receivers, exact = [], []
-    for _ in range(12):
+    for k in range(12):
         toward = rng.uniform(0.4, 1.0, ndim)
+        if k % 2:
+            # In space, as far from one axis as from another: a basis that leant on the nearer one would turn.
+            toward[1:] = 0.5
         axes = np.linalg.qr(np.column_stack((toward, rng.normal(size=(ndim, ndim - 1)))))[0]
         direction = toward / np.linalg.norm(toward)
         length = rng.uniform(0.3, 0.7)
@@ -124,7 +127,7 @@ def test_neighbouring_rays_are_as_far_apart(ndim, n):
         )
     got = spread(speed, 1.0 / (n - 1), np.array(receivers), source)
     assert np.abs(got / exact - 1.0).max() < 1e-3
-    assert np.abs(np.array(exact) - 1.0).max() > 0.15
+    assert np.abs(np.array(exact) - 1.0).max() > 0.3
 
 
 @given(seed=st.integers(0, 2**32 - 1), flat=st.booleans())
