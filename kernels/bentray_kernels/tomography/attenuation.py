@@ -46,8 +46,8 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
         problem,
         slowness,
         emitters,
-        rays=settings.rays,
-        eikonal=settings.eikonal,
+        rays=settings.traced,
+        eikonal=settings.front,
         front=settings.front_smoothing_nodes,
     )
 
@@ -67,7 +67,7 @@ def _unfocused(problem: Problem, settings: Settings, slowness: Floats, emitters:
             problem.emitters[members],
             problem.receivers[ring],
             wavelength_m=problem.wavelength_m,
-            eikonal=settings.eikonal,
+            eikonal=settings.front,
         )
     return replace(problem, log_ratio=ratio)
 

@@ -91,9 +91,9 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
 
     In an image without contrast, as the water that the first iteration begins with, rays are straight.
     """
-    rays: Kind = settings.rays if slowness.min() < slowness.max() else "straight"
+    rays: Kind = settings.traced if slowness.min() < slowness.max() else "straight"
     return linearise(
-        problem, slowness, emitters, rays=rays, eikonal=settings.eikonal, front=settings.front_smoothing_nodes
+        problem, slowness, emitters, rays=rays, eikonal=settings.front, front=settings.front_smoothing_nodes
     )
 
 

@@ -17,7 +17,7 @@ from ..rays.descent import PARTS, curved_ray, merge, straight_ray, walk
 from ..rays.fan import Fan, Kind
 from ..splines import coefficients
 from .problem import Problem
-from .sart import smoothed
+from .updates import smoothed
 
 # A piece of a bent ray is STRIDE nodes long; its parts are as short as those of other rays.
 BENT_PARTS = 3

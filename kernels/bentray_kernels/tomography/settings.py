@@ -11,7 +11,11 @@ from ..eikonal import methods
 from ..errors import InvalidInput
 
 METHODS = ("sart", "gauss-newton", "auto")
-RAYS = ("curved", "straight")
+RAYS = ("curved", "straight", "adjoint")
+
+# The wave front of the compiled pass over a slice; see ``eikonal.deviation``.
+DEVIATION = "deviation"
+
 DECOMPOSITIONS = ("slices", "volume")
 PENALTIES = ("total-variation", "laplacian", "tikhonov")
 SPEED_UPDATES = ("fixed", "data-driven")
@@ -27,8 +31,11 @@ class Settings:
         method: ``sart`` uses one emitter after the other (chapter 6); ``gauss-newton`` all at once, with bent
             rays and a penalty; ``auto`` tries several on part of the pairs and takes the one that predicts
             the others best, see ``advice``.
-        rays: ``curved`` traces down the travel time of the current image; ``straight`` ignores refraction.
-        eikonal: the wave-front method for curved rays; see ``bentray_kernels.eikonal.methods()``.
+        rays: ``curved`` traces down the travel time of the current image; ``straight`` ignores refraction;
+            ``adjoint``, for SART, traces none and takes the sensitivities from the wave front itself.
+        eikonal: the wave-front method for curved rays: ``deviation``, made for slices, or one of
+            ``bentray_kernels.eikonal.methods()``. Where ``deviation`` does not serve, which is in volumes,
+            for ``gauss-newton``, ``adjoint`` and the attenuation, ``accurate`` stands in for it.
         decomposition: ``slices`` reconstructs each height of the ring by itself; ``volume`` all in space.
         axial_room_nodes: in a volume, how far above and below an emitter and its receivers the wave front is
             tracked, nodes; None: everywhere. Fast skin can guide first arrivals far out of a ring's plane.
@@ -53,8 +60,8 @@ class Settings:
             ``tikhonov`` ones near to the iteration's start.
         penalty_strength: of the penalty, and of the attenuation's total variation, over the rms misfit;
             0: none.
-        huber_s: residuals beyond this count in proportion to their size, not to its square, s; 0: all count
-            by their square.
+        huber_s: residuals beyond this count in proportion to their size, not to its square, s (with SART from
+            the second sweep on); 0: all count by their square.
         roi: let only the dataset's region of interest change (``mask/roi``).
         reciprocity: use a missing pair's reverse (emitter and receiver exchanged) in its place.
         picker: how travel times are read where only traces were uploaded.
@@ -70,8 +77,8 @@ class Settings:
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     method: Literal["sart", "gauss-newton", "auto"] = "sart"
-    rays: Literal["curved", "straight"] = "curved"
-    eikonal: str = "accurate"
+    rays: Literal["curved", "straight", "adjoint"] = "curved"
+    eikonal: str = DEVIATION
     decomposition: Literal["slices", "volume"] = "slices"
     axial_room_nodes: int | None = None
     nodes: int = 128
@@ -102,7 +109,7 @@ class Settings:
     def __post_init__(self) -> None:
         _one_of("method", self.method, METHODS)
         _one_of("rays", self.rays, RAYS)
-        _one_of("eikonal", self.eikonal, methods())
+        _one_of("eikonal", self.eikonal, (DEVIATION, *methods()))
         _one_of("speed_update", self.speed_update, SPEED_UPDATES)
         _one_of("picker", self.picker, PICKERS)
         _one_of("decomposition", self.decomposition, DECOMPOSITIONS)
@@ -110,6 +117,8 @@ class Settings:
         _speeds("speed_bounds_mps", self.speed_bounds_mps)
         if self.speed_range_mps is not None:
             _speeds("speed_range_mps", self.speed_range_mps)
+        if self.method != "sart" and self.rays == "adjoint":
+            raise InvalidInput("rays", "'adjoint'", f"curved or straight, with method {self.method}")
         if self.method != "sart" and self.speed_update != "fixed":
             raise InvalidInput("speed_update", repr(self.speed_update), f"fixed, with method {self.method}")
         if self.speed_range_mps is None and self.speed_update == "data-driven":
@@ -138,6 +147,16 @@ class Settings:
         _within("huber_s", self.huber_s, 0.0, 1.0)
         _within("stop_rms_s", self.stop_rms_s, 0.0, 1.0)
         _within("seed", self.seed, 0, 2**63 - 1)
+
+    @property
+    def front(self) -> str:
+        """The method of ``bentray_kernels.eikonal`` that the settings ask for where rays are traced."""
+        return "accurate" if self.eikonal == DEVIATION else self.eikonal
+
+    @property
+    def traced(self) -> Literal["curved", "straight"]:
+        """The rays of what needs some: bent ones for ``adjoint`` too."""
+        return "straight" if self.rays == "straight" else "curved"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; ``Settings(**settings.to_dict())`` gives the same settings."""

@@ -9,7 +9,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct
-from bentray_kernels.tomography.sart import advance, begin, emitter_order, propagation_speed
+from bentray_kernels.tomography.sart import advance, begin, emitter_order
 from bentray_kernels.tomography.stages import start
 
 NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
@@ -62,17 +62,3 @@ def test_every_pass_slice_and_seed_has_an_order_of_its_own(scan):
     orders = [emitter_order(problem, *which) for which in ((0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0))]
     assert len({tuple(order) for order in orders}) == 4
     assert all(sorted(order) == list(range(RING.elements)) for order in orders)
-
-
-def test_data_driven_update_stretches_the_range():
-    region = np.ones((4, 4), bool)
-    region[0] = False
-    slowness = 1.0 / np.linspace(1480.0, 1520.0, 16).reshape(4, 4)
-    wanted = Settings(speed_update="data-driven", speed_range_mps=(1375.0, 1560.0))
-    stretched = propagation_speed(slowness, region, wanted, warm=True)
-    assert stretched[region].min() == pytest.approx(1375.0)
-    assert stretched[region].max() == pytest.approx(1560.0)
-    assert np.allclose(stretched[0], 1.0 / slowness[0])
-    assert np.allclose(propagation_speed(slowness, region, wanted, warm=False), 1.0 / slowness)
-    flat = np.full((4, 4), 1 / 1500.0)
-    assert np.allclose(propagation_speed(flat, region, wanted, warm=True), 1500.0)
