@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,12 @@ from numpy.typing import NDArray
 
 from bentray_kernels.acquisition.dataset import Dataset, Truth
 from bentray_kernels.tomography import Reconstruction
+from bentray_kernels.tomography.advice import reason
 from bentray_workers.comparison import NotComparable, compare
+from bentray_workers.images.residuals import within
+
+# Shares of the residuals, per cent, whose size the figures tell.
+SHARES = (50, 90, 99)
 
 
 def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[str, Any]:
@@ -21,7 +27,10 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         seconds: wall-clock time of the reconstruction, s.
 
     Returns:
-        Settings, residual history, speed range, time and provenance; ``truth`` is None without a truth.
+        Settings, residual history, speed range, time and provenance; ``residual_within_s`` tells the size
+        that a share of the last sweep's residuals does not exceed, by per cent; ``recovery_mean`` is that of
+        the resolution check over the nodes that rays pass; ``trials`` and ``reason`` say how ``auto`` chose.
+        What there is not is None, or empty for trials and reason.
     """
     return {
         "seconds": round(seconds, 3),
@@ -32,10 +41,15 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         "water_speed_mps": result.water_speed_mps,
         "speed_range_mps": [float(result.speed.min()), float(result.speed.max())],
         "residual_rms_s": result.residual_rms_s,
-        "history": [
-            {"slice": s.slice, "sweep": s.sweep, "residual_rms_s": s.residual_rms_s, "emitters": s.emitters}
-            for s in result.history
-        ],
+        "residual_within_s": (
+            None
+            if result.residuals is None
+            else {str(share): within(result.residuals, share / 100.0) for share in SHARES}
+        ),
+        "history": [asdict(sweep) for sweep in result.history],
+        "recovery_mean": _recovery_mean(result),
+        "reason": reason(result.trials),
+        "trials": [asdict(trial) for trial in result.trials],
         "truth": None if dataset.truth is None else errors(result, dataset.truth, dataset.roi),
         "settings": result.settings.to_dict(),
         "provenance": dict(result.provenance),
@@ -59,6 +73,13 @@ def errors(result: Reconstruction, truth: Truth, roi: NDArray[np.bool_] | None =
     }
 
 
+def _recovery_mean(result: Reconstruction) -> float | None:
+    if result.recovery is None:
+        return None
+    passed = result.coverage > 0.0
+    return float(result.recovery[passed].mean()) if passed.any() else 0.0
+
+
 def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
     """Rows (name, value) of the closing table, from what ``figures`` gave."""
     low, high = found["speed_range_mps"]
@@ -71,6 +92,8 @@ def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
     ]
     if found["residual_rms_s"] is not None:
         rows.insert(4, ("residual", f"{found['residual_rms_s'] * 1e9:.0f} ns rms"))
+    if found["recovery_mean"] is not None:
+        rows.append(("resolution check", f"{100 * found['recovery_mean']:.0f} % of a checkerboard recovered"))
     truth = found["truth"]
     if truth is not None:
         if truth.get("mean_absolute_error_of_range") is not None:

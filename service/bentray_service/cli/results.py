@@ -37,11 +37,11 @@ def write_results(
 
 
 def show_results(title: str, found: dict[str, Any], *, as_json: bool) -> None:
-    """The figures as a table and the three paths, or as JSON."""
+    """The figures as a table, why ``auto`` chose what it chose, and the three paths; or all as JSON."""
     from .figures import summary
 
     if as_json:
         print_json(found)
         return
     print_table(title, ("figure", "value"), summary(found))
-    print_lines(found["outputs"].values())
+    print_lines([*([found["reason"]] if found["reason"] else []), *found["outputs"].values()])

@@ -4,22 +4,62 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from bentray_kernels.errors import InvalidInput
 
 from .paths import output_file
 from .terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
+if TYPE_CHECKING:
+    from bentray_workers.simulation import SimulationSettings
+    from bentray_workers.volume_simulation import VolumeSimulationSettings
+
+
+class Phantom(StrEnum):
+    """The phantoms by the tables of the dissertation."""
+
+    TABLE6 = "table6"
+    TABLE7 = "table7"
+
+
+class Array(StrEnum):
+    """How the rings of a scan in space lie."""
+
+    MOVED = "moved"
+    RINGS = "rings"
+
 
 def simulate(
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset file to write (HDF5).")],
+    phantom: Annotated[
+        Phantom, typer.Option(help="The breast of Table 6, in a plane, or that of Table 7, in space.")
+    ] = Phantom.TABLE6,
     nodes: Annotated[int, typer.Option(help="Nodes along a side of the image it is meant for.")] = 128,
-    elements: Annotated[int, typer.Option(help="Transducers of the ring; each sends and receives.")] = 256,
+    elements: Annotated[int, typer.Option(help="Transducers of a ring; each sends and receives.")] = 256,
     coupling: Annotated[float, typer.Option(help="Speed of the water, m/s.")] = 1500.0,
     refinement: Annotated[int, typer.Option(help="How many times finer the grid of the times is.")] = 4,
-    noise_ns: Annotated[float, typer.Option(help="Standard deviation of the noise on the times, ns.")] = 0.0,
+    slices: Annotated[
+        int | None, typer.Option(show_default="40", help="table7: heights of the ring, one node apart.")
+    ] = None,
+    array: Annotated[
+        Array | None,
+        typer.Option(
+            show_default="moved",
+            help="table7: one ring moved, or rings at all heights that receive each other.",
+        ),
+    ] = None,
+    three_d: Annotated[
+        bool, typer.Option("--three-d", help="table7: wave fronts in space, not in each slice by itself.")
+    ] = False,
+    noise_ns: Annotated[
+        float | None,
+        typer.Option(show_default="0", help="table6: standard deviation of the noise on the times, ns."),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
     attenuation: Annotated[bool, typer.Option("--attenuation", help="Record amplitudes too.")] = False,
     snr: Annotated[
@@ -28,33 +68,64 @@ def simulate(
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate the travel times of the breast phantom of Table 6 and keep its truth beside them.
+    """Simulate the travel times of a breast phantom and keep its truth beside them.
 
     Example:  bentray simulate -o phantom.h5 --coupling 1375 --noise-ns 20
     """
     path = output_file(output, force=force)
 
-    from bentray_workers import simulation
     from bentray_workers.dataset_file import write_dataset
+    from bentray_workers.simulation import SimulationSettings
+    from bentray_workers.simulation import simulate as simulate_plane
+    from bentray_workers.volume_simulation import VolumeSimulationSettings, simulate_volume
 
-    settings = simulation.SimulationSettings(
-        nodes, elements, coupling, refinement, noise_ns * 1e-9, seed, attenuation, snr
-    )
+    both: dict[str, Any] = {
+        "nodes": nodes,
+        "elements": elements,
+        "coupling_mps": coupling,
+        "refinement": refinement,
+        "attenuation": attenuation,
+        "snr": snr,
+        "seed": seed,
+    }
+    settings: SimulationSettings | VolumeSimulationSettings
     started = time.perf_counter()
     with progress_bar("Simulating") as step:
-        dataset = simulation.simulate(
-            None, settings, lambda progress: step(progress.done, progress.total, "emitters")
-        )
+        if phantom is Phantom.TABLE7:
+            _refuse("table6", {"--noise-ns": noise_ns})
+            own: dict[str, Any] = {"slices": slices, "array": array and array.value}
+            own = {name: value for name, value in own.items() if value is not None}
+            settings = VolumeSimulationSettings(**both, **own, three_d=three_d)
+            dataset = simulate_volume(None, settings, lambda now: step(now.done, now.total, "emitters"))
+        else:
+            _refuse("table7", {"--slices": slices, "--array": array, "--three-d": three_d or None})
+            settings = SimulationSettings(**both, noise_s=(noise_ns or 0.0) * 1e-9)
+            dataset = simulate_plane(None, settings, lambda now: step(now.done, now.total, "emitters"))
     seconds = time.perf_counter() - started
     write_dataset(path, dataset)
     if as_json:
         print_json({"output": str(path), "seconds": round(seconds, 3), "settings": asdict(settings)})
         return
-    rows = [
-        ("elements", f"{elements} on a ring of {(dataset.radius_m or 0.0) * 1e3:.1f} mm radius"),
-        ("coupling", f"{coupling:g} m/s"),
-        ("noise", f"{noise_ns:g} ns" if snr is None else f"{noise_ns:g} ns, and 1/{snr:g} of the signal"),
-        ("time", f"{seconds:.1f} s"),
-    ]
+    rows = [*_rows(settings, dataset.radius_m or 0.0), ("time", f"{seconds:.1f} s")]
     print_table(dataset.title, ("figure", "value"), rows)
     print_lines([str(path)])
+
+
+def _refuse(phantom: str, given: dict[str, object]) -> None:
+    for option, value in given.items():
+        if value is not None:
+            raise InvalidInput(option, value, f"nothing, unless --phantom is {phantom}")
+
+
+def _rows(settings: SimulationSettings | VolumeSimulationSettings, radius_m: float) -> list[tuple[str, str]]:
+    from bentray_workers.volume_simulation import VolumeSimulationSettings
+
+    rows = [("elements", f"{settings.elements} on a ring of {radius_m * 1e3:.1f} mm radius")]
+    noise = "none" if settings.snr is None else f"1/{settings.snr:g} of the signal"
+    if isinstance(settings, VolumeSimulationSettings):
+        how = "rings at all heights at once" if settings.array == "rings" else "the ring at each in turn"
+        fronts = "wave fronts in space" if settings.three_d else "each slice by itself"
+        rows.append(("slices", f"{settings.slices}, {how}, {fronts}"))
+    elif settings.noise_s:
+        noise = f"{settings.noise_s * 1e9:g} ns"
+    return [*rows, ("coupling", f"{settings.coupling_mps:g} m/s"), ("noise", noise)]

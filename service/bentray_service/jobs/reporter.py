@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -55,13 +56,7 @@ class Reporter:
         kept = self._pending
         self._written = self._clock()
         history: list[dict[str, Any]] = [
-            {
-                "slice": sweep.slice,
-                "sweep": sweep.sweep,
-                "residual_rms_s": finite(sweep.residual_rms_s),
-                "emitters": sweep.emitters,
-            }
-            for sweep in kept.history
+            {**asdict(sweep), "residual_rms_s": finite(sweep.residual_rms_s)} for sweep in kept.history
         ]
         self._jobs.progress(self._job_id, kept.done, kept.total, history)
         self._pending = None

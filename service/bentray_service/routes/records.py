@@ -53,12 +53,13 @@ class ProgressRecord(BaseModel):
 
 
 class SweepRecord(BaseModel):
-    """One pass over all emitters of one slice."""
+    """One pass over all emitters of one slice, or of the volume."""
 
     slice: int
     sweep: int = Field(description="Number of the pass, from 1.")
     residual_rms_s: float | None = Field(description="Rms of measured minus predicted travel time, s.")
     emitters: int = Field(description="Emitters that had data.")
+    stage: int = Field(0, description="From 0: coarser grids and straight rays that come first.")
 
 
 class JobRecord(BaseModel):

@@ -41,8 +41,11 @@ def slice_png(
     service: Service,
     index: Annotated[int | None, Query(ge=0, description="Axial index; the middle slice without it.")] = None,
     quantity: Annotated[
-        Literal["speed", "coverage", "attenuation"],
-        Query(description="What to show; attenuation where the scan had amplitudes."),
+        Literal["speed", "coverage", "attenuation", "recovery"],
+        Query(
+            description="What to show; attenuation where the scan had amplitudes, "
+            "recovery where resolution_check was set."
+        ),
     ] = "speed",
     low: Annotated[float | None, Query(description="Value of the darkest colour; m/s for speed.")] = None,
     high: Annotated[float | None, Query(description="Value of the brightest colour.")] = None,

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset, Truth
-from bentray_kernels.tomography import Reconstruction, Settings, Sweep
+from bentray_kernels.tomography import Reconstruction, Settings, Sweep, Trial
+from bentray_kernels.tomography.result import residual_counts
 from bentray_service.cli.figures import errors, figures, summary
 from bentray_workers.images import comparison_png, report_png
 
@@ -93,6 +94,7 @@ def test_the_residual_is_that_of_the_last_sweep_over_all_slices() -> None:
     found = figures(replace(image(disc()), history=history), dataset(None), 1.25)
     assert found["residual_rms_s"] == pytest.approx(math.sqrt((9 + 16) / 2) * 1e-7)
     assert len(found["history"]) == 4
+    assert found["history"][3] == {"slice": 1, "sweep": 2, "residual_rms_s": 4e-7, "emitters": 3, "stage": 0}
     assert found["truth"] is None
     assert found["seconds"] == 1.25
     assert found["speed_range_mps"] == [1450.0, 1550.0]
@@ -106,3 +108,34 @@ def test_the_summary_tells_the_errors_and_their_region_only_with_a_truth() -> No
     assert with_truth["rms error"] == "10.0 m/s"
     assert with_truth["mean absolute error"] == "10.0 % of the range"
     assert with_truth["errors read"] == "the outline of what is not water in the truth"
+
+
+def test_what_a_result_lacks_is_none_or_empty() -> None:
+    found = figures(image(disc()), dataset(None), 1.0)
+    assert (found["residual_within_s"], found["recovery_mean"]) == (None, None)
+    assert (found["reason"], found["trials"]) == ("", [])
+    assert "resolution check" not in dict(summary(found))
+
+
+def test_residuals_resolution_and_trials_are_told() -> None:
+    speed = disc()
+    coverage = np.zeros_like(speed)
+    coverage[:, :5] = 1.0
+    recovery = np.where(coverage > 0.0, 0.25, 1.0)
+    trials = (Trial({"rays": "straight"}, 4e-8, 3e-8), Trial({"rays": "curved"}, 6e-8, 5e-8))
+    residuals = residual_counts(np.random.default_rng(0).normal(0.0, 1e-7, 10_000))
+    result = replace(image(speed), coverage=coverage, recovery=recovery, trials=trials, residuals=residuals)
+    found = json.loads(json.dumps(figures(result, dataset(None), 1.0)))
+    assert found["residual_within_s"] == {
+        "50": pytest.approx(0.67e-7, rel=0.1),
+        "90": pytest.approx(1.64e-7, rel=0.1),
+        "99": pytest.approx(2.58e-7, rel=0.1),
+    }
+    assert found["recovery_mean"] == pytest.approx(0.25)
+    assert dict(summary(found))["resolution check"] == "25 % of a checkerboard recovered"
+    assert found["reason"].startswith("auto chose straight 40 ns")
+    assert found["trials"][1] == {
+        "settings": {"rays": "curved"},
+        "held_out_rms_s": 6e-8,
+        "shown_rms_s": 5e-8,
+    }

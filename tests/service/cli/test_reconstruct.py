@@ -74,6 +74,21 @@ def test_worker_processes_give_the_same_bits(
     np.testing.assert_array_equal(alone.speed, shared.speed)
 
 
+def test_auto_says_in_one_line_what_it_chose_and_why(
+    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
+) -> None:
+    words = ("--method", "auto", "--set", "resolution_check=true", "--workers", 1)
+    result = bentray("reconstruct", scan_file, "-o", tmp_path, *QUICK, *words)
+    assert result.exit_code == 0
+    told = [line for line in result.stdout.splitlines() if line.startswith("auto chose ")]
+    said = json.loads((tmp_path / "reconstruction.json").read_text())
+    assert told == [said["reason"]]
+    chosen = said["trials"][0]["settings"]
+    assert chosen.items() <= said["settings"].items()
+    assert 0.0 < said["recovery_mean"] <= 1.0
+    assert 0.0 < said["residual_within_s"]["50"] < said["residual_within_s"]["99"]
+
+
 def heights(slices: int) -> Dataset:
     """A scan of so many slices; 1 is a plain 2-D scan."""
     ring, everyone = np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]]), np.arange(3)

@@ -12,6 +12,7 @@ from typer.testing import Result
 
 from bentray_workers.dataset_file import read_dataset
 
+SOLID = ("--phantom", "table7", "--nodes", 16, "--elements", 8, "--slices", 2)
 SMALL = ("--nodes", 24, "--elements", 12, "--coupling", 1400)
 
 
@@ -28,6 +29,46 @@ def test_the_file_holds_the_scan_that_was_asked_for(bentray: Callable[..., Resul
     assert dataset.delta_tof_s.shape == (12, 12)
     assert dataset.truth is not None
     assert dataset.truth.sound_speed_mps.shape == (24, 24)
+
+
+@pytest.mark.parametrize(
+    ("words", "shape", "array"),
+    [
+        ((), (2, 8, 8), "ring"),
+        (("--three-d", "--refinement", 2), (2, 8, 8), "ring"),
+        (("--three-d", "--refinement", 2, "--array", "rings"), (16, 16), "rings"),
+    ],
+)
+def test_a_scan_in_space(
+    bentray: Callable[..., Result],
+    tmp_path: Path,
+    words: tuple[object, ...],
+    shape: tuple[int, ...],
+    array: str,
+) -> None:
+    path = tmp_path / "solid.h5"
+    result = bentray("simulate", "-o", path, *SOLID, *words, "--attenuation", "--json")
+    assert result.exit_code == 0
+    said = json.loads(result.stdout)["settings"]
+    assert said["slices"] == 2
+    assert said["three_d"] is ("--three-d" in words)
+    dataset = read_dataset(path)
+    assert dataset.title == "Table 7 phantom, coupling 1500 m/s"
+    assert dataset.array_type == array
+    assert dataset.delta_tof_s is not None
+    assert dataset.delta_tof_s.shape == shape
+    assert dataset.log_ratio_np is not None
+    assert dataset.truth is not None
+    assert dataset.truth.sound_speed_mps.shape == (16, 16, 2)
+
+
+def test_the_table_tells_how_the_scan_was_made(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    told = bentray("simulate", "-o", tmp_path / "solid.h5", *SOLID, "--snr", 20).stdout
+    assert "2, the ring at each in turn, each slice by itself" in told
+    assert "1/20 of the signal" in told
+    told = bentray("simulate", "-o", tmp_path / "flat.h5", *SMALL, "--noise-ns", 5).stdout
+    assert "5 ns" in told
+    assert "slices" not in told
 
 
 def test_noise_has_the_size_and_the_seed_asked_for(bentray: Callable[..., Result], tmp_path: Path) -> None:
@@ -67,6 +108,13 @@ def test_a_file_that_exists_is_kept_without_force(bentray: Callable[..., Result]
         (("--coupling", "nan"), "coupling_mps"),
         (("--refinement", 1), "refinement"),
         (("--noise-ns", -5), "noise_s"),
+        (("--noise-ns", 5, "--snr", 10), "snr"),
+        (("--slices", 4), "--slices"),
+        (("--array", "moved"), "--array"),
+        (("--three-d",), "--three-d"),
+        ((*SOLID, "--noise-ns", 0), "--noise-ns"),
+        ((*SOLID, "--slices", 1), "slices"),
+        ((*SOLID, "--array", "rings"), "array"),
     ],
 )
 def test_bad_words_are_one_line(

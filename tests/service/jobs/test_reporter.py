@@ -49,8 +49,9 @@ def test_writes_are_throttled_and_the_last_one_arrives():
 
 def test_a_residual_that_json_cannot_hold():
     jobs = FakeJobs()
-    Reporter(jobs, "job", lambda: False).report(Progress(1, 1, (Sweep(0, 1, float("nan"), 0),)))
-    assert jobs.written[0][2] == [{"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 0}]
+    Reporter(jobs, "job", lambda: False).report(Progress(1, 1, (Sweep(0, 1, float("nan"), 0, 2),)))
+    told = {"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 0, "stage": 2}
+    assert jobs.written[0][2] == [told]
 
 
 def test_stop_asks_the_database_now_and_then():

@@ -54,6 +54,7 @@ def test_a_known_picture_is_not_drawn_again(http, here, cluster):
         ("index=-1", "index"),
         ("quantity=colour", "quantity"),
         ("quantity=attenuation", "quantity"),
+        ("quantity=recovery", "quantity"),
         ("colormap=nosuch", "colormap"),
         ("low=nan", "low"),
         ("low=1600&high=1500", "low"),

@@ -44,3 +44,43 @@ def test_over_slices_it_is_the_root_mean_square():
         axes = new_figure(3.0, 3.0).subplots()
         draw_history(axes, {"one": (Sweep(0, 1, 3e-9, 4), Sweep(1, 1, 4e-9, 4))})
     np.testing.assert_allclose(axes.lines[0].get_ydata(), [np.sqrt(12.5)])
+
+
+def staged(names: tuple[str, ...]):
+    history = (
+        *(Sweep(k, n, 8e-7, 4, 0) for n in (1, 2, 3) for k in (0, 1)),
+        Sweep(0, 1, 3e-7, 4, 1),
+        Sweep(1, 1, 4e-7, 4, 1),
+        Sweep(1, 2, 2e-7, 4, 1),
+    )
+    with drawing():
+        axes = new_figure(3.0, 3.0).subplots()
+        draw_history(axes, {"one": history}, names)
+    return axes
+
+
+def test_stages_follow_each_other_with_a_dotted_line_between():
+    first, second, border = staged(("32 nodes", "64 nodes")).lines
+    np.testing.assert_array_equal(first.get_xdata(), [1, 2, 3])
+    np.testing.assert_array_equal(second.get_xdata(), [4, 5])
+    np.testing.assert_allclose(second.get_ydata(), [np.sqrt(12.5) * 100, 200])
+    assert list(border.get_xdata()) == [3.5, 3.5]
+    assert border.get_linestyle() == ":"
+
+
+def test_the_names_of_stages_stand_above_their_sweeps_and_the_curve_keeps_clear():
+    axes = staged(("32 nodes", "64 nodes"))
+    assert [(text.get_text(), text.get_position()[0]) for text in axes.texts] == [
+        ("32 nodes", 2.0),
+        ("64 nodes", 4.5),
+    ]
+    assert axes.get_ylim()[1] >= 1.2 * 800
+    assert staged(()).get_ylim()[1] < 1.2 * 800
+
+
+def test_a_legend_names_each_history_once():
+    stages = tuple(Sweep(0, 1, 1e-7, 4, stage) for stage in (0, 1))
+    with drawing():
+        axes = new_figure(3.0, 3.0).subplots()
+        draw_history(axes, {"straight": stages, "bent": stages})
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["straight", "bent"]

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Truth
-from bentray_kernels.tomography import Reconstruction
+from bentray_kernels.tomography import Reconstruction, Sweep, Trial
+from bentray_kernels.tomography.advice import reason
 from bentray_workers.comparison import compare
 from bentray_workers.images import report_png
 
@@ -20,11 +21,64 @@ def panels(drawn) -> list[str]:
     return [axes.get_title(loc="left") for axes in drawn[-1].axes if axes.get_title(loc="left")]
 
 
-def test_without_a_truth_it_shows_speed_coverage_and_convergence(drawn):
-    assert pixels(report_png(made())).shape[1] > 1000
-    assert panels(drawn) == ["Reconstruction", "Coverage", "Convergence"]
-    report_png(replace(made(), history=()))
-    assert panels(drawn) == ["Reconstruction", "Coverage", "Convergence"]
+PLAIN = {"attenuation": None, "recovery": None, "residuals": None, "trials": ()}
+RESIDUALS = "Residuals, 33.3 ns rms"
+
+
+@pytest.mark.parametrize(
+    ("change", "shown"),
+    [
+        (PLAIN, ["Reconstruction", "Coverage", "Convergence"]),
+        ({**PLAIN, "history": ()}, ["Reconstruction", "Coverage", "Convergence"]),
+        (
+            {"attenuation": None, "recovery": None},
+            ["Reconstruction", "Coverage", "Convergence", RESIDUALS],
+        ),
+        ({"recovery": None}, ["Reconstruction", "Coverage", "Attenuation", "Convergence", RESIDUALS]),
+        (
+            {},
+            ["Reconstruction", "Coverage", "Attenuation", "Resolution check", "Convergence", RESIDUALS],
+        ),
+    ],
+)
+def test_without_a_truth_it_shows_what_there_is(drawn, change, shown):
+    result = replace(made(), history=tuple(Sweep(0, n, 1e-7 / n, 64) for n in (1, 2, 3)))
+    assert pixels(report_png(replace(result, **change))).shape[1] > 900
+    assert panels(drawn) == shown
+
+
+@pytest.mark.parametrize("change", [PLAIN, {"attenuation": None, "recovery": None}, {"recovery": None}, {}])
+def test_with_a_truth_it_also_shows_difference_and_profile(drawn, change):
+    result = replace(made(), **change)
+    report_png(result, truth())
+    known = f"Difference: {compare(result, truth())}"
+    assert panels(drawn)[:4] == ["Reconstruction", "Truth", known, "Along y = 1.0 mm"]
+    report_png(result)
+    plain = panels(drawn)
+    report_png(result, truth())
+    assert panels(drawn)[4:] == plain[1:]
+
+
+def test_each_image_has_its_own_limits_and_the_resolution_check_those_from_0_to_1(drawn):
+    report_png(made())
+    limits = {axes.get_title(loc="left"): axes.images[0].get_clim() for axes in drawn[-1].axes if axes.images}
+    assert limits["Resolution check"] == (0.0, 1.0)
+    assert limits["Attenuation"][1] == pytest.approx(5.0, abs=0.1)
+    assert len(set(limits.values())) == 4
+
+
+def test_the_stages_are_named_and_the_choice_of_auto_is_told(drawn):
+    history = (*(Sweep(0, n, 1e-7, 4, 0) for n in (1, 2)), Sweep(0, 1, 9e-8, 4, 1))
+    plan = replace(made().settings, nodes=64, coarser_grids=1)
+    trials = (
+        Trial({"rays": "curved", "method": "sart"}, 4e-8, 3e-8),
+        Trial({"rays": "straight", "method": "sart"}, 9e-8, 8e-8),
+    )
+    report_png(replace(made(), history=history, settings=plan, trials=trials))
+    assert {"32 nodes", "64 nodes"} <= set(drawn.words())
+    under = " ".join(drawn[-1].get_supxlabel().split())
+    assert "3 sweeps in 2 stages" in under
+    assert under.endswith(reason(trials))
 
 
 def test_the_errors_in_the_title_are_those_of_compare_with_their_region(drawn):
@@ -46,7 +100,8 @@ def test_reconstruction_and_truth_share_a_colour_bar(drawn):
 
 def test_a_truth_that_needs_registration_is_shown_with_the_reason(drawn):
     report_png(made(), truth(axes="as $displayed$; rotate"))
-    assert panels(drawn) == ["Reconstruction", "Truth", "Coverage", "Convergence"]
+    assert panels(drawn)[:3] == ["Reconstruction", "Truth", "Coverage"]
+    assert panels(drawn)[-2:] == ["Convergence", "Residuals, 11.1 ns rms"]
     assert "x (mm)\nnot compared: the truth must be registered with the image first" in drawn.words()
 
 

@@ -54,6 +54,7 @@ def test_quantities_maps_and_slices_differ(volume):
         slice_png(volume),
         slice_png(volume, quantity="coverage"),
         slice_png(volume, quantity="attenuation"),
+        slice_png(volume, quantity="recovery"),
         slice_png(volume, colormap="gray"),
         slice_png(volume, index=0),
     ]
@@ -92,8 +93,16 @@ def test_bad_arguments_are_named(file, given, field, accepted):
 
 def test_a_quantity_that_the_file_lacks_is_refused(tmp_path):
     write_reconstruction(tmp_path / "r.h5", replace(made(), attenuation=None))
-    with pytest.raises(InvalidInput, match="quantity"):
+    with pytest.raises(InvalidInput, match="quantity") as refused:
         slice_png(tmp_path / "r.h5", quantity="attenuation")
+    assert refused.value.accepted == "one of speed, coverage, recovery: this file has no other"
+
+
+def test_the_recovery_is_drawn_from_0_to_1_unless_told_otherwise(file, drawn):
+    for given, limits in (({}, (0.0, 1.0)), ({"low": 0.5}, (0.5, 1.0)), ({"high": 0.6}, (0.0, 0.6))):
+        slice_png(file, quantity="recovery", **given)
+        assert drawn[-1].axes[0].images[0].get_clim() == limits
+    assert "part of a checkerboard recovered" in drawn.words()
 
 
 def test_pictures_drawn_in_threads_are_those_drawn_alone(file):

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import math
 
-from bentray_kernels.tomography import Reconstruction
+from bentray_kernels.tomography import Reconstruction, Settings
 
 LABELS = {
     "speed": "sound speed (m/s)",
     "coverage": "ray length per node (m)",
     "attenuation": "attenuation (Np/m)",
+    "recovery": "part of a checkerboard recovered",
 }
-NAMES = {"speed": "Sound speed", "coverage": "Coverage", "attenuation": "Attenuation"}
+NAMES = {
+    "speed": "Sound speed",
+    "coverage": "Coverage",
+    "attenuation": "Attenuation",
+    "recovery": "Resolution check",
+}
 
 
 def which_slice(result: Reconstruction, index: int) -> str:
@@ -36,7 +42,24 @@ def facts(result: Reconstruction) -> str:
         f"water {result.water_speed_mps:.1f} m/s",
     ]
     if result.residual_rms_s is not None:
-        last = max(s.sweep for s in result.history)
-        found.insert(2, f"{last} sweep{'s' if last != 1 else ''}")
+        found.insert(2, _sweeps(result))
         found.append(f"residual {1e9 * result.residual_rms_s:.0f} ns")
     return "  ·  ".join(found)
+
+
+def stage_names(settings: Settings) -> tuple[str, ...]:
+    """What tells the stages apart that ``bentray_kernels.tomography.stages`` makes; nothing for one."""
+    grids = [-(-settings.nodes // 2**k) for k in range(settings.coarser_grids, -1, -1)]
+    names = [f"{nodes} nodes" for nodes in grids]
+    if settings.straight_sweeps and settings.rays == "curved":
+        names.insert(0, "straight")
+    return tuple(names) if len(names) > 1 else ()
+
+
+def _sweeps(result: Reconstruction) -> str:
+    most: dict[int, int] = {}
+    for sweep in result.history:
+        most[sweep.stage] = max(most.get(sweep.stage, 0), sweep.sweep)
+    count = sum(most.values())
+    text = f"{count} sweep{'s' if count != 1 else ''}"
+    return text if len(most) == 1 else f"{text} in {len(most)} stages"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 
 import numpy as np
@@ -20,32 +20,75 @@ LINES = ("#d1495b", "#00798c", "#edae49", "#30638e", "#66a182")
 WIDE = 20.0
 
 
-def draw_history(axes: Axes, histories: Mapping[str, tuple[Sweep, ...]]) -> None:
-    """Residual against sweep, a line a name; over slices the root mean square."""
+def draw_history(axes: Axes, histories: Mapping[str, tuple[Sweep, ...]], stages: Sequence[str] = ()) -> None:
+    """Residual against sweep, a line a name; over slices the root mean square.
+
+    Stages follow each other from left to right, with a dotted line where a next one begins.
+
+    Args:
+        histories: by the name to show.
+        stages: names of the stages, where all histories have the same.
+    """
     every: list[float] = []
     for (name, history), colour in zip(histories.items(), cycle(LINES), strict=False):
-        sweeps = sorted({s.sweep for s in history})
-        rms = [
-            1e9 * float(np.sqrt(np.mean([s.residual_rms_s**2 for s in history if s.sweep == sweep])))
-            for sweep in sweeps
-        ]
-        axes.plot(sweeps, rms, "o-", color=colour, linewidth=1.6, markersize=4, label=name)
-        every += rms
+        begun = 0
+        for number, rms in enumerate(_courses(history)):
+            places = begun + np.arange(1, len(rms) + 1)
+            # Matplotlib keeps names with an underscore out of the legend.
+            label = name if number == 0 else f"_{name}"
+            axes.plot(places, rms, "o-", color=colour, linewidth=1.6, markersize=4, label=label)
+            if number:
+                axes.axvline(begun + 0.5, color="#888888", linewidth=0.9, linestyle=":")
+            if number < len(stages):
+                _name_stage(axes, begun + 0.5 * (len(rms) + 1), stages[number])
+            begun += len(rms)
+            every += rms
     slices = {s.slice for history in histories.values() for s in history}
     axes.set_title("Convergence" if len(slices) < 2 else f"Convergence, all {len(slices)} slices")
     axes.set_xlabel("sweep")
     axes.set_ylabel("residual rms (ns)", labelpad=1)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    _scale(axes, every, room=bool(stages))
+    _dress(axes)
+    if len(histories) > 1:
+        axes.legend()
+
+
+def _courses(history: tuple[Sweep, ...]) -> list[list[float]]:
+    """Of each stage the residual of every sweep, ns; over slices the root mean square."""
+    squares: dict[int, dict[int, list[float]]] = {}
+    for s in history:
+        squares.setdefault(s.stage, {}).setdefault(s.sweep, []).append(s.residual_rms_s**2)
+    return [
+        [1e9 * float(np.sqrt(np.mean(found))) for _, found in sorted(of_stage.items())]
+        for _, of_stage in sorted(squares.items())
+    ]
+
+
+def _name_stage(axes: Axes, place: float, name: str) -> None:
+    axes.text(
+        place,
+        0.985,
+        name,
+        transform=axes.get_xaxis_transform(),
+        horizontalalignment="center",
+        verticalalignment="top",
+        fontsize=7,
+        color="#555555",
+    )
+
+
+def _scale(axes: Axes, every: list[float], *, room: bool) -> None:
+    """From zero, or logarithmic where the range is wide; with room for names above."""
     if every and min(every) > 0.0 and max(every) > WIDE * min(every):
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_minor_locator(NullLocator())
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
+        if room:
+            axes.set_ylim(top=max(every) * (max(every) / min(every)) ** 0.2)
     else:
-        axes.set_ylim(0.0, 1.08 * max(every, default=0.0) or 1.0)
-    _dress(axes)
-    if len(histories) > 1:
-        axes.legend()
+        axes.set_ylim(0.0, (1.25 if room else 1.08) * max(every, default=0.0) or 1.0)
 
 
 def draw_profiles(axes: Axes, place_m: Floats, profiles: Mapping[str, Floats], title: str) -> None:

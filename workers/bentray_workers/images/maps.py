@@ -19,7 +19,11 @@ Limits = tuple[float, float]
 SPEED = "viridis"
 DIFFERENCE = "RdBu_r"
 COVERAGE = "magma"
+ATTENUATION = "cividis"
+RECOVERY = "bone"
 MISSING = "#e4e4e4"
+
+RECOVERY_LIMITS = (0.0, 1.0)
 
 # Parts of the nodes that robust limits leave outside, at each end, per cent.
 OUTSIDE_PERCENT = 0.1

@@ -1,7 +1,8 @@
-"""The picture of one reconstruction: speed, coverage, convergence and, with a truth, the errors."""
+"""The picture of one reconstruction: its images, convergence and residuals and, with a truth, the errors."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,22 +12,43 @@ from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction
+from bentray_kernels.tomography.advice import reason
 
 from ..comparison import Comparison, NotComparable, compare
 from .canvas import drawing, new_figure, to_png
-from .captions import LABELS, facts, which_slice
+from .captions import LABELS, NAMES, facts, stage_names, which_slice
 from .curves import draw_history, draw_profiles
 from .cut import cut, slice_index
-from .maps import COVERAGE, DIFFERENCE, SPEED, draw_bar, draw_map, robust_limits, symmetric_limits
+from .maps import (
+    ATTENUATION,
+    COVERAGE,
+    DIFFERENCE,
+    RECOVERY,
+    RECOVERY_LIMITS,
+    SPEED,
+    draw_bar,
+    draw_map,
+    robust_limits,
+    symmetric_limits,
+)
+from .residuals import draw_residuals
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 PANEL_IN = (4.4, 3.5)
 
+# Rows and columns for so many panels at most.
+GRIDS = {3: (1, 3), 4: (2, 2), 6: (2, 3), 8: (2, 4), 9: (3, 3)}
+
+# Characters of the line under the panels that fit into an inch.
+CHARACTERS_AN_INCH = 15
+
+COLORMAPS = {"coverage": COVERAGE, "attenuation": ATTENUATION, "recovery": RECOVERY}
+
 
 def report_png(result: Reconstruction, truth: Truth | None = None, roi: Bools | None = None) -> bytes:
-    """Speed, coverage and convergence; with a truth also this, the difference and a profile.
+    """The images that there are, convergence and residuals; with a truth this, the difference and a profile.
 
     Several slices are shown by the middle one, the title says which; the errors are those of ``compare``,
     over all slices. A truth that cannot be compared is shown as it is, with the reason under it.
@@ -41,30 +63,30 @@ def report_png(result: Reconstruction, truth: Truth | None = None, roi: Bools | 
         return _plain(result, k)
     try:
         return _compared(result, compare(result, truth, roi), k)
-    except NotComparable as reason:
-        return _beside(result, truth, str(reason), k)
+    except NotComparable as why:
+        return _beside(result, truth, str(why), k)
 
 
 def _plain(result: Reconstruction, k: int) -> bytes:
     with drawing():
-        figure, panels = _sheet(result, k, 1, 3)
+        figure, panels = _sheet(result, k, 1)
         _speed(next(panels), result, k)
-        _coverage(next(panels), result, k)
-        draw_history(next(panels), {"residual": result.history})
+        _maps(panels, result, k)
+        _curves(panels, result)
         return to_png(figure)
 
 
-def _beside(result: Reconstruction, truth: Truth, reason: str, k: int) -> bytes:
+def _beside(result: Reconstruction, truth: Truth, why: str, k: int) -> bytes:
     with drawing():
-        figure, panels = _sheet(result, k, 2, 2)
+        figure, panels = _sheet(result, k, 2)
         _speed(next(panels), result, k)
         axes, image = next(panels), cut(truth.sound_speed_mps, truth.sound_speed_mps.shape[-1] // 2)
         grid = (truth.spacing_m, truth.origin_m)
         shown = draw_map(axes, image, *grid, robust_limits([image]), colormap=SPEED, title="Truth")
         draw_bar([shown], LABELS["speed"])
-        axes.set_xlabel(f"x (mm)\nnot compared: {reason}")
-        _coverage(next(panels), result, k)
-        draw_history(next(panels), {"residual": result.history})
+        axes.set_xlabel(f"x (mm)\nnot compared: {why}")
+        _maps(panels, result, k)
+        _curves(panels, result)
         return to_png(figure)
 
 
@@ -77,7 +99,7 @@ def _compared(result: Reconstruction, found: Comparison, k: int) -> bytes:
     within = region if region.any() else np.isfinite(true_speed)
     limits = robust_limits([speed, true_speed], within)
     with drawing():
-        figure, panels = _sheet(result, k, 2, 3)
+        figure, panels = _sheet(result, k, 4)
         maps = [
             draw_map(next(panels), image, *grid, limits, colormap=SPEED, title=title, outline=region)
             for title, image in (("Reconstruction", speed), ("Truth", true_speed))
@@ -89,21 +111,33 @@ def _compared(result: Reconstruction, found: Comparison, k: int) -> bytes:
         shown = draw_map(axes, difference, *grid, spread, colormap=DIFFERENCE, title=title, outline=region)
         draw_bar([shown], "reconstruction minus truth (m/s)")
         axes.set_xlabel(f"x (mm)\nerrors read: {found.region_choice}")
-        _coverage(next(panels), result, k)
-        draw_history(next(panels), {"residual": result.history})
         row = speed.shape[1] // 2
         x = result.origin_m[0] + result.spacing_m[0] * np.arange(speed.shape[0], dtype=np.float64)
         y_mm = 1e3 * (result.origin_m[1] + result.spacing_m[1] * row)
         lines = {"truth": true_speed[:, row], "reconstruction": speed[:, row]}
         draw_profiles(next(panels), x, lines, f"Along y = {y_mm:.1f} mm")
+        _maps(panels, result, k)
+        _curves(panels, result)
         return to_png(figure)
 
 
-def _sheet(result: Reconstruction, k: int, rows: int, columns: int) -> tuple[Figure, Iterator[Axes]]:
+def _sheet(result: Reconstruction, k: int, own: int) -> tuple[Figure, Iterator[Axes]]:
+    """A sheet for ``own`` panels and for those of ``_maps`` and ``_curves``."""
+    count = own + len(_held(result)) + 1 + (result.residuals is not None)
+    rows, columns = next(grid for most, grid in GRIDS.items() if count <= most)
     figure = new_figure(PANEL_IN[0] * columns, PANEL_IN[1] * rows + 0.6)
     figure.suptitle(f"Sound speed{which_slice(result, k)}")
-    figure.supxlabel(facts(result), fontsize=8, color="#666666")
-    return figure, iter(figure.subplots(rows, columns).ravel())
+    told = textwrap.wrap(reason(result.trials), int(CHARACTERS_AN_INCH * figure.get_figwidth()))
+    figure.supxlabel("\n".join([facts(result), *told]), fontsize=8, color="#666666")
+    panels = figure.subplots(rows, columns).ravel()
+    for blank in panels[count:]:
+        blank.remove()
+    return figure, iter(panels)
+
+
+def _held(result: Reconstruction) -> list[str]:
+    """The images beside the speed."""
+    return [name for name in COLORMAPS if getattr(result, name) is not None]
 
 
 def _speed(axes: Axes, result: Reconstruction, k: int) -> None:
@@ -113,8 +147,21 @@ def _speed(axes: Axes, result: Reconstruction, k: int) -> None:
     draw_bar([draw_map(axes, speed, *grid, limits, colormap=SPEED, title="Reconstruction")], LABELS["speed"])
 
 
-def _coverage(axes: Axes, result: Reconstruction, k: int) -> None:
-    image = cut(result.coverage, k)
-    limits = (0.0, robust_limits([image])[1])
-    grid = (result.spacing_m, result.origin_m)
-    draw_bar([draw_map(axes, image, *grid, limits, colormap=COVERAGE, title="Coverage")], LABELS["coverage"])
+def _maps(panels: Iterator[Axes], result: Reconstruction, k: int) -> None:
+    passed = cut(result.coverage, k) > 0.0
+    for name in _held(result):
+        image = cut(getattr(result, name), k)
+        limits = robust_limits([image], passed if passed.any() else None)
+        if name == "coverage":
+            limits = (0.0, robust_limits([image])[1])
+        elif name == "recovery":
+            limits = RECOVERY_LIMITS
+        grid = (result.spacing_m, result.origin_m)
+        shown = draw_map(next(panels), image, *grid, limits, colormap=COLORMAPS[name], title=NAMES[name])
+        draw_bar([shown], LABELS[name])
+
+
+def _curves(panels: Iterator[Axes], result: Reconstruction) -> None:
+    draw_history(next(panels), {"residual": result.history}, stage_names(result.settings))
+    if result.residuals is not None:
+        draw_residuals(next(panels), result.residuals, result.residual_rms_s)

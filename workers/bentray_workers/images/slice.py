@@ -11,7 +11,7 @@ from ..reconstruction_file import read_reconstruction
 from .canvas import drawing, new_figure, to_png
 from .captions import LABELS, NAMES, facts, which_slice
 from .cut import cut, slice_index
-from .maps import Limits, draw_bar, draw_map, robust_limits
+from .maps import RECOVERY_LIMITS, Limits, draw_bar, draw_map, robust_limits
 
 COLORMAPS = ("viridis", "magma", "inferno", "plasma", "cividis", "gray", "bone", "turbo", "coolwarm")
 
@@ -29,10 +29,10 @@ def slice_png(
 
     Args:
         path: of ``reconstruction.h5``.
-        quantity: ``speed``, ``coverage``, or ``attenuation`` where the file has it.
+        quantity: ``speed``, ``coverage``, or ``attenuation`` or ``recovery`` where the file has it.
         index: axial index; None: the middle one.
         low, high: values of the first and the last colour, in the quantity's unit; None: from the nodes
-            that rays have passed, but for a few outliers.
+            that rays have passed, but for a few outliers; of the recovery 0 and 1.
         colormap: one of ``COLORMAPS``.
 
     Raises:
@@ -45,13 +45,17 @@ def slice_png(
     result = read_reconstruction(path)
     volume = getattr(result, quantity)
     if volume is None:
-        raise InvalidInput("quantity", repr(quantity), "one of speed, coverage: this file has no other")
+        held = [name for name in LABELS if getattr(result, name) is not None]
+        accepted = f"one of {', '.join(held)}: this file has no other"
+        raise InvalidInput("quantity", repr(quantity), accepted)
     k = slice_index(result, index)
     image = cut(volume, k)
     passed = cut(result.coverage, k) > 0.0
     limits = robust_limits([image], passed if passed.any() else None)
     if quantity == "coverage":
         limits = (0.0, limits[1])
+    elif quantity == "recovery":
+        limits = RECOVERY_LIMITS
     limits = _given(limits, low, high)
     with drawing():
         figure = new_figure(6.6, 5.9)

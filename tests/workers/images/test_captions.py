@@ -1,0 +1,41 @@
+"""The words of the pictures: stages as they are made, sweeps of all of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.tomography import Settings, Sweep
+from bentray_kernels.tomography.stages import stages
+from bentray_workers.images.captions import facts, stage_names
+
+from ..reconstructions import made
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        Settings(nodes=100, coarser_grids=2),
+        Settings(nodes=99, coarser_grids=2, straight_sweeps=3),
+        Settings(nodes=64, straight_sweeps=1),
+        Settings(nodes=64, coarser_grids=1, straight_sweeps=1, rays="straight"),
+    ],
+)
+def test_the_names_are_those_of_the_stages_that_are_made(settings):
+    ring, everyone = np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]]), np.arange(3)
+    plans = stages(Dataset(ring, everyone, everyone, 1500.0, delta_tof_s=np.zeros((3, 3))), settings)
+    names = ["straight" if plan.rays != settings.rays else f"{plan.nodes} nodes" for plan in plans]
+    assert list(stage_names(settings)) == names
+
+
+def test_one_stage_needs_no_name():
+    assert stage_names(Settings()) == ()
+
+
+def test_the_sweeps_of_all_stages_are_counted():
+    history = (Sweep(0, 1, 2e-7, 4), Sweep(0, 2, 1e-7, 4), Sweep(0, 1, 1e-7, 4, 1), Sweep(1, 1, 1e-7, 4, 1))
+    assert "3 sweeps in 2 stages" in facts(replace(made(slices=2), history=history))
+    assert "  1 sweep  " in facts(replace(made(), history=history[:1]))
