@@ -1,0 +1,74 @@
+"""What every peer of the tomography is given: travel times of pairs, and the grid to answer on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bentray_kernels.acquisition import Dataset
+
+# Nodes nearer to the ring than this are water, as in a reconstruction of ours.
+RIM_NODES = 2
+
+
+@dataclass(frozen=True)
+class TravelTimes:
+    """A slice's data and its grid; node (0, 0) lies at 0, images are (x, y).
+
+    Attributes:
+        emitters, receivers: (n, 2) and (m, 2), m.
+        delta_tof: (n, m), s, object minus water; NaN where there is none.
+        water_speed: m/s.
+        region: (nodes, nodes), nodes that may differ from water.
+        spacing: m.
+    """
+
+    emitters: np.ndarray
+    receivers: np.ndarray
+    delta_tof: np.ndarray
+    water_speed: float
+    region: np.ndarray
+    spacing: float
+
+    @classmethod
+    def of(cls, dataset: Dataset, nodes: int, side_m: float) -> TravelTimes:
+        """The times of a ring whose elements all send and receive, in a square centred on 0.
+
+        A pair measured both ways keeps the mean, in one of its places: twice the rays would cost twice the
+        time and tell nothing more. Each emitter keeps the half of the ring that follows it.
+        """
+        place = dataset.element_position_m + 0.5 * side_m
+        both = dataset.delta_tof_s
+        assert both is not None
+        count = len(place)
+        ahead = (np.arange(count) - np.arange(count)[:, None]) % count
+        opposite = np.triu(2 * ahead == count)
+        first = ((ahead > 0) & (2 * ahead < count)) | opposite
+        spacing = side_m / (nodes - 1)
+        axis = np.linspace(-0.5 * side_m, 0.5 * side_m, nodes)
+        reach = np.linalg.norm(dataset.element_position_m, axis=1).min() - RIM_NODES * spacing
+        return cls(
+            emitters=place,
+            receivers=place,
+            delta_tof=np.where(first, 0.5 * (both + both.T), np.nan),
+            water_speed=dataset.water_speed_mps,
+            region=np.hypot(axis[:, None], axis[None, :]) <= reach,
+            spacing=spacing,
+        )
+
+    @property
+    def side_m(self) -> float:
+        """Distance of the first from the last node, m."""
+        return self.spacing * (len(self.region) - 1)
+
+    def pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Emitter and receiver of each pair with a travel time, emitter by emitter; each (pairs,)."""
+        emitter, receiver = np.nonzero(np.isfinite(self.delta_tof))
+        return emitter, receiver
+
+    def speed(self, change: np.ndarray) -> np.ndarray:
+        """(nodes, nodes), m/s, where the slowness of the region's nodes differs from water by ``change``."""
+        slowness = np.full(self.region.shape, 1.0 / self.water_speed)
+        slowness[self.region] += change
+        return np.asarray(1.0 / slowness)
