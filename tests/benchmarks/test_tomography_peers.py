@@ -1,0 +1,34 @@
+"""Peers of the tomography: those that are installed find a disc, the others are named with the reason."""
+
+from __future__ import annotations
+
+import warnings
+
+import _tomography_peers
+import numpy as np
+import pytest
+from _small_ring import DISC_MPS, WATER_MPS, disc, ring
+from _tomography_peers import PEERS, installed
+
+
+@pytest.mark.parametrize("name", list(PEERS))
+def test_a_peer_finds_a_disc(name: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a peer's own are its own affair
+        found, missing = installed()
+        if name in missing:
+            pytest.skip(missing[name])
+        times = ring()
+        speed = found[name](times)
+    assert speed.shape == times.region.shape
+    assert np.isfinite(speed).all()
+    assert speed[disc(times, 0.5)].mean() == pytest.approx(DISC_MPS, abs=12.0)
+    assert speed[0, 0] == pytest.approx(WATER_MPS)
+
+
+def test_a_missing_peer_is_left_out_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(_tomography_peers.PEERS, "absent", ("no_such_module", lambda module: module))
+    found, missing = installed()
+    assert "absent" not in found
+    assert "no_such_module" in missing["absent"]
+    assert set(found) | set(missing) == set(PEERS)
