@@ -7,6 +7,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +83,7 @@ class FakeWork:
         self.hold = threading.Event()
         self.hold.set()
         self.error: Exception | None = None
+        self.stages = 1
 
     def __call__(
         self,
@@ -95,16 +97,16 @@ class FakeWork:
         self.calls.append((path, settings))
         assert work_dir.is_dir()
         history: tuple[Sweep, ...] = ()
-        total = 8 * settings.sweeps
-        on_progress(Progress(0, total))
-        for sweep in range(1, settings.sweeps + 1):
+        passes = [(stage, n) for stage in range(self.stages) for n in range(1, settings.sweeps + 1)]
+        on_progress(Progress(0, 8 * len(passes)))
+        for stage, sweep in passes:
             while True:
                 if stop():
                     raise slices.Cancelled
                 if self.hold.wait(0.01):
                     break
-            history += (Sweep(0, sweep, 2e-6 / sweep, 8),)
-            on_progress(Progress(8 * sweep, total, history))
+            history += (Sweep(0, sweep, 2e-6 / sweep, 8, stage),)
+            on_progress(Progress(8 * len(history), 8 * len(passes), history))
         if self.error is not None:
             raise self.error
         x = np.linspace(-1.0, 1.0, settings.nodes)
@@ -115,7 +117,7 @@ class FakeWork:
             spacing_m=(1e-3, 1e-3),
             origin_m=(-0.01, -0.01),
             water_speed_mps=1500.0,
-            settings=settings,
+            settings=replace(settings, method="sart") if settings.method == "auto" else settings,
             history=history,
             provenance={"bentray": "test"},
         )

@@ -29,7 +29,7 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
     Returns:
         Settings, residual history, speed range, time and provenance; ``residual_within_s`` tells the size
         that a share of the last sweep's residuals does not exceed, by per cent; ``recovery_mean`` is that of
-        the resolution check over the nodes that rays pass; ``trials`` and ``reason`` say how ``auto`` chose.
+        the resolution check inside the array; ``trials`` and ``reason`` say how ``auto`` chose.
         What there is not is None, or empty for trials and reason.
     """
     return {
@@ -76,8 +76,9 @@ def errors(result: Reconstruction, truth: Truth, roi: NDArray[np.bool_] | None =
 def _recovery_mean(result: Reconstruction) -> float | None:
     if result.recovery is None:
         return None
-    passed = result.coverage > 0.0
-    return float(result.recovery[passed].mean()) if passed.any() else 0.0
+    # Exactly 0 is what lies outside of what was reconstructed.
+    inside = result.recovery != 0.0
+    return float(result.recovery[inside].mean()) if inside.any() else 0.0
 
 
 def summary(found: dict[str, Any]) -> list[tuple[str, str]]:

@@ -44,8 +44,10 @@ OPTIONS = {
         "sart",
         "sart: one emitter after the other; gauss-newton: all at once, with a penalty; auto tries both.",
     ),
-    "rays": Option("--rays", str, "curved", "curved follows refraction, straight does not."),
-    "eikonal": Option("--eikonal", str, "accurate", "Wave-front method for curved rays, as fmm or fsm."),
+    "rays": Option(
+        "--rays", str, "curved", "curved follows refraction, straight does not, adjoint traces none."
+    ),
+    "eikonal": Option("--eikonal", str, "deviation", "Wave-front method for curved rays, as fmm or fsm."),
     "nodes": Option("--nodes", int, "128", "Nodes along a side of the image."),
     "side_m": Option("--side", float, "the array and a margin", "Side of the image, m."),
     "sweeps": Option("--sweeps", int, "5", "How often every emitter is used."),

@@ -119,12 +119,12 @@ def test_what_a_result_lacks_is_none_or_empty() -> None:
 
 def test_residuals_resolution_and_trials_are_told() -> None:
     speed = disc()
-    coverage = np.zeros_like(speed)
-    coverage[:, :5] = 1.0
-    recovery = np.where(coverage > 0.0, 0.25, 1.0)
+    recovery = np.zeros_like(speed)
+    recovery[:, :5] = 0.5
+    recovery[:, 3] = -0.75
     trials = (Trial({"rays": "straight"}, 4e-8, 3e-8), Trial({"rays": "curved"}, 6e-8, 5e-8))
     residuals = residual_counts(np.random.default_rng(0).normal(0.0, 1e-7, 10_000))
-    result = replace(image(speed), coverage=coverage, recovery=recovery, trials=trials, residuals=residuals)
+    result = replace(image(speed), recovery=recovery, trials=trials, residuals=residuals)
     found = json.loads(json.dumps(figures(result, dataset(None), 1.0)))
     assert found["residual_within_s"] == {
         "50": pytest.approx(0.67e-7, rel=0.1),

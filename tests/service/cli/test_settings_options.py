@@ -107,7 +107,7 @@ def test_any_text_gives_settings_or_names_the_setting(name: str, text: str) -> N
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        (["--rays", "bent"], "rays: found 'bent'; accepted: 'curved' or 'straight'"),
+        (["--rays", "bent"], "rays: found 'bent'; accepted: 'curved', 'straight' or"),
         (["--eikonal", "magic"], "eikonal: found 'magic'; accepted: one of "),
         (["--speed-update", "data-driven"], "speed_range_mps: found None; accepted: (lowest, highest)"),
         (

@@ -63,6 +63,41 @@ def test_upload_start_watch(page, serve, scan, work):
     assert page.get_by_text("Nothing has run yet").is_hidden()
 
 
+def test_method_by_trial_asks_for_no_rays(page, serve, scan, work):
+    page.goto(serve())
+    page.set_input_files("#file", scan())
+    page.get_by_text("16 emitters").wait_for()
+    page.get_by_label("By trial").check()
+    expect(page.get_by_label("Straight")).to_be_disabled()
+    page.get_by_role("button", name="Start").click()
+    job = page.locator(".job")
+    job.get_by_text("succeeded").wait_for()
+    assert job.get_by_role("heading", name="Chosen by trial").is_visible()
+    assert work.calls[0][1].method == "auto"
+    expect(job.locator("img")).to_have_count(1)
+    page.get_by_label("all at once").check()
+    expect(page.get_by_label("Straight")).to_be_enabled()
+    page.get_by_label("Straight").check()
+    page.get_by_role("button", name="Start").click()
+    page.get_by_role("heading", name="Straight rays").wait_for()
+    assert (work.calls[1][1].method, work.calls[1][1].rays) == ("gauss-newton", "straight")
+
+
+def test_the_residual_curve_shows_where_a_stage_begins(page, serve, scan, work):
+    work.stages = 2
+    page.goto(serve())
+    page.set_input_files("#file", scan())
+    page.get_by_text("16 emitters").wait_for()
+    page.get_by_label("Sweeps").fill("3")
+    page.get_by_role("button", name="Start").click()
+    curve = page.get_by_role("img", name="Residual of 6 sweeps in 2 stages")
+    curve.wait_for()
+    points = curve.locator("polyline").get_attribute("points").split(" ")
+    assert [round(float(point.split(",")[0])) for point in points] == [0, 20, 40, 60, 80, 100]
+    border = curve.locator("line.stage")
+    assert (border.count(), float(border.get_attribute("x1"))) == (1, 50.0)
+
+
 def test_cancel(page, serve, scan, work):
     page.goto(serve())
     page.set_input_files("#file", scan())

@@ -39,3 +39,18 @@ def test_the_sweeps_of_all_stages_are_counted():
     history = (Sweep(0, 1, 2e-7, 4), Sweep(0, 2, 1e-7, 4), Sweep(0, 1, 1e-7, 4, 1), Sweep(1, 1, 1e-7, 4, 1))
     assert "3 sweeps in 2 stages" in facts(replace(made(slices=2), history=history))
     assert "  1 sweep  " in facts(replace(made(), history=history[:1]))
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (Settings(rays="straight"), "straight rays  "),
+        (Settings(), "curved rays (deviation)"),
+        (Settings(eikonal="fsm"), "curved rays (fsm)"),
+        (Settings(method="gauss-newton"), "curved rays (accurate)"),
+        (Settings(decomposition="volume"), "curved rays (accurate)"),
+        (Settings(rays="adjoint"), "adjoint, no rays (accurate)"),
+    ],
+)
+def test_the_wave_front_method_is_the_one_that_was_used(settings, words):
+    assert facts(replace(made(), settings=settings)).startswith(words)

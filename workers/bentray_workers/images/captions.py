@@ -33,10 +33,9 @@ def which_slice(result: Reconstruction, index: int) -> str:
 def facts(result: Reconstruction) -> str:
     """Rays, method, sweeps, size, water and residual in one line."""
     settings = result.settings
-    rays = "straight rays" if settings.rays == "straight" else f"curved rays ({settings.eikonal})"
     size = " by ".join(str(n) for n in result.speed.shape)
     found = [
-        rays,
+        _rays(settings),
         {"sart": "SART", "gauss-newton": "Gauss-Newton"}[settings.method],
         f"{size} nodes of {1e3 * result.spacing_m[0]:.2g} mm",
         f"water {result.water_speed_mps:.1f} m/s",
@@ -54,6 +53,15 @@ def stage_names(settings: Settings) -> tuple[str, ...]:
     if settings.straight_sweeps and settings.rays == "curved":
         names.insert(0, "straight")
     return tuple(names) if len(names) > 1 else ()
+
+
+def _rays(settings: Settings) -> str:
+    if settings.rays == "straight":
+        return "straight rays"
+    # Where ``deviation`` does not serve, another method stands in for it.
+    serves = settings.rays == "curved" and settings.method == "sart" and settings.decomposition == "slices"
+    front = settings.eikonal if serves else settings.front
+    return f"{'curved rays' if settings.rays == 'curved' else 'adjoint, no rays'} ({front})"
 
 
 def _sweeps(result: Reconstruction) -> str:

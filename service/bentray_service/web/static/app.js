@@ -88,11 +88,17 @@ async function cancel(job) {
   }
 }
 
+function showMethod() {
+  at("rays").disabled = new FormData(at("run")).get("method") === "auto";
+}
+
 async function start(event) {
   event.preventDefault();
   say("run-error", null);
   const form = new FormData(event.target);
-  const settings = { rays: form.get("rays"), nodes: Number(form.get("nodes")), sweeps: Number(form.get("sweeps")) };
+  const settings = { method: form.get("method"), nodes: Number(form.get("nodes")), sweeps: Number(form.get("sweeps")) };
+  // With auto the rays are tried, not asked for.
+  if (form.has("rays")) settings.rays = form.get("rays");
   const body = JSON.stringify({ kind: "reconstruction", dataset: at("dataset").value, settings });
   try {
     await request("/v1/jobs", { method: "POST", headers: { "Content-Type": "application/json" }, body });
@@ -138,6 +144,8 @@ drop.addEventListener("drop", (event) => {
 at("file").addEventListener("change", (event) => event.target.files.length && send(event.target.files[0]));
 at("dataset").addEventListener("change", showFacts);
 at("run").addEventListener("submit", start);
+at("run").addEventListener("change", showMethod);
+showMethod();
 fillDefaults().catch((error) => say("run-error", error));
 loadDatasets().catch((error) => say("jobs-error", error));
 refresh();

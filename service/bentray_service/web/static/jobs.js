@@ -2,6 +2,8 @@
 import { inWords } from "./api.js";
 
 const SVG = "http://www.w3.org/2000/svg";
+const RAYS = { curved: "Bent rays", straight: "Straight rays", adjoint: "Without rays" };
+const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton", auto: "auto" };
 const cards = new Map();
 
 function make(tag, className, text) {
@@ -22,31 +24,46 @@ function duration(seconds) {
   return seconds < 90 ? `${seconds.toFixed(1)} s` : `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
 }
 
-// Mean residual of each sweep, over the slices.
+// Mean residual of each sweep over the slices, stage after stage; and before which sweeps a stage begins.
 function residuals(history) {
   const sums = new Map();
-  for (const { sweep, residual_rms_s: value } of history) {
+  for (const { stage, sweep, residual_rms_s: value } of history) {
     if (value === null) continue;
-    const [sum, count] = sums.get(sweep) || [0, 0];
-    sums.set(sweep, [sum + value, count + 1]);
+    const key = `${stage} ${sweep}`;
+    const one = sums.get(key) || { stage, sweep, sum: 0, count: 0 };
+    one.sum += value;
+    one.count += 1;
+    sums.set(key, one);
   }
-  return [...sums.entries()].sort((a, b) => a[0] - b[0]).map(([, [sum, count]]) => sum / count);
+  const sweeps = [...sums.values()].sort((a, b) => a.stage - b.stage || a.sweep - b.sweep);
+  return {
+    values: sweeps.map(({ sum, count }) => sum / count),
+    begins: sweeps.flatMap(({ stage }, i) => (i && stage !== sweeps[i - 1].stage ? [i] : [])),
+  };
 }
 
-function sparkline(values) {
+function sparkline({ values, begins }) {
   const picture = document.createElementNS(SVG, "svg");
   picture.setAttribute("class", "spark");
   picture.setAttribute("viewBox", "0 0 100 40");
   picture.setAttribute("preserveAspectRatio", "none");
   picture.setAttribute("role", "img");
-  picture.setAttribute("aria-label", `Residual of ${values.length} sweeps`);
+  const stages = begins.length ? ` in ${begins.length + 1} stages` : "";
+  picture.setAttribute("aria-label", `Residual of ${values.length} sweeps${stages}`);
   const top = Math.max(...values);
   const base = document.createElementNS(SVG, "line");
   for (const [name, value] of [["x1", 0], ["x2", 100], ["y1", 39], ["y2", 39]]) base.setAttribute(name, value);
+  const across = (i) => (100 * i) / (values.length - 1);
+  const borders = begins.map((first) => {
+    const border = document.createElementNS(SVG, "line");
+    const x = across(first - 0.5);
+    for (const [name, value] of [["class", "stage"], ["x1", x], ["x2", x], ["y1", 0], ["y2", 39]]) border.setAttribute(name, value);
+    return border;
+  });
   const curve = document.createElementNS(SVG, "polyline");
-  const points = values.map((value, i) => `${(100 * i) / (values.length - 1)},${39 - (36 * value) / (top || 1)}`);
+  const points = values.map((value, i) => `${across(i)},${39 - (36 * value) / (top || 1)}`);
   curve.setAttribute("points", points.join(" "));
-  picture.append(base, curve);
+  picture.append(base, ...borders, curve);
   return picture;
 }
 
@@ -70,9 +87,10 @@ function picture(job, title) {
 
 function facts(job, title, onCancel) {
   const box = make("div");
-  const heading = make("h3", "", job.settings.rays === "straight" ? "Straight rays" : "Bent rays");
+  const { method, rays } = job.settings;
+  const heading = make("h3", "", method === "auto" ? "Chosen by trial" : RAYS[rays]);
   heading.append(make("span", `state ${job.state}`, job.state));
-  const settings = `${job.settings.nodes} × ${job.settings.nodes} nodes, ${job.settings.sweeps} sweeps`;
+  const settings = `${METHODS[method]}, ${job.settings.nodes} × ${job.settings.nodes} nodes, ${job.settings.sweeps} sweeps`;
   box.append(heading, make("p", "", title), make("p", "", settings));
   const { done, total } = job.progress;
   if (job.state === "running" || job.state === "cancelling") {
@@ -87,13 +105,14 @@ function facts(job, title, onCancel) {
   } else if (job.seconds !== null && job.finished) {
     box.append(make("p", "", `took ${duration(job.seconds)}`));
   }
-  const values = residuals(job.history);
+  const course = residuals(job.history);
+  const { values } = course;
   if (values.length) {
     const micro = (value) => `${(value * 1e6).toPrecision(3)} µs`;
     const words = values.length > 1 ? `${micro(values[0])} → ${micro(values.at(-1))}` : micro(values[0]);
     box.append(make("p", "", `residual ${words}`));
   }
-  if (values.length > 1) box.append(sparkline(values));
+  if (values.length > 1) box.append(sparkline(course));
   if (job.error) box.append(make("p", "error", inWords(job.error)));
   const row = make("div", "links");
   if (job.state === "succeeded") {
