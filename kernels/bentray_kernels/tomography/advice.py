@@ -30,6 +30,7 @@ CANDIDATES: tuple[dict[str, Any], ...] = (
     {"rays": "curved", "method": "sart"},
     {"rays": "curved", "method": "sart", "front_smoothing_nodes": 4.0},
     {"rays": "curved", "method": "gauss-newton"},
+    {"rays": "curved", "method": "gauss-newton", "edge_mps": 7.0},
 )
 
 # Trials use half the nodes, but not fewer than this.

@@ -20,6 +20,9 @@ from .settings import Settings
 # Solutions, each with the total variation that the misfit of the one before asks for.
 PASSES = 3
 
+# With ``edge_mps``: a difference from node to node, over the range, that begins to count as an edge.
+EDGE_PART = 0.04
+
 # More than any tissue has at the frequencies that pass through it, Np/m.
 MOST_NP_M = 500.0
 
@@ -96,8 +99,16 @@ def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> 
         squares = sum(float((part.residual**2).sum()) for part in left)
         rms = math.sqrt(squares / max(sum(part.residual.size for part in left), 1))
         bounds = (0.0, MOST_NP_M * problem.spacing)
+        # An edge of the attenuation is what an edge of the speed is, as a part of the range.
+        edge = EDGE_PART * float(np.ptp(image[problem.region])) if settings.edge_mps > 0.0 else 0.0
         problem_now = Linearised(
-            left, image, density, problem.region, bounds, settings.penalty_strength * rms
+            left,
+            image,
+            density,
+            problem.region,
+            bounds,
+            settings.penalty_strength * rms,
+            edge=edge or math.inf,
         )
         image, dual = problem_now.solve(dual)
     return image / problem.spacing

@@ -134,6 +134,7 @@ def step(
         settings.penalty,
         settings.huber_s or math.inf,
         state.begun * problem.spacing,
+        problem.spacing * settings.edge_mps / problem.water_speed**2 or math.inf,
     ).solve(state.dual)
     return replace(
         state,

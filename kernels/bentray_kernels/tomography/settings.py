@@ -60,6 +60,9 @@ class Settings:
             ``tikhonov`` ones near to the iteration's start.
         penalty_strength: of the penalty, and of the attenuation's total variation, over the rms misfit;
             0: none.
+        edge_mps: with total variation, speeds that differ by much more than this from node to node cost
+            little more for differing further: images become flat parts with sharp edges. For objects that are
+            such, as phantoms; 0: every difference costs.
         huber_s: residuals beyond this count in proportion to their size, not to its square, s (with SART from
             the second sweep on); 0: all count by their square.
         roi: let only the dataset's region of interest change (``mask/roi``).
@@ -98,6 +101,7 @@ class Settings:
     seed: int = 0
     penalty: Literal["total-variation", "laplacian", "tikhonov"] = "total-variation"
     penalty_strength: float = 0.3
+    edge_mps: float = 0.0
     huber_s: float = 0.0
     roi: bool = False
     reciprocity: bool = True
@@ -144,6 +148,7 @@ class Settings:
         _within("front_smoothing_nodes", self.front_smoothing_nodes, 0.0, 32.0)
         _within("subset", self.subset, 1, 4096)
         _within("penalty_strength", self.penalty_strength, 0.0, 10.0)
+        _within("edge_mps", self.edge_mps, 0.0, 1000.0)
         _within("huber_s", self.huber_s, 0.0, 1.0)
         _within("stop_rms_s", self.stop_rms_s, 0.0, 1.0)
         _within("seed", self.seed, 0, 2**63 - 1)

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation import Ring
-from bentray_kernels.tomography import Problem, Settings, gauss_newton
+from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.tomography import Problem, Settings, gauss_newton, reconstruct, rmse
 from bentray_kernels.tomography.linearisation import Rows
 from bentray_kernels.tomography.stages import start
 
@@ -90,3 +91,17 @@ def test_nothing_gained_ends_too():
     for misfit in (4e-7, 2e-7, 1.99e-7):
         state = gauss_newton.step(of, PLAN, state, [rows(misfit)])
     assert state.done
+
+
+def test_flat_parts_come_back_sharper_when_edges_are_cheap():
+    side, phantom = TABLE6_SIDE_M, table6(1375.0)
+    ring = Ring(48, 0.09)
+    everyone = np.arange(48)
+    delta = TravelTimeScan(phantom, ring, side, nodes=48).delta_tof(everyone)
+    scan = Dataset(ring.positions(), everyone, everyone, 1375.0, delta_tof_s=delta)
+    truth, inside = phantom.speed(48, side), phantom.inside(48, side)
+    plan = replace(PLAN, nodes=48, side_m=side, sweeps=8)
+    plain, sharp = (
+        rmse(reconstruct(scan, replace(plan, edge_mps=edge)).speed, truth, inside) for edge in (0.0, 7.0)
+    )
+    assert sharp < 0.9 * plain
