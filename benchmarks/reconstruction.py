@@ -9,7 +9,7 @@ import reconstruction_peers
 import reconstruction_time
 import reconstruction_volume
 from _ladder import BEST, FAT_MPS, LADDER, THEIRS, WATER_MPS, ladder_step
-from _table6_scan import Found, Table6Scan
+from _phantom_scan import Found, PhantomScan
 
 from bentray_service.cli.row import Row
 from bentray_service.cli.terminal import Step
@@ -30,7 +30,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
 def fat_coupling(nodes: int, elements: int, progress: Step) -> Iterable[Row]:
     """R1, R3 and R8 in a medium as fast as fat; R1 takes the best method, the others that of chapter 6."""
     asked = SimulationSettings(nodes, elements, FAT_MPS, attenuation=True)
-    scan = Table6Scan.simulated(asked, progress)
+    scan = PhantomScan.of_table6(asked, progress)
     ladder = {name: ladder_step(scan, name, progress) for name in LADDER}
     best = scan.run(progress, "best", **BEST)
     yield Row("R1 mean absolute error", best.error, 2.0, "<=", "% of range", best.how)
@@ -46,7 +46,7 @@ def fat_coupling(nodes: int, elements: int, progress: Step) -> Iterable[Row]:
 
 def water_coupling(nodes: int, elements: int, progress: Step) -> Iterable[Row]:
     """R2, and the ladder of R3 again, in water faster than the fat."""
-    scan = Table6Scan.simulated(SimulationSettings(nodes, elements, WATER_MPS), progress)
+    scan = PhantomScan.of_table6(SimulationSettings(nodes, elements, WATER_MPS), progress)
     ladder = {name: ladder_step(scan, name, progress) for name in LADDER}
     straight = ladder["straight"]
     yield Row("R2 straight, off 25 %", abs(straight.error - 25.0), 2.0, "<=", "% of range", straight.how)
