@@ -141,3 +141,25 @@ def test_a_middle_slice_without_a_node_in_the_region_is_drawn(empty):
     roi = np.zeros((24, 24, 3), bool)
     roi[5:9, 5:9, 0 if empty else 1] = True
     assert pixels(report_png(volume(), solid, roi)).shape[0] > 500
+
+
+def test_many_even_slices_are_shown_from_the_side_too(drawn):
+    step = (SPACING_M, SPACING_M, 0.004)
+    result = replace(made(slices=6), spacing_m=step, origin_m=(*made().origin_m, 0.01))
+    report_png(result)
+    plain = panels(drawn)
+    assert plain[:3] == ["Reconstruction", "Reconstruction, y = 1.0 mm", "Coverage"]
+    section = drawn[-1].axes[1]
+    assert section.get_ylabel() == "z (mm)"
+    np.testing.assert_allclose(section.images[0].get_array().T, result.speed[:, 12])
+    assert section.images[0].get_extent() == pytest.approx([-24.0, 24.0, 8.0, 32.0])
+    assert section.get_ylim() == pytest.approx((-4.0, 44.0)), "as high as the others"
+    solid = Truth(np.full((24, 24, 6), 1500.0), step, result.origin_m, axes="x,y,z")
+    report_png(result, solid)
+    assert panels(drawn)[3:] == plain[1:]
+
+
+@pytest.mark.parametrize("slices", [3, 6])
+def test_few_or_uneven_slices_are_not(drawn, slices):
+    report_png(volume() if slices == 3 else made(slices=slices))
+    assert panels(drawn)[1] == "Coverage"

@@ -1,7 +1,8 @@
-"""One slice of a volume: which one, and its image."""
+"""Slices of a volume: which one, its image, and the section across all of them."""
 
 from __future__ import annotations
 
+import math
 from typing import TypeVar
 
 import numpy as np
@@ -9,6 +10,9 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction
+
+# Heights from which on a section across them shows more than a line.
+LEAST_HEIGHTS = 4
 
 Kind = TypeVar("Kind", bound=np.generic)
 
@@ -30,3 +34,12 @@ def slice_index(result: Reconstruction, index: int | None = None) -> int:
 def cut(volume: NDArray[Kind], index: int) -> NDArray[Kind]:
     """The slice (nx, ny) of a volume (nx, ny, nz); a plain image is its own slice."""
     return volume if volume.ndim == 2 else volume[..., index]
+
+
+def has_section(result: Reconstruction) -> bool:
+    """Whether there are enough evenly spaced slices to show them from the side."""
+    return (
+        result.speed.ndim == 3
+        and result.speed.shape[2] >= LEAST_HEIGHTS
+        and math.isfinite(result.spacing_m[2])
+    )

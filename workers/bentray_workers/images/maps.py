@@ -57,8 +57,12 @@ def draw_map(
     colormap: str,
     title: str,
     outline: Bools | None = None,
+    up: str = "y",
 ) -> AxesImage:
-    """An image (nx, ny) with x to the right and y up, in mm, and the outline of a region of that shape."""
+    """An image (nx, ny) with x to the right and y up, in mm, and the outline of a region of that shape.
+
+    ``up`` names another axis in place of y; spacing and origin are then those of x and it.
+    """
     places = [1e3 * (o + h * np.arange(n)) for o, h, n in zip(origin_m, spacing_m, image.shape, strict=False)]
     half = [0.5e3 * h for h in spacing_m]
     shown = axes.imshow(
@@ -81,7 +85,7 @@ def draw_map(
         axes.contour(*places, outline.T.astype(float), levels=[0.5], colors=colour, linewidths=0.5)
     axes.set_title(title)
     axes.set_xlabel("x (mm)")
-    axes.set_ylabel("y (mm)", labelpad=1)
+    axes.set_ylabel(f"{up} (mm)", labelpad=1)
     axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.yaxis.set_major_locator(MaxNLocator(5))
     return shown

@@ -18,7 +18,7 @@ from ..comparison import Comparison, NotComparable, compare
 from .canvas import drawing, new_figure, to_png
 from .captions import LABELS, NAMES, facts, stage_names, which_slice
 from .curves import draw_history, draw_profiles
-from .cut import cut, slice_index
+from .cut import cut, has_section, slice_index
 from .maps import (
     ATTENUATION,
     COVERAGE,
@@ -26,6 +26,7 @@ from .maps import (
     RECOVERY,
     RECOVERY_LIMITS,
     SPEED,
+    Limits,
     draw_bar,
     draw_map,
     robust_limits,
@@ -50,7 +51,8 @@ COLORMAPS = {"coverage": COVERAGE, "attenuation": ATTENUATION, "recovery": RECOV
 def report_png(result: Reconstruction, truth: Truth | None = None, roi: Bools | None = None) -> bytes:
     """The images that there are, convergence and residuals; with a truth this, the difference and a profile.
 
-    Several slices are shown by the middle one, the title says which; the errors are those of ``compare``,
+    Several slices are shown by the middle one, the title says which, and where they are many and evenly
+    spaced by a section across them, which takes the profile's place. The errors are those of ``compare``,
     over all slices. A truth that cannot be compared is shown as it is, with the reason under it.
 
     Args:
@@ -69,8 +71,10 @@ def report_png(result: Reconstruction, truth: Truth | None = None, roi: Bools | 
 
 def _plain(result: Reconstruction, k: int) -> bytes:
     with drawing():
-        figure, panels = _sheet(result, k, 1)
+        figure, panels = _sheet(result, k, 1 + has_section(result))
         _speed(next(panels), result, k)
+        if has_section(result):
+            _section(next(panels), result, _limits(result.speed, result.coverage))
         _maps(panels, result, k)
         _curves(panels, result)
         return to_png(figure)
@@ -111,14 +115,38 @@ def _compared(result: Reconstruction, found: Comparison, k: int) -> bytes:
         shown = draw_map(axes, difference, *grid, spread, colormap=DIFFERENCE, title=title, outline=region)
         draw_bar([shown], "reconstruction minus truth (m/s)")
         axes.set_xlabel(f"x (mm)\nerrors read: {found.region_choice}")
-        row = speed.shape[1] // 2
-        x = result.origin_m[0] + result.spacing_m[0] * np.arange(speed.shape[0], dtype=np.float64)
-        y_mm = 1e3 * (result.origin_m[1] + result.spacing_m[1] * row)
-        lines = {"truth": true_speed[:, row], "reconstruction": speed[:, row]}
-        draw_profiles(next(panels), x, lines, f"Along y = {y_mm:.1f} mm")
+        if has_section(result):
+            _section(next(panels), result, limits)
+        else:
+            _profile(next(panels), result, speed, true_speed)
         _maps(panels, result, k)
         _curves(panels, result)
         return to_png(figure)
+
+
+def _profile(axes: Axes, result: Reconstruction, speed: Floats, true_speed: Floats) -> None:
+    row = speed.shape[1] // 2
+    x = result.origin_m[0] + result.spacing_m[0] * np.arange(speed.shape[0], dtype=np.float64)
+    lines = {"truth": true_speed[:, row], "reconstruction": speed[:, row]}
+    draw_profiles(axes, x, lines, f"Along y = {_y_mm(result, row):.1f} mm")
+
+
+def _section(axes: Axes, result: Reconstruction, limits: Limits) -> None:
+    """The speed across all heights, seen along y."""
+    row = result.speed.shape[1] // 2
+    grid = result.spacing_m[::2], result.origin_m[::2]
+    title = f"Reconstruction, y = {_y_mm(result, row):.1f} mm"
+    shown = draw_map(axes, result.speed[:, row], *grid, limits, colormap=SPEED, title=title, up="z")
+    # Square like the other panels, so that they stay aligned.
+    left, right, bottom, top = shown.get_extent()
+    reach = 0.5 * max(right - left, top - bottom)
+    axes.set_xlim(0.5 * (left + right) - reach, 0.5 * (left + right) + reach)
+    axes.set_ylim(0.5 * (bottom + top) - reach, 0.5 * (bottom + top) + reach)
+    draw_bar([shown], LABELS["speed"])
+
+
+def _y_mm(result: Reconstruction, row: int) -> float:
+    return 1e3 * (result.origin_m[1] + result.spacing_m[1] * row)
 
 
 def _sheet(result: Reconstruction, k: int, own: int) -> tuple[Figure, Iterator[Axes]]:
@@ -141,17 +169,21 @@ def _held(result: Reconstruction) -> list[str]:
 
 
 def _speed(axes: Axes, result: Reconstruction, k: int) -> None:
-    speed, passed = cut(result.speed, k), cut(result.coverage, k) > 0.0
-    limits = robust_limits([speed], passed if passed.any() else None)
-    grid = (result.spacing_m, result.origin_m)
+    speed, grid = cut(result.speed, k), (result.spacing_m, result.origin_m)
+    limits = _limits(speed, cut(result.coverage, k))
     draw_bar([draw_map(axes, speed, *grid, limits, colormap=SPEED, title="Reconstruction")], LABELS["speed"])
 
 
+def _limits(image: Floats, coverage: Floats) -> Limits:
+    """From the nodes that rays have passed, where any have."""
+    passed = coverage > 0.0
+    return robust_limits([image], passed if passed.any() else None)
+
+
 def _maps(panels: Iterator[Axes], result: Reconstruction, k: int) -> None:
-    passed = cut(result.coverage, k) > 0.0
     for name in _held(result):
         image = cut(getattr(result, name), k)
-        limits = robust_limits([image], passed if passed.any() else None)
+        limits = _limits(image, cut(result.coverage, k))
         if name == "coverage":
             limits = (0.0, robust_limits([image])[1])
         elif name == "recovery":
