@@ -15,6 +15,11 @@ from bentray_workers.slices import Cancelled
 
 PLAN = Settings(nodes=32, sweeps=2)
 METHODS = [PLAN, replace(PLAN, method="gauss-newton", sweeps=3)]
+OTHERS = {
+    "auto": replace(PLAN, method="auto"),
+    "stages": replace(PLAN, coarser_grids=1, straight_sweeps=1, resolution_check=True),
+    "volume": replace(PLAN, nodes=20, decomposition="volume", method="gauss-newton", axial_room_nodes=2),
+}
 
 
 @pytest.fixture
@@ -39,15 +44,15 @@ def test_amplitudes_give_the_same_attenuation_everywhere(cluster, scan, tmp_path
     assert slices.reconstruct(None, path, replace(plan, attenuation=False)).attenuation is None
 
 
-@pytest.mark.parametrize("plan", METHODS, ids=lambda plan: plan.method)
+@pytest.mark.parametrize("plan", [*METHODS, *OTHERS.values()], ids=[*(p.method for p in METHODS), *OTHERS])
 def test_cluster_and_one_process_give_the_same_bits(cluster, scan, path, plan):
     expected = reconstruct_here(scan, plan)
     for client in (cluster.client, None):
         result = slices.reconstruct(client, path, plan)
-        assert np.array_equal(result.speed, expected.speed)
-        assert np.array_equal(result.coverage, expected.coverage)
-        assert result.history == expected.history
-        assert result.spacing_m == expected.spacing_m
+        for name in ("speed", "coverage", "recovery", "residuals"):
+            assert np.array_equal(getattr(result, name), getattr(expected, name)), name
+        for name in ("history", "spacing_m", "origin_m", "settings", "trials"):
+            assert getattr(result, name) == getattr(expected, name), name
 
 
 @pytest.mark.parametrize("plan", METHODS, ids=lambda plan: plan.method)

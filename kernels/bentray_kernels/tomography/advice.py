@@ -122,8 +122,8 @@ def advise(
     settings: Settings,
     index: int,
     scan_of: Callable[[Settings, Part], Scan],
-    drive: Callable[[Sequence[Chain]], None],
-) -> tuple[Settings, tuple[Trial, ...]]:
+    drive: Callable[[Sequence[Chain], int], None],
+) -> tuple[Settings, tuple[Trial, ...], int]:
     """The settings that explain one slice best, and how all that were tried did.
 
     What predicts held-out pairs best is chosen. Where that misfit is the noise of the times, the
@@ -137,12 +137,13 @@ def advise(
         drive: runs chains to their end.
 
     Returns:
-        The settings, and the trials, the chosen one first and the others by what they predict.
+        The settings; the trials, the chosen one first and the others by what they predict; and the emitter
+        passes that they took.
     """
     chains = [
         TrialChain(scan_of(plan, "shown"), index, scan_of(plan, "held-out")) for plan in tried(settings)
     ]
-    drive(chains)
+    drive(chains, 0)
     trials = [
         Trial(changes, chain.held_out_rms_s, chain.history[-1].residual_rms_s)
         for changes, chain in zip(CANDIDATES, chains, strict=True)
@@ -150,7 +151,8 @@ def advise(
     chosen = choose(trials)
     others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
     found = replace(settings, **chosen.settings)
-    return stopped(found, chosen, noise_of(dataset)), (chosen, *others)
+    passes = sum(chain.total for chain in chains)
+    return stopped(found, chosen, noise_of(dataset)), (chosen, *others), passes
 
 
 def stopped(settings: Settings, chosen: Trial, noise_s: float) -> Settings:

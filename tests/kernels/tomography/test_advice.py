@@ -42,8 +42,13 @@ def test_invalid_pairs_stay_so(scan):
 
 
 def test_eikonal_times_ask_for_bent_rays(scan):
-    result = reconstruct(scan, PLAN)
+    seen = []
+    result = reconstruct(scan, PLAN, seen.append)
     assert result.settings.rays == "curved"
+    done = [progress.done for progress in seen]
+    assert done == sorted(done)
+    assert done[-1] == seen[-1].total
+    assert seen[-1].history == result.history
     assert result.settings.method in ("sart", "gauss-newton")
     assert len(result.trials) == len(CANDIDATES)
     assert reason(result.trials).startswith("auto chose curved")
