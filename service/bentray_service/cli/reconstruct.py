@@ -72,16 +72,16 @@ def _run(
 
 
 def useful_workers(dataset: Dataset, settings: Settings) -> int:
-    """Worker processes that have work to do at the same time, at most one a core.
+    """Worker processes that have enough to do at the same time to be worth their start, at most one a core.
 
-    SART uses its emitters one after the other, so only slices run side by side; the other methods trace the
-    rays of many emitters at once.
+    Slices run side by side; so do the emitters of a volume with Gauss-Newton, and what ``auto`` tries. SART
+    uses its emitters one after the other, and one slice with Gauss-Newton is done before workers have begun.
 
     Raises:
         InvalidInput: for a volume of a scan that has one height only.
     """
     from bentray_kernels.tomography.pairs import count
 
-    cores = len(os.sched_getaffinity(0))
-    problems = count(dataset, settings)
-    return min(problems, cores) if settings.method == "sart" else cores
+    problems, cores = count(dataset, settings), len(os.sched_getaffinity(0))
+    volume = settings.decomposition == "volume" and settings.method == "gauss-newton"
+    return cores if volume or settings.method == "auto" else min(problems, cores)

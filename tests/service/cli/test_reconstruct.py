@@ -106,7 +106,8 @@ def heights(slices: int) -> Dataset:
         (9, Settings(), 4),
         (9, Settings(decomposition="volume"), 1),
         (9, Settings(decomposition="volume", method="gauss-newton"), 4),
-        (1, Settings(method="gauss-newton"), 4),
+        (1, Settings(method="gauss-newton"), 1),
+        (3, Settings(method="gauss-newton"), 3),
         (1, Settings(method="auto"), 4),
     ],
 )
