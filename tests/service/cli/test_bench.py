@@ -97,4 +97,4 @@ def test_the_reconstruction_benchmark_measures_what_it_promises() -> None:
     labels = {row.target.split()[0] for row in rows}
     assert {"R1", "R3"} <= labels
     by_target = {row.target: row for row in rows}
-    assert by_target["R3 straight > curved"].met
+    assert by_target["R3 straight > fixed, coupling 1375"].met
