@@ -20,12 +20,14 @@ Peer = Callable[[TravelTimes], np.ndarray]
 # by, in water 1500: in favour of the peers.
 SPEED_BOUNDS_MPS = (1300.0, 1800.0)
 
-# Largest triangle, squares of the nodes' spacing: 1240 triangles for an image of 128 nodes a side. Four times
-# as many take five times as long. An image of 64 nodes has too few: 31.8 m/s, where 1240 give 22.6.
+# Largest triangle, squares of the nodes' spacing: 2830 triangles for an image of 128 nodes and 256 elements,
+# many because elements are corners. Four times as many take five times as long. An image of 64 nodes has too
+# few: 31.8 m/s, where a largest triangle of 4 gives 22.6.
 PYGIMLI_AREA = 16.0
 PYGIMLI_SECONDARY_NODES = 2
-# The strength is the package's own default, and did better than 5; L1 roughness changed little.
-PYGIMLI_ERROR_S, PYGIMLI_STRENGTH = 50e-9, 20.0
+# It weighs the roughness against a sum over pairs. For the 2016 pairs of 64 elements this is its default, 20,
+# which did better than 5; 20 for 256 elements gave 34.5 m/s. L1 roughness changed little.
+PYGIMLI_ERROR_S, PYGIMLI_STRENGTH_A_PAIR = 50e-9, 0.01
 
 # Roughness of the first and the last iterations. Constant ones did no better: 0.01 stops early, 0.001 and
 # 0.00035 gave 25.5 and 24.8 m/s on 64² nodes where this gives 23.7, and 0.0001 diverged.
@@ -88,7 +90,7 @@ def pygimli(module) -> Peer:
             startModel=water,
             secNodes=PYGIMLI_SECONDARY_NODES,
             limits=list(SPEED_BOUNDS_MPS),
-            lam=PYGIMLI_STRENGTH,
+            lam=PYGIMLI_STRENGTH_A_PAIR * emitter.size,
         )
         centres = np.array([(c.center().x(), c.center().y()) for c in manager.paraDomain.cells()])
         return _on_nodes(times, centres, np.asarray(speed))

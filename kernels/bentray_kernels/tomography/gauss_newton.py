@@ -24,6 +24,9 @@ from .settings import Settings
 # A misfit above this part of the one before ends the iteration: nothing is left to gain.
 LEAST_GAIN = 0.98
 
+# A step that makes the misfit grow is halved so often at most: rays of an image say little about far ones.
+MOST_HALVINGS = 3
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -50,6 +53,7 @@ class Iterate:
         dual: (ndim, ...), s, of the last linear problem.
         coverage: as ``slowness``, metres of ray through each node.
         best: the image with the least misfit so far.
+        halvings: of the last step.
         done: whether nothing is left to do.
         history: a record per iteration, of the misfit that it began with.
     """
@@ -59,6 +63,7 @@ class Iterate:
     dual: Floats
     coverage: Floats
     best: Measured
+    halvings: int = 0
     done: bool = False
     history: tuple[Sweep, ...] = ()
 
@@ -115,11 +120,15 @@ def step(
     best = state.best
     if rms < best.rms:
         best = Measured(state.slowness, rms, residual_counts(residual))
-    stuck = len(history) > 1 and rms > LEAST_GAIN * state.best.rms
+    grown = rms > state.best.rms and state.halvings < MOST_HALVINGS
+    stuck = len(history) > 1 and rms > LEAST_GAIN * state.best.rms and not grown
     # The last pass only measures what the one before gave.
     last = len(history) == settings.sweeps
     if len(history) > 1 and (stuck or last or rms <= settings.stop_rms_s):
         return replace(state, slowness=best.slowness, best=best, history=history, done=True)
+    if grown:
+        nearer = 0.5 * (best.slowness + state.slowness)
+        return replace(state, slowness=nearer, halvings=state.halvings + 1, history=history)
     lowest, highest = settings.speed_bounds_mps
     coverage = _coverage(problem, parts)
     # Total variation is told the misfit, s; quadratic penalties are weighed against the data themselves.
@@ -142,6 +151,7 @@ def step(
         dual=dual,
         coverage=coverage,
         best=best,
+        halvings=0,
         done=settings.sweeps == 1,
         history=history,
     )

@@ -53,15 +53,30 @@ def rows(residual):
     return Rows(np.array([0, 1]), np.array([300], np.int32), np.ones(1, np.float32), np.array([residual]), 1)
 
 
-def test_a_growing_misfit_ends_with_the_best_image():
+def test_a_step_that_makes_the_misfit_grow_is_halved_and_then_given_up():
     of = problem(np.zeros((8, 8)))
     states = [gauss_newton.begin(start(of, None))]
-    for misfit in (4e-7, 2e-7, 3e-7):
+    misfits = [4e-7, 2e-7, 6e-7, 5e-7, 4e-7, 3e-7]
+    for misfit in misfits:
+        assert not states[-1].done
         states.append(gauss_newton.step(of, PLAN, states[-1], [rows(misfit)]))
-    assert [state.done for state in states] == [False, False, False, True]
+    assert states[-1].done
     # The misfit of 2e-7 was measured on what the first step gave.
-    assert np.array_equal(states[-1].slowness, states[1].slowness)
-    assert [sweep.residual_rms_s for sweep in states[-1].history] == [4e-7, 2e-7, 3e-7]
+    best, far = states[1].slowness, states[2].slowness
+    assert np.array_equal(states[-1].slowness, best)
+    assert np.allclose(states[3].slowness - best, 0.5 * (far - best))
+    assert np.allclose(states[5].slowness - best, 0.125 * (far - best))
+    assert [sweep.residual_rms_s for sweep in states[-1].history] == misfits
+
+
+def test_a_halved_step_that_helps_goes_on():
+    of = problem(np.zeros((8, 8)))
+    state = gauss_newton.begin(start(of, None))
+    for misfit in (4e-7, 2e-7, 6e-7, 1e-7):
+        state = gauss_newton.step(of, PLAN, state, [rows(misfit)])
+    assert not state.done
+    assert state.halvings == 0
+    assert state.best.rms == 1e-7
 
 
 def test_the_last_pass_measures_and_the_best_image_is_given():
