@@ -183,8 +183,12 @@ def reason(trials: Sequence[Trial]) -> str:
     """One sentence: what was chosen, and how well each trial predicted; empty without trials."""
     if not trials:
         return ""
-    told = [
-        f"{' '.join(str(value) for value in t.settings.values())} {1e9 * t.held_out_rms_s:.0f} ns"
-        for t in trials
-    ]
+    told = [f"{_named(trial.settings)} {1e9 * trial.held_out_rms_s:.0f} ns" for trial in trials]
     return f"auto chose {told[0]} (misfit of held-out pairs); the others: {', '.join(told[1:])}"
+
+
+def _named(changes: dict[str, Any]) -> str:
+    """As ``straight sart`` or ``curved sart (front_smoothing_nodes 4)``."""
+    more = [f"{name} {value:g}" for name, value in changes.items() if name not in ("rays", "method")]
+    plain = " ".join(str(changes[name]) for name in ("rays", "method") if name in changes)
+    return f"{plain} ({', '.join(more)})" if more else plain

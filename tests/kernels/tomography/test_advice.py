@@ -109,3 +109,12 @@ def test_trials_are_coarser_and_speed_alone():
         assert not plan.attenuation
         assert plan.method == changes["method"]
     assert {plan.nodes for plan in tried(PLAN)} == {48}
+
+
+def test_the_reason_names_what_differs():
+    plain, more = trial("straight", 100e-9), trial("curved", 120e-9)
+    smooth = replace(more, settings={**more.settings, "front_smoothing_nodes": 4.0})
+    assert reason([plain, smooth]) == (
+        "auto chose straight 100 ns (misfit of held-out pairs); "
+        "the others: curved (front_smoothing_nodes 4) 120 ns"
+    )
