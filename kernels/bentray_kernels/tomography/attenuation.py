@@ -89,7 +89,9 @@ def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> 
     passed = np.zeros(shape).ravel()
     for part in parts:
         back_project(part.pointers, part.columns, part.lengths, np.ones(part.residual.size), passed)
-    density = passed.reshape(shape)[problem.region].mean()
+    density = problem.density(passed.reshape(shape))
+    if density == 0.0:
+        return water / problem.spacing
     image, dual = water, np.zeros((len(shape), *shape))
     for _ in range(PASSES):
         left = [

@@ -136,7 +136,7 @@ def step(
     image, dual = Linearised(
         parts,
         state.slowness * problem.spacing,
-        coverage[problem.region].mean() / problem.spacing,
+        problem.density(coverage) / problem.spacing,
         problem.region,
         (problem.spacing / highest, problem.spacing / lowest),
         settings.penalty_strength * unit,

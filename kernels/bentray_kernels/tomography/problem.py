@@ -59,7 +59,8 @@ class Problem:
 
         Raises:
             InvalidInput: no travel times in the slice, elements outside the image, an image without a node
-                inside the array, bounds that exclude the water, a region of interest without a grid.
+                inside the array, bounds that exclude the water, a region of interest without a grid or
+                a node.
         """
         low, high = settings.speed_bounds_mps
         if not low <= dataset.water_speed_mps <= high:
@@ -99,6 +100,11 @@ class Problem:
             heights = pairs.heights(dataset)
             height = None if heights is None or len(place) == 3 else float(heights[index])
             region &= inside(dataset, region.shape, spacing, place, height)
+            # A slice above or below a region in space stays water; the others are still worth it.
+            if not region.any() and (height is None or np.ndim(dataset.roi) == 2):
+                raise InvalidInput(
+                    "mask/roi", "no node of the image", "a region of interest with nodes inside the array"
+                )
         return cls(
             emitters=found.emitters - origin,
             receivers=found.receivers - origin,
@@ -118,6 +124,11 @@ class Problem:
     def sounding(self) -> Ints:
         """Emitters with travel times."""
         return np.flatnonzero(np.isfinite(self.delta_tof).any(axis=1))
+
+    def density(self, passed: Floats) -> float:
+        """Mean of an image over the nodes that may change; 0 where none may."""
+        inside = passed[self.region]
+        return float(inside.mean()) if inside.size else 0.0
 
     def receivers_of(self, emitter: int) -> Floats:
         """(nrx, ndim), m: where the emitter's row of the data was received."""

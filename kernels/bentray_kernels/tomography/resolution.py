@@ -55,7 +55,7 @@ def recovery(problem: Problem, parts: Sequence[Rows]) -> Floats:
         project(part.pointers, part.columns, part.lengths, board.ravel(), times)
         seen.append(replace(part, residual=times))
         back_project(part.pointers, part.columns, part.lengths, np.ones(times.size), passed)
-    density = float(passed.reshape(shape)[problem.region].mean())
+    density = problem.density(passed.reshape(shape))
     bounds = -crossing, crossing
     empty = np.zeros(shape)
     found, _ = Linearised(

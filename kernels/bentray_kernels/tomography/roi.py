@@ -28,7 +28,7 @@ def inside(
         height: z of a slice, m, for a region in space.
 
     Raises:
-        InvalidInput: without a region, or without the grid it lies on.
+        InvalidInput: without a region or a node in it, or without the grid it lies on.
     """
     roi, truth = dataset.roi, dataset.truth
     if roi is None:
@@ -38,6 +38,8 @@ def inside(
         raise InvalidInput(
             "mask/roi", f"an image of shape {roi.shape}", "an image on the grid of the truth, with axes named"
         )
+    if not roi.any():
+        raise InvalidInput("mask/roi", "no node", "a region of interest of at least one node")
     lines = [o + spacing * np.arange(n) for o, n in zip(origin, shape, strict=True)]
     if roi.ndim == 3 and len(shape) == 2:
         lines.append(np.array([height or 0.0]))

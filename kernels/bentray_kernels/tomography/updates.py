@@ -39,6 +39,8 @@ def propagation_speed(slowness: Floats, region: Flags, settings: Settings, *, wa
         return speed
     low, high = settings.speed_range_mps
     inside = speed[region]
+    if not inside.size:
+        return speed
     least, most = float(inside.min()), float(inside.max())
     if most - least <= 0.0:
         return speed

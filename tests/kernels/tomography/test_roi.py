@@ -1,0 +1,59 @@
+"""Regions of interest: one without a node in the image is refused, a slice beyond a region stays water."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset, Truth
+from bentray_kernels.acquisition.simulation import Ring
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Settings, reconstruct
+
+RING, WATER = Ring(12, 0.05), 1500.0
+PLAN = Settings(nodes=24, sweeps=2, roi=True, resolution_check=True, edge_mps=5.0)
+WAYS = [
+    {},
+    {"method": "gauss-newton"},
+    {"speed_update": "data-driven", "speed_range_mps": (1400.0, 1600.0)},
+]
+
+
+def scan(roi, slices=None):
+    everyone = np.arange(RING.elements)
+    shape = (RING.elements,) * 2 if slices is None else (len(slices), RING.elements, RING.elements)
+    speed = np.full(roi.shape, WATER)
+    names = "x,y,z"[: 2 * roi.ndim - 1]
+    return Dataset(
+        RING.positions(),
+        everyone,
+        everyone,
+        WATER,
+        delta_tof_s=np.full(shape, -1e-7),
+        log_ratio_np=np.full(shape, 0.1),
+        slice_z_m=slices,
+        roi=roi,
+        truth=Truth(speed, (0.01,) * roi.ndim, (-0.05,) * roi.ndim, axes=names),
+    )
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_region_without_a_node_in_the_image_is_refused(way):
+    outside = np.zeros((11, 11), bool)
+    outside[0, 0] = True
+    for roi in (outside, np.zeros_like(outside)):
+        with pytest.raises(InvalidInput) as refusal:
+            reconstruct(scan(roi), replace(PLAN, **way))
+        assert refusal.value.field == "mask/roi"
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_slice_above_the_region_stays_water(way):
+    roi = np.zeros((11, 11, 11), bool)
+    roi[3:8, 3:8, 5] = True
+    found = reconstruct(scan(roi, np.array([0.0, 0.02])), replace(PLAN, **way))
+    assert found.speed[..., 0].max() > WATER + 1.0
+    assert np.allclose(found.speed[..., 1], WATER)
+    assert np.array_equal(found.recovery[..., 1], np.zeros((24, 24)))
+    assert found.attenuation[..., 0].max() > 1.0
+    assert not found.attenuation[..., 1].any()
