@@ -97,8 +97,9 @@ def _ring(dataset: Dataset, settings: Settings, index: int) -> Pairs:
     """A ring of an array in space, as if it were alone in its plane."""
     z = heights(dataset)
     height = dataset.element_position_m[:, 2]
-    nearest = np.abs(height[:, None] - np.asarray(z)[None, :]).argmin(axis=1)
-    whole = _made(dataset, settings, dataset.tx, dataset.rx, np.flatnonzero(nearest == index))
+    # Each ring begins at its lowest element, which an uneven one's highest may be far above.
+    ring = np.searchsorted(np.asarray(z), height, side="right") - 1
+    whole = _made(dataset, settings, dataset.tx, dataset.rx, np.flatnonzero(ring == index))
     return Pairs(
         whole.emitters[:, :2], whole.receivers[..., :2], whole.ring, whole.delta_tof, whole.log_ratio
     )
@@ -126,8 +127,9 @@ def _moved(dataset: Dataset, settings: Settings) -> Pairs:
 def _made(dataset: Dataset, settings: Settings, tx: Ints, rx: Ints, members: Ints) -> Pairs:
     """The pairs between some elements, with reverses where the settings want them."""
     delta, ratio = dataset.differential_tof(), dataset.log_ratio_np
-    if ratio is not None and dataset.valid is not None:
-        ratio = np.where(dataset.valid, ratio, np.nan)
+    if ratio is not None:
+        usable = tx[:, None] != rx[None, :]
+        ratio = np.where(usable if dataset.valid is None else usable & dataset.valid, ratio, np.nan)
     sent, received = np.isin(tx, members), np.isin(rx, members)
     if len(members) < len(dataset.element_position_m):
         tx, rx = tx[sent], rx[received]

@@ -76,6 +76,17 @@ def test_invalid_pairs_have_neither_time_nor_amplitude():
     assert np.isnan(found.log_ratio[1, 2])
 
 
+def test_an_uneven_ring_is_one_ring():
+    """Steps of 8 µm, the highest element nearer to the next ring's lowest than to its own."""
+    uneven = rings()
+    uneven.element_position_m[:, 2] = 8e-6 * np.tile(np.arange(6), 3) + np.repeat([0.0, 5.5e-5, 1.1e-4], 6)
+    assert count(uneven, SLICES) == 3
+    for k in range(3):
+        assert np.array_equal(
+            of(uneven, SLICES, k).delta_tof, of(moved(), SLICES, k).delta_tof, equal_nan=True
+        )
+
+
 def test_one_height_is_no_volume():
     with pytest.raises(InvalidInput) as refusal:
         of(moved().slice(0), VOLUME, 0)
