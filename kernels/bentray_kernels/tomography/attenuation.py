@@ -70,6 +70,7 @@ def _unfocused(problem: Problem, settings: Settings, slowness: Floats, emitters:
             problem.emitters[members],
             problem.receivers[ring],
             wavelength_m=problem.wavelength_m,
+            longest_m=problem.longest_m,
             eikonal=settings.front,
         )
     return replace(problem, log_ratio=ratio)

@@ -26,14 +26,15 @@ def focusing(
     receivers: Floats,
     *,
     wavelength_m: float,
+    longest_m: float,
     eikonal: str,
 ) -> Floats:
     """ln(A_water / A_object) through refraction alone, of every pair; below 0 where the object focuses.
 
     A log ratio is the sum of this and of the line integral of the attenuation, so that it is subtracted
     from ``log_ratio`` where both ends of a ray lie in water. Rays know no wavelength, waves average over a
-    Fresnel zone: the image is smoothed by a Gaussian of ``FRESNEL_PART``·√(wavelength · longest distance),
-    the same for all pairs. Widths that follow each ray, √(s(L − s)/L), explained the simulation no better.
+    Fresnel zone: the image is smoothed by a Gaussian of ``FRESNEL_PART``·√(wavelength · ``longest_m``), the
+    same for all pairs. Widths that follow each ray, √(s(L − s)/L), explained the simulation no better.
 
     The correction is as good as the image's second derivatives. In a slice, tubes are as high as in water.
 
@@ -43,6 +44,7 @@ def focusing(
         emitters: (k, ndim), m, node 0 at 0, in water.
         receivers: (n, ndim), as well.
         wavelength_m: in water, at the frequency of the amplitudes; 0: no smoothing.
+        longest_m: of the distances between emitters and receivers, those of later calls included.
         eikonal: method of the wave front.
 
     Returns:
@@ -53,8 +55,7 @@ def focusing(
     """
     if not (math.isfinite(wavelength_m) and wavelength_m >= 0.0):
         raise InvalidInput("wavelength_m", wavelength_m, "a finite length >= 0 m")
-    longest = np.linalg.norm(emitters[:, None] - receivers[None], axis=-1).max()
-    width = FRESNEL_PART * math.sqrt(wavelength_m * longest)
+    width = FRESNEL_PART * math.sqrt(wavelength_m * longest_m)
     speed = 1.0 / gaussian_filter(slowness, width / spacing, mode="nearest")
     change = np.empty((len(emitters), len(receivers)))
     for row, source in enumerate(emitters):

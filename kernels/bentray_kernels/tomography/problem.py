@@ -101,7 +101,7 @@ class Problem:
             height = None if heights is None or len(place) == 3 else float(heights[index])
             region &= inside(dataset, region.shape, spacing, place, height)
             # A slice above or below a region in space stays water; the others are still worth it.
-            if not region.any() and (height is None or np.ndim(dataset.roi) == 2):
+            if not region.any() and (height is None or dataset.roi is None or dataset.roi.ndim == 2):
                 raise InvalidInput(
                     "mask/roi", "no node of the image", "a region of interest with nodes inside the array"
                 )
@@ -129,6 +129,12 @@ class Problem:
         """Mean of an image over the nodes that may change; 0 where none may."""
         inside = passed[self.region]
         return float(inside.mean()) if inside.size else 0.0
+
+    @property
+    def longest_m(self) -> float:
+        """Longest distance between an emitter and a receiver of its ring, m."""
+        pairs_of = ((self.receivers_of(k), at) for k, at in enumerate(self.emitters))
+        return max(float(np.linalg.norm(heard - at, axis=1).max()) for heard, at in pairs_of)
 
     def receivers_of(self, emitter: int) -> Floats:
         """(nrx, ndim), m: where the emitter's row of the data was received."""

@@ -87,6 +87,7 @@ def test_focusing_is_taken_off(scan):
         problem.emitters,
         problem.receivers[0],
         wavelength_m=problem.wavelength_m,
+        longest_m=problem.longest_m,
         eikonal="accurate",
     )
     bent = replace(problem, log_ratio=problem.log_ratio + lens)
@@ -97,6 +98,30 @@ def test_focusing_is_taken_off(scan):
     assert np.abs(lensed.residual - plain.residual).max() > 0.1
     assert len(mended.residual) <= len(plain.residual)
     assert np.isin(np.round(mended.residual, 9), np.round(plain.residual, 9)).all()
+
+
+def test_focusing_does_not_ask_which_emitters_come_together(scan):
+    """A receiver that one emitter alone is far from."""
+    few = replace(
+        scan,
+        rx=scan.rx[:8],
+        delta_tof_s=scan.delta_tof_s[:, :8],
+        log_ratio_np=scan.log_ratio_np[:, :8],
+        amplitude_frequency_hz=5e5,
+    )
+    settings = plan(focusing=True, reciprocity=False)
+    problem = Problem.of(few, settings)
+    slowness = 1.0 / PHANTOM.speed(NODES, SIDE)
+    near, far = np.array([12]), np.array([12, 36])
+    alone, together = (look(problem, settings, slowness, emitters) for emitters in (near, far))
+    assert np.array_equal(alone.residual, together.residual[: alone.residual.size])
+
+
+def test_an_element_that_hears_itself_says_nothing(scan):
+    loud = scan.log_ratio_np.copy()
+    np.fill_diagonal(loud, 50.0)
+    plain, own = (reconstruct(s, plan(sweeps=1)) for s in (scan, replace(scan, log_ratio_np=loud)))
+    assert np.array_equal(plain.attenuation, own.attenuation)
 
 
 def test_focusing_needs_a_frequency(scan):

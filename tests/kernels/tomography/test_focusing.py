@@ -25,7 +25,16 @@ def lens(change_mps, width=0.012):
 
 
 def ask(slowness, elements, wavelength=0.0):
-    return focusing(slowness, SPACING, elements, elements, wavelength_m=wavelength, eikonal="accurate")
+    longest = np.linalg.norm(elements[:, None] - elements[None], axis=-1).max()
+    return focusing(
+        slowness,
+        SPACING,
+        elements,
+        elements,
+        wavelength_m=wavelength,
+        longest_m=longest,
+        eikonal="accurate",
+    )
 
 
 def test_none_in_water():
@@ -80,7 +89,15 @@ def test_taken_off_it_leaves_the_line_integrals():
         absorbed[row] = log_ratios(tof, attenuation, spacing, elements, source)
         measured[row] = absorbed[row] - rays.log_amplitudes(tof, speed, spacing, elements, source)
     spacing, speed, _ = sampled(127)
-    change = focusing(1.0 / speed, spacing, elements[:4], elements, wavelength_m=0.0, eikonal="accurate")
+    change = focusing(
+        1.0 / speed,
+        spacing,
+        elements[:4],
+        elements,
+        wavelength_m=0.0,
+        longest_m=0.0,
+        eikonal="accurate",
+    )
     before = np.sqrt(np.nanmean((measured - absorbed) ** 2))
     after = np.sqrt(np.nanmean((measured - change - absorbed) ** 2))
     assert np.isfinite(change).mean() > 0.95
