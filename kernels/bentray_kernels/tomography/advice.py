@@ -12,6 +12,7 @@ import numpy as np
 from ..acquisition import Dataset
 from ..acquisition.noise import noise_level
 from ..arrays import Floats
+from ..errors import InvalidInput
 from .chains import Chain, Gathering, Scan, cut
 from .gauss_newton import look
 from .linearisation import Rows
@@ -19,6 +20,7 @@ from .result import Trial
 from .settings import Settings
 
 Part = Literal["all", "shown", "held-out"]
+PARTS: tuple[Part, ...] = ("shown", "held-out")
 
 # One pair in so many is held out, both directions together.
 HELD_OUT = 10
@@ -126,8 +128,9 @@ def advise(
 ) -> tuple[Settings, tuple[Trial, ...], int]:
     """The settings that explain one slice best, and how all that were tried did.
 
-    What predicts held-out pairs best is chosen. Where that misfit is the noise of the times, the
-    reconstruction is told to stop there (Morozov's discrepancy principle): a closer fit would draw the noise.
+    What predicts held-out pairs best is chosen. The reconstruction is told to stop at the noise of the times
+    (Morozov's discrepancy principle), for a closer fit would draw it, unless the trial shows that there is
+    less of it.
 
     Args:
         dataset: for the noise of its times.
@@ -139,7 +142,11 @@ def advise(
     Returns:
         The settings; the trials, the chosen one first and the others by what they predict; and the emitter
         passes that they took.
+
+    Raises:
+        InvalidInput: for a slice without pairs, or with too few to hold some out.
     """
+    _check_parts(settings, index, scan_of)
     chains = [
         TrialChain(scan_of(plan, "shown"), index, scan_of(plan, "held-out")) for plan in tried(settings)
     ]
@@ -155,8 +162,20 @@ def advise(
     return stopped(found, chosen, noise_of(dataset)), (chosen, *others), passes
 
 
+def _check_parts(settings: Settings, index: int, scan_of: Callable[[Settings, Part], Scan]) -> None:
+    plan = tried(settings)[0]
+    scan_of(plan, "all").problem(index)
+    for part in PARTS:
+        try:
+            scan_of(plan, part).problem(index)
+        except InvalidInput as found:
+            raise InvalidInput(
+                "method", "'auto'", f"sart or gauss-newton, for slice {index} has no pair that is {part}"
+            ) from found
+
+
 def stopped(settings: Settings, chosen: Trial, noise_s: float) -> Settings:
-    """The settings with the misfit to stop at, where noise explains what the chosen trial left over."""
+    """The settings with the misfit to stop at, unless the chosen trial shows that there is less noise."""
     if settings.stop_rms_s == 0.0 and noise_s <= EXPLAINED * chosen.held_out_rms_s:
         return replace(settings, stop_rms_s=EXPLAINED * noise_s)
     return settings

@@ -7,6 +7,7 @@ import pytest
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings, Trial, reconstruct
 from bentray_kernels.tomography.advice import CANDIDATES, choose, noise_of, part_of, reason, stopped, tried
@@ -57,6 +58,18 @@ def test_eikonal_times_ask_for_bent_rays(scan):
     assert np.array_equal(again.speed, result.speed)
     assert again.trials == ()
     assert reason(again.trials) == ""
+
+
+@pytest.mark.parametrize(("count", "part"), [(1, "held-out"), (None, "shown")])
+def test_too_few_pairs_to_hold_some_out_are_refused(scan, count, part):
+    """One pair that would be shown, or none but those that would be held out."""
+    kept = np.zeros(scan.delta_tof_s.shape, bool)
+    other = "shown" if part == "held-out" else "held-out"
+    kept[tuple(np.argwhere(np.isfinite(part_of(scan, other).differential_tof()))[:count].T)] = True
+    with pytest.raises(InvalidInput) as refusal:
+        reconstruct(replace(scan, valid=kept), PLAN)
+    assert refusal.value.field == "method"
+    assert part in str(refusal.value)
 
 
 def test_straight_times_ask_for_straight_rays(scan):
