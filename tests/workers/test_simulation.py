@@ -66,6 +66,8 @@ def test_default_reconstruction_grid_is_the_grid_of_the_truth():
     [
         ({"nodes": 8}, "nodes"),
         ({"elements": 2}, "elements"),
+        ({"refinement": 10**6}, "refinement"),
+        ({"seed": -1}, "seed"),
         ({"refinement": 1}, "refinement"),
         ({"coupling_mps": 0.0}, "coupling_mps"),
         ({"noise_s": -1.0}, "noise_s"),

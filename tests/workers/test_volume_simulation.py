@@ -86,6 +86,8 @@ def test_amplitudes_are_left_out_unless_asked_for():
         ({"nodes": 8}, "nodes"),
         ({"slices": 1}, "slices"),
         ({"elements": 2}, "elements"),
+        ({"refinement": 10**6}, "refinement"),
+        ({"seed": -1}, "seed"),
         ({"refinement": 2}, "refinement"),
         ({"array": "rings"}, "array"),
         ({"array": "spiral"}, "array"),

@@ -20,6 +20,9 @@ from bentray_kernels.tomography.problem import MARGIN_NODES
 
 from .emitter_batches import arrivals
 
+# More costs memory, which grows with its square, and gains nothing that noise would not hide.
+MOST_REFINEMENT = 64
+
 
 @dataclass(frozen=True)
 class SimulationSettings:
@@ -53,6 +56,10 @@ class SimulationSettings:
             raise InvalidInput("noise_s", self.noise_s, "seconds, 0 or more and less than 1")
         if not 3 <= self.elements <= 4096:
             raise InvalidInput("elements", self.elements, "3 to 4096")
+        if self.refinement > MOST_REFINEMENT:
+            raise InvalidInput("refinement", self.refinement, f"at most {MOST_REFINEMENT}")
+        if self.seed < 0:
+            raise InvalidInput("seed", self.seed, "0 or more")
         if self.snr is not None:
             if not 0.0 < self.snr < np.inf:
                 raise InvalidInput("snr", self.snr, "a finite ratio > 0")

@@ -20,7 +20,7 @@ from bentray_kernels.phantoms import TABLE7_FREQUENCY_HZ, TABLE7_GRIDS, TABLE7_S
 from bentray_kernels.tomography import Progress
 
 from .emitter_batches import arrivals
-from .simulation import ring_radius
+from .simulation import MOST_REFINEMENT, ring_radius
 
 # The coarsest voxels that the phantom's lesions are measured in; wider ones would join them.
 LEAST_NODES = min(nodes for nodes, _ in TABLE7_GRIDS)
@@ -62,6 +62,10 @@ class VolumeSimulationSettings:
             raise InvalidInput("slices", self.slices, "2 to 1024")
         if not 3 <= self.elements <= 4096:
             raise InvalidInput("elements", self.elements, "3 to 4096")
+        if self.refinement > MOST_REFINEMENT:
+            raise InvalidInput("refinement", self.refinement, f"at most {MOST_REFINEMENT}")
+        if self.seed < 0:
+            raise InvalidInput("seed", self.seed, "0 or more")
         if self.array not in ("moved", "rings"):
             raise InvalidInput("array", repr(self.array), "moved or rings")
         if self.array == "rings" and not self.three_d:
