@@ -97,8 +97,8 @@ def _carried_out(
 ) -> Reconstruction:
     stamp = path.stat().st_mtime_ns
 
-    def drive(chains: Sequence[Chain], before: int) -> None:
-        _drive(client, chains, before, on_progress, stop)
+    def drive(chains: Sequence[Chain], before: int, after: int) -> None:
+        _drive(client, chains, before, after, on_progress, stop)
 
     return carried_out(
         read_dataset(path, traces=False),
@@ -112,6 +112,7 @@ def _drive(
     client: Client,
     chains: Sequence[Chain],
     before: int,
+    after: int,
     on_progress: Callable[[Progress], None] | None,
     stop: Callable[[], bool] | None,
 ) -> None:
@@ -132,7 +133,7 @@ def _drive(
                 # Before other slices begin: what an iteration keeps is freed by its end.
                 ready.extendleft((chain, later) for later in reversed(chain.after(call, given)))
                 if on_progress is not None:
-                    on_progress(measured(chains, before))
+                    on_progress(measured(chains, before, after))
             if stop is not None and stop():
                 raise Cancelled
     finally:

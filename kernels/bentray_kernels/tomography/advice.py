@@ -13,11 +13,13 @@ from ..acquisition import Dataset
 from ..acquisition.noise import noise_level
 from ..arrays import Floats
 from ..errors import InvalidInput
+from . import pairs
 from .chains import Chain, Gathering, Scan, cut
 from .gauss_newton import look
 from .linearisation import Rows
 from .result import Trial
 from .settings import Settings
+from .stages import stages
 
 Part = Literal["all", "shown", "held-out"]
 PARTS: tuple[Part, ...] = ("shown", "held-out")
@@ -124,7 +126,7 @@ def advise(
     settings: Settings,
     index: int,
     scan_of: Callable[[Settings, Part], Scan],
-    drive: Callable[[Sequence[Chain], int], None],
+    drive: Callable[[Sequence[Chain], int, int], None],
 ) -> tuple[Settings, tuple[Trial, ...], int]:
     """The settings that explain one slice best, and how all that were tried did.
 
@@ -150,7 +152,7 @@ def advise(
     chains = [
         TrialChain(scan_of(plan, "shown"), index, scan_of(plan, "held-out")) for plan in tried(settings)
     ]
-    drive(chains, 0)
+    drive(chains, 0, passes_to_come(dataset, settings))
     trials = [
         Trial(changes, chain.held_out_rms_s, chain.history[-1].residual_rms_s)
         for changes, chain in zip(CANDIDATES, chains, strict=True)
@@ -160,6 +162,16 @@ def advise(
     found = replace(settings, **chosen.settings)
     passes = sum(chain.total for chain in chains)
     return stopped(found, chosen, noise_of(dataset)), (chosen, *others), passes
+
+
+def passes_to_come(dataset: Dataset, settings: Settings) -> int:
+    """Emitter passes that a reconstruction takes at most, whichever candidate is chosen."""
+    plans = [stages(dataset, replace(settings, **changes)) for changes in CANDIDATES]
+    each = max(sum(plan.sweeps for plan in found) for found in plans)
+    each += settings.attenuation and dataset.log_ratio_np is not None
+    each += settings.resolution_check
+    problems = range(pairs.count(dataset, settings))
+    return each * sum(len(pairs.of(dataset, settings, index).emitters) for index in problems)
 
 
 def _check_parts(settings: Settings, index: int, scan_of: Callable[[Settings, Part], Scan]) -> None:

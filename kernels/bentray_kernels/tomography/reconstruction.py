@@ -19,9 +19,9 @@ from .result import Progress, Reconstruction, Trial
 from .settings import Settings
 from .stages import stages
 
-# Runs chains to their end, and tells the passes done of all after each call; the number is of passes made
-# before.
-Drive = Callable[[Sequence[Chain], int], None]
+# Runs chains to their end, and tells the passes done of all after each call; the numbers are of passes made
+# before and of those that come after, at most.
+Drive = Callable[[Sequence[Chain], int, int], None]
 
 
 def reconstruct(
@@ -41,14 +41,14 @@ def reconstruct(
         InvalidInput: from the dataset or a setting that does not fit it.
     """
 
-    def drive(chains: Sequence[Chain], before: int) -> None:
+    def drive(chains: Sequence[Chain], before: int, after: int) -> None:
         for chain in chains:
             waiting = chain.first()
             while waiting:
                 call = waiting.pop(0)
                 waiting = chain.after(call, call.function(*call.arguments)) + waiting
                 if progress is not None:
-                    progress(measured(chains, before))
+                    progress(measured(chains, before, after))
 
     return carried_out(dataset, settings, lambda plan, part: Here(dataset, plan, part), drive)
 
@@ -74,7 +74,7 @@ def carried_out(
         settings, trials, before = advise(dataset, settings, count // 2, scan_of, drive)
     scan = scan_of(settings, "all")
     chains = [Chain(scan, index) for index in range(count)]
-    drive(chains, before)
+    drive(chains, before, 0)
     return _assembled(dataset, settings, scan.problem(0), chains, trials)
 
 
@@ -106,11 +106,11 @@ def problem_of(dataset: Dataset, settings: Settings, index: int) -> Problem:
     return problem.each_pair_once() if once else problem
 
 
-def measured(chains: Sequence[Chain], before: int = 0) -> Progress:
-    """Progress over all chains, and passes made before them; a stage that stopped early counts as whole."""
+def measured(chains: Sequence[Chain], before: int = 0, after: int = 0) -> Progress:
+    """Progress over all chains and passes before and after them; a stage that ended early counts as whole."""
     history = sorted((s for c in chains for s in c.history), key=lambda s: (s.stage, s.sweep, s.slice))
     done, total = (before + sum(getattr(c, name) for c in chains) for name in ("done", "total"))
-    return Progress(done, total, tuple(history))
+    return Progress(done, total + after, tuple(history))
 
 
 def _assembled(

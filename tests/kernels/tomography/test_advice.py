@@ -48,6 +48,8 @@ def test_eikonal_times_ask_for_bent_rays(scan):
     assert result.settings.rays == "curved"
     done = [progress.done for progress in seen]
     assert done == sorted(done)
+    parts = [progress.done / progress.total for progress in seen]
+    assert parts == sorted(parts)
     assert done[-1] == seen[-1].total
     assert seen[-1].history == result.history
     assert result.settings.method in ("sart", "gauss-newton")
