@@ -125,7 +125,8 @@ class Chain:
         return [call for part in self._finish for call in part.first(self._scan, self._index, image)]
 
     def _staged(self, number: int, before: Floats | None) -> Stage:
-        begun = start(self._scan.problem(self._index, number), before)
+        earlier = self._scan.problem(self._index, number - 1) if number else None
+        begun = start(self._scan.problem(self._index, number), before, earlier)
         kind = GaussNewtonStage if self._plans[number].method == "gauss-newton" else SartStage
         return kind(self._scan, self._index, number, begun)
 

@@ -28,23 +28,23 @@ def stages(dataset: Dataset, settings: Settings) -> tuple[Settings, ...]:
     return tuple(found)
 
 
-def start(problem: Problem, before: Floats | None) -> Floats:
+def start(problem: Problem, image: Floats | None = None, before: Problem | None = None) -> Floats:
     """The slowness that a stage begins with, s/m: the image of the stage before, or water everywhere.
 
-    Both grids have the same side, so a node's place is the same part of the axis in both; along z, where
-    they may differ in height, the outermost nodes are repeated.
+    Args:
+        problem: of the stage.
+        image: of the stage before; None: there is none.
+        before: the problem of that stage. Beyond its grid, which may end lower, the outermost nodes go on.
     """
     water = 1.0 / problem.water_speed
     shape = problem.region.shape
-    if before is None:
+    if image is None or before is None:
         return np.full(shape, water)
-    if before.shape == shape:
-        return before
-    scale = (before.shape[0] - 1) / (shape[0] - 1)
-    middle = [0.5 * (n - 1) for n in shape]
+    if image.shape == shape:
+        return image
     places = [
-        0.5 * (old - 1) + scale * (np.arange(n) - centre)
-        for old, n, centre in zip(before.shape, shape, middle, strict=True)
+        (low + problem.spacing * np.arange(n) - lowest) / before.spacing
+        for n, low, lowest in zip(shape, problem.origin, before.origin, strict=True)
     ]
-    found = map_coordinates(before, np.meshgrid(*places, indexing="ij"), order=1, mode="nearest")
+    found = map_coordinates(image, np.meshgrid(*places, indexing="ij"), order=1, mode="nearest")
     return np.where(problem.region, found, water)

@@ -54,9 +54,25 @@ def test_a_finer_grid_begins_with_the_same_image(scan):
     coarse, fine = (Problem.of(scan, replace(PLAN, nodes=n, side_m=0.2)) for n in (25, 49))
     x = np.linspace(-1.0, 1.0, 25)
     image = 1.0 / WATER * (1.0 + 0.02 * np.exp(-((x[:, None] - 0.2) ** 2 + x[None, :] ** 2) / 0.05))
-    found = start(fine, image)
+    found = start(fine, image, coarse)
     again = found[::2, ::2]
     inside = coarse.region & fine.region[::2, ::2]
     assert np.allclose(again[inside], image[inside], rtol=0.0, atol=1e-12)
     assert np.allclose(found[~fine.region], 1.0 / WATER)
     assert np.array_equal(start(fine, None), np.full((49, 49), 1.0 / WATER))
+
+
+def test_a_finer_grid_of_a_volume_begins_with_the_same_image_at_the_same_heights():
+    """Heights that no grid's spacing divides, so that every grid ends elsewhere."""
+    heights, everyone = np.array([-0.01, 0.0, 0.0137]), np.arange(RING.elements)
+    delta = np.zeros((3, RING.elements, RING.elements))
+    scan = Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=delta, slice_z_m=heights)
+    plan = replace(PLAN, decomposition="volume", side_m=0.2)
+    coarse, fine = (Problem.of(scan, replace(plan, nodes=n)) for n in (25, 48))
+
+    def tilted(problem):
+        z = problem.origin[2] + problem.spacing * np.arange(problem.region.shape[2])
+        return np.broadcast_to((1.0 + z) / WATER, problem.region.shape)
+
+    found = start(fine, tilted(coarse), coarse)
+    assert np.allclose(found[fine.region], tilted(fine)[fine.region], rtol=0.0, atol=1e-12)
