@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from _palette import with_a_palette
 
 from bentray_workers.images.canvas import drawing, new_figure, to_png
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
@@ -37,4 +38,4 @@ def picture(title: str, panels: Sequence[Panel], columns: int) -> bytes:
         for axes in list(places.flat)[len(panels) :]:
             axes.set_visible(False)
         draw_bar(maps, "speed (m/s)")
-        return to_png(figure)
+        return with_a_palette(to_png(figure))

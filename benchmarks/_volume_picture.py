@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from _palette import with_a_palette
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction
@@ -36,4 +37,4 @@ def picture(truth: Truth, found: Mapping[str, Reconstruction]) -> bytes:
                 axes.set_xlabel(f"{plane[0]} (mm)" if column == 0 else "")
                 axes.set_ylabel(f"{plane[1]} (mm)" if column == 0 else "")
         draw_bar(maps, "speed (m/s)")
-        return to_png(figure)
+        return with_a_palette(to_png(figure))
