@@ -40,8 +40,10 @@ CANDIDATES: tuple[dict[str, Any], ...] = (
 # Trials use half the nodes, but not fewer than this.
 TRIAL_NODES = 64
 
-# Bent rays must predict held-out pairs this much better than straight ones, which ask for less belief.
-CLEARLY = 0.98
+# Bent rays must predict held-out pairs this much better than straight ones, which ask for less belief. On a wave
+# simulation whose bent image was 2 m/s worse than the straight one they predicted better by 0.95; on Eikonal
+# times by 0.9 (water faster than a fat ring) to 0.35.
+CLEARLY = 0.92
 
 # A misfit of this many times the noise explains the times (the factor of Morozov's principle).
 EXPLAINED = 1.1
