@@ -129,6 +129,8 @@ def test_trials_are_coarser_and_speed_alone():
 def test_the_reason_names_what_differs():
     plain, more = trial("straight", 100e-9), trial("curved", 120e-9)
     smooth = replace(more, settings={**more.settings, "front_smoothing_nodes": 4.0})
+    close = replace(more, held_out_rms_s=95e-9)
+    assert "100 ns (misfit of held-out pairs; bent rays must be 8 % better);" in reason([plain, close])
     assert reason([plain, smooth]) == (
         "auto chose straight 100 ns (misfit of held-out pairs); "
         "the others: curved (front_smoothing_nodes 4) 120 ns"
