@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import io
 from collections.abc import Callable
 
 import numpy as np
+from _available import available
 
 # Travel time from a node: (speed, spacing, node) -> times in the grid's shape.
 Solver = Callable[[np.ndarray, float, tuple[int, ...]], np.ndarray]
@@ -123,11 +123,4 @@ PEERS: dict[str, tuple[str, Callable[..., Solver]]] = {
 
 def installed() -> tuple[dict[str, Solver], dict[str, str]]:
     """The peers that can be imported here, and why the others cannot."""
-    found: dict[str, Solver] = {}
-    missing: dict[str, str] = {}
-    for name, (module, adapt) in PEERS.items():
-        try:
-            found[name] = adapt(importlib.import_module(module))
-        except ImportError as error:
-            missing[name] = f"{name} is not installed ({error})"
-    return found, missing
+    return available(PEERS)

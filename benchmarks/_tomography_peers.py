@@ -7,6 +7,7 @@ import logging
 from collections.abc import Callable
 
 import numpy as np
+from _available import available
 from _straight_ray_peers import cgls, roughness, sart, sirt
 from _travel_times import TravelTimes
 from scipy.interpolate import LinearNDInterpolator
@@ -159,11 +160,4 @@ PEERS: dict[str, tuple[str, Callable[..., Peer]]] = {
 
 def installed() -> tuple[dict[str, Peer], dict[str, str]]:
     """The peers that can be imported here, and why the others cannot."""
-    found: dict[str, Peer] = {}
-    missing: dict[str, str] = {}
-    for name, (module, adapt) in PEERS.items():
-        try:
-            found[name] = adapt(importlib.import_module(module))
-        except ImportError as error:
-            missing[name] = f"{name} is not installed ({error})"
-    return found, missing
+    return available(PEERS)

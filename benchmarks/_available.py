@@ -1,0 +1,21 @@
+"""Which of the peers can be imported here; a missing one is left out, with the reason."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from typing import TypeVar
+
+Peer = TypeVar("Peer")
+
+
+def available(peers: Mapping[str, tuple[str, Callable[..., Peer]]]) -> tuple[dict[str, Peer], dict[str, str]]:
+    """The peers that can be imported, and why the others cannot; ``peers`` is name to (module, adapter)."""
+    found: dict[str, Peer] = {}
+    missing: dict[str, str] = {}
+    for name, (module, adapt) in peers.items():
+        try:
+            found[name] = adapt(importlib.import_module(module))
+        except ImportError as error:
+            missing[name] = f"{name} is not installed ({error})"
+    return found, missing
