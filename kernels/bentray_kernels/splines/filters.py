@@ -45,7 +45,7 @@ class Filter:
 
 
 def bspline(order: int) -> Filter:
-    """The B-spline of order (degree) n, 1 or more, by the truncated powers of the dissertation's equation 7."""
+    """The B-spline of order (degree) n, 1 or more, by truncated powers (dissertation, equation 7)."""
     shift = Fraction((order + 1) % 2, 2)
     before = order // 2
     weights = [_bspline_piece(order, before - shift - tap) for tap in range(order + 1)]
