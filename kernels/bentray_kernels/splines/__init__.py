@@ -1,5 +1,7 @@
 """Splines through the nodes of a grid."""
 
 from .cubic import coefficients, refined
+from .filters import FILTERS, Filter
+from .spline import Spline
 
-__all__ = ["coefficients", "refined"]
+__all__ = ["FILTERS", "Filter", "Spline", "coefficients", "refined"]

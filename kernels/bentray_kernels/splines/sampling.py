@@ -1,0 +1,124 @@
+"""Value and gradient of a filtered grid at a point: the innermost functions of every ray."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numba.core import cgutils
+from numba.core.errors import NumbaTypeError
+from numba.extending import intrinsic
+
+from ..arrays import Floats
+from ..compiled import kernel
+from .filters import Filter
+from .lanes import DOUBLE, FLOAT, INDEX, Axis, Lanes, sums
+
+
+class Stencil(NamedTuple):
+    """A filter as the compiled functions read it.
+
+    The number of taps must be known when a kernel is compiled, or its loops stay loops. Numba compiles anew
+    for each type of argument, and the length of a tuple is part of its type: hence ``places``. So one kernel
+    serves all filters, is built once for each number of taps, and numba's cache on disk keeps every build.
+    From the number of taps, ``lanes`` writes the vector instructions; a plain loop took three times as long.
+
+    Attributes:
+        places: (0, 1, …, taps − 1); only its length is used.
+        shift: as ``Filter.shift``.
+        weights: (2, taps, taps), C order: of the value and of the slope; by power of t; by node.
+    """
+
+    places: tuple[int, ...]
+    shift: float
+    weights: Floats
+
+
+def stencil_of(read: Filter) -> Stencil:
+    """The stencil of a filter; powers that its polynomials lack have the weight 0."""
+    weights = np.zeros((2, read.taps, read.taps))
+    weights[0, : read.value.shape[1]] = read.value.T
+    weights[1, : read.slope.shape[1]] = read.slope.T
+    return Stencil(tuple(range(read.taps)), read.shift, weights)
+
+
+def border_of(read: Filter) -> tuple[int, int]:
+    """How many nodes to add before the first and after the last one, so that every point has its taps."""
+    # A point on the last node belongs to the cell before it, unless cells are centred on nodes.
+    return read.before, read.taps - 1 - read.before - (0 if read.shift else 1)
+
+
+@kernel(inline="always")
+def value_at(coefficients: Any, stencil: Stencil, point: Any) -> Any:
+    """The filtered value at one point.
+
+    Args:
+        coefficients: (x[, y[, z]]), C order, float64 or float32, with the border of ``border_of``.
+        stencil: of the filter.
+        point: (x[, y[, z]]), a tuple of floats, nodes; node 0 is the first one inside the border. Off the
+            grid the outermost cell's polynomial goes on; NaN gives NaN.
+
+    Returns:
+        float64, whatever the coefficients are.
+    """
+    return _sampled_value(coefficients, stencil.places, stencil.shift, stencil.weights, point)
+
+
+@kernel(inline="always")
+def value_and_gradient_at(coefficients: Any, stencil: Stencil, point: Any) -> Any:
+    """The filtered value and its gradient, a tuple as long as the point, per node; else as ``value_at``."""
+    return _sampled_value_and_gradient(coefficients, stencil.places, stencil.shift, stencil.weights, point)
+
+
+@intrinsic
+def _sampled_value(typing: Any, coefficients: Any, places: Any, shift: Any, weights: Any, point: Any) -> Any:
+    _check(coefficients, weights, point)
+    returned = types.float64
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _sampled(context, builder, signature.args, arguments, slopes=False)[0]
+
+    return returned(coefficients, places, shift, weights, point), generate
+
+
+@intrinsic
+def _sampled_value_and_gradient(
+    typing: Any, coefficients: Any, places: Any, shift: Any, weights: Any, point: Any
+) -> Any:
+    _check(coefficients, weights, point)
+    slopes = types.UniTuple(types.float64, len(point))
+    returned = types.Tuple((types.float64, slopes))
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        value, *gradient = _sampled(context, builder, signature.args, arguments, slopes=True)
+        return context.make_tuple(builder, returned, [value, context.make_tuple(builder, slopes, gradient)])
+
+    return returned(coefficients, places, shift, weights, point), generate
+
+
+def _check(coefficients: Any, weights: Any, point: Any) -> None:
+    """The instructions read memory as these types lay it out; any other would give wrong numbers."""
+    grids = [types.Array(kind, coefficients.ndim, "C") for kind in (types.float64, types.float32)]
+    if coefficients not in (*grids, *(grid.copy(readonly=True) for grid in grids)):
+        raise NumbaTypeError(f"coefficients are {coefficients}, accepted: C order, float64 or float32")
+    if point != types.UniTuple(types.float64, coefficients.ndim):
+        raise NumbaTypeError(f"point is {point}, accepted: a tuple of {coefficients.ndim} float64")
+    if weights.layout != "C" or weights.dtype != types.float64:
+        raise NumbaTypeError(f"weights are {weights}, accepted: those of stencil_of")
+
+
+def _sampled(context: Any, builder: Any, taken: Any, arguments: Any, *, slopes: bool) -> list[Any]:
+    """The instructions of both intrinsics: the value, and the gradient if asked for."""
+    coefficients, places, _, weights, _ = taken
+    lanes = Lanes(builder, len(places))
+    grid = context.make_array(coefficients)(context, builder, arguments[0])
+    tables = context.make_array(weights)(context, builder, arguments[3]).data
+    counts = cgutils.unpack_tuple(builder, grid.shape, coefficients.ndim)
+    axes: list[Axis] = []
+    stride = INDEX(1)
+    for axis in reversed(range(coefficients.ndim)):
+        place = builder.fadd(builder.extract_value(arguments[4], axis), arguments[2])
+        axes.insert(0, Axis(lanes, counts[axis], stride, place, tables, slopes))
+        stride = builder.mul(stride, counts[axis])
+    return sums(lanes, axes, grid.data, DOUBLE if coefficients.dtype == types.float64 else FLOAT)

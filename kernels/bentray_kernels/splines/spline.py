@@ -1,0 +1,196 @@
+"""A grid read between its nodes by any of the filters: value and gradient at many points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
+
+from ..arrays import Floats
+from ..compiled import kernel
+from ..errors import InvalidInput
+from .filters import Filter, bspline, filter_of
+from .prefilter import prefilter as coefficients_of
+from .sampling import Stencil, border_of, stencil_of, value_and_gradient_at, value_at
+
+
+class Spline:
+    """A field between and beyond the nodes of a grid.
+
+    Places are in nodes, gradients per node: for metres, divide a place by the spacing before and the gradient
+    after. Off the grid the field goes on as in a mirror at its outer nodes, as scipy's mode "mirror" does;
+    where a place is not a number, so is the answer.
+
+    Args:
+        volume: (x[, y[, z]]), at least two nodes along each axis, finite, any unit.
+        order: of the B-spline, 2 to 6.
+        prefilter: whether the spline passes through the nodes; else the nodes are its coefficients, which
+            blurs it (dissertation, 3.3.2).
+        smoothing: λ as in ``prefilter.prefilter``, for prefiltered splines.
+        dtype: of the coefficients, float64 or float32; the arithmetic is in float64.
+
+    Attributes:
+        shape: of the volume.
+        filter: what is read.
+        coefficients: C order, with ``pad`` nodes before and, with them, taps − 1 or taps − 2 more than the
+            volume along each axis.
+        pad: index of node 0.
+        stencil: the filter for ``sampling.value_at`` and ``value_and_gradient_at``.
+
+    Raises:
+        InvalidInput: for another shape, a value that is not finite, another order, smoothing or type, and for
+            smoothing without a prefilter.
+    """
+
+    def __init__(
+        self,
+        volume: ArrayLike,
+        order: int = 3,
+        prefilter: bool = True,
+        smoothing: float = 0.0,
+        dtype: DTypeLike = np.float64,
+    ) -> None:
+        if order not in range(2, 7):
+            raise InvalidInput("order", order, "a whole number from 2 to 6")
+        self._read(volume, bspline(order), prefilter, smoothing, dtype)
+
+    @classmethod
+    def of(
+        cls,
+        volume: ArrayLike,
+        filter: str,  # noqa: A002 - the word of the field
+        prefilter: bool = True,
+        smoothing: float = 0.0,
+        dtype: DTypeLike = np.float64,
+    ) -> Spline:
+        """The same by any filter of ``filters.FILTERS``, by name.
+
+        Args:
+            volume, prefilter, smoothing, dtype: as above. Filters that are no B-spline pass through the nodes
+                as they are and take no smoothing.
+            filter: as ``"bspline3"``, ``"catmull-rom"``.
+
+        Raises:
+            InvalidInput: also for an unknown filter.
+        """
+        spline = cls.__new__(cls)
+        spline._read(volume, filter_of(filter), prefilter, smoothing, dtype)
+        return spline
+
+    def _read(
+        self, volume: ArrayLike, read: Filter, prefilter: bool, smoothing: float, dtype: DTypeLike
+    ) -> None:
+        if dtype not in (np.float64, np.float32):
+            raise InvalidInput("dtype", np.dtype(dtype), "float64 or float32")
+        nodes = _checked(volume)
+        if read.order and prefilter:
+            nodes = coefficients_of(nodes, read.order, smoothing)
+        elif smoothing != 0.0:
+            raise InvalidInput("smoothing", smoothing, "0 for filters that are not prefiltered")
+        self.shape = nodes.shape
+        self.filter = read
+        self.stencil: Stencil = stencil_of(read)
+        self.pad = border_of(read)[0]
+        bordered = np.pad(nodes.astype(dtype), border_of(read), mode="reflect")
+        self.coefficients: Any = np.ascontiguousarray(bordered)
+
+    def value(self, points: ArrayLike) -> Floats:
+        """The field at points (m, ndim), nodes.
+
+        Returns:
+            (m,), float64.
+
+        Raises:
+            InvalidInput: for points of another shape.
+        """
+        places = self._places(points)
+        values = np.empty(len(places))
+        _values(self.coefficients, self.stencil, places, np.array(self.shape), values)
+        return values
+
+    def gradient(self, points: ArrayLike) -> Floats:
+        """Its gradient, per node; points as in ``value``.
+
+        Returns:
+            (m, ndim), float64.
+        """
+        return self.value_and_gradient(points)[1]
+
+    def value_and_gradient(self, points: ArrayLike) -> tuple[Floats, Floats]:
+        """Both at once, for little more than the price of one."""
+        places = self._places(points)
+        values, gradients = np.empty(len(places)), np.empty(places.shape)
+        _values_and_gradients(
+            self.coefficients, self.stencil, places, np.array(self.shape), values, gradients
+        )
+        return values, gradients
+
+    def _places(self, points: ArrayLike) -> Floats:
+        places = np.ascontiguousarray(points, dtype=np.float64)
+        if places.ndim != 2 or places.shape[1] != len(self.shape):
+            raise InvalidInput("points", f"shape {places.shape}", f"shape (m, {len(self.shape)}), nodes")
+        return places
+
+
+def _checked(volume: ArrayLike) -> Floats:
+    nodes = np.asarray(volume, dtype=np.float64)
+    if nodes.ndim not in (1, 2, 3) or min(nodes.shape, default=0) < 2:
+        raise InvalidInput(
+            "volume", f"shape {nodes.shape}", "1 to 3 dimensions with at least two nodes along each"
+        )
+    if not np.isfinite(nodes).all():
+        where = tuple(int(k) for k in np.argwhere(~np.isfinite(nodes))[0])
+        raise InvalidInput("volume", f"{nodes[where]} at node {where}", "finite values")
+    return nodes
+
+
+@kernel(inline="always")
+def _mirrored(place: float, n: int) -> tuple[float, float]:
+    """The place within the grid that looks the same, and the sign of the slope there."""
+    if 0.0 <= place <= n - 1.0:
+        return place, 1.0
+    period = 2.0 * n - 2.0
+    turned = place - period * np.floor(place / period)
+    if turned > n - 1.0:
+        return period - turned, -1.0
+    return turned, 1.0
+
+
+@kernel
+def _values(coefficients: Any, stencil: Stencil, places: Floats, shape: Any, values: Floats) -> None:
+    for m in range(len(places)):
+        x, _ = _mirrored(places[m, 0], shape[0])
+        if coefficients.ndim == 1:
+            values[m] = value_at(coefficients, stencil, (x,))
+        elif coefficients.ndim == 2:
+            y, _ = _mirrored(places[m, 1], shape[1])
+            values[m] = value_at(coefficients, stencil, (x, y))
+        else:
+            y, _ = _mirrored(places[m, 1], shape[1])
+            z, _ = _mirrored(places[m, 2], shape[2])
+            values[m] = value_at(coefficients, stencil, (x, y, z))
+
+
+@kernel
+def _values_and_gradients(
+    coefficients: Any, stencil: Stencil, places: Floats, shape: Any, values: Floats, gradients: Floats
+) -> None:
+    for m in range(len(places)):
+        x, in_x = _mirrored(places[m, 0], shape[0])
+        if coefficients.ndim == 1:
+            values[m], slopes = value_and_gradient_at(coefficients, stencil, (x,))
+            gradients[m, 0] = in_x * slopes[0]
+        elif coefficients.ndim == 2:
+            y, in_y = _mirrored(places[m, 1], shape[1])
+            values[m], slopes = value_and_gradient_at(coefficients, stencil, (x, y))
+            gradients[m, 0], gradients[m, 1] = in_x * slopes[0], in_y * slopes[1]
+        else:
+            y, in_y = _mirrored(places[m, 1], shape[1])
+            z, in_z = _mirrored(places[m, 2], shape[2])
+            values[m], slopes = value_and_gradient_at(coefficients, stencil, (x, y, z))
+            gradients[m, 0], gradients[m, 1], gradients[m, 2] = (
+                in_x * slopes[0],
+                in_y * slopes[1],
+                in_z * slopes[2],
+            )
