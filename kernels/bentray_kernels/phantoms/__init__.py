@@ -1,23 +1,35 @@
 """Phantoms with an exact description, sampled on any grid."""
 
+from .cube_fields import CubeField, eight_bit, in_nodes, sampled
 from .ellipses import Ellipse, EllipsePhantom
+from .fringe_sphere import ONE_HOLE, TWO_HOLES, DistanceSphere, FringeSphere
+from .marschner_lobb import MarschnerLobb
 from .solids import Dome, Ellipsoid
 from .table6 import TABLE6_SIDE_M, table6
 from .table7 import TABLE7_FREQUENCY_HZ, TABLE7_GRIDS, TABLE7_SIDE_M, table7, table7_slices
 from .volume import Part, PhantomSlice, VolumePhantom
 
 __all__ = [
+    "ONE_HOLE",
     "TABLE6_SIDE_M",
     "TABLE7_FREQUENCY_HZ",
     "TABLE7_GRIDS",
     "TABLE7_SIDE_M",
+    "TWO_HOLES",
+    "CubeField",
+    "DistanceSphere",
     "Dome",
     "Ellipse",
     "EllipsePhantom",
     "Ellipsoid",
+    "FringeSphere",
+    "MarschnerLobb",
     "Part",
     "PhantomSlice",
     "VolumePhantom",
+    "eight_bit",
+    "in_nodes",
+    "sampled",
     "table6",
     "table7",
     "table7_slices",
