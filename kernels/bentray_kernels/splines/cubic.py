@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
 from ..compiled import kernel
-
-# Pole of the recursive filter (Unser, Aldroubi & Eden 1993).
-POLE = math.sqrt(3.0) - 2.0
-
-# |POLE|^HORIZON is below double precision: farther nodes do not reach the start of the recursion.
-HORIZON = 28
+from .prefilter import prefilter
 
 # Nodes added by mirroring before the first and after the last one, so that four lie about every point.
 BEFORE, AFTER = 1, 2
@@ -29,13 +22,8 @@ def coefficients(values: ArrayLike) -> Floats:
     Returns:
         (nx + 3, ny + 3[, nz + 3]), C order; node 0 lies at index 1.
     """
-    filtered = np.array(values, dtype=np.float64, order="C")
-    for axis, n in enumerate(filtered.shape):
-        if n > 1:
-            _prefilter(filtered.reshape(math.prod(filtered.shape[:axis]), n, -1))
-    mirrored = [(BEFORE, AFTER)] * filtered.ndim
     # numpy mirrors a single node onto itself.
-    return np.ascontiguousarray(np.pad(filtered, mirrored, mode="reflect"))
+    return np.ascontiguousarray(np.pad(prefilter(values, 3), (BEFORE, AFTER), mode="reflect"))
 
 
 def refined(values: ArrayLike, times: int) -> Floats:
@@ -59,36 +47,6 @@ def refined(values: ArrayLike, times: int) -> Floats:
             read[part::times] = sum(weights[q] * lines[q : q + places] for q in range(4))
         fine = np.moveaxis(read, 0, axis)
     return np.ascontiguousarray(fine)
-
-
-@kernel
-def _prefilter(lines: Floats) -> None:
-    """Along the middle axis of (outer, n, inner), in place."""
-    outer, n, inner = lines.shape
-    period = 2 * n - 2
-    for o in range(outer):
-        line = lines[o]
-        start = np.zeros(inner)
-        power = 1.0
-        if period > HORIZON:
-            terms, whole = HORIZON, 1.0
-        else:
-            terms, whole = period, 1.0 - POLE**period
-        for k in range(terms):
-            mirrored = k if k < n else period - k
-            for x in range(inner):
-                start[x] += power * line[mirrored, x]
-            power *= POLE
-        for x in range(inner):
-            line[0, x] = 6.0 * start[x] / whole
-        for k in range(1, n):
-            for x in range(inner):
-                line[k, x] = 6.0 * line[k, x] + POLE * line[k - 1, x]
-        for x in range(inner):
-            line[n - 1, x] = POLE / (POLE * POLE - 1.0) * (line[n - 1, x] + POLE * line[n - 2, x])
-        for k in range(n - 2, -1, -1):
-            for x in range(inner):
-                line[k, x] = POLE * (line[k + 1, x] - line[k, x])
 
 
 @kernel(inline="always")

@@ -1,0 +1,106 @@
+"""How much to smooth: the λ that leaves as much of a volume behind as there is noise in it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.fft import dctn
+from scipy.optimize import brentq
+
+from ..arrays import Floats
+from ..errors import InvalidInput
+from .prefilter import MOST_SMOOTHING, sampled_bspline, symbols
+
+# Rounding to whole numbers leaves errors that are uniform over one step.
+ROUNDING = 1.0 / math.sqrt(12.0)
+
+# A normal distribution's median distance from its mean, in standard deviations.
+MEDIAN_DEVIATION = 0.6745
+
+LEAST_SMOOTHING = 1e-9
+
+
+def noise_of(volume: ArrayLike) -> float:
+    """Standard deviation of a volume's noise, by the median of its finest differences.
+
+    A second difference along every axis keeps the noise and little else, where the field is smooth over most
+    of the volume (Donoho & Johnstone 1994). Whole numbers have at least the noise of their rounding.
+
+    Args:
+        volume: (x[, y[, z]]), at least three nodes along each axis, any unit.
+
+    Returns:
+        In the volume's unit.
+
+    Raises:
+        InvalidInput: for fewer nodes.
+    """
+    nodes = np.asarray(volume)
+    if min(nodes.shape, default=0) < 3:
+        raise InvalidInput("volume", f"shape {nodes.shape}", "at least three nodes along each axis")
+    finest = nodes.astype(np.float64)
+    for axis in range(nodes.ndim):
+        finest = np.diff(finest, 2, axis) / math.sqrt(6.0)
+    found = float(np.median(np.abs(finest))) / MEDIAN_DEVIATION
+    return max(found, ROUNDING) if np.issubdtype(nodes.dtype, np.integer) else found
+
+
+def smoothing_for_noise(volume: ArrayLike, order: int, sigma: float | None = None) -> float:
+    """The λ for which the smoothing spline misses the nodes by the noise, in the mean square.
+
+    Morozov's discrepancy principle. The mean is taken over the mirrored volume, which counts its outer nodes
+    half; there the cosine transform turns the prefilter into a product, so that no λ needs a spline.
+
+    Args:
+        volume: (x[, y[, z]]), finite, at least two nodes along each axis.
+        order: of the B-spline, 2 to 6.
+        sigma: standard deviation of the noise, in the volume's unit; by ``noise_of`` if it is not known.
+            For data rounded to whole numbers it is 1/√12.
+
+    Returns:
+        λ for ``Spline``: 0 where there is no noise, at most 1e6.
+
+    Raises:
+        InvalidInput: for a sigma below 0 or NaN.
+    """
+    sigma = noise_of(volume) if sigma is None else sigma
+    if not sigma >= 0.0:
+        raise InvalidInput("sigma", sigma, "a number >= 0")
+    nodes = np.asarray(volume, dtype=np.float64)
+    power = dctn(nodes - nodes.mean(), type=1) ** 2
+    for axis, n in enumerate(nodes.shape):
+        shares = np.full(n, 2.0)
+        shares[0] = shares[-1] = 1.0
+        power *= np.expand_dims(shares / (2.0 * n - 2.0) ** 2, [a for a in range(nodes.ndim) if a != axis])
+
+    def excess(log_smoothing: float) -> float:
+        passed = _passed(order, math.exp(log_smoothing), nodes.shape)
+        return float((power * (1.0 - passed) ** 2).sum()) - sigma**2
+
+    least, most = math.log(LEAST_SMOOTHING), math.log(MOST_SMOOTHING)
+    if excess(least) >= 0.0:
+        return 0.0
+    if excess(most) <= 0.0:
+        return MOST_SMOOTHING
+    return math.exp(brentq(excess, least, most, xtol=1e-6))
+
+
+def response(symmetric: Floats, frequencies: Floats) -> Floats:
+    """Fourier transform of a symmetric kernel on the nodes, its middle at 0; radians per node."""
+    reach = len(symmetric) // 2
+    places = np.arange(-reach, reach + 1)
+    return np.asarray(np.cos(np.multiply.outer(frequencies, places)) @ symmetric)
+
+
+def _passed(order: int, smoothing: float, shape: Sequence[int]) -> Floats:
+    """Which part of each cosine of the volume the smoothing spline has left at the nodes."""
+    numerator, denominator = symbols(order, smoothing)
+    passed = np.ones(())
+    for n in shape:
+        frequencies = np.linspace(0.0, math.pi, n)
+        along = response(sampled_bspline(order), frequencies) * response(numerator, frequencies)
+        passed = np.multiply.outer(passed, along / response(denominator, frequencies))
+    return passed
