@@ -1,0 +1,212 @@
+"""The first place where the field along a ray leaves an interval of values: what every ray caster asks."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ..compiled import kernel
+from .octree import Octree
+from .roots import Field, Ray, brent, field_at, first_root_of_cubic
+
+# How the search looks within a cell.
+CERTAIN, BRENT, ANALYTIC = 0, 1, 2
+
+# Accuracy of a crossing, nodes, and the shortest piece of a ray that is still halved.
+TOLERANCE = 1e-10
+SHORTEST = 1e-7
+
+
+class Search(NamedTuple):
+    """How crossings are found.
+
+    Attributes:
+        roots: ``CERTAIN``: no crossing is missed, however close to the next one. ``BRENT``: a cell is
+            searched if the field at its two ends lies on different sides (dissertation, 4.2.3), which misses
+            double crossings at grazing rays. ``ANALYTIC``: the cubic of a trilinear cell.
+        top: level of the octree at which the descent begins; 0 is the 3-D DDA through all cells.
+        step: length of the steps in nodes, without octree; 0 with it.
+    """
+
+    roots: int
+    top: int
+    step: float
+
+
+@kernel(inline="always")
+def leave_interval(
+    field: Field,
+    octree: Octree,
+    search: Search,
+    ray: Ray,
+    start: float,
+    stop: float,
+    below: float,
+    above: float,
+    slope: float,
+) -> tuple[float, int]:
+    """First s, start < s < stop, where the field is no longer between ``below`` and ``above``.
+
+    A ray is in a layer of the object; the iso-values about it are the interval. So nested iso-surfaces, and
+    the way out as well as the way in, are one question.
+
+    Args:
+        field: what is read.
+        octree: over its cells.
+        search: how.
+        ray: within the grid from start to stop.
+        start, stop: s.
+        below, above: the interval, in which the field lies just after start.
+        slope: of the field along the ray at start, per unit of s, if start lies on an iso-surface; else 0.
+
+    Returns:
+        s and +1 where the field rises above the interval, −1 where it falls below it; 0 if it does not.
+    """
+    speed = math.sqrt(ray.along_x**2 + ray.along_y**2 + ray.along_z**2)
+    if search.step > 0.0:
+        return _scan(field, ray, speed, start, stop, search.step / speed, 0.0, below, above)
+    cells_x, cells_y, cells_z = octree.levels[0, 1], octree.levels[0, 2], octree.levels[0, 3]
+    i = min(max(int(ray.x + start * ray.along_x), 0), cells_x - 1)
+    j = min(max(int(ray.y + start * ray.along_y), 0), cells_y - 1)
+    k = min(max(int(ray.z + start * ray.along_z), 0), cells_z - 1)
+    over_x, over_y, over_z = _inverse(ray.along_x), _inverse(ray.along_y), _inverse(ray.along_z)
+    s, level = start, search.top
+    while s < stop:
+        p, q, r = i >> level, j >> level, k >> level
+        node = octree.levels[level, 0] + (p * octree.levels[level, 2] + q) * octree.levels[level, 3] + r
+        skipped = octree.ranges[node, 0] > below and octree.ranges[node, 1] < above
+        if not skipped and level > 0:
+            level -= 1
+            continue
+        out_x = _way_out(ray.x, ray.along_x, over_x, p, level, cells_x)
+        out_y = _way_out(ray.y, ray.along_y, over_y, q, level, cells_y)
+        out_z = _way_out(ray.z, ray.along_z, over_z, r, level, cells_z)
+        out = max(min(out_x, out_y, out_z), s)
+        if not skipped:
+            end, bend = min(out, stop), octree.bend[node] * speed * speed
+            if slope != 0.0:
+                # From the surface the field first goes inwards, and cannot have turned back before this.
+                s = min(s + abs(slope) / bend, end) if bend > 0.0 else end
+                slope = 0.0
+            if search.roots == ANALYTIC:
+                found, side = _solve(field, ray, s, end, below, above)
+            else:
+                certain = bend if search.roots == CERTAIN else 0.0
+                found, side = _scan(field, ray, speed, s, end, end - s, certain, below, above)
+            if side != 0:
+                return found, side
+        s = out
+        # The axis of the face moves to the next node; rounding must not carry the others out of theirs.
+        before = p if out_x <= out_y and out_x <= out_z else (q if out_y <= out_z else r)
+        if out_x <= out_y and out_x <= out_z:
+            i = ((p + 1) << level) if ray.along_x > 0.0 else (p << level) - 1
+            j, k = (
+                _within(ray.y + s * ray.along_y, q, level, cells_y),
+                _within(ray.z + s * ray.along_z, r, level, cells_z),
+            )
+            after = i
+            if i < 0 or i >= cells_x:
+                break
+        elif out_y <= out_z:
+            j = ((q + 1) << level) if ray.along_y > 0.0 else (q << level) - 1
+            i, k = (
+                _within(ray.x + s * ray.along_x, p, level, cells_x),
+                _within(ray.z + s * ray.along_z, r, level, cells_z),
+            )
+            after = j
+            if j < 0 or j >= cells_y:
+                break
+        else:
+            k = ((r + 1) << level) if ray.along_z > 0.0 else (r << level) - 1
+            i, j = (
+                _within(ray.x + s * ray.along_x, p, level, cells_x),
+                _within(ray.y + s * ray.along_y, q, level, cells_y),
+            )
+            after = k
+            if k < 0 or k >= cells_z:
+                break
+        # Above the highest level at which the node changed, nothing is new.
+        changed = (after >> level) ^ before
+        while changed > 1 and level < search.top:
+            changed >>= 1
+            level += 1
+    return stop, 0
+
+
+@kernel(inline="always")
+def _inverse(along: float) -> float:
+    return 1.0 / along if along != 0.0 else 0.0
+
+
+@kernel(inline="always")
+def _way_out(start: float, along: float, over: float, node: int, level: int, cells: int) -> float:
+    """s of the face by which the ray leaves a node of the octree along one axis."""
+    if along == 0.0:
+        return math.inf
+    face = min((node + 1) << level, cells) if along > 0.0 else node << level
+    return (face - start) * over
+
+
+@kernel(inline="always")
+def _within(place: float, node: int, level: int, cells: int) -> int:
+    """The cell at a place, kept within a node of the octree."""
+    return min(max(int(place), node << level), min(((node + 1) << level), cells) - 1)
+
+
+@kernel(inline="always")
+def _scan(
+    field: Field,
+    ray: Ray,
+    speed: float,
+    start: float,
+    stop: float,
+    step: float,
+    bend: float,
+    below: float,
+    above: float,
+) -> tuple[float, int]:
+    """The first way out of the interval between start and stop, in steps that are halved where in doubt.
+
+    Over a length h the field departs from its chord by at most bend·h²/8. So it stays in the interval where
+    both ends are farther than that from its bounds, and is monotone where the ends differ by more than
+    bend·h²/2: then one crossing lies between them.
+    """
+    a = start
+    value_a = min(max(field_at(field, ray, a), below), above)
+    length = step
+    while a < stop:
+        b = min(a + length, stop)
+        value_b = field_at(field, ray, b)
+        sag = 0.125 * bend * (b - a) ** 2
+        inside = below < value_b < above
+        if inside and min(min(value_a, value_b) - below, above - max(value_a, value_b)) >= sag:
+            a, value_a = b, value_b
+            length = min(2.0 * length, step)
+        elif not inside and (abs(value_b - value_a) >= 4.0 * sag or (b - a) * speed <= SHORTEST):
+            target, side = (above, 1) if value_b >= above else (below, -1)
+            return brent(field, ray, target, a, value_a, b, value_b, TOLERANCE / speed), side
+        elif (b - a) * speed <= SHORTEST:
+            a, value_a = b, value_b
+            length = min(2.0 * length, step)
+        else:
+            length = 0.5 * (b - a)
+    return stop, 0
+
+
+@kernel(inline="always")
+def _solve(
+    field: Field, ray: Ray, start: float, stop: float, below: float, above: float
+) -> tuple[float, int]:
+    """The same in a trilinear cell, whose field along the ray is the cubic through four values."""
+    third = (stop - start) / 3.0
+    f0, f1 = field_at(field, ray, start), field_at(field, ray, start + third)
+    f2, f3 = field_at(field, ray, start + 2.0 * third), field_at(field, ray, stop)
+    c1 = 0.5 * (-11.0 * f0 + 18.0 * f1 - 9.0 * f2 + 2.0 * f3)
+    c2 = 4.5 * (2.0 * f0 - 5.0 * f1 + 4.0 * f2 - f3)
+    c3 = 4.5 * (-f0 + 3.0 * f1 - 3.0 * f2 + f3)
+    rising = first_root_of_cubic(f0 - above, c1, c2, c3) if above < math.inf else math.inf
+    falling = first_root_of_cubic(f0 - below, c1, c2, c3) if below > -math.inf else math.inf
+    first = min(rising, falling)
+    if first > 1.0 + 1e-12:
+        return stop, 0
+    return start + first * 3.0 * third, 1 if rising < falling else -1

@@ -1,0 +1,146 @@
+"""A picture of a refracting volume before a backdrop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..errors import InvalidInput
+from .backdrop import Backdrop, Colours, locate
+from .camera import Camera
+from .caster import LOST, cast, medium_of, space_for
+from .scene import Scene
+from .supersampling import averaged, point_colours, post_refraction_colours
+
+# Rows of the image cast in one call.
+TILE_ROWS = 16
+
+SUPERSAMPLING = ("none", "post", "real")
+
+
+@dataclass(frozen=True)
+class RenderSettings:
+    """How a picture is made.
+
+    Attributes:
+        rows, columns: pixels.
+        depth: most interfaces that a ray may meet; what is lost beyond it is black.
+        supersampling: "none"; "post", after refraction (4.3.3); "real", more rays.
+        degree: for "post" as in ``post_refraction_colours``; for "real" rays a pixel along each axis.
+        fresnel: whether light is weakened by what each interface mirrors away.
+        structure, roots, step: as in ``Scene.search``.
+        seed: of the jitter of real supersampling; None leaves the rays in even rows.
+        threads: tiles of rows are cast in so many threads.
+
+    Raises:
+        InvalidInput: for a number below 1, or another name.
+    """
+
+    rows: int = 256
+    columns: int = 256
+    depth: int = 16
+    supersampling: str = "post"
+    degree: int = 1
+    fresnel: bool = False
+    structure: str = "octree"
+    roots: str = "certain"
+    step: float = 0.1
+    seed: int | None = 0
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("rows", "columns", "depth", "degree", "threads"):
+            if getattr(self, name) < 1:
+                raise InvalidInput(name, getattr(self, name), "a whole number >= 1")
+        if self.supersampling not in SUPERSAMPLING:
+            raise InvalidInput("supersampling", self.supersampling, "one of " + ", ".join(SUPERSAMPLING))
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture and what is known of each pixel; with real supersampling, of each ray.
+
+    Attributes:
+        image: (rows, columns, 3) 8-bit RGB.
+        position_m: (rows, columns, 2) where the ray ends, from the middle of its plane, right and down, m;
+            NaN where it ends on none.
+        plane: (rows, columns) number of the plane, −1 for none.
+        fate: (rows, columns) ``caster.MISSED``, ``REFRACTED`` or ``LOST``.
+        crossed: (rows, columns) interfaces met.
+        weight: (rows, columns) share of unpolarised energy on this path.
+    """
+
+    image: Colours
+    position_m: Floats
+    plane: NDArray[np.int8]
+    fate: NDArray[np.uint8]
+    crossed: NDArray[np.int16]
+    weight: Floats
+
+
+def render(scene: Scene, camera: Camera, backdrop: Backdrop, settings: RenderSettings) -> Picture:
+    """Cast one ray a pixel, or more, and colour each by where it ends on the backdrop.
+
+    Args:
+        scene: the volume, ``Scene.build``.
+        camera: ``camera.orthographic`` or ``perspective``.
+        backdrop: ``backdrop_of``.
+        settings: the rest.
+    """
+    times = settings.degree if settings.supersampling == "real" else 1
+    rows, columns = times * settings.rows, times * settings.columns
+    places = _places(rows, columns, settings.seed if settings.supersampling == "real" else None)
+    traced = space_for(rows * columns, settings.depth, False)
+    plane, where = np.empty(rows * columns, dtype=np.int8), np.empty((rows * columns, 2))
+    medium = medium_of(scene)
+    search = scene.search(settings.structure, settings.roots, settings.step)
+
+    def tile(part: slice) -> None:
+        filled = type(traced)(*(array[part] for array in traced))
+        cast(medium, search, (camera.origin, camera.direction), places[part], settings.depth, filled)
+        locate(backdrop, filled.point, filled.direction, plane[part], where[part])
+
+    with ThreadPoolExecutor(settings.threads) as pool:
+        list(pool.map(tile, _tiles(rows, columns)))
+    shape = (rows, columns)
+    plane[traced.fate == LOST] = -1
+    weight = traced.weight.reshape(shape)
+    light = weight if settings.fresnel else np.ones(shape)
+    grid = (backdrop, plane.reshape(shape), where.reshape(*shape, 2))
+    crossed = traced.crossed.reshape(shape)
+    image = np.empty((*shape, 3), dtype=np.uint8)
+    if settings.supersampling == "post":
+        post_refraction_colours(*grid, crossed, light, settings.degree, image)
+    else:
+        point_colours(*grid, light, image)
+    edges = np.vstack([backdrop.edges, [np.nan, np.nan]])[plane]
+    return Picture(
+        averaged(image, times),
+        (where * edges).reshape(*shape, 2),
+        plane.reshape(shape),
+        traced.fate.reshape(shape),
+        crossed,
+        weight,
+    )
+
+
+def _tiles(rows: int, columns: int) -> Iterator[slice]:
+    for first in range(0, rows, TILE_ROWS):
+        yield slice(first * columns, min(first + TILE_ROWS, rows) * columns)
+
+
+def _places(rows: int, columns: int, seed: int | None) -> Floats:
+    """(rows·columns, 2) u and v of the rays: middles of squares, or a random place in each."""
+    within = (
+        np.full((rows, columns, 2), 0.5)
+        if seed is None
+        else np.random.default_rng(seed).random((rows, columns, 2))
+    )
+    u = (np.arange(columns) + within[..., 0]) / columns - 0.5
+    v = (np.arange(rows)[:, None] + within[..., 1]) / rows - 0.5
+    return np.stack([u.ravel(), v.ravel()], axis=1)

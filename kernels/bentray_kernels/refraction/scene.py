@@ -1,0 +1,125 @@
+"""What a ray meets: a filtered volume whose nested iso-surfaces part layers of different refractive index."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import InvalidInput
+from ..isosurface.cell_bounds import cell_ranges
+from ..isosurface.crossing import ANALYTIC, BRENT, CERTAIN, Search
+from ..isosurface.octree import Octree, octree_of
+from ..isosurface.roots import Field
+from ..splines.spline import Spline
+
+ROOTS = {"certain": CERTAIN, "brent": BRENT, "analytic": ANALYTIC}
+STRUCTURES = ("octree", "dda", "steps")
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Nested iso-surfaces and what lies between them.
+
+    Attributes:
+        isos: rising iso-values, unit of the volume.
+        indices: refractive index below the first, between them, and above the last; one more than ``isos``.
+            The first one is that of the surroundings too.
+
+    Raises:
+        InvalidInput: for none, iso-values that do not rise, another number of indices, or one not above 0.
+    """
+
+    isos: tuple[float, ...]
+    indices: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        rising = all(a < b for a, b in zip(self.isos, self.isos[1:], strict=False))
+        if not self.isos or not rising or not all(map(math.isfinite, self.isos)):
+            raise InvalidInput("iso", self.isos, "one or more finite, rising iso-values")
+        if len(self.indices) != len(self.isos) + 1 or not all(0.0 < n < math.inf for n in self.indices):
+            raise InvalidInput("indices", self.indices, f"{len(self.isos) + 1} refractive indices > 0")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A volume made ready for rays.
+
+    Attributes:
+        field: the filtered volume.
+        octree: over its cells.
+        layers: its iso-surfaces.
+        origin: (3,) place of node 0, m.
+        spacing: (3,) between nodes, m.
+        shape: nodes along each axis.
+        linear: whether the field is trilinear in each cell.
+    """
+
+    field: Field
+    octree: Octree
+    layers: Layers
+    origin: Floats
+    spacing: Floats
+    shape: tuple[int, int, int]
+    linear: bool
+
+    @classmethod
+    def build(
+        cls,
+        spline: Spline,
+        layers: Layers,
+        spacing_m: float | Sequence[float] = 1.0,
+        centre_m: Sequence[float] = (0.0, 0.0, 0.0),
+        bound: str = "bernstein",
+    ) -> Scene:
+        """Bound the cells and build the octree.
+
+        Args:
+            spline: of a volume (nx, ny, nz).
+            layers: iso-values within the volume's range, and refractive indices.
+            spacing_m: between nodes, one for all axes or one each, m.
+            centre_m: where the middle of the volume lies, m.
+            bound: as in ``isosurface.cell_ranges``.
+
+        Raises:
+            InvalidInput: for a volume not in space, an iso-value that the field nowhere has, a spacing that
+                is not above 0, or an unknown bound.
+        """
+        if len(spline.shape) != 3:
+            raise InvalidInput("volume", f"{len(spline.shape)} dimensions", "3 dimensions")
+        spacing = np.broadcast_to(np.asarray(spacing_m, dtype=np.float64), 3).copy()
+        if not ((spacing > 0.0) & np.isfinite(spacing)).all():
+            raise InvalidInput("spacing_m", spacing.tolist(), "finite distances > 0 m")
+        octree = octree_of(cell_ranges(spline, layers.isos, bound))
+        low, high = (float(end) for end in octree.ranges[-1])
+        for iso in layers.isos:
+            if not low < iso < high:
+                raise InvalidInput("iso", iso, f"between {low:.6g} and {high:.6g}, the volume's range")
+        origin = np.asarray(centre_m, dtype=np.float64) - 0.5 * spacing * (np.array(spline.shape) - 1.0)
+        linear = spline.filter.name in ("trilinear", "central")
+        field = Field(spline.coefficients, spline.stencil)
+        return cls(field, octree, layers, origin, spacing, spline.shape, linear)
+
+    def search(self, structure: str = "octree", roots: str = "certain", step: float = 0.1) -> Search:
+        """How rays look for surfaces.
+
+        Args:
+            structure: "octree"; "dda", through all cells; "steps", of fixed length.
+            roots: "certain"; "brent"; or "analytic", of trilinear cells. Steps always use Brent's method.
+            step: length of the steps, nodes.
+
+        Raises:
+            InvalidInput: for another name, or an analytic root of another filter.
+        """
+        if structure not in STRUCTURES:
+            raise InvalidInput("structure", structure, "one of " + ", ".join(STRUCTURES))
+        if roots not in ROOTS or (roots == "analytic" and not self.linear):
+            accepted = ROOTS if self.linear else [name for name in ROOTS if name != "analytic"]
+            raise InvalidInput("roots", roots, "one of " + ", ".join(accepted))
+        if not step > 0.0:
+            raise InvalidInput("step", step, "a number of nodes > 0")
+        top = len(self.octree.levels) - 1 if structure == "octree" else 0
+        return Search(ROOTS[roots], top, step if structure == "steps" else 0.0)
