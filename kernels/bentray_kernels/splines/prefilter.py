@@ -46,7 +46,7 @@ def prefilter(values: ArrayLike, order: int, smoothing: float = 0.0) -> Floats:
     if not 0.0 <= smoothing <= MOST_SMOOTHING:
         raise InvalidInput("smoothing", smoothing, f"a number from 0 to {MOST_SMOOTHING:g}")
     filtered = np.array(values, dtype=np.float64, order="C")
-    numerator, denominator = symbols(order, smoothing)
+    numerator, denominator = symbols(int(order), smoothing)
     for axis, n in enumerate(filtered.shape):
         if n == 1 or len(denominator) == 1:
             continue

@@ -53,7 +53,7 @@ class Spline:
     ) -> None:
         if order not in range(2, 7):
             raise InvalidInput("order", order, "a whole number from 2 to 6")
-        self._read(volume, bspline(order), prefilter, smoothing, dtype)
+        self._read(volume, bspline(int(order)), prefilter, smoothing, dtype)
 
     @classmethod
     def of(
@@ -104,7 +104,7 @@ class Spline:
         Raises:
             InvalidInput: for points of another shape.
         """
-        places = self._places(points)
+        places = self.places(points)
         values = np.empty(len(places))
         _values(self.coefficients, self.stencil, places, np.array(self.shape), values)
         return values
@@ -119,14 +119,15 @@ class Spline:
 
     def value_and_gradient(self, points: ArrayLike) -> tuple[Floats, Floats]:
         """Both at once, for little more than the price of one."""
-        places = self._places(points)
+        places = self.places(points)
         values, gradients = np.empty(len(places)), np.empty(places.shape)
         _values_and_gradients(
             self.coefficients, self.stencil, places, np.array(self.shape), values, gradients
         )
         return values, gradients
 
-    def _places(self, points: ArrayLike) -> Floats:
+    def places(self, points: ArrayLike) -> Floats:
+        """The points as (m, ndim), float64, C order; raises InvalidInput for another shape."""
         places = np.ascontiguousarray(points, dtype=np.float64)
         if places.ndim != 2 or places.shape[1] != len(self.shape):
             raise InvalidInput("points", f"shape {places.shape}", f"shape (m, {len(self.shape)}), nodes")

@@ -1,0 +1,139 @@
+"""The prefilter: scipy's coefficients, the dense minimum of a smoothing spline, and the filter's poles."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import BSpline
+from scipy.ndimage import spline_filter1d
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.splines.prefilter import MOST_SMOOTHING, prefilter, sampled_bspline, symbols
+
+SHAPES = st.one_of(
+    st.tuples(st.integers(1, 70)),
+    st.tuples(st.integers(1, 40), st.integers(1, 9)),
+    st.tuples(st.integers(1, 7), st.integers(1, 35), st.integers(1, 40)),
+)
+SEEDS = st.integers(0, 2**32 - 1)
+SMOOTHINGS = st.floats(-4.0, 3.0).map(lambda log: 10.0**log)
+
+
+def basis(order, derivative=0):
+    """A B-spline about 0, or its derivative, by scipy."""
+    knots = np.arange(order + 2) - 0.5 * (order + 1)
+    element = BSpline.basis_element(knots, extrapolate=False)
+    read = element.derivative(derivative) if derivative else element
+    return lambda x: np.nan_to_num(read(x))
+
+
+def dense_minimum(values, order, smoothing):
+    """Coefficients of the spline that minimises the functional over one period of the mirrored data.
+
+    The penalty's integral is taken by Gauss–Legendre on each half node, where the integrand is a polynomial.
+    """
+    n, m = len(values), (order + 1) // 2
+    mirrored = np.concatenate([values, values[-2:0:-1]])
+    period = len(mirrored)
+    read = np.zeros((period, period))
+    abscissae, weights = np.polynomial.legendre.leggauss(order + 1)
+    halves = np.arange(0.0, period, 0.5)
+    places = (halves[:, np.newaxis] + 0.25 * (abscissae + 1.0)).ravel()
+    shares = np.tile(0.25 * weights, len(halves))
+    curved = np.zeros((len(places), period))
+    for node in range(period):
+        for turn in range(-3 - 8 // period, 4 + 8 // period):
+            read[:, node] += basis(order)(np.arange(period) - node + turn * period)
+            curved[:, node] += basis(order, m)(places - node + turn * period)
+    normal = read.T @ read + smoothing * curved.T @ (shares[:, np.newaxis] * curved)
+    return np.linalg.solve(normal, read.T @ mirrored)[:n]
+
+
+@pytest.mark.parametrize("order", range(2, 6))
+@given(shape=SHAPES, seed=SEEDS)
+@settings(max_examples=25, deadline=None)
+def test_without_smoothing_equals_scipys(order, shape, seed):
+    values = np.random.default_rng(seed).uniform(-1.0, 1.0, shape)
+    expected = values
+    for axis in range(values.ndim):
+        expected = spline_filter1d(expected, order, axis, mode="mirror")
+    assert np.abs(prefilter(values, order) - expected).max() < 1e-12
+
+
+@pytest.mark.parametrize("order", range(2, 7))
+@given(n=st.integers(2, 14), smoothing=st.one_of(st.just(0.0), SMOOTHINGS), seed=SEEDS)
+@settings(max_examples=10, deadline=None)
+def test_is_the_minimum_of_the_smoothing_functional(order, n, smoothing, seed):
+    values = np.random.default_rng(seed).uniform(-1.0, 1.0, n)
+    expected = dense_minimum(values, order, smoothing)
+    assert np.abs(prefilter(values, order, smoothing) - expected).max() < 1e-11 * (1.0 + smoothing)
+
+
+@pytest.mark.parametrize("order", range(2, 7))
+@pytest.mark.parametrize("smoothing", [0.0, 0.01, 1.0, 30.0])
+def test_far_from_the_rim_it_is_the_recursive_filter_of_its_poles(order, smoothing):
+    """The answer to one node of 1 decays as the poles say: the roots of the denominator inside the circle."""
+    numerator, denominator = symbols(order, smoothing)
+    roots = np.roots(denominator)
+    poles = roots[np.abs(roots) < 1.0]
+    recursion = np.poly(poles).real
+    assert len(poles) == len(denominator) // 2
+    line = np.zeros(401)
+    line[200] = 1.0
+    answer = prefilter(line, order, smoothing)
+    first = 201 + len(numerator) // 2
+    parts = [factor * answer[first + len(poles) - k : 330 - k] for k, factor in enumerate(recursion)]
+    assert np.abs(answer[first : first + 8]).max() > 1e-5
+    assert np.abs(sum(parts)).max() < 1e-14 * np.abs(recursion).sum() * 30
+
+
+@pytest.mark.parametrize("order", range(2, 7))
+def test_axes_are_filtered_in_turn(order):
+    values = np.random.default_rng(0).uniform(-1.0, 1.0, (34, 5, 40))
+    expected = values
+    for axis in range(3):
+        expected = np.apply_along_axis(prefilter, axis, expected, order, 0.4)
+    assert np.abs(prefilter(values, order, 0.4) - expected).max() < 1e-13
+
+
+@pytest.mark.parametrize("order", range(2, 7))
+@given(smoothing=st.one_of(st.just(0.0), st.floats(-6.0, 6.0).map(lambda log: 10.0**log)))
+@settings(max_examples=20, deadline=None)
+def test_a_constant_is_its_own_spline(order, smoothing):
+    assert prefilter(np.full((9, 70), 3.0), order, smoothing) == pytest.approx(3.0, rel=1e-7)
+
+
+def test_much_smoothing_leaves_the_mean():
+    values = np.random.default_rng(0).uniform(0.0, 1.0, 12)
+    weights = np.array([0.5, *[1.0] * 10, 0.5])
+    smooth = prefilter(values, 3, MOST_SMOOTHING)
+    assert smooth == pytest.approx(np.average(values, weights=weights), abs=1e-3)
+
+
+def test_values_are_left_alone_where_nothing_is_filtered():
+    values = np.random.default_rng(0).uniform(0.0, 1.0, (4, 1))
+    assert np.array_equal(prefilter(values, 1), values)
+    assert np.array_equal(prefilter(values.T[:, :1], 5), values.T[:, :1])
+    before = values.copy()
+    prefilter(values, 3)
+    assert np.array_equal(values, before)
+
+
+@pytest.mark.parametrize("order", range(1, 8))
+def test_sampled_bsplines_are_scipys(order):
+    reach = order // 2
+    found = sampled_bspline(order)
+    assert len(found) == 2 * reach + 1
+    assert found == pytest.approx(basis(order)(np.arange(-reach, reach + 1.0)), abs=1e-15)
+
+
+@pytest.mark.parametrize("order", [0, 7, 2.5, "3"])
+def test_other_orders_are_refused(order):
+    with pytest.raises(InvalidInput, match="order"):
+        prefilter(np.ones(4), order)
+
+
+@pytest.mark.parametrize("smoothing", [-1e-9, float("nan"), 2e6])
+def test_smoothing_off_its_range_is_refused(smoothing):
+    with pytest.raises(InvalidInput, match=r"smoothing.*1e\+06"):
+        prefilter(np.ones(4), 3, smoothing)

@@ -1,0 +1,101 @@
+"""The innermost functions: what a kernel gets from them on the grid and off it, and what they refuse."""
+
+import numpy as np
+import pytest
+from numba.core.errors import TypingError
+
+from bentray_kernels.compiled import kernel
+from bentray_kernels.splines import FILTERS, Spline
+from bentray_kernels.splines.sampling import border_of, stencil_of, value_and_gradient_at, value_at
+
+
+@kernel
+def read(coefficients, stencil, x, y, z):
+    value = value_at(coefficients, stencil, (x, y, z))
+    same, slopes = value_and_gradient_at(coefficients, stencil, (x, y, z))
+    return value, same, slopes[0], slopes[1], slopes[2]
+
+
+def volume(seed=0, shape=(5, 7, 6)):
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, shape)
+
+
+@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("place", [(1.3, 4.0, 2.81), (0.0, 6.0, 5.0), (-0.9, 6.6, 5.4)])
+def test_equals_the_sum_over_the_taps(name, dtype, place):
+    """Written out in numpy from the filter's own matrices; off the grid the outermost cell goes on."""
+    spline = Spline.of(volume(), name, dtype=dtype)
+    used, point = spline.filter, np.array(place)
+    last = np.array(spline.coefficients.shape) - used.taps
+    cells = np.clip(np.floor(point + used.shift).astype(int), 0, last)
+    part = spline.coefficients[tuple(slice(i, i + used.taps) for i in cells)].astype(float)
+    powers = (point + used.shift - cells)[:, np.newaxis] ** np.arange(used.value.shape[1])
+    w, d = powers @ used.value.T, powers @ used.slope.T
+    sums = [
+        np.einsum("ijk,i,j,k", part, *rows)
+        for rows in ((w[0], w[1], w[2]), (d[0], w[1], w[2]), (w[0], d[1], w[2]), (w[0], w[1], d[2]))
+    ]
+    value, same, *slopes = read(spline.coefficients, spline.stencil, *point)
+    assert value == pytest.approx(sums[0], abs=1e-12)
+    assert same == pytest.approx(sums[0], abs=1e-12)
+    assert slopes == pytest.approx(sums[1:], abs=1e-11)
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_nothing_beyond_the_coefficients_is_read(name):
+    """Corners of a grid that lies between NaNs."""
+    spline = Spline.of(volume(shape=(3, 2, 3)), name)
+    among = np.full(spline.coefficients.size + 40, np.nan)
+    among[20:-20] = spline.coefficients.ravel()
+    inside = among[20:-20].reshape(spline.coefficients.shape)
+    for corner in np.ndindex(2, 2, 2):
+        point = np.array(corner) * [2.0, 1.0, 2.0]
+        assert np.isfinite(read(inside, spline.stencil, *point)).all()
+
+
+@pytest.mark.parametrize("far", [1e300, -1e300, np.inf, -np.inf, np.nan])
+def test_far_away_and_not_a_number_stay_within_the_memory(far):
+    spline = Spline(volume())
+    assert not np.isfinite(read(spline.coefficients, spline.stencil, 1.0, far, 2.0)[0])
+
+
+def test_arrays_that_the_instructions_would_misread_are_refused():
+    spline = Spline(volume())
+    for wrong in (
+        np.asfortranarray(spline.coefficients),
+        spline.coefficients[:, :, ::2],
+        spline.coefficients.astype(np.int64),
+        spline.coefficients[0],
+    ):
+        with pytest.raises(TypingError, match="accepted"):
+            read(wrong, spline.stencil, 1.0, 2.0, 3.0)
+    with pytest.raises(TypingError, match="accepted"):
+        read(spline.coefficients, spline.stencil, 1, 2, 3)
+
+
+def test_coefficients_that_may_not_be_written_are_read():
+    spline = Spline(volume())
+    fixed = spline.coefficients.copy()
+    fixed.setflags(write=False)
+    assert read(fixed, spline.stencil, 1.0, 2.0, 3.0) == read(
+        spline.coefficients, spline.stencil, 1.0, 2.0, 3.0
+    )
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_the_border_is_just_wide_enough(name):
+    """The first and the last point of the grid read the first and the last node of the border."""
+    used = FILTERS[name]
+    before, after = border_of(used)
+    n, stencil = 4, stencil_of(used)
+    for end, place in ((0, 0.01), (-1, n - 1.01)):
+        line = np.zeros(n + before + after)
+        line[end] = 1.0
+        value, (slope,) = read_1d(line, stencil, place)
+        assert (value, slope) != (0.0, 0.0)
+
+
+@kernel
+def read_1d(coefficients, stencil, x):
+    return value_and_gradient_at(coefficients, stencil, (x,))
