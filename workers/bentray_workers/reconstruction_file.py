@@ -25,6 +25,7 @@ HISTORY = {
     "residual_rms_s": np.float64,
     "emitters": np.int64,
     "stage": np.int64,
+    "given": np.bool_,
 }
 IMAGES = {
     "speed": "speed_mps",

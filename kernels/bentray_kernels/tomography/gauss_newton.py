@@ -27,6 +27,9 @@ LEAST_GAIN = 0.98
 # A step that makes the misfit grow is halved so often at most: rays of an image say little about far ones.
 MOST_HALVINGS = 3
 
+# The median of |x| over the standard deviation of x, for a normal distribution.
+MEDIAN_PART = 0.6745
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -34,12 +37,16 @@ class Measured:
 
     Attributes:
         slowness: of the region's shape, s/m.
-        rms: of its misfit, s.
+        sweep: the pass that measured it, from 1; 0 for none.
+        limit: Huber's, s, for its residuals.
+        loss: of its residuals, s; see ``huber_loss``.
         residuals: how many of them fall between two of ``RESIDUAL_EDGES_S``.
     """
 
     slowness: Floats
-    rms: float
+    sweep: int
+    limit: float
+    loss: float
     residuals: Ints
 
 
@@ -52,7 +59,7 @@ class Iterate:
         begun: the image that the iteration began with.
         dual: (ndim, ...), s, of the last linear problem.
         coverage: as ``slowness``, metres of ray through each node.
-        best: the image with the least misfit so far.
+        best: the best image so far: each is held against the best before it, at the limit of that one.
         halvings: of the last step.
         done: whether nothing is left to do.
         history: a record per iteration, of the misfit that it began with.
@@ -85,7 +92,7 @@ class Iterate:
 
 def begin(slowness: Floats) -> Iterate:
     """An image to begin with, of the region's shape, s/m."""
-    best = Measured(slowness, math.inf, residual_counts(np.empty(0)))
+    best = Measured(slowness, 0, math.inf, math.inf, residual_counts(np.empty(0)))
     return Iterate(
         slowness, slowness, np.zeros((slowness.ndim, *slowness.shape)), np.zeros_like(slowness), best
     )
@@ -102,6 +109,24 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
     )
 
 
+def huber_limit(settings: Settings, residual: Floats) -> float:
+    """Beyond which residuals count by their size, s: the lesser of what the two settings ask for."""
+    limit = settings.huber_s or math.inf
+    if settings.huber_spreads > 0.0:
+        spread = float(np.median(np.abs(residual))) / MEDIAN_PART
+        limit = min(limit, settings.huber_spreads * spread)
+    # All residuals zero: none is an outlier.
+    return limit or math.inf
+
+
+def huber_loss(residual: Floats, limit: float) -> float:
+    """Of residuals, s: the root mean square of those within the limit, which the others add less to."""
+    size = np.abs(residual)
+    inner = np.minimum(size, limit)
+    outer = np.maximum(size - limit, 0.0)
+    return math.sqrt(float((inner * (inner + 2.0 * outer)).mean()))
+
+
 def step(
     problem: Problem, settings: Settings, state: Iterate, parts: Sequence[Rows], slice_index: int = 0
 ) -> Iterate:
@@ -115,16 +140,20 @@ def step(
     """
     residual = np.concatenate([part.residual for part in parts])
     rms = math.sqrt(float((residual**2).mean()))
-    record = Sweep(slice_index, len(state.history) + 1, rms, len(problem.sounding))
+    number = len(state.history) + 1
+    record = Sweep(slice_index, number, rms, len(problem.sounding), given=False)
     history = (*state.history, record)
-    best = state.best
-    if rms < best.rms:
-        best = Measured(state.slowness, rms, residual_counts(residual))
-    grown = rms > state.best.rms and state.halvings < MOST_HALVINGS
-    stuck = len(history) > 1 and rms > LEAST_GAIN * state.best.rms and not grown
+    best, limit = state.best, huber_limit(settings, residual)
+    against = huber_loss(residual, best.limit)
+    if against < best.loss:
+        loss = huber_loss(residual, limit)
+        best = Measured(state.slowness, number, limit, loss, residual_counts(residual))
+    grown = against > state.best.loss and state.halvings < MOST_HALVINGS
+    stuck = number > 1 and against > LEAST_GAIN * state.best.loss and not grown
     # The last pass only measures what the one before gave.
-    last = len(history) == settings.sweeps
-    if len(history) > 1 and (stuck or last or rms <= settings.stop_rms_s):
+    last = number == settings.sweeps
+    if number > 1 and (stuck or last or rms <= settings.stop_rms_s):
+        history = tuple(replace(sweep, given=sweep.sweep == best.sweep) for sweep in history)
         return replace(state, slowness=best.slowness, best=best, history=history, done=True)
     if grown:
         nearer = 0.5 * (best.slowness + state.slowness)
@@ -132,7 +161,8 @@ def step(
     lowest, highest = settings.speed_bounds_mps
     coverage = _coverage(problem, parts)
     # Total variation is told the misfit, s; quadratic penalties are weighed against the data themselves.
-    unit = rms if settings.penalty == "total-variation" else 1.0
+    clipped = np.minimum(np.abs(residual), limit)
+    unit = math.sqrt(float((clipped**2).mean())) if settings.penalty == "total-variation" else 1.0
     image, dual = Linearised(
         parts,
         state.slowness * problem.spacing,
@@ -141,7 +171,7 @@ def step(
         (problem.spacing / highest, problem.spacing / lowest),
         settings.penalty_strength * unit,
         settings.penalty,
-        settings.huber_s or math.inf,
+        limit,
         state.begun * problem.spacing,
         problem.spacing * settings.edge_mps / problem.water_speed**2 or math.inf,
     ).solve(state.dual)

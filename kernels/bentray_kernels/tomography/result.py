@@ -33,6 +33,8 @@ class Sweep:
             each emitter as the pass met it (SART), of all at once (Gauss–Newton).
         emitters: how many emitters had data.
         stage: from 0: coarser grids and straight rays that come first are stages of their own.
+        given: whether the misfit is that of the image which the stage gave: with SART, as near as a pass
+            comes to it; with Gauss–Newton of the best image, once it is known which.
     """
 
     slice: int
@@ -40,6 +42,7 @@ class Sweep:
     residual_rms_s: float
     emitters: int
     stage: int = 0
+    given: bool = True
 
 
 @dataclass(frozen=True)
@@ -102,15 +105,12 @@ class Reconstruction:
     def residual_rms_s(self) -> float | None:
         """Root mean square of the misfit over all slices, s; None without a history.
 
-        Of each slice that of its last sweep, or with Gauss–Newton, which gives the best image that it
-        measured, the least of its last stage.
+        Of each slice the last misfit that is one of the image given, in its last stage.
         """
         of_slice: dict[int, tuple[int, float]] = {}
         for sweep in self.history:
-            stage, known = of_slice.get(sweep.slice, (0, math.inf))
-            least = self.settings.method == "gauss-newton" and stage == sweep.stage
-            rms = min(known, sweep.residual_rms_s) if least else sweep.residual_rms_s
-            of_slice[sweep.slice] = sweep.stage, rms
+            if sweep.given and sweep.stage >= of_slice.get(sweep.slice, (0, 0.0))[0]:
+                of_slice[sweep.slice] = sweep.stage, sweep.residual_rms_s
         if not of_slice:
             return None
         return math.sqrt(sum(rms**2 for _, rms in of_slice.values()) / len(of_slice))

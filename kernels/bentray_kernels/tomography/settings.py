@@ -65,6 +65,8 @@ class Settings:
             such, as phantoms; 0: every difference costs.
         huber_s: residuals beyond this count in proportion to their size, not to its square, s (with SART from
             the second sweep on); 0: all count by their square.
+        huber_spreads: the same for ``gauss-newton``, in standard deviations of the residuals, which their
+            median tells, so that the rays which no image of these nodes explains do not decide; 0: none.
         roi: let only the dataset's region of interest change (``mask/roi``).
         reciprocity: use a missing pair's reverse (emitter and receiver exchanged) in its place.
         picker: how travel times are read where only traces were uploaded.
@@ -103,6 +105,7 @@ class Settings:
     penalty_strength: float = 0.3
     edge_mps: float = 0.0
     huber_s: float = 0.0
+    huber_spreads: float = 3.0
     roi: bool = False
     reciprocity: bool = True
     picker: Literal["aic", "threshold"] = "aic"
@@ -150,6 +153,7 @@ class Settings:
         _within("penalty_strength", self.penalty_strength, 0.0, 10.0)
         _within("edge_mps", self.edge_mps, 0.0, 1000.0)
         _within("huber_s", self.huber_s, 0.0, 1.0)
+        _within("huber_spreads", self.huber_spreads, 0.0, 100.0)
         _within("stop_rms_s", self.stop_rms_s, 0.0, 1.0)
         _within("seed", self.seed, 0, 2**63 - 1)
 

@@ -60,6 +60,7 @@ class SweepRecord(BaseModel):
     residual_rms_s: float | None = Field(description="Rms of measured minus predicted travel time, s.")
     emitters: int = Field(description="Emitters that had data.")
     stage: int = Field(0, description="From 0: coarser grids and straight rays that come first.")
+    given: bool = Field(True, description="Whether the misfit is that of the image which the stage gave.")
 
 
 class JobRecord(BaseModel):

@@ -50,7 +50,7 @@ def test_writes_are_throttled_and_the_last_one_arrives():
 def test_a_residual_that_json_cannot_hold():
     jobs = FakeJobs()
     Reporter(jobs, "job", lambda: False).report(Progress(1, 1, (Sweep(0, 1, float("nan"), 0, 2),)))
-    told = {"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 0, "stage": 2}
+    told = {"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 0, "stage": 2, "given": True}
     assert jobs.written[0][2] == [told]
 
 
