@@ -43,6 +43,7 @@ def leave_interval(
     stop: float,
     below: float,
     above: float,
+    sought: int,
     slope: float,
 ) -> tuple[float, int]:
     """First s, start < s < stop, where the field is no longer between ``below`` and ``above``.
@@ -57,6 +58,7 @@ def leave_interval(
         ray: within the grid from start to stop.
         start, stop: s.
         below, above: the interval, in which the field lies just after start.
+        sought: bits of the two in ``Octree.masks``.
         slope: of the field along the ray at start, per unit of s, if start lies on an iso-surface; else 0.
 
     Returns:
@@ -64,37 +66,45 @@ def leave_interval(
     """
     speed = math.sqrt(ray.along_x**2 + ray.along_y**2 + ray.along_z**2)
     if search.step > 0.0:
-        return _scan(field, ray, speed, start, stop, search.step / speed, 0.0, below, above)
+        step = search.step / speed
+        found, side, _ = _scan(field, ray, speed, start, math.nan, stop, step, 0.0, below, above)
+        return found, side
     cells_x, cells_y, cells_z = octree.levels[0, 1], octree.levels[0, 2], octree.levels[0, 3]
     i = min(max(int(ray.x + start * ray.along_x), 0), cells_x - 1)
     j = min(max(int(ray.y + start * ray.along_y), 0), cells_y - 1)
     k = min(max(int(ray.z + start * ray.along_z), 0), cells_z - 1)
-    over_x, over_y, over_z = _inverse(ray.along_x), _inverse(ray.along_y), _inverse(ray.along_z)
-    s, level = start, search.top
+    # The cell of a surface cannot be skipped, nor can a node about it.
+    s, level = start, search.top if slope == 0.0 else 0
+    # The field at s, where it is known.
+    value = math.nan
     while s < stop:
         p, q, r = i >> level, j >> level, k >> level
         node = octree.levels[level, 0] + (p * octree.levels[level, 2] + q) * octree.levels[level, 3] + r
-        skipped = octree.ranges[node, 0] > below and octree.ranges[node, 1] < above
+        skipped = octree.masks[node] & sought == 0
         if not skipped and level > 0:
             level -= 1
             continue
-        out_x = _way_out(ray.x, ray.along_x, over_x, p, level, cells_x)
-        out_y = _way_out(ray.y, ray.along_y, over_y, q, level, cells_y)
-        out_z = _way_out(ray.z, ray.along_z, over_z, r, level, cells_z)
+        out_x = _way_out(ray.x, ray.over_x, p, level, cells_x)
+        out_y = _way_out(ray.y, ray.over_y, q, level, cells_y)
+        out_z = _way_out(ray.z, ray.over_z, r, level, cells_z)
         out = max(min(out_x, out_y, out_z), s)
         if not skipped:
             end, bend = min(out, stop), octree.bend[node] * speed * speed
             if slope != 0.0:
-                # From the surface the field first goes inwards, and cannot have turned back before this.
-                s = min(s + abs(slope) / bend, end) if bend > 0.0 else end
+                s = _turned(s, end, abs(slope), bend, above - below)
                 slope = 0.0
-            if search.roots == ANALYTIC:
+            if s >= end:
+                value = math.nan
+                found, side = s, 0
+            elif search.roots == ANALYTIC:
                 found, side = _solve(field, ray, s, end, below, above)
             else:
                 certain = bend if search.roots == CERTAIN else 0.0
-                found, side = _scan(field, ray, speed, s, end, end - s, certain, below, above)
+                found, side, value = _scan(field, ray, speed, s, value, end, end - s, certain, below, above)
             if side != 0:
                 return found, side
+        else:
+            value = math.nan
         s = out
         # The axis of the face moves to the next node; rounding must not carry the others out of theirs.
         before = p if out_x <= out_y and out_x <= out_z else (q if out_y <= out_z else r)
@@ -134,16 +144,25 @@ def leave_interval(
 
 
 @kernel(inline="always")
-def _inverse(along: float) -> float:
-    return 1.0 / along if along != 0.0 else 0.0
+def _turned(s: float, end: float, slope: float, bend: float, height: float) -> float:
+    """How far the field surely stays in the interval from one of its bounds, s, which it leaves with a slope.
+
+    Within slope·h ± bend·h²/2 of that bound, it can be back only where bend·h reaches 2·slope, and at the
+    other bound only where the rise reaches the height. If not to the end, then to where it is farthest off.
+    """
+    length = end - s
+    rise = slope * length + 0.5 * bend * length * length
+    if bend * length < 2.0 * slope and rise < height:
+        return end
+    return min(s + slope / max(bend, 2.0 * slope * slope / height), end)
 
 
 @kernel(inline="always")
-def _way_out(start: float, along: float, over: float, node: int, level: int, cells: int) -> float:
-    """s of the face by which the ray leaves a node of the octree along one axis."""
-    if along == 0.0:
+def _way_out(start: float, over: float, node: int, level: int, cells: int) -> float:
+    """s of the face by which the ray leaves a node of the octree along one axis; infinity if by none."""
+    if math.isinf(over):
         return math.inf
-    face = min((node + 1) << level, cells) if along > 0.0 else node << level
+    face = min((node + 1) << level, cells) if over > 0.0 else node << level
     return (face - start) * over
 
 
@@ -159,20 +178,29 @@ def _scan(
     ray: Ray,
     speed: float,
     start: float,
+    value: float,
     stop: float,
     step: float,
     bend: float,
     below: float,
     above: float,
-) -> tuple[float, int]:
+) -> tuple[float, int, float]:
     """The first way out of the interval between start and stop, in steps that are halved where in doubt.
 
     Over a length h the field departs from its chord by at most bend·h²/8. So it stays in the interval where
     both ends are farther than that from its bounds, and is monotone where the ends differ by more than
     bend·h²/2: then one crossing lies between them.
+
+    Args:
+        value: the field at start, NaN where unknown.
+
+    Returns:
+        As ``leave_interval``, and the field where the search ended.
     """
     a = start
-    value_a = min(max(field_at(field, ray, a), below), above)
+    if math.isnan(value):
+        value = field_at(field, ray, a)
+    value_a = min(max(value, below), above)
     length = step
     while a < stop:
         b = min(a + length, stop)
@@ -184,13 +212,14 @@ def _scan(
             length = min(2.0 * length, step)
         elif not inside and (abs(value_b - value_a) >= 4.0 * sag or (b - a) * speed <= SHORTEST):
             target, side = (above, 1) if value_b >= above else (below, -1)
-            return brent(field, ray, target, a, value_a, b, value_b, TOLERANCE / speed), side
+            found = brent(field, ray, target, a, value_a, b, value_b, TOLERANCE / speed)
+            return found, side, target
         elif (b - a) * speed <= SHORTEST:
             a, value_a = b, value_b
             length = min(2.0 * length, step)
         else:
             length = 0.5 * (b - a)
-    return stop, 0
+    return stop, 0, value_a
 
 
 @kernel(inline="always")

@@ -22,7 +22,13 @@ class Field(NamedTuple):
 
 
 class Ray(NamedTuple):
-    """The points origin + s·direction, in nodes; s is in the unit in which direction is nodes per unit."""
+    """The points origin + s·direction, in nodes; s is in the unit in which direction is nodes per unit.
+
+    Attributes:
+        x, y, z: origin.
+        along_x, along_y, along_z: direction.
+        over_x, over_y, over_z: one over the direction; ±infinity where it is 0.
+    """
 
     x: float
     y: float
@@ -30,6 +36,16 @@ class Ray(NamedTuple):
     along_x: float
     along_y: float
     along_z: float
+    over_x: float
+    over_y: float
+    over_z: float
+
+
+@kernel(inline="always")
+def ray_of(origin: tuple[float, float, float], along: tuple[float, float, float]) -> Ray:
+    """The ray from an origin, nodes."""
+    over = (1.0 / along[0], 1.0 / along[1], 1.0 / along[2])
+    return Ray(*origin, *along, *over)
 
 
 @kernel(inline="always")
@@ -63,11 +79,12 @@ def brent(
         target: the value.
         a, b: ends, between whose values ``target`` lies.
         value_a, value_b: the field there.
-        tolerance: of s.
+        tolerance: of s; also reached where the field is as close to ``target`` as the chord is over it.
     """
     f_a, f_b = value_a - target, value_b - target
     if f_a == 0.0:
         return a
+    close = tolerance * abs(f_b - f_a) / abs(b - a)
     c, f_c = a, f_a
     step = last = b - a
     for _ in range(STEPS):
@@ -78,7 +95,7 @@ def brent(
             a, b, c = b, c, b
             f_a, f_b, f_c = f_b, f_c, f_b
         half = 0.5 * (c - b)
-        if abs(half) <= tolerance or f_b == 0.0:
+        if abs(half) <= tolerance or abs(f_b) <= close:
             break
         if abs(last) >= tolerance and abs(f_a) > abs(f_b):
             ratio = f_b / f_a

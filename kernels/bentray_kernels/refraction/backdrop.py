@@ -186,4 +186,4 @@ def _column(index: int, count: int, alone: bool) -> int:
 def _mixed(pictures: Colours, a: int, b: int, c: int, d: int, t: float, w: float) -> float:
     upper = (1.0 - t) * pictures[a] + t * pictures[b]
     lower = (1.0 - t) * pictures[c] + t * pictures[d]
-    return (1.0 - w) * upper + w * lower
+    return float((1.0 - w) * upper + w * lower)

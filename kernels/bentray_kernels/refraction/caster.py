@@ -12,7 +12,7 @@ from ..arrays import Floats
 from ..compiled import kernel
 from ..isosurface.crossing import Search, leave_interval
 from ..isosurface.octree import Octree
-from ..isosurface.roots import Field, Ray, field_at, point_at
+from ..isosurface.roots import Field, Ray, field_at, point_at, ray_of
 from ..splines.sampling import value_and_gradient_at
 from .optics import Vector, refracted
 from .scene import Scene
@@ -29,8 +29,9 @@ class Medium(NamedTuple):
         levels: (isos + 2,) −∞, the iso-values, +∞: layer m lies between m and m + 1.
         indices: (isos + 1,) refractive indices of the layers.
         origin: of node 0, m.
-        spacing: m.
-        last: index of the last node along each axis.
+        density: nodes per m along each axis.
+        low, high: corners of the box that holds all surfaces, nodes.
+        open: whether that is the grid itself, whose faces then cut the object.
     """
 
     field: Field
@@ -38,18 +39,33 @@ class Medium(NamedTuple):
     levels: Floats
     indices: Floats
     origin: Vector
-    spacing: Vector
-    last: Vector
+    density: Vector
+    low: Vector
+    high: Vector
+    open: bool
 
 
-def medium_of(scene: Scene) -> Medium:
-    """The scene for the compiled functions."""
+def medium_of(scene: Scene, structure: str) -> Medium:
+    """The scene for the compiled functions; the DDA and steps go through the whole grid, as published."""
+    boxed = structure == "octree"
+    low, high = scene.box if boxed else scene.grid
     levels = np.array([-np.inf, *scene.layers.isos, np.inf])
-    x, y, z = (float(p) for p in scene.origin)
-    dx, dy, dz = (float(p) for p in scene.spacing)
-    nx, ny, nz = (float(n - 1) for n in scene.shape)
-    indices = np.array(scene.layers.indices)
-    return Medium(scene.field, scene.octree, levels, indices, (x, y, z), (dx, dy, dz), (nx, ny, nz))
+    return Medium(
+        scene.field,
+        scene.octree,
+        levels,
+        np.array(scene.layers.indices),
+        _vector(scene.origin),
+        _vector(1.0 / scene.spacing),
+        _vector(low),
+        _vector(high),
+        scene.open or not boxed,
+    )
+
+
+def _vector(numbers: Floats) -> Vector:
+    x, y, z = (float(number) for number in numbers)
+    return x, y, z
 
 
 class Traced(NamedTuple):
@@ -70,6 +86,17 @@ class Traced(NamedTuple):
     crossed: NDArray[np.int16]
     weight: Floats
     vertices: Floats
+
+    def part(self, rays: slice) -> Traced:
+        """Some of the rays; what is written there is written here."""
+        return Traced(
+            self.point[rays],
+            self.direction[rays],
+            self.fate[rays],
+            self.crossed[rays],
+            self.weight[rays],
+            self.vertices[rays],
+        )
 
 
 def space_for(rays: int, depth: int, paths: bool) -> Traced:
@@ -105,15 +132,15 @@ def cast(
     """
     origin, direction = camera
     for n in range(len(places)):
-        start = _affine(origin, places[n, 0], places[n, 1])
-        ahead = _affine(direction, places[n, 0], places[n, 1])
+        start = affine(origin, places[n, 0], places[n, 1])
+        ahead = affine(direction, places[n, 0], places[n, 1])
         length = math.sqrt(ahead[0] ** 2 + ahead[1] ** 2 + ahead[2] ** 2)
         ahead = (ahead[0] / length, ahead[1] / length, ahead[2] / length)
         _follow(medium, search, start, ahead, depth, traced, n)
 
 
 @kernel(inline="always")
-def _affine(basis: Floats, u: float, v: float) -> Vector:
+def affine(basis: Floats, u: float, v: float) -> Vector:
     return (
         basis[0, 0] + u * basis[1, 0] + v * basis[2, 0],
         basis[0, 1] + u * basis[1, 1] + v * basis[2, 1],
@@ -125,26 +152,20 @@ def _affine(basis: Floats, u: float, v: float) -> Vector:
 def _follow(
     medium: Medium, search: Search, origin: Vector, direction: Vector, depth: int, traced: Traced, n: int
 ) -> None:
-    layers = len(medium.indices)
     crossed, weight = 0, 1.0
     layer, entered, slope = 0, False, 0.0
     fate = MISSED
     while True:
-        ray = _in_nodes(medium, origin, direction)
-        near, far, face_in, face_out = _box(ray, medium.last)
+        ray = in_nodes(medium, origin, direction)
+        near, far, face_in, face_out = through_box(ray, medium.low, medium.high)
         start = 0.0 if entered else max(near, 0.0)
         if not entered:
             if not far > start:
                 break
             entered = True
-            value = field_at(medium.field, ray, start)
-            while layer + 1 < layers and value > medium.levels[layer + 1]:
-                layer += 1
-            if layer == 0 or near < 0.0:
-                # Outside the object, or the camera itself is within the volume.
-                pass
-            else:
-                # The object is cut by the volume's box: that face is flat.
+            layer = layer_at(medium, ray, start)
+            if layer > 0 and near >= 0.0:
+                # The object is cut by the grid's face, which is flat. (A camera within it sees no face.)
                 origin = _moved(origin, direction, start)
                 ratio = medium.indices[0] / medium.indices[layer]
                 direction, share, passed = refracted(direction, _axis(face_in), ratio)
@@ -162,6 +183,8 @@ def _follow(
             far,
             medium.levels[layer],
             medium.levels[layer + 1],
+            # Iso-value m − 1 lies below layer m, iso-value m above it.
+            (1 << layer) | (1 << layer >> 1),
             slope,
         )
         if side == 0 and layer == 0:
@@ -174,10 +197,8 @@ def _follow(
             normal, behind = _axis(face_out), 0
             gradient = (0.0, 0.0, 0.0)
         else:
-            _, gradient = value_and_gradient_at(
-                medium.field.coefficients, medium.field.stencil, point_at(ray, s)
-            )
-            normal, behind = _unit_normal(gradient, medium.spacing), layer + side
+            gradient = gradient_at(medium, ray, s)
+            normal, behind = unit_normal(gradient), layer + side
         ratio = medium.indices[layer] / medium.indices[behind]
         direction, share, passed = refracted(direction, normal, ratio)
         weight, crossed, fate = weight * share, crossed + 1, REFRACTED
@@ -186,40 +207,46 @@ def _follow(
             layer = behind
             if side == 0:
                 break
-        slope = (
-            gradient[0] * direction[0] / medium.spacing[0]
-            + gradient[1] * direction[1] / medium.spacing[1]
-            + gradient[2] * direction[2] / medium.spacing[2]
-        )
+        slope = gradient[0] * direction[0] + gradient[1] * direction[1] + gradient[2] * direction[2]
     traced.point[n, 0], traced.point[n, 1], traced.point[n, 2] = origin
     traced.direction[n, 0], traced.direction[n, 1], traced.direction[n, 2] = direction
     traced.fate[n], traced.crossed[n], traced.weight[n] = fate, crossed, weight
 
 
 @kernel(inline="always")
-def _in_nodes(medium: Medium, origin: Vector, direction: Vector) -> Ray:
-    return Ray(
-        (origin[0] - medium.origin[0]) / medium.spacing[0],
-        (origin[1] - medium.origin[1]) / medium.spacing[1],
-        (origin[2] - medium.origin[2]) / medium.spacing[2],
-        direction[0] / medium.spacing[0],
-        direction[1] / medium.spacing[1],
-        direction[2] / medium.spacing[2],
-    )
+def layer_at(medium: Medium, ray: Ray, s: float) -> int:
+    """The layer in which a ray begins, at the box or within it."""
+    layer = 0
+    # On the faces of a box within the grid lies layer 0, and most rays begin there.
+    if medium.open or s == 0.0:
+        value = field_at(medium.field, ray, s)
+        while layer + 1 < len(medium.indices) and value > medium.levels[layer + 1]:
+            layer += 1
+    return layer
 
 
 @kernel(inline="always")
-def _box(ray: Ray, last: Vector) -> tuple[float, float, int, int]:
-    """s where the ray enters and leaves the grid, and the axes of these faces; far < near where it misses."""
+def in_nodes(medium: Medium, origin: Vector, direction: Vector) -> Ray:
+    x, y, z = medium.density
+    place = (
+        (origin[0] - medium.origin[0]) * x,
+        (origin[1] - medium.origin[1]) * y,
+        (origin[2] - medium.origin[2]) * z,
+    )
+    return ray_of(place, (direction[0] * x, direction[1] * y, direction[2] * z))
+
+
+@kernel(inline="always")
+def through_box(ray: Ray, low: Vector, high: Vector) -> tuple[float, float, int, int]:
+    """s where the ray enters and leaves a box, and the axes of these faces; far < near where it misses."""
     near, far, face_in, face_out = -math.inf, math.inf, 0, 0
-    starts, alongs = (ray.x, ray.y, ray.z), (ray.along_x, ray.along_y, ray.along_z)
+    starts, overs = (ray.x, ray.y, ray.z), (ray.over_x, ray.over_y, ray.over_z)
     for axis in range(3):
-        start, along = starts[axis], alongs[axis]
-        if along == 0.0:
-            if not 0.0 <= start <= last[axis]:
+        if math.isinf(overs[axis]):
+            if not low[axis] <= starts[axis] <= high[axis]:
                 far = -math.inf
             continue
-        a, b = -start / along, (last[axis] - start) / along
+        a, b = (low[axis] - starts[axis]) * overs[axis], (high[axis] - starts[axis]) * overs[axis]
         if min(a, b) > near:
             near, face_in = min(a, b), axis
         if max(a, b) < far:
@@ -237,11 +264,19 @@ def _axis(axis: int) -> Vector:
 
 
 @kernel(inline="always")
-def _unit_normal(gradient: Vector, spacing: Vector) -> Vector:
-    x, y, z = gradient[0] / spacing[0], gradient[1] / spacing[1], gradient[2] / spacing[2]
-    length = math.sqrt(x * x + y * y + z * z)
+def gradient_at(medium: Medium, ray: Ray, s: float) -> Vector:
+    """Of the field at s, per m."""
+    _, slopes = value_and_gradient_at(medium.field.coefficients, medium.field.stencil, point_at(ray, s))
+    x, y, z = medium.density
+    return slopes[0] * x, slopes[1] * y, slopes[2] * z
+
+
+@kernel(inline="always")
+def unit_normal(slope: Vector) -> Vector:
+    length = math.sqrt(slope[0] * slope[0] + slope[1] * slope[1] + slope[2] * slope[2])
     # A surface without a gradient, at a singular point, has no normal: the ray goes straight on.
-    return (x / length, y / length, z / length) if length > 0.0 else (0.0, 0.0, 0.0)
+    over = 1.0 / length if length > 0.0 else 0.0
+    return slope[0] * over, slope[1] * over, slope[2] * over
 
 
 @kernel(inline="always")

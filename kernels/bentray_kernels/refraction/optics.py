@@ -44,8 +44,9 @@ def refracted(direction: Vector, normal: Vector, ratio: float) -> tuple[Vector, 
             ratio * direction[1] + turn * normal[1],
             ratio * direction[2] + turn * normal[2],
         )
-    length = math.sqrt(bent[0] * bent[0] + bent[1] * bent[1] + bent[2] * bent[2])
-    return (bent[0] / length, bent[1] / length, bent[2] / length), share, goes
+    # A unit vector but for rounding; one step of Newton's method for 1/√ keeps it one.
+    longer = 1.5 - 0.5 * (bent[0] * bent[0] + bent[1] * bent[1] + bent[2] * bent[2])
+    return (longer * bent[0], longer * bent[1], longer * bent[2]), share, goes
 
 
 @kernel(inline="always")

@@ -97,11 +97,11 @@ def render(scene: Scene, camera: Camera, backdrop: Backdrop, settings: RenderSet
     places = _places(rows, columns, settings.seed if settings.supersampling == "real" else None)
     traced = space_for(rows * columns, settings.depth, False)
     plane, where = np.empty(rows * columns, dtype=np.int8), np.empty((rows * columns, 2))
-    medium = medium_of(scene)
+    medium = medium_of(scene, settings.structure)
     search = scene.search(settings.structure, settings.roots, settings.step)
 
     def tile(part: slice) -> None:
-        filled = type(traced)(*(array[part] for array in traced))
+        filled = traced.part(part)
         cast(medium, search, (camera.origin, camera.direction), places[part], settings.depth, filled)
         locate(backdrop, filled.point, filled.direction, plane[part], where[part])
 

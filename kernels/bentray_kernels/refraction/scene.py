@@ -54,7 +54,10 @@ class Scene:
         layers: its iso-surfaces.
         origin: (3,) place of node 0, m.
         spacing: (3,) between nodes, m.
-        shape: nodes along each axis.
+        grid: (2, 3) corners of the grid, nodes.
+        box: (2, 3) the same of the cells that may hold a surface; ``grid`` if ``open``.
+        open: whether the object may reach the faces of the grid, which then cut it.
+        top: highest level of the octree with a node that a ray can skip.
         linear: whether the field is trilinear in each cell.
     """
 
@@ -63,7 +66,10 @@ class Scene:
     layers: Layers
     origin: Floats
     spacing: Floats
-    shape: tuple[int, int, int]
+    grid: Floats
+    box: Floats
+    open: bool
+    top: int
     linear: bool
 
     @classmethod
@@ -93,15 +99,20 @@ class Scene:
         spacing = np.broadcast_to(np.asarray(spacing_m, dtype=np.float64), 3).copy()
         if not ((spacing > 0.0) & np.isfinite(spacing)).all():
             raise InvalidInput("spacing_m", spacing.tolist(), "finite distances > 0 m")
-        octree = octree_of(cell_ranges(spline, layers.isos, bound))
-        low, high = (float(end) for end in octree.ranges[-1])
+        cells = cell_ranges(spline, layers.isos, bound)
+        octree = octree_of(cells, layers.isos)
+        low, high = float(cells.low.min()), float(cells.high.max())
         for iso in layers.isos:
             if not low < iso < high:
                 raise InvalidInput("iso", iso, f"between {low:.6g} and {high:.6g}, the volume's range")
         origin = np.asarray(centre_m, dtype=np.float64) - 0.5 * spacing * (np.array(spline.shape) - 1.0)
+        faces = [cells.high[edge] for axis in range(3) for edge in _ends(axis)]
+        cut = max(float(face.max()) for face in faces) >= layers.isos[0]
+        grid = np.array([[0.0] * 3, cells.low.shape])
+        box = grid if cut else octree.occupied()
         linear = spline.filter.name in ("trilinear", "central")
         field = Field(spline.coefficients, spline.stencil)
-        return cls(field, octree, layers, origin, spacing, spline.shape, linear)
+        return cls(field, octree, layers, origin, spacing, grid, box, cut, octree.highest_empty(), linear)
 
     def search(self, structure: str = "octree", roots: str = "certain", step: float = 0.1) -> Search:
         """How rays look for surfaces.
@@ -121,5 +132,11 @@ class Scene:
             raise InvalidInput("roots", roots, "one of " + ", ".join(accepted))
         if not step > 0.0:
             raise InvalidInput("step", step, "a number of nodes > 0")
-        top = len(self.octree.levels) - 1 if structure == "octree" else 0
+        top = self.top if structure == "octree" else 0
         return Search(ROOTS[roots], top, step if structure == "steps" else 0.0)
+
+
+def _ends(axis: int) -> tuple[tuple[slice | int, ...], tuple[slice | int, ...]]:
+    """What selects the first and the last layer of cells across an axis."""
+    before = (slice(None),) * axis
+    return (*before, 0), (*before, -1)

@@ -138,4 +138,4 @@ def averaged(image: Colours, times: int) -> Colours:
     """
     rows, columns = image.shape[0] // times, image.shape[1] // times
     samples = image.reshape(rows, times, columns, times, 3)
-    return (samples.mean(axis=(1, 3)) + 0.5).astype(np.uint8)
+    return np.asarray(samples.mean(axis=(1, 3)) + 0.5, dtype=np.uint8)

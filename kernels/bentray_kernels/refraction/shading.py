@@ -1,0 +1,139 @@
+"""The surface itself, lit and opaque: the picture that does not refract."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats
+from ..compiled import kernel
+from ..errors import InvalidInput
+from ..isosurface.crossing import Search, leave_interval
+from .backdrop import Colours
+from .camera import Camera
+from .caster import Medium, affine, gradient_at, in_nodes, layer_at, medium_of, through_box, unit_normal
+from .optics import Vector
+from .scene import Scene
+
+
+class Light(NamedTuple):
+    """Phong's model (1975): ambient + diffuse·cos + specular·cosⁿ, with one light far away.
+
+    Attributes:
+        towards: unit vector from the object to the light.
+        ambient, diffuse, specular: shares; without ``specular`` the model is Lambert's.
+        shininess: n.
+        colour: 8-bit RGB of the surface; highlights are white.
+        background: 8-bit RGB where there is none.
+    """
+
+    towards: Vector
+    ambient: float = 0.1
+    diffuse: float = 0.7
+    specular: float = 0.2
+    shininess: float = 20.0
+    colour: Vector = (220.0, 200.0, 160.0)
+    background: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Shaded:
+    """A shaded surface.
+
+    Attributes:
+        image: (rows, columns, 3) 8-bit RGB.
+        normal: (rows, columns, 3) unit vectors towards lower values, NaN where there is no surface.
+        distance_m: (rows, columns) along the ray, NaN where there is none.
+    """
+
+    image: Colours
+    normal: Floats
+    distance_m: Floats
+
+
+def shade(scene: Scene, camera: Camera, light: Light, rows: int, columns: int) -> Shaded:
+    """The first surface that each pixel's ray meets.
+
+    Args:
+        scene: ``Scene.build``; the refractive indices are not used.
+        camera: where the picture is taken from.
+        light: and what the surface looks like.
+        rows, columns: pixels, at least 1.
+
+    Raises:
+        InvalidInput: for no pixels.
+    """
+    if min(rows, columns) < 1:
+        raise InvalidInput("rows, columns", (rows, columns), "whole numbers >= 1")
+    image = np.empty((rows, columns, 3), dtype=np.uint8)
+    normal, distance = np.full((rows, columns, 3), np.nan), np.full((rows, columns), np.nan)
+    medium, search = medium_of(scene, "octree"), scene.search()
+    _shade(medium, search, (camera.origin, camera.direction), light, image, normal, distance)
+    return Shaded(image, normal, distance)
+
+
+@kernel
+def _shade(
+    medium: Medium,
+    search: Search,
+    camera: tuple[Floats, Floats],
+    light: Light,
+    image: Colours,
+    normals: Floats,
+    distances: Floats,
+) -> None:
+    rows, columns = distances.shape
+    for i in range(rows):
+        for j in range(columns):
+            u, v = (j + 0.5) / columns - 0.5, (i + 0.5) / rows - 0.5
+            origin, ahead = affine(camera[0], u, v), affine(camera[1], u, v)
+            length = math.sqrt(ahead[0] ** 2 + ahead[1] ** 2 + ahead[2] ** 2)
+            direction = (ahead[0] / length, ahead[1] / length, ahead[2] / length)
+            ray = in_nodes(medium, origin, direction)
+            near, far, _, _ = through_box(ray, medium.low, medium.high)
+            near = max(near, 0.0)
+            image[i, j, 0], image[i, j, 1], image[i, j, 2] = light.background
+            if not far > near:
+                continue
+            layer = layer_at(medium, ray, near)
+            s, side = leave_interval(
+                medium.field,
+                medium.octree,
+                search,
+                ray,
+                near,
+                far,
+                medium.levels[layer],
+                medium.levels[layer + 1],
+                (1 << layer) | (1 << layer >> 1),
+                0.0,
+            )
+            if side == 0:
+                continue
+            gradient = gradient_at(medium, ray, s)
+            normal = unit_normal((-gradient[0], -gradient[1], -gradient[2]))
+            distances[i, j] = s
+            normals[i, j, 0], normals[i, j, 1], normals[i, j, 2] = normal
+            _paint(image, i, j, light, normal, direction)
+
+
+@kernel(inline="always")
+def _paint(image: Colours, i: int, j: int, light: Light, normal: Vector, direction: Vector) -> None:
+    along = direction[0] * normal[0] + direction[1] * normal[1] + direction[2] * normal[2]
+    # The side that is seen is lit, whichever way values fall.
+    facing = -1.0 if along > 0.0 else 1.0
+    towards = light.towards
+    cosine = facing * (towards[0] * normal[0] + towards[1] * normal[1] + towards[2] * normal[2])
+    diffuse, specular = 0.0, 0.0
+    if cosine > 0.0:
+        mirrored = 2.0 * along * facing * cosine - (
+            direction[0] * towards[0] + direction[1] * towards[1] + direction[2] * towards[2]
+        )
+        diffuse = light.diffuse * cosine
+        specular = light.specular * max(-mirrored, 0.0) ** light.shininess if light.specular > 0.0 else 0.0
+    for c in range(3):
+        colour = light.colour[c] * (light.ambient + diffuse) + 255.0 * specular
+        image[i, j, c] = np.uint8(min(colour + 0.5, 255.0))
