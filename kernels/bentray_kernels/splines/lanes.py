@@ -12,59 +12,86 @@ DOUBLE, FLOAT = ir.DoubleType(), ir.FloatType()
 INDEX, SHORT, BIT = ir.IntType(64), ir.IntType(32), ir.IntType(1)
 
 
+def width_of(taps: int) -> int:
+    """Lanes of a vector with one lane a tap: a power of two, those left over hold 0."""
+    return 1 << (taps - 1).bit_length()
+
+
 class Lanes:
-    """Vectors of doubles with one lane a tap, filled up to a power of two by lanes that hold 0.
+    """Instructions on vectors of ``width`` lanes, one a tap, and on pairs of such vectors in one.
 
     Args:
         builder: where the instructions go.
         taps: nodes that a point reads along one axis.
+        real: LLVM's type of the numbers, float or double.
     """
 
-    def __init__(self, builder: Any, taps: int) -> None:
+    def __init__(self, builder: Any, taps: int, real: Any) -> None:
         self.builder = builder
         self.taps = taps
-        self.width = 1 << (taps - 1).bit_length()
-        self.type = ir.VectorType(DOUBLE, self.width)
+        self.width = width_of(taps)
+        self.real = real
 
-    def load(self, start: Any, element: Any) -> Any:
-        """``taps`` numbers of the type ``element`` from memory; nothing beyond them is touched."""
-        read = ir.VectorType(element, self.width)
-        place = self.builder.bitcast(start, read.as_pointer())
-        align = 8 if element == DOUBLE else 4
+    def load_nodes(self, start: Any) -> Any:
+        """``taps`` neighbouring nodes; nothing beyond them is touched."""
         if self.width == self.taps:
-            numbers = self.builder.load(place)
-            numbers.align = align
-        else:
-            mask = ir.VectorType(BIT, self.width)
-            name = f"llvm.masked.load.v{self.width}f{8 * align}.p0"
-            load = self._instruction(name, read, [read.as_pointer(), SHORT, mask, read])
-            wanted = ir.Constant(mask, [BIT(int(k < self.taps)) for k in range(self.width)])
-            numbers = self.builder.call(load, [place, SHORT(align), wanted, ir.Constant(read, None)])
-        return numbers if element == DOUBLE else self.builder.fpext(numbers, self.type)
+            return self.load(start, self.width)
+        row = ir.VectorType(self.real, self.width)
+        mask = ir.VectorType(BIT, self.width)
+        name = f"llvm.masked.load.v{self.width}f{8 * self._size()}.p0"
+        load = self._instruction(name, row, [row.as_pointer(), SHORT, mask, row])
+        wanted = ir.Constant(mask, [BIT(int(k < self.taps)) for k in range(self.width)])
+        place = self.builder.bitcast(start, row.as_pointer())
+        return self.builder.call(load, [place, SHORT(self._size()), wanted, ir.Constant(row, None)])
 
-    def everywhere(self, number: Any) -> Any:
-        """A number in all lanes."""
-        first = self.builder.insert_element(ir.Constant(self.type, ir.Undefined), number, SHORT(0))
-        return self.lane(first, 0)
+    def load(self, start: Any, count: int) -> Any:
+        """A vector of so many numbers."""
+        numbers = self.builder.load(self.builder.bitcast(start, ir.VectorType(self.real, count).as_pointer()))
+        numbers.align = self._size()
+        return numbers
 
-    def lane(self, vector: Any, k: int) -> Any:
-        """Lane ``k`` of a vector in all lanes."""
-        places = ir.Constant(ir.VectorType(SHORT, self.width), [SHORT(k)] * self.width)
-        return self.builder.shuffle_vector(vector, ir.Constant(self.type, ir.Undefined), places)
+    def everywhere(self, number: Any, count: int) -> Any:
+        """A number in so many lanes."""
+        vector = ir.VectorType(self.real, 1)
+        first = self.builder.insert_element(ir.Constant(vector, ir.Undefined), number, SHORT(0))
+        return self.pick(first, [0] * count)
+
+    def pick(self, vector: Any, places: Sequence[int], other: Any | None = None) -> Any:
+        """These lanes of a vector, or of two that follow one another."""
+        wanted = ir.Constant(ir.VectorType(SHORT, len(places)), [SHORT(k) for k in places])
+        second = ir.Constant(vector.type, ir.Undefined) if other is None else other
+        return self.builder.shuffle_vector(vector, second, wanted)
 
     def multiply_add(self, a: Any, b: Any, c: Any | None) -> Any:
         """a·b + c, rounded once where the processor can; without ``c`` the product."""
         if c is None:
             return self.builder.fmul(a, b)
-        name = f"llvm.fmuladd.v{self.width}f64"
-        return self.builder.call(self._instruction(name, self.type, [self.type] * 3), [a, b, c])
+        name = f"llvm.fmuladd.v{a.type.count}f{8 * self._size()}"
+        return self.builder.call(self._instruction(name, a.type, [a.type] * 3), [a, b, c])
 
-    def total(self, vector: Any) -> Any:
-        """Sum of the lanes."""
-        name = f"llvm.vector.reduce.fadd.v{self.width}f64"
-        add = self._instruction(name, DOUBLE, [DOUBLE, self.type])
-        # In halves instead of one after the other.
-        return self.builder.call(add, [DOUBLE(0.0), vector], fastmath=("reassoc",))
+    def totals(self, vectors: Sequence[Any]) -> list[Any]:
+        """Sum of the lanes of each of up to four vectors, as doubles; added in halves, all at once."""
+        width = vectors[0].type.count
+        joined = self._joined(vectors)
+        while width > 1:
+            lanes, width = joined.type.count, width // 2
+            even, odd = (self.pick(joined, range(first, lanes, 2)) for first in (0, 1))
+            joined = self.builder.fadd(even, odd)
+        sums = [self.builder.extract_element(joined, SHORT(k)) for k in range(len(vectors))]
+        return sums if self.real == DOUBLE else [self.builder.fpext(number, DOUBLE) for number in sums]
+
+    def _joined(self, vectors: Sequence[Any]) -> Any:
+        """Vectors end to end; a third one is followed by itself."""
+        if len(vectors) == 1:
+            return vectors[0]
+        if len(vectors) > 2:
+            pairs = [self._joined(vectors[:2]), self._joined((vectors[2], vectors[-1]))]
+            return self._joined(pairs)
+        first, second = vectors
+        return self.pick(first, range(2 * first.type.count), second)
+
+    def _size(self) -> int:
+        return 8 if self.real == DOUBLE else 4
 
     def _instruction(self, name: str, returned: Any, taken: list[Any]) -> Any:
         return cgutils.get_or_insert_function(self.builder.module, ir.FunctionType(returned, taken), name)
@@ -77,14 +104,14 @@ class Axis:
         lanes: of the filter.
         count: nodes of the axis, border included.
         stride: from one node to the next, in numbers.
-        place: of the point, nodes, plus the filter's shift.
+        place: of the point, nodes, plus the filter's shift; a double.
         tables: start of ``Stencil.weights``.
         slopes: whether the weights of the slope are asked for.
 
     Attributes:
         stride: as given.
         offset: of the first node that is read, in numbers.
-        weights: a vector: of the value by node, and of the slope or None.
+        weights: of the nodes, ``width`` lanes; with ``slopes`` those of the slope follow in as many more.
     """
 
     def __init__(self, lanes: Lanes, count: Any, stride: Any, place: Any, tables: Any, slopes: bool) -> None:
@@ -94,60 +121,105 @@ class Axis:
         within = builder.select(builder.fcmp_ordered(">", place, DOUBLE(0.0)), place, DOUBLE(0.0))
         within = builder.select(builder.fcmp_ordered("<", within, last), within, last)
         cell = builder.fptosi(within, INDEX)
-        t = lanes.everywhere(builder.fsub(place, builder.sitofp(cell, DOUBLE)))
+        t = builder.fsub(place, builder.sitofp(cell, DOUBLE))
+        t = t if lanes.real == DOUBLE else builder.fptrunc(t, FLOAT)
+        self.lanes = lanes
         self.stride = stride
         self.offset = builder.mul(cell, stride)
-        self.value = _horner(lanes, tables, 0, t)
-        self.slope = _horner(lanes, tables, 1, t) if slopes else None
+        self.weights = self._horner(tables, t, 2 * lanes.width if slopes else lanes.width)
+
+    def weight(self, k: int, count: int) -> Any:
+        """The weight of node ``k`` in so many lanes."""
+        return self.lanes.pick(self.weights, [k] * count)
+
+    def slope(self, k: int, count: int) -> Any:
+        """The same for the slope."""
+        return self.lanes.pick(self.weights, [self.lanes.width + k] * count)
+
+    def both(self, k: int) -> Any:
+        """The weight in ``width`` lanes, then that of the slope in as many."""
+        width = self.lanes.width
+        return self.lanes.pick(self.weights, [k] * width + [width + k] * width)
+
+    def _horner(self, tables: Any, t: Any, count: int) -> Any:
+        lanes, weights = self.lanes, None
+        t = lanes.everywhere(t, count)
+        for power in reversed(range(lanes.taps)):
+            row = lanes.builder.gep(tables, [INDEX(power * 2 * lanes.width)])
+            row = lanes.load(row, count)
+            weights = row if weights is None else lanes.multiply_add(weights, t, row)
+        return weights
 
 
-def sums(lanes: Lanes, axes: Sequence[Axis], start: Any, element: Any) -> list[Any]:
-    """The weighted sum of the nodes about a point, and those with the slope's weights along each axis.
+def value(lanes: Lanes, axes: Sequence[Axis], start: Any) -> Any:
+    """The weighted sum of the nodes about a point.
 
     Args:
         lanes: of the filter.
-        axes: of the grid, the last one contiguous.
+        axes: of the grid, 1 to 3, without slopes; the last one is contiguous.
         start: of the grid.
-        element: type of its numbers.
-
-    Returns:
-        The value; then, if the axes have slopes, the gradient.
     """
+
+    def row(axes: Sequence[Axis], start: Any) -> Any:
+        if len(axes) == 1:
+            return lanes.load_nodes(start)
+        total = None
+        for k, node in _nodes(lanes, axes[0], start):
+            total = lanes.multiply_add(axes[0].weight(k, lanes.width), row(axes[1:], node), total)
+        return total
+
+    row_of_all = row(axes, _first(lanes, axes, start))
+    return lanes.totals([lanes.multiply_add(row_of_all, axes[-1].weights, None)])[0]
+
+
+def value_and_gradient(lanes: Lanes, axes: Sequence[Axis], start: Any) -> list[Any]:
+    """The same and its gradient, for axes with slopes.
+
+    A vector holds two rows of nodes at once: summed with the weights of the value, and with those of the
+    slope along the last axis but one. So both cost one multiplication, and the weights one polynomial.
+    """
+    first = _first(lanes, axes, start)
+    low, high = range(lanes.width), range(lanes.width, 2 * lanes.width)
+
+    def plane(start: Any) -> Any:
+        """[value | slope along y] by node of z."""
+        total = None
+        for k, node in _nodes(lanes, axes[-2], start):
+            twice = lanes.pick(lanes.load_nodes(node), [*low, *low])
+            total = lanes.multiply_add(axes[-2].both(k), twice, total)
+        return total
+
+    along = axes[-1].weights
+    if len(axes) == 1:
+        row = lanes.load_nodes(first)
+        twice = lanes.multiply_add(lanes.pick(row, [*low, *low]), along, None)
+        return lanes.totals([lanes.pick(twice, low), lanes.pick(twice, high)])
+    across = None
+    if len(axes) == 2:
+        rows = plane(first)
+    else:
+        rows = None
+        for k, node in _nodes(lanes, axes[0], first):
+            found = plane(node)
+            rows = lanes.multiply_add(axes[0].weight(k, 2 * lanes.width), found, rows)
+            across = lanes.multiply_add(axes[0].slope(k, lanes.width), lanes.pick(found, low), across)
+    value_row, slope_row = lanes.pick(rows, low), lanes.pick(rows, high)
+    weights, slopes = lanes.pick(along, low), lanes.pick(along, high)
+    products = [lanes.multiply_add(value_row, weights, None)]
+    if across is not None:
+        products.append(lanes.multiply_add(across, weights, None))
+    products += [lanes.multiply_add(slope_row, weights, None), lanes.multiply_add(value_row, slopes, None)]
+    return lanes.totals(products)
+
+
+def _first(lanes: Lanes, axes: Sequence[Axis], start: Any) -> Any:
     offset = axes[0].offset
     for axis in axes[1:]:
         offset = lanes.builder.add(offset, axis.offset)
-    rows = _rows(lanes, axes, lanes.builder.gep(start, [offset]), element)
-    last = axes[-1]
-    values = [lanes.total(lanes.multiply_add(row, last.value, None)) for row in rows]
-    if last.slope is not None:
-        values.append(lanes.total(lanes.multiply_add(rows[0], last.slope, None)))
-    return values
+    return lanes.builder.gep(start, [offset])
 
 
-def _rows(lanes: Lanes, axes: Sequence[Axis], start: Any, element: Any) -> list[Any]:
-    """Summed over all axes but the last: the value, then the slopes along these axes."""
-    if len(axes) == 1:
-        return [lanes.load(start, element)]
-    axis, inner = axes[0], axes[1:]
-    summed: list[Any] = [None] * (len(axes) if axis.slope is not None else 1)
+def _nodes(lanes: Lanes, axis: Axis, start: Any) -> Any:
+    """The places and the addresses of the nodes along an axis."""
     for k in range(lanes.taps):
-        node = lanes.builder.gep(start, [lanes.builder.mul(INDEX(k), axis.stride)])
-        value, *across = _rows(lanes, inner, node, element)
-        weight = lanes.lane(axis.value, k)
-        terms = [(weight, value)]
-        if axis.slope is not None:
-            terms.append((lanes.lane(axis.slope, k), value))
-        terms += [(weight, row) for row in across]
-        summed = [lanes.multiply_add(*term, before) for term, before in zip(terms, summed, strict=True)]
-    return summed
-
-
-def _horner(lanes: Lanes, tables: Any, table: int, t: Any) -> Any:
-    """The weights of all nodes at t, by falling powers."""
-    weights = None
-    # A slope's polynomial has one power less.
-    for power in reversed(range(lanes.taps - table)):
-        row = lanes.builder.gep(tables, [INDEX((table * lanes.taps + power) * lanes.taps)])
-        coefficients = lanes.load(row, DOUBLE)
-        weights = coefficients if weights is None else lanes.multiply_add(weights, t, coefficients)
-    return weights
+        yield k, lanes.builder.gep(start, [lanes.builder.mul(INDEX(k), axis.stride)])

@@ -9,11 +9,11 @@ from numba import types
 from numba.core import cgutils
 from numba.core.errors import NumbaTypeError
 from numba.extending import intrinsic
+from numpy.typing import DTypeLike
 
-from ..arrays import Floats
 from ..compiled import kernel
 from .filters import Filter
-from .lanes import DOUBLE, FLOAT, INDEX, Axis, Lanes, sums
+from .lanes import DOUBLE, FLOAT, INDEX, Axis, Lanes, value, value_and_gradient, width_of
 
 
 class Stencil(NamedTuple):
@@ -22,24 +22,25 @@ class Stencil(NamedTuple):
     The number of taps must be known when a kernel is compiled, or its loops stay loops. Numba compiles anew
     for each type of argument, and the length of a tuple is part of its type: hence ``places``. So one kernel
     serves all filters, is built once for each number of taps, and numba's cache on disk keeps every build.
-    From the number of taps, ``lanes`` writes the vector instructions; a plain loop took three times as long.
+    From the number of taps, ``lanes`` writes the vector instructions; a plain loop took five times as long.
 
     Attributes:
         places: (0, 1, …, taps − 1); only its length is used.
         shift: as ``Filter.shift``.
-        weights: (2, taps, taps), C order: of the value and of the slope; by power of t; by node.
+        weights: (taps, 2, width), C order, by power of t: of the value and of the slope, by node, 0 in the
+            lanes that no node fills (``lanes.width_of``).
     """
 
     places: tuple[int, ...]
     shift: float
-    weights: Floats
+    weights: Any
 
 
-def stencil_of(read: Filter) -> Stencil:
-    """The stencil of a filter; powers that its polynomials lack have the weight 0."""
-    weights = np.zeros((2, read.taps, read.taps))
-    weights[0, : read.value.shape[1]] = read.value.T
-    weights[1, : read.slope.shape[1]] = read.slope.T
+def stencil_of(read: Filter, dtype: DTypeLike = np.float64) -> Stencil:
+    """The stencil of a filter, for coefficients of that type; powers that it lacks have the weight 0."""
+    weights = np.zeros((read.taps, 2, width_of(read.taps)), dtype)
+    for which, matrix in enumerate((read.value, read.slope)):
+        weights[: matrix.shape[1], which, : read.taps] = matrix.T
     return Stencil(tuple(range(read.taps)), read.shift, weights)
 
 
@@ -55,12 +56,12 @@ def value_at(coefficients: Any, stencil: Stencil, point: Any) -> Any:
 
     Args:
         coefficients: (x[, y[, z]]), C order, float64 or float32, with the border of ``border_of``.
-        stencil: of the filter.
+        stencil: of the filter, in the same type; the sums are in it too.
         point: (x[, y[, z]]), a tuple of floats, nodes; node 0 is the first one inside the border. Off the
             grid the outermost cell's polynomial goes on; NaN gives NaN.
 
     Returns:
-        float64, whatever the coefficients are.
+        float64.
     """
     return _sampled_value(coefficients, stencil.places, stencil.shift, stencil.weights, point)
 
@@ -74,12 +75,11 @@ def value_and_gradient_at(coefficients: Any, stencil: Stencil, point: Any) -> An
 @intrinsic
 def _sampled_value(typing: Any, coefficients: Any, places: Any, shift: Any, weights: Any, point: Any) -> Any:
     _check(coefficients, weights, point)
-    returned = types.float64
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _sampled(context, builder, signature.args, arguments, slopes=False)[0]
+        return value(*_stage(context, builder, signature.args, arguments, slopes=False))
 
-    return returned(coefficients, places, shift, weights, point), generate
+    return types.float64(coefficients, places, shift, weights, point), generate
 
 
 @intrinsic
@@ -87,31 +87,33 @@ def _sampled_value_and_gradient(
     typing: Any, coefficients: Any, places: Any, shift: Any, weights: Any, point: Any
 ) -> Any:
     _check(coefficients, weights, point)
-    slopes = types.UniTuple(types.float64, len(point))
-    returned = types.Tuple((types.float64, slopes))
+    gradient = types.UniTuple(types.float64, len(point))
+    returned = types.Tuple((types.float64, gradient))
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        value, *gradient = _sampled(context, builder, signature.args, arguments, slopes=True)
-        return context.make_tuple(builder, returned, [value, context.make_tuple(builder, slopes, gradient)])
+        found = value_and_gradient(*_stage(context, builder, signature.args, arguments, slopes=True))
+        slopes = context.make_tuple(builder, gradient, found[1:])
+        return context.make_tuple(builder, returned, [found[0], slopes])
 
     return returned(coefficients, places, shift, weights, point), generate
 
 
 def _check(coefficients: Any, weights: Any, point: Any) -> None:
     """The instructions read memory as these types lay it out; any other would give wrong numbers."""
-    grids = [types.Array(kind, coefficients.ndim, "C") for kind in (types.float64, types.float32)]
-    if coefficients not in (*grids, *(grid.copy(readonly=True) for grid in grids)):
+    if coefficients.layout != "C" or coefficients.dtype not in (types.float64, types.float32):
         raise NumbaTypeError(f"coefficients are {coefficients}, accepted: C order, float64 or float32")
+    if weights.layout != "C" or weights.dtype != coefficients.dtype:
+        raise NumbaTypeError(f"weights are {weights}, accepted: stencil_of with the coefficients' type")
     if point != types.UniTuple(types.float64, coefficients.ndim):
         raise NumbaTypeError(f"point is {point}, accepted: a tuple of {coefficients.ndim} float64")
-    if weights.layout != "C" or weights.dtype != types.float64:
-        raise NumbaTypeError(f"weights are {weights}, accepted: those of stencil_of")
 
 
-def _sampled(context: Any, builder: Any, taken: Any, arguments: Any, *, slopes: bool) -> list[Any]:
-    """The instructions of both intrinsics: the value, and the gradient if asked for."""
+def _stage(
+    context: Any, builder: Any, taken: Any, arguments: Any, *, slopes: bool
+) -> tuple[Lanes, list[Axis], Any]:
+    """What both intrinsics begin with: the filter's lanes, the axes and the start of the grid."""
     coefficients, places, _, weights, _ = taken
-    lanes = Lanes(builder, len(places))
+    lanes = Lanes(builder, len(places), DOUBLE if coefficients.dtype == types.float64 else FLOAT)
     grid = context.make_array(coefficients)(context, builder, arguments[0])
     tables = context.make_array(weights)(context, builder, arguments[3]).data
     counts = cgutils.unpack_tuple(builder, grid.shape, coefficients.ndim)
@@ -121,4 +123,4 @@ def _sampled(context: Any, builder: Any, taken: Any, arguments: Any, *, slopes: 
         place = builder.fadd(builder.extract_value(arguments[4], axis), arguments[2])
         axes.insert(0, Axis(lanes, counts[axis], stride, place, tables, slopes))
         stride = builder.mul(stride, counts[axis])
-    return sums(lanes, axes, grid.data, DOUBLE if coefficients.dtype == types.float64 else FLOAT)
+    return lanes, axes, grid.data

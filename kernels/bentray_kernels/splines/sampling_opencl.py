@@ -36,10 +36,9 @@ class OpenCLSpline:
     def __init__(self, spline: Spline, session: Session) -> None:
         self.spline = spline
         self.session = session
-        real = spline.coefficients.dtype
         with session.lock:
             self._coefficients = session.upload(spline.coefficients)
-            self._tables = session.upload(spline.stencil.weights.astype(real))
+            self._tables = session.upload(spline.stencil.weights)
 
     def value(self, points: ArrayLike) -> Floats:
         """As ``Spline.value``."""
@@ -65,7 +64,8 @@ class OpenCLSpline:
         real = spline.coefficients.dtype
         dims, taps = len(spline.shape), spline.filter.taps
         name = "float" if real == np.float32 else "double"
-        kernel = session.kernel("splines", "sample", f"REAL={name}", f"DIMS={dims}", f"TAPS={taps}")
+        sizes = f"DIMS={dims}", f"TAPS={taps}", f"WIDTH={spline.stencil.weights.shape[-1]}"
+        kernel = session.kernel("splines", "sample", f"REAL={name}", *sizes)
         values, gradients = np.empty(len(places), real), np.empty(places.shape, real)
         nodes = (1,) * (3 - dims) + spline.shape
         border = spline.coefficients.shape[0] - spline.shape[0]

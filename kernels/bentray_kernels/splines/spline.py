@@ -28,7 +28,7 @@ class Spline:
         prefilter: whether the spline passes through the nodes; else the nodes are its coefficients, which
             blurs it (dissertation, 3.3.2).
         smoothing: λ as in ``prefilter.prefilter``, for prefiltered splines.
-        dtype: of the coefficients, float64 or float32; the arithmetic is in float64.
+        dtype: of the coefficients and of the sums, float64 or float32; places stay in float64.
 
     Attributes:
         shape: of the volume.
@@ -90,7 +90,7 @@ class Spline:
             raise InvalidInput("smoothing", smoothing, "0 for filters that are not prefiltered")
         self.shape = nodes.shape
         self.filter = read
-        self.stencil: Stencil = stencil_of(read)
+        self.stencil: Stencil = stencil_of(read, dtype)
         self.pad = border_of(read)[0]
         bordered = np.pad(nodes.astype(dtype), border_of(read), mode="reflect")
         self.coefficients: Any = np.ascontiguousarray(bordered)

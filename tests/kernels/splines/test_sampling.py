@@ -37,9 +37,10 @@ def test_equals_the_sum_over_the_taps(name, dtype, place):
         for rows in ((w[0], w[1], w[2]), (d[0], w[1], w[2]), (w[0], d[1], w[2]), (w[0], w[1], d[2]))
     ]
     value, same, *slopes = read(spline.coefficients, spline.stencil, *point)
-    assert value == pytest.approx(sums[0], abs=1e-12)
-    assert same == pytest.approx(sums[0], abs=1e-12)
-    assert slopes == pytest.approx(sums[1:], abs=1e-11)
+    allowed = 1e-12 if dtype == np.float64 else 1e-4
+    assert value == pytest.approx(sums[0], abs=allowed)
+    assert same == pytest.approx(sums[0], abs=allowed)
+    assert slopes == pytest.approx(sums[1:], abs=10 * allowed)
 
 
 @pytest.mark.parametrize("name", FILTERS)

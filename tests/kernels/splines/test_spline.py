@@ -17,7 +17,7 @@ class TestDouble(EveryFilter):
 
 
 class TestSingle(EveryFilter):
-    tolerance = 5e-7
+    tolerance = 2e-6
 
     def made(self, volume, name, **how):
         return Spline.of(volume, name, dtype=np.float32, **how)

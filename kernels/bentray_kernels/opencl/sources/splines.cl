@@ -1,6 +1,7 @@
 // Value and gradient of a filtered grid at many points, one work-item a point; the last group has items left over.
 //
 // REAL: float or double, of the coefficients and the sums. TAPS: nodes that a point reads along one axis.
+// WIDTH: numbers of a row of the tables (Stencil.weights).
 // DIMS: 1 to 3; axes that the grid lacks come first, with one node that has weight 1 and slope 0.
 // Scalars only: not every device computes vectors of doubles right.
 
@@ -31,10 +32,10 @@ int weigh(double place, double shift, int cells, constant const REAL *tables, RE
     const int cell = (int)fmin(fmax(shifted, 0.0), (double)cells);
     const REAL t = (REAL)(shifted - cell);
     for (int tap = 0; tap < TAPS; ++tap) {
-        REAL weight = tables[(TAPS - 1) * TAPS + tap], slope = 0;
-        for (int power = TAPS - 2; power >= 0; --power) {
-            weight = weight * t + tables[power * TAPS + tap];
-            slope = slope * t + tables[(TAPS + power) * TAPS + tap];
+        REAL weight = 0, slope = 0;
+        for (int power = TAPS - 1; power >= 0; --power) {
+            weight = weight * t + tables[2 * power * WIDTH + tap];
+            slope = slope * t + tables[(2 * power + 1) * WIDTH + tap];
         }
         weights[tap] = weight;
         slopes[tap] = slope;
