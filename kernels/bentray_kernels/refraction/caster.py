@@ -198,7 +198,7 @@ def _follow(
             gradient = (0.0, 0.0, 0.0)
         else:
             gradient = gradient_at(medium, ray, s)
-            normal, behind = unit_normal(gradient), layer + side
+            normal, behind = unit_normal(gradient, direction), layer + side
         ratio = medium.indices[layer] / medium.indices[behind]
         direction, share, passed = refracted(direction, normal, ratio)
         weight, crossed, fate = weight * share, crossed + 1, REFRACTED
@@ -272,11 +272,13 @@ def gradient_at(medium: Medium, ray: Ray, s: float) -> Vector:
 
 
 @kernel(inline="always")
-def unit_normal(slope: Vector) -> Vector:
-    length = math.sqrt(slope[0] * slope[0] + slope[1] * slope[1] + slope[2] * slope[2])
-    # A surface without a gradient, at a singular point, has no normal: the ray goes straight on.
-    over = 1.0 / length if length > 0.0 else 0.0
-    return slope[0] * over, slope[1] * over, slope[2] * over
+def unit_normal(gradient: Vector, direction: Vector) -> Vector:
+    """Along the gradient; a singular point has none, and there a ray passes as if it stood on the surface."""
+    square = gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2]
+    if square == 0.0:
+        return direction
+    over = 1.0 / math.sqrt(square)
+    return gradient[0] * over, gradient[1] * over, gradient[2] * over
 
 
 @kernel(inline="always")

@@ -101,9 +101,9 @@ class Scene:
             raise InvalidInput("spacing_m", spacing.tolist(), "finite distances > 0 m")
         cells = cell_ranges(spline, layers.isos, bound)
         octree = octree_of(cells, layers.isos)
-        low, high = float(cells.low.min()), float(cells.high.max())
-        for iso in layers.isos:
-            if not low < iso < high:
+        for bit, iso in enumerate(layers.isos):
+            if not octree.masks[-1] >> bit & 1:
+                low, high = _range_at_nodes(spline)
                 raise InvalidInput("iso", iso, f"between {low:.6g} and {high:.6g}, the volume's range")
         origin = np.asarray(centre_m, dtype=np.float64) - 0.5 * spacing * (np.array(spline.shape) - 1.0)
         faces = [cells.high[edge] for axis in range(3) for edge in _ends(axis)]
@@ -140,3 +140,14 @@ def _ends(axis: int) -> tuple[tuple[slice | int, ...], tuple[slice | int, ...]]:
     """What selects the first and the last layer of cells across an axis."""
     before = (slice(None),) * axis
     return (*before, 0), (*before, -1)
+
+
+def _range_at_nodes(spline: Spline) -> tuple[float, float]:
+    """Least and greatest value at the nodes; plane by plane, since volumes may be large."""
+    x, y, z = spline.shape
+    plane = np.stack(np.meshgrid(np.arange(y), np.arange(z), indexing="ij"), axis=-1).reshape(-1, 2)
+    ends = []
+    for i in range(x):
+        values = spline.value(np.column_stack([np.full(len(plane), i), plane]))
+        ends.append((values.min(), values.max()))
+    return float(np.min(ends)), float(np.max(ends))

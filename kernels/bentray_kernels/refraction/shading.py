@@ -114,7 +114,7 @@ def _shade(
             if side == 0:
                 continue
             gradient = gradient_at(medium, ray, s)
-            normal = unit_normal((-gradient[0], -gradient[1], -gradient[2]))
+            normal = unit_normal((-gradient[0], -gradient[1], -gradient[2]), direction)
             distances[i, j] = s
             normals[i, j, 0], normals[i, j, 1], normals[i, j, 2] = normal
             _paint(image, i, j, light, normal, direction)

@@ -1,0 +1,169 @@
+"""Crossings along rays: the first one is found, for every filter and by every structure, however grazing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.compiled import kernel
+from bentray_kernels.isosurface import BOUNDS, cell_ranges
+from bentray_kernels.isosurface.crossing import ANALYTIC, BRENT, CERTAIN, Search, leave_interval
+from bentray_kernels.isosurface.octree import Octree, octree_of
+from bentray_kernels.isosurface.roots import Field, ray_of
+from bentray_kernels.splines import Spline
+
+SHAPE = (6, 5, 7)
+FILTERS = ("trilinear", "catmull-rom", "bspline2", "bspline3", "bspline6")
+
+
+@kernel
+def leave(
+    field: Field,
+    octree: Octree,
+    search: Search,
+    origin: tuple[float, float, float],
+    along: tuple[float, float, float],
+    span: tuple[float, float],
+    interval: tuple[float, float],
+    slope: float,
+) -> tuple[float, int]:
+    ray = ray_of(origin, along)
+    return leave_interval(field, octree, search, ray, span[0], span[1], interval[0], interval[1], 255, slope)
+
+
+class Case:
+    """A random volume, a ray through its grid from face to face, and the interval of values it starts in."""
+
+    def __init__(self, seed: int, name: str, bound: str = "bernstein") -> None:
+        random = np.random.default_rng(seed)
+        self.spline = Spline.of(random.normal(0.0, 1.0, SHAPE), name)
+        self.isos = np.sort(random.normal(0.0, 0.5, 2))
+        self.octree = octree_of(cell_ranges(self.spline, self.isos, bound), self.isos)
+        ends = random.random((2, 3)) * (np.array(SHAPE) - 1.0)
+        for end in ends:
+            axis = random.integers(3)
+            end[axis] = random.integers(2) * (SHAPE[axis] - 1.0)
+        if random.random() < 0.2:
+            ends[1, 1:] = ends[0, 1:]
+        self.origin, self.along = ends[0], ends[1] - ends[0]
+
+    def field(self, s: np.ndarray) -> np.ndarray:
+        # Kept on the grid: beyond it the class mirrors, where the ray does not go.
+        places = self.origin + np.asarray(s)[:, None] * self.along
+        return self.spline.value(np.clip(places, 0.0, np.array(SHAPE) - 1.0))
+
+    def interval(self, value: float) -> tuple[float, float]:
+        levels = [-np.inf, *self.isos, np.inf]
+        layer = int(np.searchsorted(self.isos, value))
+        return float(levels[layer]), float(levels[layer + 1])
+
+    def leave(self, search: Search, start: float, interval: tuple[float, float], slope: float = 0.0):
+        field = Field(self.spline.coefficients, self.spline.stencil)
+        return leave(
+            field, self.octree, search, tuple(self.origin), tuple(self.along), (start, 1.0), interval, slope
+        )
+
+
+def searches(case: Case, name: str) -> list[Search]:
+    top = len(case.octree.levels) - 1
+    kinds = [Search(CERTAIN, top, 0.0), Search(CERTAIN, 0, 0.0), Search(CERTAIN, 1, 0.0)]
+    return [*kinds, Search(ANALYTIC, top, 0.0)] if name == "trilinear" else kinds
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_no_crossing_is_missed_and_none_invented(name):
+    dense = np.linspace(0.0, 1.0, 4001)
+
+    @given(seed=st.integers(0, 2**32 - 1), bound=st.sampled_from(BOUNDS[:4]))
+    @settings(max_examples=150, deadline=None)
+    def holds(seed, bound):
+        case = Case(seed, name, bound)
+        values = case.field(dense)
+        below, above = case.interval(values[0])
+        outside = np.flatnonzero((values < below - 1e-9) | (values > above + 1e-9))
+        latest = dense[outside[0]] if len(outside) else np.inf
+        for search in searches(case, name):
+            s, side = case.leave(search, 0.0, (below, above))
+            assert (s if side else np.inf) <= latest
+            if side:
+                target = above if side > 0 else below
+                np.testing.assert_allclose(case.field([s]), target, atol=1e-7)
+                before = values[dense < s - 1e-6]
+                assert (before >= below - 1e-7).all()
+                assert (before <= above + 1e-7).all()
+
+    holds()
+
+
+@pytest.mark.parametrize("name", ["trilinear", "catmull-rom", "bspline3"])
+def test_from_surface_to_surface_all_crossings_are_met(name):
+    dense = np.linspace(0.0, 1.0, 20001)
+
+    @given(seed=st.integers(0, 2**32 - 1))
+    @settings(max_examples=60, deadline=None)
+    def holds(seed):
+        case = Case(seed, name)
+        values = case.field(dense)
+        expected = sum(int((np.diff(np.sign(values - iso)) != 0).sum()) for iso in case.isos)
+        levels = [-np.inf, *case.isos, np.inf]
+        layer = int(np.searchsorted(case.isos, values[0]))
+        s, slope, met = 0.0, 0.0, 0
+        while True:
+            s, side = case.leave(
+                Search(CERTAIN, 3, 0.0), s, (float(levels[layer]), float(levels[layer + 1])), slope
+            )
+            if side == 0:
+                break
+            met, layer = met + 1, layer + side
+            place = np.clip(case.origin + s * case.along, 0.0, np.array(SHAPE) - 1.0)
+            slope = float(case.spline.gradient(place[None])[0] @ case.along)
+        # Pairs of crossings between two of the dense samples count in one and not in the other.
+        assert met >= expected
+        assert (met - expected) % 2 == 0
+
+    holds()
+
+
+def grazing(peak: float) -> Case:
+    """A ray along the crest of 10 − (x − 9.37)²/8, and an iso-value just below it."""
+    case = Case(0, "bspline3")
+    # The cubic B-spline makes x² + 1/3 of the coefficients k².
+    coefficients = 10.0 - 0.125 * ((np.arange(20.0) - 9.37) ** 2 - 1.0 / 3.0)
+    case.spline = Spline(coefficients[:, None, None] + np.zeros((1, 4, 4)), prefilter=False)
+    case.isos = np.array([10.0 - peak])
+    case.octree = octree_of(cell_ranges(case.spline, case.isos, "bernstein"), case.isos)
+    case.origin, case.along = np.array([3.0, 1.2, 1.7]), np.array([12.0, 0.0, 0.0])
+    return case
+
+
+@pytest.mark.parametrize("peak", [1e-2, 1e-5, 1e-8])
+def test_a_grazing_ray_crosses_twice_within_a_cell(peak):
+    case = grazing(peak)
+    below, above = -np.inf, float(case.isos[0])
+    s, side = case.leave(Search(CERTAIN, 5, 0.0), 0.0, (below, above))
+    assert side == 1
+    assert 3.0 + 12.0 * s == pytest.approx(9.37 - np.sqrt(8.0 * peak), abs=1e-7)
+    slope = float(case.spline.gradient(np.array([[3.0 + 12.0 * s, 1.2, 1.7]]))[0, 0] * 12.0)
+    out, back = case.leave(Search(CERTAIN, 5, 0.0), s, (above, np.inf), slope)
+    assert back == -1
+    assert 3.0 + 12.0 * out == pytest.approx(9.37 + np.sqrt(8.0 * peak), abs=1e-7)
+    # What looks at the ends of the cell only sees neither, nor do steps.
+    assert case.leave(Search(BRENT, 5, 0.0), 0.0, (below, above))[1] == 0
+    if peak < 1e-4:
+        assert case.leave(Search(BRENT, 0, 0.1), 0.0, (below, above))[1] == 0
+
+
+def test_steps_find_what_lies_between_two_of_them():
+    agreed = 0
+    for seed in range(20):
+        case = Case(seed, "bspline3")
+        interval = case.interval(float(case.field([0.0])[0]))
+        exact = case.leave(Search(CERTAIN, 3, 0.0), 0.0, interval)
+        stepped = case.leave(Search(BRENT, 0, 0.001), 0.0, interval)
+        assert exact[1] == stepped[1]
+        if exact[1]:
+            assert stepped[0] == pytest.approx(exact[0], abs=1e-9)
+            agreed += 1
+    assert agreed >= 8

@@ -1,0 +1,118 @@
+"""Pictures: maps in metres, supersampling nearer to the truth, threads that change nothing, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.refraction import (
+    Layers,
+    Picture,
+    RenderSettings,
+    Scene,
+    backdrop_of,
+    checkerboard,
+    orthographic,
+    render,
+)
+from bentray_kernels.refraction.caster import LOST, REFRACTED
+from bentray_kernels.splines import Spline
+
+from .solids import squared, through_ball
+
+RADIUS = 0.3
+CAMERA = orthographic((0.0, 0.0, -2.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0), 1.0)
+BACKDROP = backdrop_of([checkerboard((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 10)])
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    layers = Layers((-(RADIUS**2),), (1.0, 1.5))
+    return Scene.build(Spline(-squared(20), prefilter=False), layers, 1.0 / 19)
+
+
+def picture(scene: Scene, **options) -> Picture:
+    return render(scene, CAMERA, BACKDROP, RenderSettings(**({"rows": 48, "columns": 48} | options)))
+
+
+def test_the_map_of_positions_is_in_metres(scene):
+    made = picture(scene, rows=24, columns=32)
+    x, y = (np.arange(32) + 0.5) / 32 - 0.5, (np.arange(24) + 0.5) / 24 - 0.5
+    u, v = np.meshgrid(x, y)
+    radius = np.hypot(u, v)
+    outside = radius > RADIUS
+    np.testing.assert_allclose(made.position_m[outside], np.stack([u, v], -1)[outside], atol=1e-12)
+    inside = radius < 0.98 * RADIUS
+    exact = through_ball(radius[inside], RADIUS, 1.5, 1.0)[0] / radius[inside]
+    np.testing.assert_allclose(
+        made.position_m[inside], (np.stack([u, v], -1))[inside] * exact[:, None], atol=1e-6
+    )
+    assert ((made.fate == REFRACTED) == ~outside).all()
+    np.testing.assert_array_equal(made.crossed[inside], 2)
+    assert made.image.shape == (24, 32, 3)
+    assert made.image.dtype == np.uint8
+
+
+def test_supersampling_comes_nearer_to_the_picture_of_64_samples(scene):
+    truth = picture(scene, supersampling="real", degree=8, seed=1).image.astype(float)
+
+    def psnr(**options) -> float:
+        error = picture(scene, **options).image - truth
+        return float(10.0 * np.log10(255.0**2 / (error**2).mean()))
+
+    none, post = psnr(supersampling="none"), psnr(supersampling="post")
+    assert post > none + 3.0
+    assert psnr(supersampling="post", degree=3) > post
+    assert psnr(supersampling="real", degree=3) > post
+
+
+def test_threads_and_tiles_change_nothing(scene):
+    one, two = picture(scene), picture(scene, threads=2)
+    for name in ("image", "position_m", "plane", "fate", "crossed", "weight"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+
+
+def test_jitter_is_drawn_from_its_seed(scene):
+    options = {"supersampling": "real", "degree": 2}
+    same = [picture(scene, **options, seed=4).image for _ in range(2)]
+    np.testing.assert_array_equal(*same)
+    assert (picture(scene, **options, seed=5).image != same[0]).any()
+    even = picture(scene, **options, seed=None)
+    assert even.position_m.shape == (96, 96, 2)
+    np.testing.assert_allclose(even.position_m[0, :, 0], (np.arange(96) + 0.5) / 96 - 0.5, atol=1e-12)
+
+
+def test_fresnels_weights_darken_the_rim(scene):
+    bright, dim = picture(scene, supersampling="none"), picture(scene, supersampling="none", fresnel=True)
+    np.testing.assert_array_equal(dim.image[0, 0], bright.image[0, 0])
+    middle = dim.image[24, 24].astype(float) / bright.image[24, 24]
+    np.testing.assert_allclose(middle, 0.96**2, atol=0.01)
+    assert dim.weight.min() < 0.7
+
+
+def test_lost_rays_show_nothing(scene):
+    made = picture(scene, depth=1)
+    lost = made.fate == LOST
+    assert lost.sum() > 500
+    assert (made.plane[lost] == -1).all()
+    assert np.isnan(made.position_m[lost]).all()
+    inner = lost & np.roll(lost, 1, 0) & np.roll(lost, -1, 0)
+    assert (made.image[inner] == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "field"),
+    [
+        ({"rows": 0}, "rows"),
+        ({"columns": -1}, "columns"),
+        ({"depth": 0}, "depth"),
+        ({"degree": 0}, "degree"),
+        ({"threads": 0}, "threads"),
+        ({"supersampling": "adaptive"}, "supersampling"),
+    ],
+)
+def test_settings_that_cannot_be_are_refused(wrong, field):
+    with pytest.raises(InvalidInput) as refusal:
+        RenderSettings(**wrong)
+    assert refusal.value.field == field

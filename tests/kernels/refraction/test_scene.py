@@ -1,0 +1,90 @@
+"""Scenes: what is refused, by name, and what the octree's box holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.refraction import Layers, Scene
+from bentray_kernels.splines import Spline
+
+from .solids import distance
+
+VOLUME = 0.3 - distance(16)
+
+
+@pytest.mark.parametrize(
+    ("isos", "indices", "field"),
+    [
+        ((), (1.0,), "iso"),
+        ((1.0, 1.0), (1.0, 1.2, 1.3), "iso"),
+        ((2.0, 1.0), (1.0, 1.2, 1.3), "iso"),
+        ((float("nan"),), (1.0, 1.2), "iso"),
+        ((1.0,), (1.0,), "indices"),
+        ((1.0,), (1.0, 0.0), "indices"),
+        ((1.0,), (1.0, float("inf")), "indices"),
+    ],
+)
+def test_what_are_no_layers_is_refused(isos, indices, field):
+    with pytest.raises(InvalidInput) as refusal:
+        Layers(isos, indices)
+    assert refusal.value.field == field
+
+
+@pytest.mark.parametrize("iso", [-5.0, 0.31, 400.0])
+def test_an_iso_value_that_the_volume_does_not_have_is_refused_with_the_range(iso):
+    with pytest.raises(InvalidInput, match=rf"iso: found {iso}; accepted: between -0.5\d+ and 0.2\d+"):
+        Scene.build(Spline(VOLUME), Layers((iso,), (1.0, 1.5)))
+
+
+def test_an_empty_volume_has_no_surface():
+    with pytest.raises(InvalidInput, match=r"iso: found 0\.5; accepted: between 0 and 0"):
+        Scene.build(Spline(np.zeros((8, 8, 8))), Layers((0.5,), (1.0, 1.5)))
+
+
+def test_voxels_that_are_no_numbers_are_refused():
+    broken = VOLUME.copy()
+    broken[3, 4, 5] = np.nan
+    with pytest.raises(InvalidInput, match="volume: found nan"):
+        Scene.build(Spline(broken), Layers((0.0,), (1.0, 1.5)))
+
+
+@pytest.mark.parametrize("spacing", [0.0, -1.0, float("nan"), (1.0, 1.0, 0.0)])
+def test_impossible_spacings_are_refused(spacing):
+    with pytest.raises(InvalidInput, match="spacing_m"):
+        Scene.build(Spline(VOLUME), Layers((0.0,), (1.0, 1.5)), spacing)
+
+
+def test_flat_volumes_are_refused():
+    with pytest.raises(InvalidInput, match="volume: found 2 dimensions"):
+        Scene.build(Spline(VOLUME[0]), Layers((0.0,), (1.0, 1.5)))
+
+
+def test_searches_that_do_not_fit_are_refused():
+    scene = Scene.build(Spline(VOLUME), Layers((0.0,), (1.0, 1.5)))
+    for wrong, field in (
+        ({"structure": "grid"}, "structure"),
+        ({"roots": "newton"}, "roots"),
+        ({"roots": "analytic"}, "roots"),
+        ({"step": 0.0}, "step"),
+    ):
+        with pytest.raises(InvalidInput) as refusal:
+            scene.search(**wrong)
+        assert refusal.value.field == field
+
+
+def test_the_box_holds_the_surface_and_little_more():
+    scene = Scene.build(Spline(VOLUME), Layers((0.0,), (1.0, 1.5)), 1.0 / 15)
+    assert not scene.open
+    # The sphere of radius 4.5 spacings about node 7.5.
+    assert (scene.box[0] <= 3.0).all()
+    assert (scene.box[0] >= 2.0).all()
+    assert (scene.box[1] >= 12.0).all()
+    assert (scene.box[1] <= 13.0).all()
+
+
+def test_a_volume_that_is_cut_keeps_its_whole_grid():
+    scene = Scene.build(Spline(-VOLUME), Layers((0.0,), (1.0, 1.5)))
+    assert scene.open
+    np.testing.assert_array_equal(scene.box, scene.grid)

@@ -1,0 +1,51 @@
+"""The shaded surface: distances and normals of a ball, and Lambert's and Phong's shares."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.refraction import Layers, Light, Scene, orthographic, shade
+from bentray_kernels.splines import Spline
+
+from .solids import squared
+
+RADIUS = 0.3
+CAMERA = orthographic((0.0, 0.0, -2.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0), 1.0)
+
+
+def ball(sign: float) -> Scene:
+    layers = Layers((sign * -(RADIUS**2),), (1.0, 1.5))
+    return Scene.build(Spline(-sign * squared(24), prefilter=False), layers, 1.0 / 23)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_ball_is_seen_where_it_is(sign):
+    shaded = shade(ball(sign), CAMERA, Light((0.0, 0.0, -1.0), 0.0, 1.0, 0.0, colour=(200, 100, 50)), 41, 41)
+    place = (np.arange(41) + 0.5) / 41 - 0.5
+    radius = np.hypot(place[:, None], place)
+    seen = radius < RADIUS
+    np.testing.assert_array_equal(np.isfinite(shaded.distance_m), seen)
+    depth = np.sqrt(np.maximum(RADIUS**2 - radius**2, 0.0))
+    np.testing.assert_allclose(shaded.distance_m[seen], (2.0 - depth)[seen], atol=1e-8)
+    cosine = (depth / RADIUS)[seen]
+    np.testing.assert_allclose(-sign * shaded.normal[seen][:, 2], cosine, atol=1e-6)
+    np.testing.assert_allclose(shaded.image[seen], cosine[:, None] * [200, 100, 50], atol=0.51)
+    assert (shaded.image[~seen] == 0).all()
+
+
+def test_the_highlight_lies_where_the_light_is_mirrored():
+    towards = (np.sin(0.8), 0.0, -np.cos(0.8))
+    light = Light(towards, 0.0, 0.0, 1.0, 200.0, background=(1, 2, 3))
+    shaded = shade(ball(1.0), CAMERA, light, 81, 81)
+    row, column = np.unravel_index(shaded.image[..., 0].argmax(), (81, 81))
+    assert row == 40
+    # Half way between the camera and the light.
+    assert (column + 0.5) / 81 - 0.5 == pytest.approx(RADIUS * np.sin(0.4), abs=1.0 / 81)
+    assert shaded.image[0, 0].tolist() == [1, 2, 3]
+
+
+def test_no_pixels_are_refused():
+    with pytest.raises(InvalidInput, match="rows, columns"):
+        shade(ball(1.0), CAMERA, Light((0.0, 0.0, -1.0)), 0, 4)

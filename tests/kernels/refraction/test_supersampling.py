@@ -1,0 +1,107 @@
+"""Supersampling after refraction: the low-pass of known patterns, and nothing across a border."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bentray_kernels.refraction import backdrop_of, checkerboard
+from bentray_kernels.refraction.backdrop import Backdrop, Plane
+from bentray_kernels.refraction.supersampling import averaged, point_colours, post_refraction_colours
+
+BOARD = backdrop_of([checkerboard((0, 0, 1), (8, 0, 0), (0, 8, 0), 8, ((200,) * 3, (0,) * 3))])
+
+
+def regular(n: int, across: float, shift: float = 0.0) -> tuple[np.ndarray, ...]:
+    """Planes, places and interfaces of n × n pixels that look straight at the board."""
+    place = (np.arange(n) + 0.5) / n * across + shift
+    places = np.stack(np.meshgrid(place, place), axis=-1)
+    return np.zeros((n, n), dtype=np.int8), places, np.zeros((n, n), dtype=np.int16)
+
+
+def post(backdrop: Backdrop, planes, places, crossed, degree=1, weights=None) -> np.ndarray:
+    image = np.empty((*planes.shape, 3), dtype=np.uint8)
+    light = np.ones(planes.shape) if weights is None else weights
+    post_refraction_colours(backdrop, planes, places, crossed, light, degree, image)
+    return image
+
+
+def points(backdrop: Backdrop, planes, places, weights=None) -> np.ndarray:
+    image = np.empty((*planes.shape, 3), dtype=np.uint8)
+    point_colours(backdrop, planes, places, np.ones(planes.shape) if weights is None else weights, image)
+    return image
+
+
+def test_the_binomial_weights_at_an_edge():
+    planes, places, crossed = regular(4, 4 / 64)
+    places[..., 1] = 1.0 / 32
+    # The edge of a square lies between columns 1 and 2, a quarter of a pixel before column 2.
+    places[..., 0] = np.array([-1.25, -0.25 - 0.5, 0.25, 1.25]) / 64 + 0.0
+    image = post(BOARD, planes, places, crossed)
+    plain = points(BOARD, planes, places)
+    assert plain[1, 1, 0] == 0
+    assert plain[1, 2, 0] == 200
+    # To the left of column 2, half way to column 1, lies the other colour.
+    assert image[1, 2, 0] == pytest.approx(200 * 0.75, abs=1)
+    assert image[1, 1, 0] == 0
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4])
+def test_pixels_within_one_square_stay_as_they_are(degree):
+    planes, places, crossed = regular(32, 1.0)
+    plain, smooth = points(BOARD, planes, places), post(BOARD, planes, places, crossed, degree)
+    inner = (np.abs(places * 8 - np.round(places * 8)) > 0.3).all(axis=-1)
+    np.testing.assert_array_equal(smooth[inner], plain[inner])
+
+
+def test_a_higher_degree_comes_closer_to_the_mean_over_the_pixel():
+    # Pixels as large as squares: the mean over each is known from many samples.
+    planes, places, crossed = regular(40, 0.9 * 5.0, shift=0.013)
+    fine = regular(40 * 32, 0.9 * 5.0, shift=0.013)
+    truth = points(BOARD, *fine[:2])[..., 0].reshape(40, 32, 40, 32).mean(axis=(1, 3))
+    errors = [np.abs(points(BOARD, planes, places)[1:-1, 1:-1, 0] - truth[1:-1, 1:-1]).mean()]
+    for degree in (1, 2, 4):
+        image = post(BOARD, planes, places, crossed, degree)[1:-1, 1:-1, 0]
+        errors.append(np.abs(image - truth[1:-1, 1:-1]).mean())
+    assert errors[0] > errors[1] > errors[2] > errors[3]
+
+
+def test_nothing_lies_between_rays_of_different_fates():
+    planes, places, crossed = regular(8, 1.0)
+    crossed[:, 4:] = 2
+    places[:, 4:] += 0.37
+    planes[0] = -1
+    places[0] = np.nan
+    image, plain = post(BOARD, planes, places, crossed), points(BOARD, planes, places)
+    parts = [
+        post(BOARD, p, q, c)
+        for p, q, c in (
+            (planes[1:, :4].copy(), places[1:, :4].copy(), crossed[1:, :4].copy()),
+            (planes[1:, 4:].copy(), places[1:, 4:].copy(), crossed[1:, 4:].copy()),
+        )
+    ]
+    inner = np.s_[2:-1]
+    np.testing.assert_array_equal(image[1:, :3][inner], parts[0][:, :3][inner])
+    np.testing.assert_array_equal(image[1:, 5:][inner], parts[1][:, 1:][inner])
+    np.testing.assert_array_equal(image[0], plain[0])
+
+
+def test_smooth_pictures_are_filtered_as_well_and_light_is_weakened():
+    picture = np.zeros((8, 8, 3), dtype=np.uint8)
+    picture[:, ::2] = 240
+    backdrop = backdrop_of([Plane((0, 0, 1), (1, 0, 0), (0, 1, 0), picture, 4.0)])
+    planes, places, crossed = regular(32, 1.0, -0.5)
+    weights = np.full((32, 32), 0.5)
+    plain, image = (
+        points(backdrop, planes, places, weights),
+        post(backdrop, planes, places, crossed, 1, weights),
+    )
+    assert plain.max() == 120
+    assert image[1:-1, 1:-1].std() < 0.8 * plain[1:-1, 1:-1].std()
+
+
+def test_real_samples_are_averaged():
+    image = np.arange(4 * 6 * 3, dtype=np.uint8).reshape(4, 6, 3)
+    means = image.reshape(2, 2, 3, 2, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(averaged(image, 2), means, atol=0.5)
+    np.testing.assert_array_equal(averaged(image, 1), image)
