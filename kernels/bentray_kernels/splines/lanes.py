@@ -50,12 +50,6 @@ class Lanes:
         numbers.align = self._size()
         return numbers
 
-    def everywhere(self, number: Any, count: int) -> Any:
-        """A number in so many lanes."""
-        vector = ir.VectorType(self.real, 1)
-        first = self.builder.insert_element(ir.Constant(vector, ir.Undefined), number, SHORT(0))
-        return self.pick(first, [0] * count)
-
     def pick(self, vector: Any, places: Sequence[int], other: Any | None = None) -> Any:
         """These lanes of a vector, or of two that follow one another."""
         wanted = ir.Constant(ir.VectorType(SHORT, len(places)), [SHORT(k) for k in places])
@@ -97,36 +91,77 @@ class Lanes:
         return cgutils.get_or_insert_function(self.builder.module, ir.FunctionType(returned, taken), name)
 
 
-class Axis:
-    """One axis of a grid, and where the point lies along it.
+def point_vector(builder: Any, numbers: Sequence[Any]) -> Any:
+    """One double an axis, in a vector of 1, 2 or 4 lanes; a lane left over repeats the last one."""
+    width = width_of(len(numbers))
+    filled = [*numbers, *[numbers[-1]] * (width - len(numbers))]
+    vector = ir.Constant(ir.VectorType(DOUBLE, width), ir.Undefined)
+    for k, number in enumerate(filled):
+        vector = builder.insert_element(vector, number, SHORT(k))
+    return vector
+
+
+def within(builder: Any, point: Sequence[Any], last: Sequence[Any]) -> Any:
+    """Whether 0 ≤ place ≤ last along every axis."""
+    places, ends = point_vector(builder, point), point_vector(builder, last)
+    starts = ir.Constant(places.type, [DOUBLE(0.0)] * places.type.count)
+    inside = builder.and_(
+        builder.fcmp_ordered(">=", places, starts), builder.fcmp_ordered("<=", places, ends)
+    )
+    bits = builder.bitcast(inside, ir.IntType(places.type.count))
+    return builder.icmp_unsigned("==", bits, ir.Constant(bits.type, -1))
+
+
+def cells(lanes: Lanes, point: Sequence[Any], shift: Any, counts: Sequence[Any]) -> tuple[list[Any], Any]:
+    """The filter's cell of a point along every axis, and how far into it the point lies.
 
     Args:
         lanes: of the filter.
-        count: nodes of the axis, border included.
+        point: nodes, doubles.
+        shift: of the filter, a double.
+        counts: nodes of each axis, border included.
+
+    Returns:
+        The cells, and a vector of the rests t.
+    """
+    builder = lanes.builder
+    places = point_vector(builder, point)
+    places = builder.fadd(places, point_vector(builder, [shift] * len(point)))
+    taps = INDEX(lanes.taps)
+    last = [builder.sitofp(builder.sub(count, taps), DOUBLE) for count in counts]
+    ends = point_vector(builder, last)
+    starts = ir.Constant(places.type, [DOUBLE(0.0)] * places.type.count)
+    # Both comparisons are false for NaN, which so reads a node of the grid.
+    inside = builder.select(builder.fcmp_ordered(">", places, starts), places, starts)
+    inside = builder.select(builder.fcmp_ordered("<", inside, ends), inside, ends)
+    floors = builder.fptosi(inside, ir.VectorType(INDEX, places.type.count))
+    rests = builder.fsub(places, builder.sitofp(floors, places.type))
+    if lanes.real == FLOAT:
+        rests = builder.fptrunc(rests, ir.VectorType(FLOAT, places.type.count))
+    return [builder.extract_element(floors, SHORT(k)) for k in range(len(point))], rests
+
+
+class Axis:
+    """One axis of a grid: which of its nodes a point reads, and with which weights.
+
+    Args:
+        lanes: of the filter.
         stride: from one node to the next, in numbers.
-        place: of the point, nodes, plus the filter's shift; a double.
+        cell: the first node that is read.
+        rest: how far into the cell the point lies, in all lanes.
         tables: start of ``Stencil.weights``.
-        slopes: whether the weights of the slope are asked for.
 
     Attributes:
         stride: as given.
         offset: of the first node that is read, in numbers.
-        weights: of the nodes, ``width`` lanes; with ``slopes`` those of the slope follow in as many more.
+        weights: of the nodes, ``width`` lanes; where ``rest`` has twice as many, those of the slope follow.
     """
 
-    def __init__(self, lanes: Lanes, count: Any, stride: Any, place: Any, tables: Any, slopes: bool) -> None:
-        builder = lanes.builder
-        last = builder.sitofp(builder.sub(count, INDEX(lanes.taps)), DOUBLE)
-        # Both comparisons are false for NaN, which so reads a node of the grid.
-        within = builder.select(builder.fcmp_ordered(">", place, DOUBLE(0.0)), place, DOUBLE(0.0))
-        within = builder.select(builder.fcmp_ordered("<", within, last), within, last)
-        cell = builder.fptosi(within, INDEX)
-        t = builder.fsub(place, builder.sitofp(cell, DOUBLE))
-        t = t if lanes.real == DOUBLE else builder.fptrunc(t, FLOAT)
+    def __init__(self, lanes: Lanes, stride: Any, cell: Any, rest: Any, tables: Any) -> None:
         self.lanes = lanes
         self.stride = stride
-        self.offset = builder.mul(cell, stride)
-        self.weights = self._horner(tables, t, 2 * lanes.width if slopes else lanes.width)
+        self.offset = lanes.builder.mul(cell, stride)
+        self.weights = self._horner(tables, rest)
 
     def weight(self, k: int, count: int) -> Any:
         """The weight of node ``k`` in so many lanes."""
@@ -141,13 +176,12 @@ class Axis:
         width = self.lanes.width
         return self.lanes.pick(self.weights, [k] * width + [width + k] * width)
 
-    def _horner(self, tables: Any, t: Any, count: int) -> Any:
+    def _horner(self, tables: Any, rest: Any) -> Any:
         lanes, weights = self.lanes, None
-        t = lanes.everywhere(t, count)
         for power in reversed(range(lanes.taps)):
             row = lanes.builder.gep(tables, [INDEX(power * 2 * lanes.width)])
-            row = lanes.load(row, count)
-            weights = row if weights is None else lanes.multiply_add(weights, t, row)
+            row = lanes.load(row, rest.type.count)
+            weights = row if weights is None else lanes.multiply_add(weights, rest, row)
         return weights
 
 

@@ -13,7 +13,7 @@ from numpy.typing import DTypeLike
 
 from ..compiled import kernel
 from .filters import Filter
-from .lanes import DOUBLE, FLOAT, INDEX, Axis, Lanes, value, value_and_gradient, width_of
+from .lanes import DOUBLE, FLOAT, INDEX, Axis, Lanes, cells, value, value_and_gradient, width_of, within
 
 
 class Stencil(NamedTuple):
@@ -72,6 +72,20 @@ def value_and_gradient_at(coefficients: Any, stencil: Stencil, point: Any) -> An
     return _sampled_value_and_gradient(coefficients, stencil.places, stencil.shift, stencil.weights, point)
 
 
+@kernel(inline="always")
+def lies_within(point: Any, last: Any) -> Any:
+    """Whether a point lies on the grid: two tuples of floats, nodes, the second of the last node."""
+    return _lies_within(point, last)
+
+
+@intrinsic
+def _lies_within(typing: Any, point: Any, last: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return within(builder, *(cgutils.unpack_tuple(builder, place, len(point)) for place in arguments))
+
+    return types.boolean(point, last), generate
+
+
 @intrinsic
 def _sampled_value(typing: Any, coefficients: Any, places: Any, shift: Any, weights: Any, point: Any) -> Any:
     _check(coefficients, weights, point)
@@ -117,10 +131,12 @@ def _stage(
     grid = context.make_array(coefficients)(context, builder, arguments[0])
     tables = context.make_array(weights)(context, builder, arguments[3]).data
     counts = cgutils.unpack_tuple(builder, grid.shape, coefficients.ndim)
+    point = [builder.extract_value(arguments[4], axis) for axis in range(coefficients.ndim)]
+    first, rests = cells(lanes, point, arguments[2], counts)
     axes: list[Axis] = []
     stride = INDEX(1)
     for axis in reversed(range(coefficients.ndim)):
-        place = builder.fadd(builder.extract_value(arguments[4], axis), arguments[2])
-        axes.insert(0, Axis(lanes, counts[axis], stride, place, tables, slopes))
+        rest = lanes.pick(rests, [axis] * (2 * lanes.width if slopes else lanes.width))
+        axes.insert(0, Axis(lanes, stride, first[axis], rest, tables))
         stride = builder.mul(stride, counts[axis])
     return lanes, axes, grid.data

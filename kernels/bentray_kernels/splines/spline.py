@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba.cpython.unsafe.tuple import tuple_setitem
 from numpy.typing import ArrayLike, DTypeLike
 
 from ..arrays import Floats
@@ -12,7 +13,7 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from .filters import Filter, bspline, filter_of
 from .prefilter import prefilter as coefficients_of
-from .sampling import Stencil, border_of, stencil_of, value_and_gradient_at, value_at
+from .sampling import Stencil, border_of, lies_within, stencil_of, value_and_gradient_at, value_at
 
 
 class Spline:
@@ -89,6 +90,7 @@ class Spline:
         elif smoothing != 0.0:
             raise InvalidInput("smoothing", smoothing, "0 for filters that are not prefiltered")
         self.shape = nodes.shape
+        self._last = tuple(n - 1.0 for n in nodes.shape)
         self.filter = read
         self.stencil: Stencil = stencil_of(read, dtype)
         self.pad = border_of(read)[0]
@@ -106,7 +108,7 @@ class Spline:
         """
         places = self.places(points)
         values = np.empty(len(places))
-        _values(self.coefficients, self.stencil, places, np.array(self.shape), values)
+        _values(self.coefficients, self.stencil, places, self._last, values)
         return values
 
     def gradient(self, points: ArrayLike) -> Floats:
@@ -121,9 +123,7 @@ class Spline:
         """Both at once, for little more than the price of one."""
         places = self.places(points)
         values, gradients = np.empty(len(places)), np.empty(places.shape)
-        _values_and_gradients(
-            self.coefficients, self.stencil, places, np.array(self.shape), values, gradients
-        )
+        _values_and_gradients(self.coefficients, self.stencil, places, self._last, values, gradients)
         return values, gradients
 
     def places(self, points: ArrayLike) -> Floats:
@@ -146,52 +146,50 @@ def _checked(volume: ArrayLike) -> Floats:
     return nodes
 
 
-@kernel(inline="always")
-def _mirrored(place: float, n: int) -> tuple[float, float]:
-    """The place within the grid that looks the same, and the sign of the slope there."""
-    if 0.0 <= place <= n - 1.0:
-        return place, 1.0
-    period = 2.0 * n - 2.0
-    turned = place - period * np.floor(place / period)
-    if turned > n - 1.0:
-        return period - turned, -1.0
-    return turned, 1.0
-
-
 @kernel
-def _values(coefficients: Any, stencil: Stencil, places: Floats, shape: Any, values: Floats) -> None:
+def _values(coefficients: Any, stencil: Stencil, places: Floats, last: Any, values: Floats) -> None:
     for m in range(len(places)):
-        x, _ = _mirrored(places[m, 0], shape[0])
-        if coefficients.ndim == 1:
-            values[m] = value_at(coefficients, stencil, (x,))
-        elif coefficients.ndim == 2:
-            y, _ = _mirrored(places[m, 1], shape[1])
-            values[m] = value_at(coefficients, stencil, (x, y))
+        point = _point(coefficients, places, m)
+        if lies_within(point, last):
+            values[m] = value_at(coefficients, stencil, point)
         else:
-            y, _ = _mirrored(places[m, 1], shape[1])
-            z, _ = _mirrored(places[m, 2], shape[2])
-            values[m] = value_at(coefficients, stencil, (x, y, z))
+            values[m] = _mirrored(coefficients, stencil, point, last)[0]
 
 
 @kernel
 def _values_and_gradients(
-    coefficients: Any, stencil: Stencil, places: Floats, shape: Any, values: Floats, gradients: Floats
+    coefficients: Any, stencil: Stencil, places: Floats, last: Any, values: Floats, gradients: Floats
 ) -> None:
     for m in range(len(places)):
-        x, in_x = _mirrored(places[m, 0], shape[0])
-        if coefficients.ndim == 1:
-            values[m], slopes = value_and_gradient_at(coefficients, stencil, (x,))
-            gradients[m, 0] = in_x * slopes[0]
-        elif coefficients.ndim == 2:
-            y, in_y = _mirrored(places[m, 1], shape[1])
-            values[m], slopes = value_and_gradient_at(coefficients, stencil, (x, y))
-            gradients[m, 0], gradients[m, 1] = in_x * slopes[0], in_y * slopes[1]
+        point = _point(coefficients, places, m)
+        if lies_within(point, last):
+            values[m], slopes = value_and_gradient_at(coefficients, stencil, point)
         else:
-            y, in_y = _mirrored(places[m, 1], shape[1])
-            z, in_z = _mirrored(places[m, 2], shape[2])
-            values[m], slopes = value_and_gradient_at(coefficients, stencil, (x, y, z))
-            gradients[m, 0], gradients[m, 1], gradients[m, 2] = (
-                in_x * slopes[0],
-                in_y * slopes[1],
-                in_z * slopes[2],
-            )
+            values[m], slopes = _mirrored(coefficients, stencil, point, last)
+        for axis, slope in enumerate(slopes):
+            gradients[m, axis] = slope
+
+
+@kernel(inline="always")
+def _point(coefficients: Any, places: Floats, m: int) -> Any:
+    if coefficients.ndim == 1:
+        return (places[m, 0],)
+    if coefficients.ndim == 2:
+        return places[m, 0], places[m, 1]
+    return places[m, 0], places[m, 1], places[m, 2]
+
+
+# Not inlined, so that points on the grid do not wait for it.
+@kernel
+def _mirrored(coefficients: Any, stencil: Stencil, point: Any, last: Any) -> Any:
+    """Value and gradient at a point off the grid: those of its image, the slopes turned round with it."""
+    image, signs = point, point
+    for axis, place in enumerate(point):
+        turned = place - 2.0 * last[axis] * np.floor(place / (2.0 * last[axis]))
+        beyond = turned > last[axis]
+        image = tuple_setitem(image, axis, 2.0 * last[axis] - turned if beyond else turned)
+        signs = tuple_setitem(signs, axis, -1.0 if beyond else 1.0)
+    value, slopes = value_and_gradient_at(coefficients, stencil, image)
+    for axis, sign in enumerate(signs):
+        slopes = tuple_setitem(slopes, axis, sign * slopes[axis])
+    return value, slopes

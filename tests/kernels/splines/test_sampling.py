@@ -6,7 +6,13 @@ from numba.core.errors import TypingError
 
 from bentray_kernels.compiled import kernel
 from bentray_kernels.splines import FILTERS, Spline
-from bentray_kernels.splines.sampling import border_of, stencil_of, value_and_gradient_at, value_at
+from bentray_kernels.splines.sampling import (
+    border_of,
+    lies_within,
+    stencil_of,
+    value_and_gradient_at,
+    value_at,
+)
 
 
 @kernel
@@ -100,3 +106,19 @@ def test_the_border_is_just_wide_enough(name):
 @kernel
 def read_1d(coefficients, stencil, x):
     return value_and_gradient_at(coefficients, stencil, (x,))
+
+
+@kernel
+def inside(x, y, z, last_x, last_y, last_z):
+    return lies_within((x, y, z), (last_x, last_y, last_z)), lies_within((x, y), (last_x, last_y))
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize(
+    ("place", "found"),
+    [(0.0, True), (-0.0, True), (4.0, True), (-1e-300, False), (4.000001, False), (np.nan, False)],
+)
+def test_the_outer_nodes_belong_to_the_grid(axis, place, found):
+    point = [1.0, 2.0, 3.0]
+    point[axis] = place
+    assert inside(*point, 4.0, 4.0, 4.0) == (found, found or axis == 2)
