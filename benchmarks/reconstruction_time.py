@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from _pass_split import split
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.phantoms import TABLE7_SIDE_M
@@ -47,7 +48,16 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
     """Seconds of three sweeps over a Table 7 volume on two cores, and how a sweep grows."""
     for nodes, slices, elements, distinct in QUICK if quick else SIZES:
         yield from volume(nodes, slices, elements, distinct, progress)
+        yield where(nodes, slices, elements)
     yield from growth(quick, progress)
+
+
+def where(nodes: int, slices: int, elements: int) -> Row:
+    """What one emitter's pass takes of a core, in parts, against what the time asked for leaves it."""
+    parts = split(nodes, elements)
+    goal = 1e3 * 2 * GOALS.get((nodes, slices), 10.0) / (slices * elements * SWEEPS)
+    label = f"R5 one pass, {nodes}², {elements} transducers"
+    return Row(label, 1e3 * parts.whole, goal, "<=", "ms", str(parts))
 
 
 def volume(nodes: int, slices: int, elements: int, distinct: int, progress: Step) -> Iterable[Row]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..rays.fan import Kind
+from . import huber
 from .linear import Linearised
 from .linearisation import Rows, linearise
 from .matrix import back_project
@@ -27,9 +28,6 @@ LEAST_GAIN = 0.98
 # A step that makes the misfit grow is halved so often at most: rays of an image say little about far ones.
 MOST_HALVINGS = 3
 
-# The median of |x| over the standard deviation of x, for a normal distribution.
-MEDIAN_PART = 0.6745
-
 
 @dataclass(frozen=True)
 class Measured:
@@ -39,7 +37,7 @@ class Measured:
         slowness: of the region's shape, s/m.
         sweep: the pass that measured it, from 1; 0 for none.
         limit: Huber's, s, for its residuals.
-        loss: of its residuals, s; see ``huber_loss``.
+        loss: of its residuals, s; see ``huber.loss``.
         residuals: how many of them fall between two of ``RESIDUAL_EDGES_S``.
     """
 
@@ -109,24 +107,6 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
     )
 
 
-def huber_limit(settings: Settings, residual: Floats) -> float:
-    """Beyond which residuals count by their size, s: the lesser of what the two settings ask for."""
-    limit = settings.huber_s or math.inf
-    if settings.huber_spreads > 0.0:
-        spread = float(np.median(np.abs(residual))) / MEDIAN_PART
-        limit = min(limit, settings.huber_spreads * spread)
-    # All residuals zero: none is an outlier.
-    return limit or math.inf
-
-
-def huber_loss(residual: Floats, limit: float) -> float:
-    """Of residuals, s: the root mean square of those within the limit, which the others add less to."""
-    size = np.abs(residual)
-    inner = np.minimum(size, limit)
-    outer = np.maximum(size - limit, 0.0)
-    return math.sqrt(float((inner * (inner + 2.0 * outer)).mean()))
-
-
 def step(
     problem: Problem, settings: Settings, state: Iterate, parts: Sequence[Rows], slice_index: int = 0
 ) -> Iterate:
@@ -143,10 +123,10 @@ def step(
     number = len(state.history) + 1
     record = Sweep(slice_index, number, rms, len(problem.sounding), given=False)
     history = (*state.history, record)
-    best, limit = state.best, huber_limit(settings, residual)
-    against = huber_loss(residual, best.limit)
+    best, limit = state.best, huber.limit(residual, settings.huber_spreads, settings.huber_s or math.inf)
+    against = huber.loss(residual, best.limit)
     if against < best.loss:
-        loss = huber_loss(residual, limit)
+        loss = huber.loss(residual, limit)
         best = Measured(state.slowness, number, limit, loss, residual_counts(residual))
     grown = against > state.best.loss and state.halvings < MOST_HALVINGS
     stuck = number > 1 and against > LEAST_GAIN * state.best.loss and not grown
@@ -161,8 +141,7 @@ def step(
     lowest, highest = settings.speed_bounds_mps
     coverage = _coverage(problem, parts)
     # Total variation is told the misfit, s; quadratic penalties are weighed against the data themselves.
-    clipped = np.minimum(np.abs(residual), limit)
-    unit = math.sqrt(float((clipped**2).mean())) if settings.penalty == "total-variation" else 1.0
+    unit = huber.clipped_rms(residual, limit) if settings.penalty == "total-variation" else 1.0
     image, dual = Linearised(
         parts,
         state.slowness * problem.spacing,

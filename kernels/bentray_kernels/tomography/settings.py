@@ -65,8 +65,8 @@ class Settings:
             such, as phantoms; 0: every difference costs.
         huber_s: residuals beyond this count in proportion to their size, not to its square, s (with SART from
             the second sweep on); 0: all count by their square.
-        huber_spreads: the same for ``gauss-newton``, in standard deviations of the residuals, which their
-            median tells, so that the rays which no image of these nodes explains do not decide; 0: none.
+        huber_spreads: the same for ``gauss-newton`` and the attenuation after it, in standard deviations of
+            the residuals, which their median tells: rays that no image explains do not decide; 0: none.
         roi: let only the dataset's region of interest change (``mask/roi``).
         reciprocity: use a missing pair's reverse (emitter and receiver exchanged) in its place.
         picker: how travel times are read where only traces were uploaded.

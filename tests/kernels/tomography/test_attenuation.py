@@ -46,6 +46,20 @@ def test_line_integrals_give_it_back(scan, method):
     assert rmse(result.attenuation, truth, inside) < 0.16 * (truth.max() - truth.min())
 
 
+def test_amplitudes_far_off_count_less(scan):
+    truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+    rng = np.random.default_rng(7)
+    wrong = rng.random(scan.log_ratio_np.shape) < 0.05
+    bad = replace(
+        scan, log_ratio_np=scan.log_ratio_np + np.where(wrong, rng.normal(0.0, 3.0, wrong.shape), 0.0)
+    )
+    plain, robust = (
+        rmse(reconstruct(bad, plan(huber_spreads=spreads)).attenuation, truth, inside)
+        for spreads in (0.0, 3.0)
+    )
+    assert robust < 0.8 * plain
+
+
 def test_along_straight_rays_it_is_worse(scan):
     truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     bent, straight = (reconstruct(scan, plan(rays=rays)).attenuation for rays in ("curved", "straight"))

@@ -4,14 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, gauss_newton, reconstruct, rmse
-from bentray_kernels.tomography.gauss_newton import huber_limit, huber_loss
 from bentray_kernels.tomography.linearisation import Rows
 from bentray_kernels.tomography.stages import start
 
@@ -98,23 +95,6 @@ def test_the_last_pass_measures_and_the_best_image_is_given():
     once = gauss_newton.step(of, replace(PLAN, sweeps=1), states[0], [rows(4e-7)])
     assert once.done
     assert not np.array_equal(once.slowness, states[0].slowness)
-
-
-def test_rays_far_off_decide_neither_the_image_nor_when_to_end():
-    residual = np.array([*np.linspace(-2e-8, 2e-8, 99), 5e-6])
-    robust = replace(PLAN, huber_spreads=3.0)
-    assert huber_limit(replace(PLAN, huber_spreads=0.0), residual) == np.inf
-    limit = huber_limit(robust, residual)
-    assert limit == pytest.approx(3.0 * np.median(np.abs(residual)) / 0.6745)
-    assert huber_limit(replace(robust, huber_s=1e-9), residual) == 1e-9
-    assert huber_loss(residual, np.inf) == pytest.approx(np.sqrt((residual**2).mean()))
-    assert huber_loss(residual, limit) < 0.2 * huber_loss(residual, np.inf)
-
-
-@given(st.floats(1e-9, 1e-6), st.floats(1e-9, 1e-6))
-def test_the_loss_is_that_of_huber(size, limit):
-    loss = 0.5 * size**2 if size <= limit else limit * (size - 0.5 * limit)
-    assert huber_loss(np.array([size, -size]), limit) == pytest.approx(np.sqrt(2.0 * loss))
 
 
 def test_no_ray_through_the_image_leaves_water():
