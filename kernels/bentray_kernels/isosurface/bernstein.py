@@ -7,53 +7,65 @@ import math
 from ..arrays import Floats
 from ..compiled import kernel
 
+# A tuple of which only the length is used: it is part of the type, so that loops over it are unrolled.
+Length = tuple[int, ...]
+
+
+def length(count: int) -> Length:
+    """A tuple of that length."""
+    return (0,) * count
+
 
 @kernel(inline="always")
 def contract(
-    nodes: Floats, x: Floats, y: Floats, z: Floats, first: Floats, second: Floats, result: Floats
-) -> int:
+    nodes: Floats,
+    x: Floats,
+    y: Floats,
+    z: Floats,
+    across: Length,
+    rows: Length,
+    first: Floats,
+    second: Floats,
+    result: Floats,
+) -> None:
     """Σ x[a, p]·y[b, q]·z[c, r]·nodes[p, q, r] for all a, b, c.
 
     Args:
         nodes: (n³,) coefficients of the cell, C order.
-        x, y, z: (rows, n) Bernstein coefficients of the weights along each axis.
-        first: scratch, at least rows(x)·n².
-        second: scratch, at least rows(x)·rows(y)·n.
-        result: (…,), filled from its start, C order.
-
-    Returns:
-        How many entries were written.
+        x, y, z: (m, n) Bernstein coefficients of the weights along each axis.
+        across: n.
+        rows: m.
+        first: (m·n²,) scratch.
+        second: (m²·n,) scratch.
+        result: (m³,), filled, C order.
     """
-    n = x.shape[1]
-    square = n * n
-    for a in range(len(x)):
-        for rest in range(square):
+    n, m = len(across), len(rows)
+    for a in range(m):
+        for rest in range(n * n):
             total = 0.0
             for p in range(n):
-                total += x[a, p] * nodes[p * square + rest]
-            first[a * square + rest] = total
-    for a in range(len(x)):
-        for b in range(len(y)):
+                total += x[a, p] * nodes[p * n * n + rest]
+            first[a * n * n + rest] = total
+    for a in range(m):
+        for b in range(m):
             for r in range(n):
                 total = 0.0
                 for q in range(n):
-                    total += y[b, q] * first[a * square + q * n + r]
-                second[(a * len(y) + b) * n + r] = total
-    rows = len(x) * len(y)
-    for ab in range(rows):
-        for c in range(len(z)):
+                    total += y[b, q] * first[(a * n + q) * n + r]
+                second[(a * m + b) * n + r] = total
+    for ab in range(m * m):
+        for c in range(m):
             total = 0.0
             for r in range(n):
                 total += z[c, r] * second[ab * n + r]
-            result[ab * len(z) + c] = total
-    return rows * len(z)
+            result[ab * m + c] = total
 
 
 @kernel(inline="always")
-def hull(control: Floats, count: int) -> tuple[float, float]:
-    """Least and greatest of the first ``count`` Bernstein coefficients."""
+def hull(control: Floats) -> tuple[float, float]:
+    """Least and greatest Bernstein coefficient."""
     low, high = control[0], control[0]
-    for k in range(1, count):
+    for k in range(1, len(control)):
         low, high = min(low, control[k]), max(high, control[k])
     return low, high
 
@@ -63,6 +75,7 @@ def bend_bound(
     nodes: Floats,
     slope: Floats,
     bend: Floats,
+    across: Length,
     total: float,
     line: Floats,
 ) -> float:
@@ -74,20 +87,24 @@ def bend_bound(
     Args:
         nodes: (n³,) coefficients, C order.
         slope, bend: (rows, n) Bernstein coefficients of the weights' derivatives.
+        across: n.
         total: upper bound of the sum of absolute weights along an axis.
         line: (n,) scratch.
     """
-    n = bend.shape[1]
+    n = len(across)
     square = n * n
     norm = 0.0
     for axis in range(3):
         # Along an axis, every line of nodes parallel to it.
         step = square if axis == 0 else (n if axis == 1 else 1)
         pure = 0.0
-        for across in range(square):
-            start = (
-                across if axis == 0 else ((across // n) * square + across % n if axis == 1 else across * n)
-            )
+        for other in range(square):
+            if axis == 0:
+                start = other
+            elif axis == 1:
+                start = (other // n) * square + other % n
+            else:
+                start = other * n
             for a in range(len(bend)):
                 curved = 0.0
                 for p in range(n):

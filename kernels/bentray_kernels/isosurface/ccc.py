@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..compiled import kernel
-from .bernstein import contract, hull
+from .bernstein import Length, contract, hull
 
 # Halvings along each axis: the hull approaches a critical value as the square of the width.
 HALVINGS = 18
@@ -19,7 +19,9 @@ ROUNDING = 1e-13
 
 
 @kernel
-def exact_range(nodes: Floats, value: Floats, pieces: int) -> tuple[float, float]:
+def exact_range(
+    nodes: Floats, value: Floats, pieces: int, across: Length, rows: Length
+) -> tuple[float, float]:
     """Least and greatest value of a cell to 1e-8 of its hull, never short of them.
 
     The dissertation solves for the stationary points of the cell, its faces and its edges. Here the Bernstein
@@ -30,9 +32,10 @@ def exact_range(nodes: Floats, value: Floats, pieces: int) -> tuple[float, float
         nodes: (n³,) coefficients, C order.
         value: (pieces·(degree + 1), n) Bernstein coefficients of the weights.
         pieces: polynomial pieces along each axis.
+        across: n.
+        rows: degree + 1.
     """
-    n = value.shape[1]
-    m = len(value) // pieces
+    n, m = len(across), len(rows)
     size = m * m * m
     first, second = np.empty(m * n * n), np.empty(m * m * n)
     stack = np.empty((3 * HALVINGS + 2, size))
@@ -43,7 +46,7 @@ def exact_range(nodes: Floats, value: Floats, pieces: int) -> tuple[float, float
     for piece in range(pieces**3):
         p, q, r = piece // pieces**2, (piece // pieces) % pieces, piece % pieces
         x, y, z = value[p * m : p * m + m], value[q * m : q * m + m], value[r * m : r * m + m]
-        contract(nodes, x, y, z, first, second, stack[0])
+        contract(nodes, x, y, z, across, rows, first, second, stack[0])
         depths[0] = 0
         top = 1
         while top > 0:
@@ -52,7 +55,7 @@ def exact_range(nodes: Floats, value: Floats, pieces: int) -> tuple[float, float
             for corner in range(8):
                 at = (m - 1) * ((corner >> 2) * m * m + ((corner >> 1) & 1) * m + (corner & 1))
                 low, high = min(low, control[at]), max(high, control[at])
-            least, most = hull(control, size)
+            least, most = hull(control)
             if depth == 0:
                 room = TOLERANCE * (most - least) + ROUNDING * max(abs(least), abs(most))
             if depth == 3 * HALVINGS or (least >= low - room and most <= high + room):

@@ -13,7 +13,7 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from ..splines.spline import Spline
 from .accc import product_ranges, weighted_range
-from .bernstein import bend_bound, contract, hull
+from .bernstein import Length, bend_bound, contract, hull, length
 from .bmcc import support_ranges
 from .ccc import exact_range
 from .cell_weights import cell_weights
@@ -70,11 +70,14 @@ def cell_ranges(spline: Spline, isos: Sequence[float], bound: str) -> CellRanges
     _refine(
         spline.coefficients,
         spline.pad + weights.first,
-        np.sort(np.asarray(isos, dtype=np.float64)),
+        np.asarray(isos, dtype=np.float64),
         BOUNDS.index(bound),
         product_ranges(weights, divisions),
         (weights.control(0), weights.control(1), weights.control(2)),
         len(weights.powers),
+        length(weights.nodes),
+        length(len(weights.powers) * (weights.degree + 1)),
+        length(weights.degree + 1),
         weights.total(),
         ranges,
     )
@@ -94,19 +97,20 @@ def _refine(
     products: tuple[Floats, Floats],
     control: tuple[Floats, Floats, Floats],
     pieces: int,
+    across: Length,
+    rows: Length,
+    piece_rows: Length,
     total: float,
     ranges: CellRanges,
 ) -> None:
     """Closer ranges, and the bend, of the cells that may hold an iso-value."""
     value, slope, bend = control
     least, most = products
-    n = value.shape[1]
-    nodes = np.empty(n * n * n)
-    first_axis, second_axis = np.empty(len(value) * n * n), np.empty(len(value) ** 2 * n)
-    form, line = np.empty(len(value) ** 3), np.empty(n)
+    n, m = len(across), len(rows)
+    nodes, line = np.empty(n * n * n), np.empty(n)
+    one_axis, two_axes, form = np.empty(m * n * n), np.empty(m * m * n), np.empty(m * m * m)
     for i, j, k in np.ndindex(ranges.low.shape):
-        above = np.searchsorted(isos, ranges.low[i, j, k])
-        if above == len(isos) or isos[above] > ranges.high[i, j, k]:
+        if not _reaches(isos, ranges, i, j, k):
             continue
         at = 0
         for p in range(n):
@@ -114,16 +118,25 @@ def _refine(
                 for r in range(n):
                     nodes[at] = coefficients[i + first + p, j + first + q, k + first + r]
                     at += 1
-        ranges.bend[i, j, k] = bend_bound(nodes, slope, bend, total, line) * (1.0 + OUTWARD)
-        if bound == 0:
-            continue
+        low, high = float(ranges.low[i, j, k]), float(ranges.high[i, j, k])
         if bound == 3:
-            count = contract(nodes, value, value, value, first_axis, second_axis, form)
-            low, high = hull(form, count)
+            contract(nodes, value, value, value, across, rows, one_axis, two_axes, form)
+            low, high = hull(form)
         elif bound == 4:
-            low, high = exact_range(nodes, value, pieces)
-        else:
+            low, high = exact_range(nodes, value, pieces, across, piece_rows)
+        elif bound > 0:
             low, high = weighted_range(nodes, least, most)
         margin = OUTWARD * max(abs(low), abs(high))
         ranges.low[i, j, k] = max(float(ranges.low[i, j, k]), low - margin)
         ranges.high[i, j, k] = min(float(ranges.high[i, j, k]), high + margin)
+        if _reaches(isos, ranges, i, j, k):
+            ranges.bend[i, j, k] = bend_bound(nodes, slope, bend, across, total, line) * (1.0 + OUTWARD)
+
+
+@kernel(inline="always")
+def _reaches(isos: Floats, ranges: CellRanges, i: int, j: int, k: int) -> bool:
+    """Whether a cell may hold one of the iso-values."""
+    reached = False
+    for iso in isos:
+        reached |= ranges.low[i, j, k] <= iso <= ranges.high[i, j, k]
+    return reached
