@@ -197,8 +197,10 @@ def stopped(settings: Settings, chosen: Trial, noise_s: float) -> Settings:
 
 def noise_of(dataset: Dataset) -> float:
     """Standard deviation of the travel times, s: as the dataset tells it, or as their roughness does."""
-    if dataset.sigma_s is not None and np.isfinite(dataset.sigma_s).any():
-        return math.sqrt(float(np.nanmean(dataset.sigma_s**2)))
+    if dataset.sigma_s is not None:
+        told = dataset.sigma_s[np.isfinite(dataset.differential_tof()) & np.isfinite(dataset.sigma_s)]
+        if told.size:
+            return math.sqrt(float((told**2).mean()))
     return noise_level(dataset.differential_tof())
 
 

@@ -149,7 +149,9 @@ class Gathering:
         self._rows: dict[int, Any] = {}
 
     def first(self, scan: Scan, index: int, image: Floats) -> list[Call]:
-        """Calls to begin with; none without emitters."""
+        """Calls to begin with; without emitters the one that uses their rows, which are none."""
+        if not self.sizes:
+            return [Call(self.then, (scan, index, []))]
         return [Call(self.look, (scan, index, image, part), keep=True) for part in range(len(self.sizes))]
 
     def after(self, call: Call, given: Any) -> list[Call]:

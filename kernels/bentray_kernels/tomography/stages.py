@@ -23,7 +23,7 @@ def stages(dataset: Dataset, settings: Settings) -> tuple[Settings, ...]:
     if settings.coarser_grids and settings.side_m is None:
         last = replace(last, side_m=image_side(dataset, settings.nodes))
     found = [replace(last, nodes=-(-settings.nodes // 2**k)) for k in range(settings.coarser_grids, -1, -1)]
-    if settings.straight_sweeps and settings.rays == "curved":
+    if settings.straight_sweeps and settings.rays != "straight":
         found.insert(0, replace(found[0], rays="straight", sweeps=settings.straight_sweeps))
     return tuple(found)
 

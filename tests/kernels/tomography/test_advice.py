@@ -116,6 +116,10 @@ def test_the_noise_is_told_or_estimated(scan):
     assert 2.7e-7 < noise_of(noisy) < 4.5e-7
     told = replace(scan, sigma_s=np.full(scan.delta_tof_s.shape, 5e-8))
     assert noise_of(told) == pytest.approx(5e-8)
+    # A pair without a time says nothing, whatever its sigma.
+    told.sigma_s[0, 1:] = 1.0
+    gaps = replace(told, delta_tof_s=np.where(told.sigma_s < 1.0, told.delta_tof_s, np.nan))
+    assert noise_of(gaps) == pytest.approx(5e-8)
 
 
 def test_trials_are_coarser_and_speed_alone():

@@ -60,6 +60,16 @@ def test_amplitudes_far_off_count_less(scan):
     assert robust < 0.8 * plain
 
 
+def test_a_slice_without_amplitudes_has_that_of_the_water(scan):
+    ratios = np.stack([scan.log_ratio_np, np.full_like(scan.log_ratio_np, np.nan)])
+    times = np.stack([scan.delta_tof_s] * 2)
+    both = replace(scan, delta_tof_s=times, log_ratio_np=ratios, slice_z_m=np.array([0.0, 0.01]))
+    both = replace(both, water_attenuation_np_m=0.3)
+    found = reconstruct(both, plan("sart", sweeps=1)).attenuation
+    assert np.allclose(found[..., 1], 0.3)
+    assert np.ptp(found[..., 0]) > 1.0
+
+
 def test_along_straight_rays_it_is_worse(scan):
     truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     bent, straight = (reconstruct(scan, plan(rays=rays)).attenuation for rays in ("curved", "straight"))

@@ -50,7 +50,7 @@ def stage_names(settings: Settings) -> tuple[str, ...]:
     """What tells the stages apart that ``bentray_kernels.tomography.stages`` makes; nothing for one."""
     grids = [-(-settings.nodes // 2**k) for k in range(settings.coarser_grids, -1, -1)]
     names = [f"{nodes} nodes" for nodes in grids]
-    if settings.straight_sweeps and settings.rays == "curved":
+    if settings.straight_sweeps and settings.rays != "straight":
         names.insert(0, "straight")
     return tuple(names) if len(names) > 1 else ()
 
