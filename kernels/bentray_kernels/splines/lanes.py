@@ -71,8 +71,9 @@ class Lanes:
             lanes, width = joined.type.count, width // 2
             even, odd = (self.pick(joined, range(first, lanes, 2)) for first in (0, 1))
             joined = self.builder.fadd(even, odd)
-        sums = [self.builder.extract_element(joined, SHORT(k)) for k in range(len(vectors))]
-        return sums if self.real == DOUBLE else [self.builder.fpext(number, DOUBLE) for number in sums]
+        if self.real == FLOAT:
+            joined = self.builder.fpext(joined, ir.VectorType(DOUBLE, joined.type.count))
+        return [self.builder.extract_element(joined, SHORT(k)) for k in range(len(vectors))]
 
     def _joined(self, vectors: Sequence[Any]) -> Any:
         """Vectors end to end; a third one is followed by itself."""
