@@ -94,8 +94,13 @@ class Spline:
         self.filter = read
         self.stencil: Stencil = stencil_of(read, dtype)
         self.pad = border_of(read)[0]
-        bordered = np.pad(nodes.astype(dtype), border_of(read), mode="reflect")
-        self.coefficients: Any = np.ascontiguousarray(bordered)
+        with np.errstate(over="ignore"):
+            nodes = nodes.astype(dtype)
+        if not np.isfinite(nodes).all():
+            raise InvalidInput(
+                "volume", "values too large to filter", f"values that {np.dtype(dtype)} can hold"
+            )
+        self.coefficients: Any = np.ascontiguousarray(np.pad(nodes, border_of(read), mode="reflect"))
 
     def value(self, points: ArrayLike) -> Floats:
         """The field at points (m, ndim), nodes.

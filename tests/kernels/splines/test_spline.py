@@ -88,6 +88,8 @@ NAN = np.where(np.arange(12).reshape(3, 4) == 6, np.nan, 1.0)
         ({"volume": VOLUME, "smoothing": float("nan")}, "smoothing.*nan"),
         ({"volume": VOLUME, "smoothing": 1.0, "prefilter": False}, "smoothing"),
         ({"volume": VOLUME, "dtype": np.int32}, "dtype.*int32"),
+        ({"volume": np.full((3, 4), 1e300), "dtype": np.float32}, "volume.*float32"),
+        ({"volume": 1e308 * (-1.0) ** np.arange(9), "order": 6}, "volume.*float64"),
     ],
 )
 def test_what_makes_no_spline_is_refused(words, named):
