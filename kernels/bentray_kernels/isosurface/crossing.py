@@ -13,7 +13,7 @@ from .roots import Field, Ray, brent, field_at, first_root_of_cubic
 CERTAIN, BRENT, ANALYTIC = 0, 1, 2
 
 # Accuracy of a crossing, nodes, and the shortest piece of a ray that is still halved.
-TOLERANCE = 1e-10
+TOLERANCE = 1e-8
 SHORTEST = 1e-7
 
 

@@ -47,82 +47,104 @@ def post_refraction_colours(
     """Post-refraction supersampling (PRSS): no more rays, only more samples of the backdrop.
 
     The places of a pixel and its 8 neighbours show how the object distorts the grid of pixels. Between the
-    pixel and each neighbour, out to half way, lie ``degree`` places more each way; the backdrop is read there
-    and the colours are averaged with the trapezoidal weights of the pixel's area, for degree 1 the binomial
-    ¼ ½ ¼. A neighbour whose ray met another number of interfaces, or ended on another plane, belongs to
-    another piece of the picture: nothing lies between it and the pixel, whose own colour stands in.
+    pixel and them (2·degree + 1)² samples fill the square of the pixel evenly, their places interpolated
+    bilinearly; the low-pass is their mean. For degree 1 these are the pixel's own place and the 8
+    intermediate ones of the dissertation, a third of the way. A neighbour whose ray met another number of
+    interfaces, or ended on another plane, belongs to another piece of the picture: nothing lies between it
+    and the pixel, whose own colour stands in.
 
     Args:
         backdrop, planes, places, weights: as for ``point_colours``.
         crossed: (rows, columns) interfaces met by the ray.
-        degree: 1 for the 8 intermediate places of the dissertation, more for 2·degree + 1 squared.
+        degree: at least 1.
         image: (rows, columns, 3), filled.
     """
     rows, columns = planes.shape
+    point_colours(backdrop, planes, places, weights, image)
+    pieces, squares = np.empty((rows, columns), dtype=np.int32), np.empty((rows, columns), dtype=np.int64)
+    _name_pieces(backdrop, planes, places, crossed, pieces, squares)
+    # Of the four pixels about each corner; none beyond the rim.
+    same_square = np.ones((rows + 1, columns + 1), dtype=np.bool_)
+    same_piece = np.zeros((rows + 1, columns + 1), dtype=np.bool_)
+    for i in range(1, rows):
+        _compare(squares[i - 1], squares[i], same_square[i])
+        _compare(pieces[i - 1], pieces[i], same_piece[i])
+    share = 1.0 / (2 * degree + 1) ** 2
     for i in range(rows):
         for j in range(columns):
+            upper = same_square[i, j] and same_square[i, j + 1]
+            lower = same_square[i + 1, j] and same_square[i + 1, j + 1]
+            if planes[i, j] < 0 or (upper and lower):
+                continue
             own = colour_at(backdrop, planes[i, j], places[i, j, 0], places[i, j, 1])
-            red = green = blue = total = 0.0
-            if not _alike_around(backdrop, planes, places, crossed, i, j):
-                for a in range(-degree, degree + 1):
-                    for b in range(-degree, degree + 1):
-                        weight = (0.5 if abs(a) == degree else 1.0) * (0.5 if abs(b) == degree else 1.0)
-                        place, found = _between(planes, places, crossed, i, j, a / degree, b / degree)
-                        colour = colour_at(backdrop, planes[i, j], place[0], place[1]) if found else own
-                        red += weight * colour[0]
-                        green += weight * colour[1]
-                        blue += weight * colour[2]
-                        total += weight
-            if total > 0.0:
-                own = (red / total, green / total, blue / total)
-            for c in range(3):
-                image[i, j, c] = np.uint8(own[c] * weights[i, j] + 0.5)
+            red = green = blue = 0.0
+            for down in range(2):
+                for right in range(2):
+                    corner = (i + down, j + right)
+                    other = not same_square[corner] and same_piece[corner]
+                    # Samples on a line between two corners go with the one below or to the right.
+                    for a in range(1 - down, degree + 1):
+                        for b in range(1 - right, degree + 1):
+                            colour = own
+                            if other and a + b > 0:
+                                p, q = i - 1 + 2 * down, j - 1 + 2 * right
+                                u, v = _between(
+                                    places, i, j, p, q, a / (2 * degree + 1), b / (2 * degree + 1)
+                                )
+                                colour = colour_at(backdrop, planes[i, j], u, v)
+                            red += colour[0]
+                            green += colour[1]
+                            blue += colour[2]
+            scale = share * weights[i, j]
+            image[i, j, 0] = np.uint8(red * scale + 0.5)
+            image[i, j, 1] = np.uint8(green * scale + 0.5)
+            image[i, j, 2] = np.uint8(blue * scale + 0.5)
+
+
+@kernel
+def _name_pieces(
+    backdrop: Backdrop,
+    planes: Planes,
+    places: Floats,
+    crossed: Crossed,
+    pieces: NDArray[np.int32],
+    squares: NDArray[np.int64],
+) -> None:
+    """A number for the piece of the picture that a pixel belongs to, and one for its square of a pattern."""
+    rows, columns = planes.shape
+    for i in range(rows):
+        for j in range(columns):
+            plane = planes[i, j]
+            piece = 256 * np.int64(crossed[i, j]) + plane
+            pieces[i, j] = piece
+            if plane < 0:
+                squares[i, j] = -1
+            elif backdrop.tables[plane, 3]:
+                # Colours run into each other: no two pixels see the same.
+                squares[i, j] = i * columns + j
+            else:
+                across = backdrop.repeats[plane] * backdrop.tables[plane, 2]
+                below = backdrop.repeats[plane] * backdrop.tables[plane, 1]
+                x = np.int64(np.floor((places[i, j, 0] + 0.5) * across)) & 0x1FFFFF
+                y = np.int64(np.floor((places[i, j, 1] + 0.5) * below)) & 0x1FFFFF
+                squares[i, j] = (piece << 42) ^ (x << 21) ^ y
 
 
 @kernel(inline="always")
-def _between(
-    planes: Planes, places: Floats, crossed: Crossed, i: int, j: int, down: float, right: float
-) -> tuple[tuple[float, float], bool]:
-    """The place down/2 rows and right/2 columns from a pixel, between the four about it, if all are alike."""
-    rows, columns = planes.shape
-    p = min(max(i + (1 if down > 0.0 else -1), 0), rows - 1)
-    q = min(max(j + (1 if right > 0.0 else -1), 0), columns - 1)
-    t, w = 0.5 * abs(down), 0.5 * abs(right)
-    u = v = 0.0
-    for row, share_row in ((i, 1.0 - t), (p, t)):
-        for column, share_column in ((j, 1.0 - w), (q, w)):
-            share = share_row * share_column
-            if share > 0.0:
-                if planes[row, column] != planes[i, j] or crossed[row, column] != crossed[i, j]:
-                    return (u, v), False
-                u += share * places[row, column, 0]
-                v += share * places[row, column, 1]
-    return (u, v), planes[i, j] >= 0
+def _compare(above: NDArray[np.int64], below: NDArray[np.int64], same: NDArray[np.bool_]) -> None:
+    """Which four neighbours have one number; ``same`` has an entry more at either end."""
+    for j in range(1, len(above)):
+        across = (above[j - 1] == above[j]) & (below[j - 1] == below[j])
+        same[j] = across & (above[j] == below[j])
 
 
 @kernel(inline="always")
-def _alike_around(
-    backdrop: Backdrop, planes: Planes, places: Floats, crossed: Crossed, i: int, j: int
-) -> bool:
-    """Whether the pixel and its neighbours all end in one square of a pattern of squares."""
-    plane = planes[i, j]
-    if plane < 0:
-        return True
-    if backdrop.tables[plane, 3]:
-        return False
-    rows, columns = planes.shape
-    low_u = low_v = np.inf
-    high_u = high_v = -np.inf
-    for p in range(max(i - 1, 0), min(i + 2, rows)):
-        for q in range(max(j - 1, 0), min(j + 2, columns)):
-            if planes[p, q] == plane and crossed[p, q] == crossed[i, j]:
-                low_u, high_u = min(low_u, places[p, q, 0]), max(high_u, places[p, q, 0])
-                low_v, high_v = min(low_v, places[p, q, 1]), max(high_v, places[p, q, 1])
-    across = backdrop.repeats[plane] * backdrop.tables[plane, 2]
-    below = backdrop.repeats[plane] * backdrop.tables[plane, 1]
-    return bool(
-        np.floor((low_u + 0.5) * across) == np.floor((high_u + 0.5) * across)
-        and np.floor((low_v + 0.5) * below) == np.floor((high_v + 0.5) * below)
+def _between(places: Floats, i: int, j: int, p: int, q: int, t: float, w: float) -> tuple[float, float]:
+    """The place t of the way from row i to row p and w of the way from column j to column q."""
+    own, down, right, both = (1.0 - t) * (1.0 - w), t * (1.0 - w), (1.0 - t) * w, t * w
+    return (
+        own * places[i, j, 0] + down * places[p, j, 0] + right * places[i, q, 0] + both * places[p, q, 0],
+        own * places[i, j, 1] + down * places[p, j, 1] + right * places[i, q, 1] + both * places[p, q, 1],
     )
 
 

@@ -32,18 +32,17 @@ def points(backdrop: Backdrop, planes, places, weights=None) -> np.ndarray:
     return image
 
 
-def test_the_binomial_weights_at_an_edge():
+def test_the_samples_lie_a_third_of_the_way_to_the_neighbours():
     planes, places, crossed = regular(4, 4 / 64)
     places[..., 1] = 1.0 / 32
-    # The edge of a square lies between columns 1 and 2, a quarter of a pixel before column 2.
-    places[..., 0] = np.array([-1.25, -0.25 - 0.5, 0.25, 1.25]) / 64 + 0.0
-    image = post(BOARD, planes, places, crossed)
-    plain = points(BOARD, planes, places)
-    assert plain[1, 1, 0] == 0
-    assert plain[1, 2, 0] == 200
-    # To the left of column 2, half way to column 1, lies the other colour.
-    assert image[1, 2, 0] == pytest.approx(200 * 0.75, abs=1)
-    assert image[1, 1, 0] == 0
+    # The edge of a square lies at 0: a quarter of the way from column 2 to column 1.
+    places[..., 0] = np.array([-1.25, -0.75, 0.25, 1.25]) / 64
+    image, plain = post(BOARD, planes, places, crossed), points(BOARD, planes, places)
+    assert plain[1].tolist() == [[0] * 3, [0] * 3, [200] * 3, [200] * 3]
+    assert image[1, :, 0] == pytest.approx([0, 0, 200 * 2 / 3, 200], abs=1)
+    # A fifth and two fifths of the way.
+    finer = post(BOARD, planes, places, crossed, 2)
+    assert finer[1, :, 0] == pytest.approx([0, 0, 200 * 4 / 5, 200], abs=1)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4])
