@@ -1,0 +1,52 @@
+"""NIfTI-1 and -2 of one part: nibabel reads the header, the values are read here, within bounds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.errors import InvalidInput
+
+from .bounded_reading import LONGEST_HEADER, UNITS_M, declared, refusing, whole
+from .volume_file import Volume
+
+
+def read_nifti(file: Any) -> Volume:
+    """The volume in an open file, unpacked; raises InvalidInput for anything else."""
+    from nibabel.nifti1 import Nifti1Header
+    from nibabel.nifti2 import Nifti2Header
+    from nibabel.spatialimages import HeaderDataError
+
+    with refusing("file", "a whole NIfTI file of one part"):
+        start = file.read(540)
+        kind, size = (Nifti2Header, 540) if start[4:8] == b"n+2\0" else (Nifti1Header, 348)
+        if b"n+" not in (start[344:346], start[4:6]):
+            raise InvalidInput("file", f"packed content of another kind ({start[:8]!r})", "NIfTI")
+        try:
+            header: Any = kind(start[:size], check=True)
+            dtype, shape = header.get_data_dtype(), tuple(int(n) for n in header.get_data_shape())
+            slope, intercept = header.get_slope_inter()
+            affine, unit = header.get_best_affine(), header.get_xyzt_units()[0]
+        except HeaderDataError as error:
+            raise InvalidInput("file", f"a damaged NIfTI header ({error})", "a whole NIfTI file") from None
+        # A volume of one moment often has a fourth axis of length 1.
+        while len(shape) > 3 and shape[-1] == 1:
+            shape = shape[:-1]
+        count = declared("dim", shape, dtype)
+        offset = int(header["vox_offset"])
+        if not size <= offset <= LONGEST_HEADER:
+            raise InvalidInput("vox_offset", offset, f"{size} to {LONGEST_HEADER} bytes")
+        file.seek(offset)
+        values = np.frombuffer(whole(file, count), dtype).reshape(shape, order="F")
+        if (slope or 1.0, intercept or 0.0) != (1.0, 0.0):
+            with np.errstate(over="ignore", invalid="ignore"):
+                values = values * np.float32(slope) + np.float32(intercept)
+        scale = UNITS_M["mm" if unit == "unknown" else unit]
+        spacing = scale * np.linalg.norm(affine[:3, :3], axis=0)
+        return Volume.of(values, spacing, scale * affine[:3, 3], _text(header["descrip"]))
+
+
+def _text(field: NDArray[Any]) -> str:
+    return bytes(field.item()).decode("utf-8", "replace")

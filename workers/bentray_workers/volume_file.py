@@ -1,0 +1,135 @@
+"""Volumes as files: ``bentray-volume`` in HDF5, written atomically and read back exactly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bentray_kernels.errors import InvalidInput
+
+from .hdf5_reading import Limits, Reader, opened, printable
+from .hdf5_writing import creating
+
+FORMAT = "bentray-volume"
+VERSION = "1.0"
+
+# Types that are kept; every other one becomes float32.
+KEPT = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Volume:
+    """Numbers on an even grid.
+
+    Attributes:
+        values: (nx, ny, nz), uint8, uint16 or float32, finite, any unit.
+        spacing_m: between nodes along each axis, m.
+        origin_m: place of node 0, m.
+        title: what it is.
+
+    Raises:
+        InvalidInput: naming the first field that is wrong.
+    """
+
+    values: NDArray[Any]
+    spacing_m: Triple
+    origin_m: Triple = (0.0, 0.0, 0.0)
+    title: str = ""
+
+    def __post_init__(self) -> None:
+        check_shape("values", self.values.shape)
+        if not np.isfinite(self.values).all():
+            place = tuple(int(k) for k in np.argwhere(~np.isfinite(self.values))[0])
+            raise InvalidInput("values", f"{self.values[place]} at node {place}", "finite numbers")
+        if len(self.spacing_m) != 3 or not all(0.0 < step < math.inf for step in self.spacing_m):
+            raise InvalidInput("spacing_m", self.spacing_m, "three finite distances > 0 m, all even")
+        if len(self.origin_m) != 3 or not all(math.isfinite(place) for place in self.origin_m):
+            raise InvalidInput("origin_m", self.origin_m, "three finite places, m")
+
+    @classmethod
+    def of(
+        cls,
+        values: ArrayLike,
+        spacing_m: Sequence[float],
+        origin_m: Sequence[float] = (0.0, 0.0, 0.0),
+        title: str = "",
+    ) -> Volume:
+        """A volume of numbers of any real type, in a type that is kept."""
+        given = np.asarray(values)
+        check_type("values", given.dtype)
+        kept = given.dtype.newbyteorder("=")
+        # Numbers beyond float32 become infinite, which is refused above.
+        with np.errstate(over="ignore"):
+            stored = np.ascontiguousarray(given, dtype=kept if kept in KEPT else np.float32)
+        return cls(
+            stored,
+            tuple(float(step) for step in spacing_m),  # type: ignore[arg-type]
+            tuple(float(place) for place in origin_m),  # type: ignore[arg-type]
+            printable(title)[:200].strip(),
+        )
+
+    def range(self) -> tuple[float, float]:
+        """Least and greatest value."""
+        return float(self.values.min()), float(self.values.max())
+
+
+def check_shape(field: str, shape: Sequence[int]) -> None:
+    """Refuse what is not (nx, ny, nz) with two nodes or more along each axis."""
+    if len(shape) != 3 or min(shape) < 2:
+        raise InvalidInput(field, f"shape {tuple(shape)}", "(nx, ny, nz), at least two nodes along each axis")
+
+
+def check_type(field: str, dtype: np.dtype[Any]) -> None:
+    """Refuse what is not a real number."""
+    if dtype.kind not in "buif":
+        words = {"c": "complex numbers", "O": "Python objects", "V": "records, as RGB"}
+        found = words.get(dtype.kind, "no numbers")
+        raise InvalidInput(field, f"{found} ({dtype})", "integers or floating-point numbers")
+
+
+def write_volume(path: Path, volume: Volume) -> None:
+    """Write a volume; ``path`` is replaced whole or not touched.
+
+    The file holds ``values``, not packed, since every picture reads them whole, and the root attributes
+    ``format``, ``format_version``, ``spacing_m``, ``origin_m`` and ``title``.
+
+    Raises:
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    with creating(Path(path)) as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["format_version"] = VERSION
+        file.attrs["spacing_m"] = volume.spacing_m
+        file.attrs["origin_m"] = volume.origin_m
+        file.attrs["title"] = volume.title
+        file.create_dataset("values", data=volume.values, track_times=False)
+
+
+def volume_in(reader: Reader) -> Volume:
+    """The volume in an open file that says it is one; raises InvalidInput as ``read_volume`` does."""
+    if (version := reader.text("", "format_version")) != VERSION:
+        raise InvalidInput("@format_version", repr(version), f'"{VERSION}"')
+    values = reader.array("values", "buif", "(nx, ny, nz) numbers")
+    if values is None:
+        raise InvalidInput("values", "nothing", "(nx, ny, nz) numbers")
+    spacing, origin = (reader.numbers("", name, "m") or () for name in ("spacing_m", "origin_m"))
+    return Volume.of(values, spacing, origin, reader.text("", "title") or "")
+
+
+def read_volume(path: Path, limits: Limits | None = None) -> Volume:
+    """Read what ``write_volume`` wrote.
+
+    Raises:
+        InvalidInput: naming the first field that is missing or wrong, as ``read_dataset`` does.
+    """
+    with opened(Path(path), limits or Limits()) as reader:
+        if (found := reader.text("", "format")) != FORMAT:
+            raise InvalidInput("@format", repr(found), f'"{FORMAT}"')
+        return volume_in(reader)
