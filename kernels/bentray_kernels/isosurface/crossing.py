@@ -7,13 +7,16 @@ from typing import NamedTuple
 
 from ..compiled import kernel
 from .octree import Octree
-from .roots import Field, Ray, brent, field_at, first_root_of_cubic
+from .roots import Field, Ray, Vector, brent, field_at, first_root_of_cubic, newton
 
 # How the search looks within a cell.
-CERTAIN, BRENT, ANALYTIC = 0, 1, 2
+CERTAIN, CERTAIN_BRENT, BRENT, ANALYTIC = 0, 1, 2, 3
+
+# The gradient of a crossing that was found without one.
+UNKNOWN = (math.nan, math.nan, math.nan)
 
 # Accuracy of a crossing, nodes, and the shortest piece of a ray that is still halved.
-TOLERANCE = 1e-8
+TOLERANCE = 1e-9
 SHORTEST = 1e-7
 
 
@@ -21,9 +24,10 @@ class Search(NamedTuple):
     """How crossings are found.
 
     Attributes:
-        roots: ``CERTAIN``: no crossing is missed, however close to the next one. ``BRENT``: a cell is
-            searched if the field at its two ends lies on different sides (dissertation, 4.2.3), which misses
-            double crossings at grazing rays. ``ANALYTIC``: the cubic of a trilinear cell.
+        roots: ``CERTAIN``: no crossing is missed, however close to the next one; found by Newton's method.
+            ``CERTAIN_BRENT``: the same by Brent's, where gradients are not those of the values. ``BRENT``: a
+            cell is searched if the field at its two ends lies on different sides (dissertation, 4.2.3), which
+            misses double crossings at grazing rays. ``ANALYTIC``: the cubic of a trilinear cell.
         top: level of the octree at which the descent begins; 0 is the 3-D DDA through all cells.
         step: length of the steps in nodes, without octree; 0 with it.
     """
@@ -45,7 +49,7 @@ def leave_interval(
     above: float,
     sought: int,
     slope: float,
-) -> tuple[float, int]:
+) -> tuple[float, int, Vector]:
     """First s, start < s < stop, where the field is no longer between ``below`` and ``above``.
 
     A ray is in a layer of the object; the iso-values about it are the interval. So nested iso-surfaces, and
@@ -62,13 +66,16 @@ def leave_interval(
         slope: of the field along the ray at start, per unit of s, if start lies on an iso-surface; else 0.
 
     Returns:
-        s and +1 where the field rises above the interval, −1 where it falls below it; 0 if it does not.
+        s; +1 where the field rises above the interval, −1 where it falls below it, 0 if it does not; and the
+        gradient there, per node, NaN where it was not needed.
     """
     speed = math.sqrt(ray.along_x**2 + ray.along_y**2 + ray.along_z**2)
     if search.step > 0.0:
         step = search.step / speed
-        found, side, _ = _scan(field, ray, speed, start, math.nan, stop, step, 0.0, below, above)
-        return found, side
+        found, side, gradient, _ = _scan(
+            field, ray, False, speed, start, math.nan, stop, step, 0.0, below, above
+        )
+        return found, side, gradient
     cells_x, cells_y, cells_z = octree.levels[0, 1], octree.levels[0, 2], octree.levels[0, 3]
     i = min(max(int(ray.x + start * ray.along_x), 0), cells_x - 1)
     j = min(max(int(ray.y + start * ray.along_y), 0), cells_y - 1)
@@ -95,14 +102,17 @@ def leave_interval(
                 slope = 0.0
             if s >= end:
                 value = math.nan
-                found, side = s, 0
+                found, side, gradient = s, 0, UNKNOWN
             elif search.roots == ANALYTIC:
-                found, side = _solve(field, ray, s, end, below, above)
+                found, side, gradient = _solve(field, ray, s, end, below, above)
             else:
-                certain = bend if search.roots == CERTAIN else 0.0
-                found, side, value = _scan(field, ray, speed, s, value, end, end - s, certain, below, above)
+                certain = bend if search.roots != BRENT else 0.0
+                smooth = search.roots == CERTAIN
+                found, side, gradient, value = _scan(
+                    field, ray, smooth, speed, s, value, end, end - s, certain, below, above
+                )
             if side != 0:
-                return found, side
+                return found, side, gradient
         else:
             value = math.nan
         s = out
@@ -140,7 +150,7 @@ def leave_interval(
         while changed > 1 and level < search.top:
             changed >>= 1
             level += 1
-    return stop, 0
+    return stop, 0, UNKNOWN
 
 
 @kernel(inline="always")
@@ -176,6 +186,7 @@ def _within(place: float, node: int, level: int, cells: int) -> int:
 def _scan(
     field: Field,
     ray: Ray,
+    smooth: bool,
     speed: float,
     start: float,
     value: float,
@@ -184,7 +195,7 @@ def _scan(
     bend: float,
     below: float,
     above: float,
-) -> tuple[float, int, float]:
+) -> tuple[float, int, Vector, float]:
     """The first way out of the interval between start and stop, in steps that are halved where in doubt.
 
     Over a length h the field departs from its chord by at most bend·h²/8. So it stays in the interval where
@@ -192,6 +203,7 @@ def _scan(
     bend·h²/2: then one crossing lies between them.
 
     Args:
+        smooth: whether the gradient is the values' own.
         value: the field at start, NaN where unknown.
 
     Returns:
@@ -212,20 +224,24 @@ def _scan(
             length = min(2.0 * length, step)
         elif not inside and (abs(value_b - value_a) >= 4.0 * sag or (b - a) * speed <= SHORTEST):
             target, side = (above, 1) if value_b >= above else (below, -1)
-            found = brent(field, ray, target, a, value_a, b, value_b, TOLERANCE / speed)
-            return found, side, target
+            if smooth and abs(value_b - value_a) >= 4.0 * sag:
+                found, gradient = newton(field, ray, target, a, value_a, b, value_b, bend, TOLERANCE / speed)
+            else:
+                found = brent(field, ray, target, a, value_a, b, value_b, TOLERANCE / speed)
+                gradient = UNKNOWN
+            return found, side, gradient, target
         elif (b - a) * speed <= SHORTEST:
             a, value_a = b, value_b
             length = min(2.0 * length, step)
         else:
             length = 0.5 * (b - a)
-    return stop, 0, value_a
+    return stop, 0, UNKNOWN, value_a
 
 
 @kernel(inline="always")
 def _solve(
     field: Field, ray: Ray, start: float, stop: float, below: float, above: float
-) -> tuple[float, int]:
+) -> tuple[float, int, Vector]:
     """The same in a trilinear cell, whose field along the ray is the cubic through four values."""
     third = (stop - start) / 3.0
     f0, f1 = field_at(field, ray, start), field_at(field, ray, start + third)
@@ -237,5 +253,5 @@ def _solve(
     falling = first_root_of_cubic(f0 - below, c1, c2, c3) if below > -math.inf else math.inf
     first = min(rising, falling)
     if first > 1.0 + 1e-12:
-        return stop, 0
-    return start + first * 3.0 * third, 1 if rising < falling else -1
+        return stop, 0, UNKNOWN
+    return start + first * 3.0 * third, 1 if rising < falling else -1, UNKNOWN

@@ -8,9 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..compiled import kernel
-from ..splines.sampling import Stencil, value_at
+from ..splines.sampling import Stencil, value_and_gradient_at, value_at
 
-# Steps of Brent's method; it halves at worst every third.
+Vector = tuple[float, float, float]
+
+# Steps of either method; both halve what is left at worst every third.
 STEPS = 200
 
 
@@ -117,6 +119,58 @@ def brent(
         b += step if abs(step) > tolerance else math.copysign(tolerance, half)
         f_b = field_at(field, ray, b) - target
     return b
+
+
+@kernel(inline="always")
+def newton(
+    field: Field,
+    ray: Ray,
+    target: float,
+    a: float,
+    value_a: float,
+    b: float,
+    value_b: float,
+    bend: float,
+    tolerance: float,
+) -> tuple[float, Vector]:
+    """Where the field is ``target`` between a and b, and its gradient there, by Newton's method.
+
+    The field is monotone from a to b and its second derivative at most ``bend``, so a step leaves an error of
+    at most bend·step²/2 over the slope. The gradient is carried on to the root along the last two readings.
+
+    Args:
+        field, ray, target, a, value_a, b, value_b: as for ``brent``.
+        bend: upper bound of the second derivative along the ray.
+        tolerance: of s.
+
+    Returns:
+        s and the gradient, per node.
+    """
+    s = a + (b - a) * (target - value_a) / (value_b - value_a)
+    gradient, last = (0.0, 0.0, 0.0), 0.0
+    for count in range(STEPS):
+        before = gradient
+        value, gradient = value_and_gradient_at(field.coefficients, field.stencil, point_at(ray, s))
+        slope = gradient[0] * ray.along_x + gradient[1] * ray.along_y + gradient[2] * ray.along_z
+        if (value > target) == (value_b > value_a):
+            b = s
+        else:
+            a = s
+        step = (target - value) / slope
+        if not a <= s + step <= b:
+            # Out of the bracket, or no slope to follow.
+            step = 0.5 * (a + b) - s
+        elif abs(step) <= tolerance:
+            return s + step, gradient
+        elif count > 0 and 0.5 * bend * step * step <= tolerance * abs(slope):
+            on = step / last
+            x = gradient[0] + on * (gradient[0] - before[0])
+            y = gradient[1] + on * (gradient[1] - before[1])
+            z = gradient[2] + on * (gradient[2] - before[2])
+            return s + step, (x, y, z)
+        last = step
+        s += step
+    return s, gradient
 
 
 @kernel(inline="always")

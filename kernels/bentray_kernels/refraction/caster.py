@@ -174,7 +174,7 @@ def _follow(
                 if not passed:
                     break
                 continue
-        s, side = leave_interval(
+        s, side, gradient = leave_interval(
             medium.field,
             medium.octree,
             search,
@@ -197,7 +197,7 @@ def _follow(
             normal, behind = _axis(face_out), 0
             gradient = (0.0, 0.0, 0.0)
         else:
-            gradient = gradient_at(medium, ray, s)
+            gradient = gradient_at(medium, ray, s, gradient)
             normal, behind = unit_normal(gradient, direction), layer + side
         ratio = medium.indices[layer] / medium.indices[behind]
         direction, share, passed = refracted(direction, normal, ratio)
@@ -264,9 +264,11 @@ def _axis(axis: int) -> Vector:
 
 
 @kernel(inline="always")
-def gradient_at(medium: Medium, ray: Ray, s: float) -> Vector:
-    """Of the field at s, per m."""
-    _, slopes = value_and_gradient_at(medium.field.coefficients, medium.field.stencil, point_at(ray, s))
+def gradient_at(medium: Medium, ray: Ray, s: float, known: Vector) -> Vector:
+    """Of the field at s, per m; read there unless it is known per node, not NaN."""
+    slopes = known
+    if math.isnan(known[0]):
+        _, slopes = value_and_gradient_at(medium.field.coefficients, medium.field.stencil, point_at(ray, s))
     x, y, z = medium.density
     return slopes[0] * x, slopes[1] * y, slopes[2] * z
 

@@ -99,7 +99,7 @@ def _shade(
             if not far > near:
                 continue
             layer = layer_at(medium, ray, near)
-            s, side = leave_interval(
+            s, side, gradient = leave_interval(
                 medium.field,
                 medium.octree,
                 search,
@@ -113,7 +113,7 @@ def _shade(
             )
             if side == 0:
                 continue
-            gradient = gradient_at(medium, ray, s)
+            gradient = gradient_at(medium, ray, s, gradient)
             normal = unit_normal((-gradient[0], -gradient[1], -gradient[2]), direction)
             distances[i, j] = s
             normals[i, j, 0], normals[i, j, 1], normals[i, j, 2] = normal

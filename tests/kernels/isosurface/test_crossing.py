@@ -30,7 +30,10 @@ def leave(
     slope: float,
 ) -> tuple[float, int]:
     ray = ray_of(origin, along)
-    return leave_interval(field, octree, search, ray, span[0], span[1], interval[0], interval[1], 255, slope)
+    s, side, _ = leave_interval(
+        field, octree, search, ray, span[0], span[1], interval[0], interval[1], 255, slope
+    )
+    return s, side
 
 
 class Case:
