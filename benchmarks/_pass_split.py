@@ -45,7 +45,7 @@ def split(nodes: int, elements: int) -> Split:
     """Of a pass through the middle slice of the Table 7 phantom in water as fast as fat."""
     spacing = TABLE7_SIDE_M / (nodes - 1)
     # As smooth as an image of SART is; the front goes round its grid more often where edges are sharp.
-    slowness = 1.0 / gaussian_filter(table7(1375.0, nodes).at(0.0).speed(nodes, TABLE7_SIDE_M), 2.0)
+    slowness = 1.0 / gaussian_filter(table7(1375.0, max(nodes, 128)).at(0.0).speed(nodes, TABLE7_SIDE_M), 2.0)
     places = Ring(elements, ring_radius(TABLE7_SIDE_M, nodes)).positions() + 0.5 * TABLE7_SIDE_M
     source, receivers = places[0], places[1:]
     measured = np.linalg.norm(receivers - source, axis=1) / 1375.0

@@ -1,0 +1,48 @@
+"""A sheet of small pictures in rows, each with its name."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.font_manager import findfont
+from PIL import Image, ImageDraw, ImageFont
+
+PANEL, GAP, LINE = 176, 6, 14
+INK, PAPER = (25, 25, 25), (255, 255, 255)
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A picture, (rows, columns, 3) 8-bit RGB, and up to two lines of text under it."""
+
+    name: str
+    image: np.ndarray
+
+
+def sheet(rows: Sequence[tuple[str, Sequence[Panel]]]) -> bytes:
+    """PNG of rows of panels, each row under its title, in 64 colours."""
+    # Pillow's own font has no Greek.
+    face = findfont("DejaVu Sans")
+    font, bold = ImageFont.truetype(face, 10), ImageFont.truetype(face, 12)
+    widest = max(len(panels) for _, panels in rows)
+    width = GAP + widest * (PANEL + GAP)
+    height = len(rows) * (LINE + PANEL + 2 * LINE + 2 * GAP) + GAP
+    page = Image.new("RGB", (width, height), PAPER)
+    pen = ImageDraw.Draw(page)
+    top = GAP
+    for title, panels in rows:
+        pen.text((GAP, top), title, INK, bold)
+        top += LINE + GAP
+        for k, panel in enumerate(panels):
+            left = GAP + k * (PANEL + GAP)
+            page.paste(
+                Image.fromarray(panel.image).resize((PANEL, PANEL), Image.Resampling.LANCZOS), (left, top)
+            )
+            pen.multiline_text((left, top + PANEL + 1), panel.name, INK, font, spacing=1)
+        top += PANEL + 2 * LINE + GAP
+    buffer = io.BytesIO()
+    page.quantize(64, dither=Image.Dither.NONE).save(buffer, "png", optimize=True)
+    return buffer.getvalue()
