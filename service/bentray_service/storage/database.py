@@ -1,7 +1,8 @@
-"""The database connection: how it is opened, how a read and a write begin, and the check of its version."""
+"""The database connection: how it is opened, brought up to date, and how a read and a write begin."""
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +15,9 @@ from sqlalchemy.exc import ArgumentError, NoSuchModuleError, SQLAlchemyError
 from bentray_kernels.errors import InvalidInput
 
 from . import schema
+from .migration import SQLITE_PRAGMAS, STEPS, migrate
+
+log = logging.getLogger("bentray.storage")
 
 BUSY_SECONDS = 30.0
 
@@ -47,20 +51,19 @@ class Database:
 
 
 def open_database(address: str) -> Database:
-    """Open the database and make its tables where it is new.
+    """Open the database, make its tables where it is new, and change them where an older Bentray made them.
 
     Raises:
-        InvalidInput: when it cannot be opened, or was made by another version of Bentray.
+        InvalidInput: when it cannot be opened, or was made by a later version of Bentray.
     """
     shown = address
     try:
         shown = make_url(address).render_as_string(hide_password=True)
-        engine = create_engine(address, **_options(address))
-        if engine.dialect.name == "sqlite":
-            event.listen(engine, "connect", _configure_sqlite)
-            event.listen(engine, "begin", _begin_sqlite)
+        engine = _engine(address, ("foreign_keys=ON",))
         with engine.begin() as connection:
-            _make_or_check(connection, shown)
+            current = _make_or_check(connection, shown)
+        if not current:
+            _update(address, shown)
     except (SQLAlchemyError, ArgumentError, NoSuchModuleError, ImportError) as error:
         reason = str(getattr(error, "orig", None) or error).splitlines()[0]
         raise InvalidInput(
@@ -77,11 +80,20 @@ def _options(address: str) -> dict[str, Any]:
     )
 
 
-def _configure_sqlite(connection: Any, _record: object) -> None:
-    # The driver's own idea of when a transaction begins is switched off; _begin_sqlite says it instead.
-    connection.isolation_level = None
-    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
-        connection.execute(f"PRAGMA {pragma}")
+def _engine(address: str, pragmas: tuple[str, ...]) -> Engine:
+    """An engine; ``pragmas`` are for SQLite alone."""
+
+    def configure_sqlite(connection: Any, _record: object) -> None:
+        # The driver's own idea of when a transaction begins is switched off; _begin_sqlite says it instead.
+        connection.isolation_level = None
+        for pragma in ("journal_mode=WAL", "synchronous=FULL", *pragmas):
+            connection.execute(f"PRAGMA {pragma}")
+
+    engine = create_engine(address, **_options(address))
+    if engine.dialect.name == "sqlite":
+        event.listen(engine, "connect", configure_sqlite)
+        event.listen(engine, "begin", _begin_sqlite)
+    return engine
 
 
 def _begin_sqlite(connection: Connection) -> None:
@@ -91,15 +103,33 @@ def _begin_sqlite(connection: Connection) -> None:
     connection.exec_driver_sql("BEGIN" if read_only else "BEGIN IMMEDIATE")
 
 
-def _make_or_check(connection: Connection, shown: str) -> None:
+def _make_or_check(connection: Connection, shown: str) -> bool:
+    """Make the tables of a new database; whether they are those of this version."""
     if not inspect(connection).has_table(schema.about.name):
         schema.metadata.create_all(connection)
         connection.execute(insert(schema.about).values(version=schema.VERSION, probed=time.time()))
-        return
-    found = connection.execute(select(schema.about.c.version)).scalar_one()
-    if found != schema.VERSION:
+        return True
+    found = _version(connection)
+    if found != schema.VERSION and found not in STEPS:
         raise InvalidInput(
             "database_url",
             f"{shown} with schema version {found}",
-            f"schema version {schema.VERSION}: use the Bentray that made it, or another database",
+            f"{min(STEPS)} to {schema.VERSION}: use the Bentray that made it, or another database",
         )
+    return found == schema.VERSION
+
+
+def _update(address: str, shown: str) -> None:
+    """Change the tables by a connection of its own: SQLite takes the pragmas before a transaction only."""
+    engine = _engine(address, SQLITE_PRAGMAS)
+    try:
+        with engine.begin() as connection:
+            found = _version(connection)
+            log.warning("%s goes from schema version %d to %d", shown, found, schema.VERSION)
+            migrate(connection, found)
+    finally:
+        engine.dispose()
+
+
+def _version(connection: Connection) -> int:
+    return int(connection.execute(select(schema.about.c.version)).scalar_one())

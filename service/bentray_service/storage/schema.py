@@ -17,7 +17,7 @@ from sqlalchemy import (
     Table,
 )
 
-VERSION = 1
+VERSION = 2
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
@@ -60,7 +60,9 @@ jobs = Table(
     Column("number", Integer, primary_key=True, autoincrement=True),
     Column("id", String(32), nullable=False, unique=True),
     Column("kind", String(32), nullable=False),
-    Column("dataset_id", String(32), ForeignKey("datasets.id"), nullable=False),
+    # What the job reads: a reconstruction a dataset, a refraction a volume of either table.
+    Column("dataset_id", String(32), ForeignKey("datasets.id")),
+    Column("volume_id", String(32)),
     Column("settings", JSON, nullable=False),
     Column("state", String(16), nullable=False),
     Column("attempts", Integer, nullable=False, default=0),
@@ -86,6 +88,7 @@ events = Table(
     Column("note", String(500), nullable=False, default=""),
 )
 
+# Results of reconstructions; what was uploaded is in a table of its own.
 volumes = Table(
     "volumes",
     metadata,
@@ -100,4 +103,19 @@ volumes = Table(
     Column("speed_range_mps", JSON, nullable=False),
     Column("water_speed_mps", Float, nullable=False),
     Column("provenance", JSON, nullable=False),
+)
+
+uploaded_volumes = Table(
+    "uploaded_volumes",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(32), nullable=False, unique=True),
+    Column("created", Float, nullable=False),
+    Column("bytes", BigInteger, nullable=False),
+    Column("sha256", String(64), nullable=False),
+    Column("title", String(200), nullable=False),
+    Column("shape", JSON, nullable=False),
+    Column("spacing_m", JSON, nullable=False),
+    Column("origin_m", JSON, nullable=False),
+    Column("value_range", JSON, nullable=False),
 )

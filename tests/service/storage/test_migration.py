@@ -1,0 +1,182 @@
+"""A database of an older version opens, keeps every row, and is as a new one afterwards."""
+
+import json
+import sqlite3
+
+import pytest
+from sqlalchemy import inspect, text
+from sqlalchemy.dialects import postgresql
+from sqlalchemy.exc import IntegrityError
+
+from bentray_service.storage import migration, schema
+from bentray_service.storage.database import open_database
+from bentray_service.storage.ids import new_id, volume_of
+from bentray_service.storage.jobs import Jobs
+from bentray_service.storage.volumes import Volumes
+
+# The tables of version 1, word for word as SQLite kept them.
+VERSION_1 = """
+CREATE TABLE about (version INTEGER NOT NULL, probed FLOAT NOT NULL, PRIMARY KEY (version));
+CREATE TABLE datasets (
+    number INTEGER NOT NULL, id VARCHAR(32) NOT NULL, created FLOAT NOT NULL, bytes BIGINT NOT NULL,
+    sha256 VARCHAR(64) NOT NULL, title VARCHAR(200) NOT NULL, source VARCHAR(200) NOT NULL,
+    license VARCHAR(200) NOT NULL, dimension INTEGER NOT NULL, elements INTEGER NOT NULL,
+    ntx INTEGER NOT NULL, nrx INTEGER NOT NULL, slices INTEGER NOT NULL, has_traces BOOLEAN NOT NULL,
+    has_travel_times BOOLEAN NOT NULL, has_truth BOOLEAN NOT NULL, water_speed_mps FLOAT NOT NULL,
+    PRIMARY KEY (number), UNIQUE (id));
+CREATE TABLE jobs (
+    number INTEGER NOT NULL, id VARCHAR(32) NOT NULL, kind VARCHAR(32) NOT NULL,
+    dataset_id VARCHAR(32) NOT NULL, settings JSON NOT NULL, state VARCHAR(16) NOT NULL,
+    attempts INTEGER NOT NULL, done INTEGER NOT NULL, total INTEGER NOT NULL, history JSON NOT NULL,
+    error JSON, created FLOAT NOT NULL, started FLOAT, finished FLOAT,
+    PRIMARY KEY (number),
+    CONSTRAINT known_state CHECK (
+        state IN ('queued', 'running', 'cancelling', 'succeeded', 'failed', 'cancelled')),
+    UNIQUE (id), FOREIGN KEY(dataset_id) REFERENCES datasets (id));
+CREATE INDEX jobs_by_state ON jobs (state, number);
+CREATE TABLE events (
+    number INTEGER NOT NULL, job_id VARCHAR(32) NOT NULL, time FLOAT NOT NULL, state VARCHAR(16) NOT NULL,
+    note VARCHAR(500) NOT NULL, PRIMARY KEY (number), FOREIGN KEY(job_id) REFERENCES jobs (id));
+CREATE INDEX ix_events_job_id ON events (job_id);
+CREATE TABLE volumes (
+    id VARCHAR(32) NOT NULL, job_id VARCHAR(32) NOT NULL, created FLOAT NOT NULL, bytes BIGINT NOT NULL,
+    axes VARCHAR(8) NOT NULL, shape JSON NOT NULL, spacing_m JSON NOT NULL, origin_m JSON NOT NULL,
+    speed_range_mps JSON NOT NULL, water_speed_mps FLOAT NOT NULL, provenance JSON NOT NULL,
+    PRIMARY KEY (id), FOREIGN KEY(job_id) REFERENCES jobs (id), UNIQUE (job_id));
+INSERT INTO about VALUES (1, 0.0);
+"""
+DATASET, DONE, WAITING = new_id("dataset"), new_id("job"), new_id("job")
+
+
+@pytest.fixture
+def old(tmp_path):
+    """A database as version 1 left it, with a finished and a waiting job."""
+    path = tmp_path / "old.sqlite"
+    with sqlite3.connect(path) as connection:
+        connection.executescript(VERSION_1)
+        connection.execute(
+            "INSERT INTO datasets VALUES (1, ?, 1.0, 9, 'f', 'A scan', '', '', 2, 8, 8, 8, 1, 0, 1, 0, 1500)",
+            (DATASET,),
+        )
+        for number, job, state in ((3, DONE, "succeeded"), (7, WAITING, "queued")):
+            row = (number, job, DATASET, json.dumps({"nodes": number}), state)
+            connection.execute(
+                "INSERT INTO jobs VALUES (?, ?, 'reconstruction', ?, ?, ?, 1, 2, 3, '[]', NULL, 5, 6, 7)",
+                row,
+            )
+            connection.execute("INSERT INTO events VALUES (?, ?, 1.0, ?, 'a note')", (number, job, state))
+        volume = (volume_of(DONE), DONE, "[8, 8]", "[1, 1]", "[0, 0]", "[1400, 1600]", "{}")
+        connection.execute("INSERT INTO volumes VALUES (?, ?, 8.0, 9, 'x,y', ?, ?, ?, ?, 1500.0, ?)", volume)
+    connection.close()
+    return f"sqlite:///{path}"
+
+
+def described(database):
+    """Columns, keys and indices of every table."""
+    with database.read() as connection:
+        found = inspect(connection)
+        return {
+            table: (
+                {
+                    column["name"]: (str(column["type"]), column["nullable"])
+                    for column in found.get_columns(table)
+                },
+                sorted(str(key["constrained_columns"]) for key in found.get_foreign_keys(table)),
+                sorted(str(key["referred_table"]) for key in found.get_foreign_keys(table)),
+                sorted(str(index["column_names"]) for index in found.get_indexes(table)),
+                sorted(str(one["column_names"]) for one in found.get_unique_constraints(table)),
+            )
+            for table in found.get_table_names()
+        }
+
+
+def test_the_old_tables_were_those_of_version_1(old, tmp_path):
+    """Guards the fixture: all but what version 2 changed is as in a new database."""
+    new = open_database(f"sqlite:///{tmp_path / 'new.sqlite'}")
+    expected = described(new)
+    new.close()
+    with sqlite3.connect(tmp_path / "old.sqlite") as connection:
+        names = {row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+    connection.close()
+    assert names == set(expected) - {"uploaded_volumes"}
+
+
+def test_afterwards_it_is_as_a_new_one(old, tmp_path):
+    new, opened = open_database(f"sqlite:///{tmp_path / 'new.sqlite'}"), open_database(old)
+    assert described(opened) == described(new)
+    new.close()
+    opened.close()
+
+
+def test_every_row_is_kept(old):
+    for _ in range(2):
+        database = open_database(old)
+        jobs, volume = Jobs(database), Volumes(database).get(volume_of(DONE))
+        assert [row["id"] for row in jobs.newest(9)] == [WAITING, DONE]
+        job = jobs.get(DONE)
+        assert (job["number"], job["dataset_id"], job["volume_id"]) == (3, DATASET, None)
+        assert (job["settings"], job["done"], job["finished"]) == ({"nodes": 3}, 2, 7.0)
+        assert [event["note"] for event in jobs.events(WAITING)] == ["a note"]
+        assert (volume["dataset_id"], volume["shape"]) == (DATASET, [8, 8])
+        database.close()
+
+
+def test_a_job_that_waited_is_run(old):
+    database = open_database(old)
+    jobs = Jobs(database)
+    assert jobs.claim()["id"] == WAITING
+    assert jobs.state(WAITING) == "running"
+    database.close()
+
+
+def test_keys_hold_afterwards(old):
+    database = open_database(old)
+    with pytest.raises(IntegrityError), database.write() as connection:
+        connection.execute(text("DELETE FROM jobs"))
+    database.close()
+
+
+def test_what_fails_half_way_leaves_the_old_database(old, monkeypatch):
+    def broken(connection):
+        migration._to_2(connection)
+        raise RuntimeError("the power went")
+
+    monkeypatch.setattr(migration, "STEPS", {1: broken})
+    with pytest.raises(RuntimeError, match="power"):
+        open_database(old)
+    monkeypatch.undo()
+    database = open_database(old)
+    assert Jobs(database).get(DONE)["settings"] == {"nodes": 3}
+    database.close()
+
+
+def test_a_row_that_points_at_nothing_stops_it(old, tmp_path):
+    with sqlite3.connect(tmp_path / "old.sqlite") as connection:
+        connection.execute("INSERT INTO events VALUES (99, 'job-gone', 1.0, 'queued', '')")
+    connection.close()
+    with pytest.raises(RuntimeError, match="1 rows would point at nothing"):
+        open_database(old)
+
+
+class Recorder:
+    """A connection to Postgres that only writes down what it is told."""
+
+    dialect = postgresql.dialect()
+
+    def __init__(self):
+        self.said = []
+
+    def execute(self, statement):
+        self.said.append(str(statement.compile(dialect=self.dialect)))
+
+
+def test_postgres_changes_the_columns_in_place(monkeypatch):
+    told = Recorder()
+    monkeypatch.setattr(type(schema.uploaded_volumes), "create", lambda table, to: to.said.append(table.name))
+    migration.migrate(told, 1)
+    assert told.said[:3] == [
+        "uploaded_volumes",
+        "ALTER TABLE jobs ALTER COLUMN dataset_id DROP NOT NULL",
+        "ALTER TABLE jobs ADD COLUMN volume_id VARCHAR(32)",
+    ]
+    assert told.said[3].startswith("UPDATE about SET version")
