@@ -15,7 +15,7 @@ from bentray_workers.cluster import open_cluster
 from . import __version__, errors
 from .compute import Cluster, Compute
 from .jobs.runner import Runner
-from .routes import datasets, health, jobs, pages, volumes
+from .routes import datasets, health, jobs, pages, uploads, volumes
 from .settings import ServiceSettings
 from .storage.database import open_database
 from .storage.datasets import Datasets
@@ -45,7 +45,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
         stack = ExitStack()
         try:
             app.state.parts = await run_in_threadpool(_open, settings, cluster, stack)
-            app.state.ingest_limiter = anyio.CapacityLimiter(datasets.INGESTS_AT_ONCE)
+            app.state.ingest_limiter = anyio.CapacityLimiter(uploads.INGESTS_AT_ONCE)
             yield
         finally:
             await run_in_threadpool(stack.close)

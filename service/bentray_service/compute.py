@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -49,9 +50,14 @@ class Compute:
             InvalidInput: from the renderer.
             Busy: when no worker delivered it in time.
         """
-        future = self.client.submit(
-            images.slice_png, path, **how, pure=False, resources=RENDER, priority=RENDER_PRIORITY
-        )
+        return self._drawn(images.slice_png, path, how)
+
+    def volume_slice_png(self, path: Path, **how: Any) -> bytes:
+        """The same of an uploaded volume; ``how`` as in ``bentray_workers.images.volume_slice_png``."""
+        return self._drawn(images.volume_slice_png, path, how)
+
+    def _drawn(self, draw: Callable[..., bytes], path: Path, how: dict[str, Any]) -> bytes:
+        future = self.client.submit(draw, path, **how, pure=False, resources=RENDER, priority=RENDER_PRIORITY)
         try:
             return bytes(future.result(timeout=RENDER_SECONDS))
         except TimeoutError:

@@ -11,9 +11,7 @@ class UnknownId(InvalidInput):
     """No dataset, job or volume has this id."""
 
     def __init__(self, field: str, value: str) -> None:
-        # A volume is found through its job.
-        listed = "jobs" if field == "volume" else f"{field}s"
-        super().__init__(field, repr(value[:80]), f"the id of a {field} that exists; see GET /v1/{listed}")
+        super().__init__(field, repr(value[:80]), f"the id of a {field} that exists; see GET /v1/{field}s")
 
     def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
         return InvalidInput, (self.field, self.value, self.accepted)

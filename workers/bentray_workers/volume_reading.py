@@ -13,7 +13,7 @@ import numpy as np
 from bentray_kernels.errors import InvalidInput
 
 from .bounded_reading import LARGEST_BYTES, declared, refusing
-from .hdf5_reading import SIGNATURE, Limits, opened
+from .hdf5_reading import SIGNATURE, Limits, opened, printable
 from .nifti_reading import read_nifti
 from .nrrd_reading import read_nrrd
 from .reconstruction_file import FORMAT as RECONSTRUCTION
@@ -72,7 +72,7 @@ def import_volume(path: Path, given: Given | None = None) -> Volume:
             volume = _read(path, file, start, given)
     except OSError as error:
         raise InvalidInput("file", f"{path.name}: {error.strerror or error}", ACCEPTED) from None
-    return replace(volume, title=given.title[:200]) if given.title else volume
+    return replace(volume, title=printable(given.title)[:200]) if given.title else volume
 
 
 def _read(path: Path, file: IO[bytes], start: bytes, given: Given) -> Volume:

@@ -1,1 +1,1 @@
-"""From the bytes of a stranger to a canonical dataset file."""
+"""From the bytes of a stranger to a canonical file of a scan or a volume."""

@@ -1,6 +1,6 @@
 """The process that opens an uploaded file: limits itself, reads, rewrites, and prints one line of JSON.
 
-``python -m bentray_service.ingest.child IN OUT --memory BYTES --seconds SECONDS``
+``python -m bentray_service.ingest.child dataset|volume IN OUT --memory BYTES --seconds SECONDS --given JSON``
 """
 
 from __future__ import annotations
@@ -16,21 +16,30 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bentray_kernels.acquisition.dataset import Dataset
+    from bentray_workers.volume_file import Volume
 
 LONGEST_TEXT = 200
 OPEN_FILES = 64
+
+# What may be ingested, and how the user is told of it.
+ACCEPTED = {
+    "dataset": "an HDF5 file in the format uct-transmission",
+    "volume": "a volume as NumPy (.npy), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype",
+}
 
 
 def main() -> None:
     """Print ``{"ok": summary}``, ``{"error": {field, found, accepted}}`` or ``{"full": true}``."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=list(ACCEPTED))
     parser.add_argument("source", type=Path)
     parser.add_argument("target", type=Path)
     parser.add_argument("--memory", type=int, required=True)
     parser.add_argument("--seconds", type=float, required=True)
-    given = parser.parse_args()
-    limit(given.memory, given.seconds)
-    answer = convert(given.source, given.target)
+    parser.add_argument("--given", type=json.loads, required=True, help="what the user says of the file")
+    asked = parser.parse_args()
+    limit(asked.memory, asked.seconds)
+    answer = convert(asked.what, asked.source, asked.target, asked.given)
     sys.stdout.write(json.dumps(answer) + "\n")
 
 
@@ -49,28 +58,32 @@ def limit(memory_bytes: int, seconds: float) -> None:
         resource.setrlimit(what, (allowed, allowed))
 
 
-def convert(source: Path, target: Path) -> dict[str, Any]:
+def convert(what: str, source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
     """Read ``source``, write the canonical ``target``, and say what it holds or what is wrong with it."""
     try:
         from bentray_kernels.errors import InvalidInput
         from bentray_workers.dataset_file import read_dataset, write_dataset
+        from bentray_workers.volume_file import write_volume
+        from bentray_workers.volume_reading import Given, import_volume
     except MemoryError:
         return _error("file", "no memory left to start the reader", "a larger BENTRAY_INGEST_MEMORY_BYTES")
     try:
-        dataset = read_dataset(source)
-        write_dataset(target, dataset)
-        return {"ok": summary(dataset)}
+        if what == "dataset":
+            dataset = read_dataset(source)
+            write_dataset(target, dataset)
+            return {"ok": summary(dataset)}
+        volume = import_volume(source, Given(**given))
+        write_volume(target, volume)
+        return {"ok": volume_summary(volume)}
     except InvalidInput as error:
         return _error(error.field, error.value, error.accepted)
     except MemoryError:
-        return _error("file", "data that does not fit into the memory of the reader", "a smaller dataset")
+        return _error("file", "data that does not fit into the memory of the reader", "a smaller one")
     except Exception as error:
         if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
             return {"full": True}
         # A reader must never take the service down: whatever breaks it is a fault of the file.
-        return _error(
-            "file", f"{type(error).__name__}: {error}", "an HDF5 file in the format uct-transmission"
-        )
+        return _error("file", f"{type(error).__name__}: {error}", ACCEPTED[what])
 
 
 def summary(dataset: Dataset) -> dict[str, Any]:
@@ -88,6 +101,17 @@ def summary(dataset: Dataset) -> dict[str, Any]:
         "has_travel_times": dataset.picked,
         "has_truth": dataset.truth is not None,
         "water_speed_mps": float(dataset.water_speed_mps),
+    }
+
+
+def volume_summary(volume: Volume) -> dict[str, Any]:
+    """The same of a volume."""
+    return {
+        "title": text(volume.title),
+        "shape": list(volume.values.shape),
+        "spacing_m": list(volume.spacing_m),
+        "origin_m": list(volume.origin_m),
+        "value_range": list(volume.range()),
     }
 
 

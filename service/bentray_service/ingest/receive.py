@@ -25,7 +25,9 @@ class Received:
     sha256: str
 
 
-async def receive(stream: AsyncIterator[bytes], announced: int | None, path: Path, limit: int) -> Received:
+async def receive(
+    stream: AsyncIterator[bytes], announced: int | None, path: Path, limit: int, expected: str
+) -> Received:
     """Write a body to ``path``, durably, without blocking the event loop.
 
     Args:
@@ -33,10 +35,13 @@ async def receive(stream: AsyncIterator[bytes], announced: int | None, path: Pat
         announced: the Content-Length, if there was one; too large a one is refused before a byte is read.
         path: the file to make; the caller removes it.
         limit: largest size, bytes.
+        expected: what the body should hold, for the refusal of an empty one.
 
     Raises:
         TooLarge, EmptyBody, StorageFull: as their names say.
     """
+    if announced == 0:
+        raise EmptyBody("body", "0 bytes", expected)
     if announced is not None and announced > limit:
         raise _too_large(f"{announced} bytes", limit)
     digest, size, batch = hashlib.sha256(), 0, bytearray()
@@ -51,7 +56,7 @@ async def receive(stream: AsyncIterator[bytes], announced: int | None, path: Pat
                 await run_in_threadpool(_write, file, bytes(batch), digest)
                 batch.clear()
         if not size:
-            raise EmptyBody("body", "0 bytes", "an HDF5 file")
+            raise EmptyBody("body", "0 bytes", expected)
         await run_in_threadpool(_write, file, bytes(batch), digest)
         await run_in_threadpool(os.fsync, file.fileno())
     except OSError as error:

@@ -9,17 +9,18 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from bentray_kernels.errors import InvalidInput
 
 from ..refusals import StorageFull
+from .child import ACCEPTED
 
 log = logging.getLogger("bentray.ingest")
 
-ACCEPTED = "an HDF5 file in the format uct-transmission"
 # One thread each: every further one reserves address space, which is limited. No filter plug-in is loaded.
 ENVIRONMENT = {
     "PATH": os.defpath,
@@ -32,30 +33,35 @@ ENVIRONMENT = {
 
 
 def ingest(
+    what: str,
     source: Path,
     target: Path,
     *,
     memory_bytes: int,
     seconds: float,
     scratch: Path,
+    given: Mapping[str, Any] = MappingProxyType({}),
     started: Callable[[int], None] = lambda process_id: None,
 ) -> dict[str, Any]:
     """Check ``source`` in a process of its own and write the canonical ``target``.
 
     Args:
+        what: "dataset" or "volume".
+        source, target: paths of this machine.
         memory_bytes, seconds: what the process may use of address space, of processor and of wall time.
         scratch: the folder it runs in.
+        given: what the user says of a volume, as ``volume_reading.Given``.
         started: told the id of the process.
 
     Returns:
-        The summary of the dataset.
+        The summary of the dataset or the volume.
 
     Raises:
         InvalidInput: when the file is refused, and also when reading it crashed, hung or ate the memory.
         StorageFull: when there is no space for the canonical file.
     """
-    command = [sys.executable, "-I", "-m", "bentray_service.ingest.child", str(source), str(target)]
-    command += ["--memory", str(memory_bytes), "--seconds", str(seconds)]
+    command = [sys.executable, "-I", "-m", "bentray_service.ingest.child", what, str(source), str(target)]
+    command += ["--memory", str(memory_bytes), "--seconds", str(seconds), "--given", json.dumps(dict(given))]
     process = subprocess.Popen(  # noqa: S603 - our own program and paths
         command,
         cwd=scratch,
@@ -69,14 +75,16 @@ def ingest(
         started(process.pid)
         output, complaint = process.communicate(timeout=seconds)
     except subprocess.TimeoutExpired:
-        raise InvalidInput("file", f"a file that takes more than {seconds:g} s to read", ACCEPTED) from None
+        raise InvalidInput(
+            "file", f"a file that takes more than {seconds:g} s to read", ACCEPTED[what]
+        ) from None
     finally:
         _kill(process)
     if process.returncode != 0:
         log.warning(
             "the ingest process ended with %s: %s", process.returncode, complaint.decode(errors="replace")
         )
-        raise InvalidInput("file", _death(process.returncode, memory_bytes), ACCEPTED)
+        raise InvalidInput("file", _death(process.returncode, memory_bytes), ACCEPTED[what])
     answer: dict[str, Any] = json.loads(output)
     if "full" in answer:
         raise StorageFull("body", "no space for the checked copy", "a smaller file, or a larger disk")

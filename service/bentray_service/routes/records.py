@@ -14,6 +14,9 @@ from ..storage.ids import volume_of
 State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
 Row = dict[str, Any]
 
+# What the rows of reconstructed and of uploaded volumes have in common.
+SHARED = ("id", "title", "axes", "shape", "spacing_m", "origin_m", "value_range", "unit", "bytes")
+
 
 class DatasetRecord(BaseModel):
     """One uploaded scan."""
@@ -89,21 +92,32 @@ class JobList(BaseModel):
 
 
 class VolumeRecord(BaseModel):
-    """One result."""
+    """One volume: the result of a reconstruction, or an upload."""
 
     id: str
-    job: str
-    dataset: str
+    source: Literal["reconstruction", "upload"]
+    title: str = Field(description="Of the scan, or of the upload.")
+    job: str | None = Field(description="The reconstruction that made it.")
+    dataset: str | None = Field(description="The scan that it was made of.")
     axes: str = Field(description="Names of the axes, in order.")
     shape: list[int] = Field(description="Nodes along each axis.")
     spacing_m: list[float | None] = Field(description="Node spacing; null where it is not even.")
     origin_m: list[float | None] = Field(description="Position of node 0.")
-    speed_range_mps: tuple[float, float]
-    water_speed_mps: float
+    value_range: tuple[float, float] = Field(description="Least and greatest value.")
+    unit: str = Field(description="Of the values: m/s of a reconstruction; empty where it is not known.")
+    speed_range_mps: tuple[float, float] | None = Field(description="The range of a reconstruction.")
+    water_speed_mps: float | None
     provenance: dict[str, str]
-    bytes: int
+    bytes: int = Field(description="Size of the file of a reconstruction, or of what was uploaded.")
+    sha256: str | None = Field(description="SHA-256 of what was uploaded.")
     created: datetime
     links: dict[str, str]
+
+
+class VolumeList(BaseModel):
+    """Volumes, newest first."""
+
+    volumes: list[VolumeRecord]
 
 
 def dataset_record(row: Row) -> DatasetRecord:
@@ -143,14 +157,21 @@ def job_record(row: Row) -> JobRecord:
 
 def volume_record(row: Row) -> VolumeRecord:
     here = f"/v1/volumes/{row['id']}"
-    links = {
-        "self": here,
-        "image": f"{here}/slice.png",
-        "data": f"{here}/data",
-        "job": f"/v1/jobs/{row['job_id']}",
-    }
+    links = {"self": here, "image": f"{here}/slice.png", "data": f"{here}/data"}
+    job = row.get("job_id")
+    if job is not None:
+        links["job"] = f"/v1/jobs/{job}"
     return VolumeRecord(
-        **{**row, "created": _time(row["created"])}, job=row["job_id"], dataset=row["dataset_id"], links=links
+        source="upload" if job is None else "reconstruction",
+        job=job,
+        dataset=row.get("dataset_id"),
+        speed_range_mps=row.get("speed_range_mps"),
+        water_speed_mps=row.get("water_speed_mps"),
+        provenance=row.get("provenance", {}),
+        sha256=row.get("sha256"),
+        created=_time(row["created"]),
+        links=links,
+        **{name: row[name] for name in SHARED},
     )
 
 

@@ -1,52 +1,99 @@
-"""/v1/volumes: results as metadata, pictures and files."""
+"""/v1/volumes: results and uploads as metadata, pictures and files."""
 
 from __future__ import annotations
 
-import hashlib
 import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Header, Query, Response
+from fastapi import APIRouter, Depends, Header, Query, Request, Response, status
 from fastapi.responses import FileResponse
 
 from bentray_kernels.errors import InvalidInput
 
-from .. import __version__
 from ..errors import described
-from ..storage.exports import speed_as_npy
+from ..storage.exports import values_as_npy
+from ..storage.ids import new_id
 from ..wiring import Service
-from .records import VolumeRecord, volume_record
+from .bodies import only
+from .pictures import PICTURE, picture
+from .records import VolumeList, VolumeRecord, volume_record
+from .uploads import body_of, take_in
 
-router = APIRouter(prefix="/v1/volumes", tags=["volumes"], responses=described(404))
+MEDIA_TYPES = ("application/octet-stream", "application/x-npy", "application/x-hdf5")
+
+router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
 
 
-@router.get("/{volume_id}")
+@router.post(
+    "",
+    status_code=status.HTTP_201_CREATED,
+    dependencies=[Depends(only(*MEDIA_TYPES))],
+    openapi_extra=body_of("volume", MEDIA_TYPES),
+    responses=described(413, 415, 422, 507),
+)
+async def upload_volume(
+    request: Request,
+    response: Response,
+    service: Service,
+    title: Annotated[str, Query(max_length=200, description="In place of the file's own.")] = "",
+    spacing_m: Annotated[
+        str | None,
+        Query(max_length=100, description="One distance or three, m; NumPy and raw only, 0.001 without it."),
+    ] = None,
+    shape: Annotated[
+        str | None, Query(max_length=100, description="nx,ny,nz of raw bytes, in which x runs fastest.")
+    ] = None,
+    dtype: Annotated[
+        str | None,
+        Query(
+            max_length=20, description="Of raw bytes: uint8, int16, float32, ...; big-endian as uint16-be."
+        ),
+    ] = None,
+) -> VolumeRecord:
+    """Upload a volume. Its content tells the format; a process of its own reads it, or says why not."""
+    given = {
+        "title": title,
+        "spacing_m": _numbers("spacing_m", spacing_m, float, "0.001 or 0.001,0.001,0.002"),
+        "shape": _numbers("shape", shape, int, "nx,ny,nz"),
+        "dtype": dtype,
+    }
+    volume_id = new_id("volume")
+
+    def store(size: int, sha256: str, summary: dict[str, Any]) -> dict[str, Any]:
+        return service.volumes.add(volume_id, size=size, sha256=sha256, summary=summary)
+
+    record = volume_record(await take_in(request, service, "volume", volume_id, store, given))
+    response.headers["Location"] = record.links["self"]
+    return record
+
+
+@router.get("")
+def list_volumes(service: Service, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> VolumeList:
+    """Volumes, reconstructed and uploaded, newest first."""
+    return VolumeList(volumes=[volume_record(row) for row in service.volumes.newest(limit)])
+
+
+@router.get("/{volume_id}", responses=described(404))
 def show_volume(volume_id: str, service: Service) -> VolumeRecord:
-    """Shape, axes, spacing and origin of one result."""
+    """Shape, axes, spacing, origin and range of one volume."""
     return volume_record(service.volumes.get(volume_id))
 
 
-@router.get(
-    "/{volume_id}/slice.png",
-    response_class=Response,
-    responses={
-        200: {"content": {"image/png": {}}, "description": "The picture."},
-        304: {"description": "The picture that the client has is still right."},
-        **described(503),
-    },
-)
+@router.get("/{volume_id}/slice.png", response_class=Response, responses=PICTURE)
 def slice_png(
     volume_id: str,
     service: Service,
     index: Annotated[int | None, Query(ge=0, description="Axial index; the middle slice without it.")] = None,
     quantity: Annotated[
-        Literal["speed", "coverage", "attenuation", "recovery"],
+        Literal["speed", "coverage", "attenuation", "recovery", "value"] | None,
         Query(
-            description="What to show; attenuation where the scan had amplitudes, "
-            "recovery where resolution_check was set."
+            description="What to show. Of a reconstruction: speed, which it is without this, coverage, "
+            "attenuation where the scan had amplitudes, recovery where resolution_check was set. Of an "
+            "upload: value."
         ),
-    ] = "speed",
+    ] = None,
     low: Annotated[float | None, Query(description="Value of the darkest colour; m/s for speed.")] = None,
     high: Annotated[float | None, Query(description="Value of the brightest colour.")] = None,
     colormap: Annotated[
@@ -62,14 +109,16 @@ def slice_png(
     for name, value in (("low", low), ("high", high)):
         if value is not None and not math.isfinite(value):
             raise InvalidInput(name, value, "a finite number")
-    how = {"index": index, "quantity": quantity, "low": low, "high": high, "colormap": colormap}
-    seed = repr((__version__, volume["id"], volume["created"], sorted(how.items())))
-    tag = f'"{hashlib.sha256(seed.encode()).hexdigest()[:32]}"'
-    headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
-    if if_none_match is not None and tag in if_none_match:
-        return Response(status_code=304, headers=headers)
-    png = service.compute.slice_png(service.files.volume(volume["id"]), **how)
-    return Response(png, media_type="image/png", headers=headers)
+    how: dict[str, Any] = {"index": index, "low": low, "high": high, "colormap": colormap}
+    path = service.files.volume(volume["id"])
+    if "job_id" in volume:
+        if quantity == "value":
+            raise InvalidInput("quantity", "'value'", "speed, coverage, attenuation or recovery")
+        how["quantity"] = quantity or "speed"
+        return picture(volume, how, if_none_match, lambda: service.compute.slice_png(path, **how))
+    if quantity not in (None, "value"):
+        raise InvalidInput("quantity", repr(quantity), "value: this volume was uploaded")
+    return picture(volume, how, if_none_match, lambda: service.compute.volume_slice_png(path, **how))
 
 
 @router.get(
@@ -79,20 +128,33 @@ def slice_png(
         200: {
             "content": {"application/x-hdf5": {}, "application/octet-stream": {}},
             "description": "The file.",
-        }
+        },
+        **described(404),
     },
 )
 def download(
     volume_id: str,
     service: Service,
     format: Annotated[  # noqa: A002 - the name of the query parameter
-        Literal["hdf5", "npy"], Query(description="hdf5: everything; npy: the speed in m/s alone.")
+        Literal["hdf5", "npy"], Query(description="hdf5: everything; npy: the values alone, speed in m/s.")
     ] = "hdf5",
 ) -> FileResponse:
-    """The result as a file."""
+    """The volume as a file."""
     volume = service.volumes.get(volume_id)
     source: Path = service.files.volume(volume["id"])
     if format == "hdf5":
         return FileResponse(source, media_type="application/x-hdf5", filename=f"{volume['id']}.h5")
-    exported = speed_as_npy(source, service.files.export(volume["id"], "npy"))
-    return FileResponse(exported, media_type="application/octet-stream", filename=f"{volume['id']}-speed.npy")
+    uploaded = "job_id" not in volume
+    exported = values_as_npy(source, service.files.export(volume["id"], "npy"), uploaded=uploaded)
+    name = f"{volume['id']}-{'values' if uploaded else 'speed'}.npy"
+    return FileResponse(exported, media_type="application/octet-stream", filename=name)
+
+
+def _numbers(field: str, text: str | None, kind: Callable[[str], float], accepted: str) -> list[float] | None:
+    """The numbers in a query parameter, which commas part."""
+    if text is None:
+        return None
+    try:
+        return [kind(part) for part in text.split(",")]
+    except ValueError:
+        raise InvalidInput(field, repr(text), accepted) from None

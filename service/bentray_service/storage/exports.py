@@ -8,13 +8,20 @@ import numpy as np
 
 from bentray_workers.atomic import replacing
 from bentray_workers.reconstruction_file import read_reconstruction
+from bentray_workers.volume_file import read_volume
 
 
-def speed_as_npy(volume: Path, target: Path) -> Path:
-    """The speed of a reconstruction file, (x, y[, z]) m/s, as a NumPy file; made when first asked for."""
+def values_as_npy(volume: Path, target: Path, *, uploaded: bool) -> Path:
+    """A volume's numbers, (x, y[, z]), as a NumPy file; made when first asked for.
+
+    Args:
+        volume: its file.
+        target: the file to make.
+        uploaded: whether it was; else it is a reconstruction, whose speed is taken, m/s.
+    """
     if target.exists():
         return target
-    speed = read_reconstruction(volume).speed
+    values = read_volume(volume).values if uploaded else read_reconstruction(volume).speed
     with replacing(target) as partial, partial.open("wb") as file:
-        np.save(file, np.ascontiguousarray(speed), allow_pickle=False)
+        np.save(file, np.ascontiguousarray(values), allow_pickle=False)
     return target

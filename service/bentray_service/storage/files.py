@@ -10,14 +10,15 @@ from typing import IO
 
 from bentray_kernels.errors import InvalidInput
 
-from .ids import checked
+from .ids import PREFIXES, checked
 
 
 class Files:
     """Folders of one service under ``data_dir``.
 
-    ``incoming/`` holds uploads that no one has checked, ``datasets/`` the canonical files, ``volumes/`` the
-    results, ``exports/`` the same results in other formats, ``scratch/`` what workers need while they work.
+    ``incoming/`` holds uploads that no one has checked, ``datasets/`` the canonical files of scans,
+    ``volumes/`` results and the canonical files of uploaded volumes, ``exports/`` volumes in other formats,
+    ``scratch/`` what workers need while they work. An upload is a dataset or a volume, as its id tells.
     """
 
     def __init__(self, data_dir: Path) -> None:
@@ -55,37 +56,41 @@ class Files:
             else:
                 left.unlink()
 
-    def incoming(self, dataset_id: str) -> Path:
+    def incoming(self, upload_id: str) -> Path:
         """Where an upload lands, before anything has looked at it."""
-        return self._incoming / f"{checked('dataset', dataset_id)}.upload"
+        return self._incoming / f"{self._canonical(upload_id).stem}.upload"
 
-    def candidate(self, dataset_id: str) -> Path:
+    def candidate(self, upload_id: str) -> Path:
         """Where the ingest process writes the canonical file."""
-        return self._incoming / f"{checked('dataset', dataset_id)}.h5"
+        return self._incoming / self._canonical(upload_id).name
 
     def dataset(self, dataset_id: str) -> Path:
         """The canonical file of a dataset."""
         return self._datasets / f"{checked('dataset', dataset_id)}.h5"
 
     def volume(self, volume_id: str) -> Path:
-        """The reconstruction file of a volume."""
+        """The file of a volume: a reconstruction, or what was uploaded."""
         return self._volumes / f"{checked('volume', volume_id)}.h5"
 
     def export(self, volume_id: str, extension: str) -> Path:
         """A volume in another format; made on demand."""
         return self._exports / f"{checked('volume', volume_id)}.{extension}"
 
-    def discard_candidate(self, dataset_id: str) -> None:
+    def discard_candidate(self, upload_id: str) -> None:
         """Remove a canonical file that was not adopted, also what a killed process left of it."""
-        for left in self._incoming.glob(f"{self.candidate(dataset_id).name}*"):
+        for left in self._incoming.glob(f"{self.candidate(upload_id).name}*"):
             left.unlink(missing_ok=True)
 
-    def adopt(self, dataset_id: str) -> Path:
+    def adopt(self, upload_id: str) -> Path:
         """Move the checked canonical file to its place, durably."""
-        target = self.dataset(dataset_id)
-        self.candidate(dataset_id).replace(target)
+        target = self._canonical(upload_id)
+        self.candidate(upload_id).replace(target)
         sync_folder(target.parent)
         return target
+
+    def _canonical(self, upload_id: str) -> Path:
+        is_volume = upload_id.startswith(f"{PREFIXES['volume']}-")
+        return self.volume(upload_id) if is_volume else self.dataset(upload_id)
 
 
 def sync_folder(folder: Path) -> None:

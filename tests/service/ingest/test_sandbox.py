@@ -30,7 +30,7 @@ def program(monkeypatch, tmp_path):
 
 
 def run(source, tmp_path, **more):
-    return sandbox.ingest(source, tmp_path / "out.h5", scratch=tmp_path, **{**LIMITS, **more})
+    return sandbox.ingest("dataset", source, tmp_path / "out.h5", scratch=tmp_path, **{**LIMITS, **more})
 
 
 def test_a_good_file(scan, tmp_path):

@@ -1,5 +1,7 @@
-"""/v1/volumes: metadata, pictures and files of a result."""
+"""/v1/volumes: uploads, metadata, pictures and files."""
 
+import gzip
+import hashlib
 import io
 
 import h5py
@@ -91,3 +93,114 @@ def test_wrong_format(http, here):
 @pytest.mark.parametrize("part", ["", "/slice.png", "/data"])
 def test_unknown_volume(http, volume, part):
     assert http.get(f"/v1/volumes/{volume}{part}").status_code == 404
+
+
+STREAM = {"Content-Type": "application/octet-stream"}
+
+
+def npy(values):
+    buffer = io.BytesIO()
+    np.save(buffer, values, allow_pickle=True)
+    return buffer.getvalue()
+
+
+RAMP = np.arange(60, dtype=np.uint8).reshape(3, 4, 5)
+
+
+def send(http, content, query="", headers=STREAM):
+    return http.post(f"/v1/volumes{query}", content=content, headers=headers)
+
+
+def test_an_uploaded_volume_is_stored(start):
+    http = start()
+    answer = send(http, npy(RAMP), "?title=A%20head%00&spacing_m=0.001,0.002,0.003")
+    body = answer.json()
+    assert answer.status_code == 201, body
+    assert answer.headers["location"] == f"/v1/volumes/{body['id']}" == body["links"]["self"]
+    assert (body["source"], body["title"], body["axes"]) == ("upload", "A head", "x,y,z")
+    assert (body["shape"], body["spacing_m"], body["origin_m"]) == ([3, 4, 5], [1e-3, 2e-3, 3e-3], [0, 0, 0])
+    assert (body["value_range"], body["unit"], body["speed_range_mps"]) == ([0, 59], "", None)
+    assert (body["job"], body["dataset"], body["provenance"]) == (None, None, {})
+    assert (body["bytes"], body["sha256"]) == (len(npy(RAMP)), hashlib.sha256(npy(RAMP)).hexdigest())
+    assert http.get(answer.headers["location"]).json() == body
+    root = http.app.state.parts.files.root
+    assert [path.name for path in (root / "volumes").iterdir()] == [f"{body['id']}.h5"]
+    assert not list((root / "incoming").iterdir())
+
+
+def test_raw_bytes(start):
+    http = start()
+    body = send(http, RAMP.tobytes(order="F"), "?shape=3,4,5&dtype=uint8").json()
+    answer = http.get(f"{body['links']['data']}?format=npy")
+    assert answer.headers["content-disposition"].endswith(f'"{body["id"]}-values.npy"')
+    np.testing.assert_array_equal(np.load(io.BytesIO(answer.content)), RAMP)
+    with h5py.File(io.BytesIO(http.get(body["links"]["data"]).content)) as file:
+        np.testing.assert_array_equal(file["values"], RAMP)
+
+
+def test_a_downloaded_volume_can_be_uploaded_again(start):
+    http = start()
+    first = send(http, npy(RAMP), "?title=once").json()
+    again = send(http, http.get(first["links"]["data"]).content).json()
+    assert [again[name] for name in ("title", "shape", "value_range")] == ["once", [3, 4, 5], [0.0, 59.0]]
+
+
+def test_both_kinds_are_listed_newest_first(http, job):
+    made = [send(http, npy(RAMP)).json()["id"] for _ in range(2)]
+    listed = http.get("/v1/volumes").json()["volumes"]
+    assert [one["id"] for one in listed] == [made[1], made[0], job["volume"]]
+    assert [one["source"] for one in listed] == ["upload", "upload", "reconstruction"]
+    assert (listed[2]["title"], listed[2]["unit"]) == ("Sixteen elements", "m/s")
+    assert listed[2]["value_range"] == listed[2]["speed_range_mps"] == [1500.0, 1540.0]
+    assert [one["id"] for one in http.get("/v1/volumes?limit=1").json()["volumes"]] == [made[1]]
+
+
+def test_slice_of_an_upload(start, cluster):
+    http = start()
+    body = send(http, npy(RAMP)).json()
+    answer = http.get(body["links"]["image"], params={"index": 4, "quantity": "value", "high": 70})
+    assert answer.content.startswith(b"\x89PNG")
+    assert (cluster.submitted[-1]["index"], cluster.submitted[-1]["resources"]) == (4, {"render": 1})
+    tag = {"If-None-Match": answer.headers["etag"]}
+    query = {"index": 4, "quantity": "value", "high": 70}
+    assert http.get(body["links"]["image"], params=query, headers=tag).status_code == 304
+    for query, field in (("index=5", "index"), ("quantity=speed", "quantity"), ("low=99", "low")):
+        refused = http.get(f"{body['links']['image']}?{query}")
+        assert (refused.status_code, refused.json()["field"]) == (422, field)
+
+
+def test_a_reconstruction_has_no_quantity_value(http, here):
+    assert http.get(f"{here}/slice.png?quantity=value").json()["field"] == "quantity"
+
+
+@pytest.mark.parametrize(
+    ("content", "query", "field"),
+    [
+        (b"no volume", "", "file"),
+        (npy(np.full((2, 2, 2), np.nan)), "", "values"),
+        (gzip.compress(b"\0" * 300_000_000), "", "file"),
+        (RAMP.tobytes(), "?shape=3,4,5", "dtype"),
+        (RAMP.tobytes(), "?shape=wide&dtype=uint8", "shape"),
+        (npy(RAMP), "?spacing_m=1,x,1", "spacing_m"),
+        (npy(RAMP), "?spacing_m=nan", "spacing_m"),
+        (npy(RAMP), f"?title={'x' * 201}", "title"),
+        (b"", "", "body"),
+    ],
+)
+def test_a_refused_volume_leaves_nothing(start, content, query, field):
+    http = start()
+    answer = send(http, content, query)
+    body = answer.json()
+    assert (answer.status_code, body["field"]) == (422, field), body
+    assert body["found"]
+    assert body["accepted"]
+    assert http.get("/v1/volumes").json() == {"volumes": []}
+    root = http.app.state.parts.files.root
+    assert not list((root / "incoming").iterdir())
+    assert not list((root / "volumes").iterdir())
+
+
+def test_a_volume_of_the_wrong_media_type_or_size(start):
+    http = start(max_upload_bytes=50)
+    assert send(http, npy(RAMP)).status_code == 413
+    assert send(http, b"x", headers={"Content-Type": "image/png"}).status_code == 415

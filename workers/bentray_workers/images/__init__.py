@@ -1,7 +1,8 @@
-"""Pictures of reconstructions as PNG: one slice, a report, a comparison of several with the truth."""
+"""Pictures as PNG: one slice of a reconstruction or a volume, a report, a comparison with the truth."""
 
 from .comparison import comparison_png
 from .report import report_png
 from .slice import COLORMAPS, slice_png
+from .volume_slice import volume_slice_png
 
-__all__ = ["COLORMAPS", "comparison_png", "report_png", "slice_png"]
+__all__ = ["COLORMAPS", "comparison_png", "report_png", "slice_png", "volume_slice_png"]

@@ -56,7 +56,7 @@ def slice_png(
         limits = (0.0, limits[1])
     elif quantity == "recovery":
         limits = RECOVERY_LIMITS
-    limits = _given(limits, low, high)
+    limits = given_limits(limits, low, high)
     with drawing():
         figure = new_figure(6.6, 5.9)
         axes = figure.subplots()
@@ -69,7 +69,12 @@ def slice_png(
         return to_png(figure)
 
 
-def _given(limits: Limits, low: float | None, high: float | None) -> Limits:
+def given_limits(limits: Limits, low: float | None, high: float | None) -> Limits:
+    """The limits with what was asked for in their place.
+
+    Raises:
+        InvalidInput: for what is not finite, or not lower than the other.
+    """
     for name, value in (("low", low), ("high", high)):
         if value is not None and not math.isfinite(value):
             raise InvalidInput(name, value, "a finite number")

@@ -1,0 +1,38 @@
+"""Pictures of volumes over HTTP, each with a tag, so that none is drawn twice for one client."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from fastapi import Response
+
+from .. import __version__
+from ..errors import described
+
+# What a route that gives a picture may answer.
+PICTURE: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"image/png": {}}, "description": "The picture."},
+    304: {"description": "The picture that the client has is still right."},
+    **described(404, 503),
+}
+
+
+def picture(
+    volume: Mapping[str, Any], how: Mapping[str, Any], known: str | None, draw: Callable[[], bytes]
+) -> Response:
+    """A PNG with its tag, or 304 where the client has it.
+
+    Args:
+        volume: its row.
+        how: all that the picture depends on beside it.
+        known: the header If-None-Match.
+        draw: makes the picture; called where it is needed.
+    """
+    seed = repr((__version__, volume["id"], volume["created"], sorted(how.items())))
+    tag = f'"{hashlib.sha256(seed.encode()).hexdigest()[:32]}"'
+    headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
+    if known is not None and tag in known:
+        return Response(status_code=304, headers=headers)
+    return Response(draw(), media_type="image/png", headers=headers)

@@ -1,0 +1,78 @@
+"""How an upload comes in: received, read by a process of its own, kept as a canonical file, and stored."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import anyio
+from fastapi import Request
+from starlette.concurrency import run_in_threadpool
+
+from ..ingest.child import ACCEPTED
+from ..ingest.receive import Received, receive
+from ..ingest.sandbox import ingest
+from ..wiring import Parts
+
+# Each ingest process may take the whole of its memory limit.
+INGESTS_AT_ONCE = 2
+
+Row = dict[str, Any]
+
+
+def body_of(what: str, media_types: tuple[str, ...]) -> dict[str, Any]:
+    """How OpenAPI describes the body of an upload."""
+    content = {media: {"schema": {"type": "string", "format": "binary"}} for media in media_types}
+    described = ACCEPTED[what][0].upper() + ACCEPTED[what][1:] + "."
+    return {"requestBody": {"required": True, "description": described, "content": content}}
+
+
+async def take_in(
+    request: Request,
+    service: Parts,
+    what: str,
+    upload_id: str,
+    store: Callable[[int, str, Row], Row],
+    given: Mapping[str, Any],
+) -> Row:
+    """From the body of a request to a stored row; nothing is left behind when it is refused.
+
+    Args:
+        request: whose body is read.
+        service: the parts of the service.
+        what: "dataset" or "volume".
+        upload_id: its new id.
+        store: writes the row, from the size and SHA-256 of the body and the summary of its content.
+        given: what the user says of a volume.
+    """
+    announced = request.headers.get("content-length")
+    path = service.files.incoming(upload_id)
+
+    def check_and_store(received: Received) -> Row:
+        try:
+            summary = ingest(
+                what,
+                path,
+                service.files.candidate(upload_id),
+                memory_bytes=service.settings.ingest_memory_bytes,
+                seconds=service.settings.ingest_seconds,
+                scratch=service.files.scratch,
+                given=given,
+            )
+            service.files.adopt(upload_id)
+        finally:
+            service.files.discard_candidate(upload_id)
+        return store(received.size, received.sha256, summary)
+
+    try:
+        received = await receive(
+            request.stream(),
+            int(announced) if announced else None,
+            path,
+            service.settings.max_upload_bytes,
+            ACCEPTED[what],
+        )
+        limiter: anyio.CapacityLimiter = request.app.state.ingest_limiter
+        return await anyio.to_thread.run_sync(check_and_store, received, limiter=limiter)
+    finally:
+        await run_in_threadpool(path.unlink, missing_ok=True)

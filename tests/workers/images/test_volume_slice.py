@@ -1,0 +1,39 @@
+"""Slices of uploaded volumes: the right one, with its place, and refusals in words."""
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.images import volume_slice_png
+from bentray_workers.volume_file import Volume, write_volume
+
+
+@pytest.fixture
+def path(tmp_path):
+    values = np.zeros((6, 5, 4)) + 10.0 * np.arange(4)
+    write_volume(tmp_path / "v.h5", Volume.of(values, (1e-3,) * 3, (0.0, 0.0, 5e-3), "A $head"))
+    return tmp_path / "v.h5"
+
+
+def test_the_middle_slice_says_where_it_is(path, drawn):
+    assert volume_slice_png(path).startswith(b"\x89PNG")
+    words = drawn.words()
+    assert "Slice index 2 (0 to 3), z = 7 mm" in words
+    assert {"A $head", "value"} <= set(words)
+    assert np.asarray(drawn[-1].axes[0].images[0].get_array()).max() == 20.0
+
+
+def test_what_was_asked_for_is_drawn(path, drawn):
+    volume_slice_png(path, index=0, low=-1.0, high=7.0, colormap="gray")
+    image = drawn[-1].axes[0].images[0]
+    assert (image.get_clim(), image.get_cmap().name) == ((-1.0, 7.0), "gray")
+    assert np.asarray(image.get_array()).shape == (5, 6)
+
+
+@pytest.mark.parametrize(
+    ("how", "field"), [({"index": 4}, "index"), ({"index": -1}, "index"), ({"colormap": "x"}, "colormap")]
+)
+def test_refusals(path, how, field):
+    with pytest.raises(InvalidInput) as caught:
+        volume_slice_png(path, **how)
+    assert caught.value.field == field
