@@ -108,7 +108,8 @@ def render(scene: Scene, camera: Camera, backdrop: Backdrop, settings: RenderSet
     with ThreadPoolExecutor(settings.threads) as pool:
         list(pool.map(tile, _tiles(rows, columns)))
     shape = (rows, columns)
-    plane[traced.fate == LOST] = -1
+    lost = traced.fate == LOST
+    plane[lost], where[lost] = -1, np.nan
     weight = traced.weight.reshape(shape)
     light = weight if settings.fresnel else np.ones(shape)
     grid = (backdrop, plane.reshape(shape), where.reshape(*shape, 2))
@@ -118,10 +119,11 @@ def render(scene: Scene, camera: Camera, backdrop: Backdrop, settings: RenderSet
         post_refraction_colours(*grid, crossed, light, settings.degree, image)
     else:
         point_colours(*grid, light, image)
-    edges = np.vstack([backdrop.edges, [np.nan, np.nan]])[plane]
+    # Where there is no plane, any edge leaves NaN what it is.
+    where *= backdrop.edges[plane]
     return Picture(
-        averaged(image, times),
-        (where * edges).reshape(*shape, 2),
+        image if times == 1 else averaged(image, times),
+        where.reshape(*shape, 2),
         plane.reshape(shape),
         traced.fate.reshape(shape),
         crossed,
