@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..errors import InvalidInput
@@ -15,58 +14,69 @@ from ..isosurface.crossing import Search
 from ..isosurface.roots import STEPS
 from ..opencl import OpenCLFallbackWarning, Session, session_or_warning
 from ..opencl.session import set_arguments
-from .caster import Medium, Traced, cast, medium_of, space_for
+from .camera import perspective
+from .caster import Medium, Traced, cast, space_for
 from .scene import Scene
-
-Precision = Literal["float64", "float32"]
 
 # Rays of a work-group.
 GROUP = 64
 
-# How the kernel names the ways to look within a cell, by ``Search.roots``.
-WITHIN_CELLS = {crossing.CERTAIN: "CERTAIN", crossing.BRENT: "BRENT", crossing.ANALYTIC: "ANALYTIC"}
+# What the kernel calls the ways to look within a cell.
+WITHIN_CELLS = {
+    crossing.CERTAIN: "CERTAIN",
+    crossing.CERTAIN_BRENT: "CERTAIN_BRENT",
+    crossing.BRENT: "BRENT",
+    crossing.ANALYTIC: "ANALYTIC",
+}
 
-# Accuracy of a crossing and the shortest piece of a ray that is halved, nodes. A float resolves 1e-4 nodes a
-# thousand nodes from the camera.
+# Accuracy of a crossing and the shortest piece of a ray that is still halved, nodes. A thousand nodes from
+# the camera neighbouring numbers of float32 lie 1e-4 nodes apart.
 FINENESS = {"float64": (crossing.TOLERANCE, crossing.SHORTEST), "float32": (1e-4, 1e-3)}
 
-# Rays that are compared with the CPU before a device is believed, and how many interfaces they may meet: where
-# light bends often, what is rounded differently grows at each of them.
+# Rays that are compared with the CPU before a device is believed, and the most interfaces that they may meet:
+# at each of them what was rounded differently grows.
 TRIED, TRIED_DEPTH = 256, 4
 
-# How far a direction may be off by then, and the share of rays that may be off farther. Grazing rays and those
-# that pass close to an edge of the object go either way.
-TOLERANCES = {"float64": (1e-6, 0.02), "float32": (2e-2, 0.1)}
+# How far a direction may be off then, and the share of rays that may be off farther: a ray that grazes the
+# object, or passes close to one of its edges, may go either way.
+TOLERANCES = {"float64": (1e-6, 0.02), "float32": (1e-2, 0.1)}
 
 
 class OpenCLCaster:
-    """A scene kept on a device. What the device gets wrong in its trial, ``cast`` does instead.
+    """A scene on a device. What the device gets wrong in its trial, ``caster.cast`` does in its place.
 
     Args:
-        scene: its volume and octree are copied to the device once.
+        scene: its volume and octree are copied to the device, once.
         session: the device.
-        precision: of all numbers on the device. "float32" finds crossings to 1e-4 nodes in place of 1e-8.
+        precision: of all numbers there, "float64" or "float32", which finds crossings to 1e-4 nodes instead
+            of 1e-9; None for the better one that the device has.
 
     Raises:
         InvalidInput: for another precision.
     """
 
-    def __init__(self, scene: Scene, session: Session, precision: Precision = "float64") -> None:
+    def __init__(self, scene: Scene, session: Session, precision: str | None = None) -> None:
+        if precision is None:
+            precision = "float64" if "cl_khr_fp64" in session.handle.extensions else "float32"
         if precision not in FINENESS:
             raise InvalidInput("precision", precision, "one of " + ", ".join(FINENESS))
         self.scene = scene
         self.session = session
         self.precision = precision
         self._real: Any = np.dtype(precision)
-        # Sums are in the type of the coefficients, on the device as on the CPU.
+        # Sums are in the type of the coefficients, as on the CPU.
         self._sum: Any = min(self._real, scene.field.coefficients.dtype, key=lambda kind: kind.itemsize)
         self._faults: dict[str, str] = {}
         with session.lock:
-            self._coefficients = self._upload(scene.field.coefficients, self._sum)
-            self._tables = self._upload(scene.field.stencil.weights, self._sum)
-            self._masks = session.upload(scene.octree.masks)
-            self._bend = session.upload(scene.octree.bend)
-            self._shapes = self._upload(scene.octree.levels, np.dtype(np.int64))
+            self._volume = (
+                session.upload(scene.field.coefficients.astype(self._sum, copy=False)),
+                session.upload(scene.field.stencil.weights.astype(self._sum)),
+            )
+            self._octree = (
+                session.upload(scene.octree.masks),
+                session.upload(scene.octree.bend),
+                session.upload(scene.octree.levels.astype(np.int64)),
+            )
 
     def cast(
         self,
@@ -80,36 +90,35 @@ class OpenCLCaster:
         """As ``caster.cast``.
 
         Raises:
-            InvalidInput: for the medium of another scene.
+            InvalidInput: for a medium of another scene.
 
         Warns:
             OpenCLFallbackWarning: once for each way to look for crossings, where the device fails its trial
-                and ``caster.cast`` follows the rays instead.
+                and ``caster.cast`` follows the rays.
         """
         if medium.field is not self.scene.field:
-            raise InvalidInput("medium", "of another scene", "a medium of the scene that is on the device")
+            raise InvalidInput("medium", "that of another scene", "a medium of the scene on the device")
         way = _way(search)
         if way not in self._faults:
-            self._faults[way] = self.fault_of(medium, search)
-            if self._faults[way]:
-                message = f"{self.session.handle.name} casts rays wrong ({way.lower()}), cast takes over: "
-                warnings.warn(OpenCLFallbackWarning(message + self._faults[way]), stacklevel=2)
-        if self._faults[way]:
-            cast(medium, search, camera, places, depth, traced)
-        else:
-            self.follow(medium, search, camera, places, depth, traced)
+            self._faults[way] = fault = self.fault_of(medium, search)
+            if fault:
+                name = self.session.handle.name
+                message = f"{name} casts rays wrong ({way.lower()}), the CPU takes over: {fault}"
+                warnings.warn(OpenCLFallbackWarning(message), stacklevel=2)
+        follow = cast if self._faults[way] else self.follow
+        follow(medium, search, camera, places, depth, traced)
 
     def fault_of(self, medium: Medium, search: Search) -> str:
-        """How the device differs from ``caster.cast`` in a few rays at the object; empty where it does not."""
-        camera, places = _towards(self.scene)
+        """How the device differs from ``caster.cast`` in rays at the object; empty where it does not."""
+        camera, places = _towards_the_object(self.scene)
         found, expected = (space_for(TRIED, TRIED_DEPTH, False) for _ in range(2))
         self.follow(medium, search, camera, places, TRIED_DEPTH, found)
         cast(medium, search, camera, places, TRIED_DEPTH, expected)
         far, allowed = TOLERANCES[self.precision]
         same = (found.fate == expected.fate) & (found.crossed == expected.crossed)
         same &= np.abs(found.direction - expected.direction).max(axis=1) <= far
-        share = 1.0 - float(same.mean())
-        return "" if share <= allowed else f"{share:.0%} of its rays where {allowed:.0%} are allowed"
+        off = 1.0 - float(same.mean())
+        return "" if off <= allowed else f"{off:.0%} of its rays are off, {allowed:.0%} may be"
 
     def follow(
         self,
@@ -120,16 +129,18 @@ class OpenCLCaster:
         depth: int,
         traced: Traced,
     ) -> None:
-        """As ``cast``, on the device whatever it computes."""
-        kept = traced.vertices.shape[1]
-        at_once = max(1, self.session.doubles_at_once() // (12 + 3 * kept))
+        """As ``cast``, but on the device, whatever it computes."""
+        # Place, point, direction, weight and the two whole numbers of a ray; its path.
+        at_once = max(1, self.session.doubles_at_once() // (10 + 3 * traced.vertices.shape[1]))
+        kernel = self.session.kernel("refraction", "follow", *self._defines(medium, search))
         for start in range(0, len(places), at_once):
             rays = slice(start, start + at_once)
-            part = traced.part(rays) if kept else traced.part(rays)._replace(vertices=traced.vertices)
-            self._follow(medium, search, camera, places[rays], depth, part)
+            with self.session.lock:
+                self._launch(kernel, medium, search, camera, places[rays], depth, traced.part(rays))
 
-    def _follow(
+    def _launch(
         self,
+        kernel: Any,
         medium: Medium,
         search: Search,
         camera: tuple[Floats, Floats],
@@ -137,10 +148,88 @@ class OpenCLCaster:
         depth: int,
         traced: Traced,
     ) -> None:
-        session, stencil = self.session, medium.field.stencil
-        kernel = session.kernel("refraction", "follow", *self._defines(medium, search))
+        real, session = self._real.type, self.session
         frame = np.array([medium.origin, medium.density, medium.low, medium.high])
-        numbers = [*medium.field.coefficients.shape]
-        with session.lock:
-            filled = [self._upload(array, self._kind(array)) for array in traced if array.size]
-"""
+        # Setting an argument does not keep its buffer alive: the names do.
+        levels, indices, frames, views, at = (
+            session.upload(np.ascontiguousarray(array, real))
+            for array in (medium.levels, medium.indices, frame, np.stack(camera), places)
+        )
+        wanted: list[Any] = [array for array in traced if array.size]
+        here = [np.zeros(array.shape, real if array.dtype.kind == "f" else array.dtype) for array in wanted]
+        if traced.vertices.size:
+            # Those that no ray reaches stay as they are.
+            here[-1][...] = traced.vertices
+        there = [session.upload(array) for array in here]
+        if not traced.vertices.size:
+            there.append(session.reserve(self._real.itemsize))
+        arguments = (
+            *self._volume,
+            real(medium.field.stencil.shift),
+            *(np.int32(count) for count in medium.field.coefficients.shape),
+            *self._octree,
+            np.int32(search.top),
+            levels,
+            indices,
+            np.int32(len(medium.indices)),
+            frames,
+            np.int32(medium.open),
+            real(search.step),
+            views,
+            np.int32(depth),
+            np.int32(traced.vertices.shape[1]),
+            np.uint32(len(places)),
+            at,
+            *there,
+        )
+        set_arguments(kernel, *arguments)
+        session.launch(kernel, (-(-len(places) // GROUP) * GROUP,), (GROUP,))
+        for array, filled, buffer in zip(wanted, here, there, strict=False):
+            session.download(filled, buffer)
+            array[...] = filled
+
+    def _defines(self, medium: Medium, search: Search) -> tuple[str, ...]:
+        names = {"float64": "double", "float32": "float"}
+        weights = medium.field.stencil.weights
+        tolerance, shortest = FINENESS[self.precision]
+        return (
+            f"REAL={names[self.precision]}",
+            f"SUM={names[self._sum.name]}",
+            f"TAPS={len(medium.field.stencil.places)}",
+            f"POWERS={int(np.flatnonzero(weights.any(axis=(1, 2)))[-1]) + 1}",
+            f"WIDTH={weights.shape[-1]}",
+            f"HOW={_way(search)}",
+            f"TOLERANCE={tolerance}",
+            f"SHORTEST={shortest}",
+            f"DEEPEST={STEPS}",
+        )
+
+
+def _way(search: Search) -> str:
+    return "STEPS" if search.step > 0.0 else WITHIN_CELLS[search.roots]
+
+
+def _towards_the_object(scene: Scene) -> tuple[tuple[Floats, Floats], Floats]:
+    """A camera that looks at all of the object's box along none of its axes, and places in its image."""
+    low, high = scene.origin + scene.box * scene.spacing
+    middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
+    camera = perspective(middle - 1.5 * size * np.array([0.48, 0.6, 0.64]), middle, (0.0, 0.0, 1.0), 40.0)
+    places = np.random.default_rng(0).uniform(-0.5, 0.5, (TRIED, 2))
+    return (camera.origin, camera.direction), places
+
+
+def on_the_device(scene: Scene, precision: str | None = None) -> OpenCLCaster | None:
+    """The scene on the chosen OpenCL device, for ``render``; None where no device can be trusted.
+
+    Args:
+        scene: to look at.
+        precision: as in ``OpenCLCaster``.
+
+    Raises:
+        InvalidInput: for another precision, or where ``BENTRAY_OPENCL_DEVICE`` names no one device.
+
+    Warns:
+        OpenCLFallbackWarning: once, where no device passes its trial.
+    """
+    session = session_or_warning(instead="caster.cast")
+    return None if session is None else OpenCLCaster(scene, session, precision)
