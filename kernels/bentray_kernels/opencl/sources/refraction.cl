@@ -74,88 +74,103 @@ Vector moved(Vector a, Vector along, REAL s)
 Vector read3(constant const REAL *at) { return (Vector){at[0], at[1], at[2]}; }
 Vector axis_of(int axis) { return (Vector){R(axis == 0), R(axis == 1), R(axis == 2)}; }
 
-// First node that is read along one axis, and the weights of TAPS nodes from there on; with or without slopes.
-int weigh(REAL place, REAL shift, int cells, constant const SUM *tables, SUM *weights, SUM *slopes)
+// First node that is read along one axis, and how far into that cell the place lies.
+int cell_of(REAL place, REAL shift, int cells, SUM *t)
 {
     const REAL shifted = place + shift;
     const int cell = (int)lower(upper(shifted, 0), R(cells));
-    const SUM t = (SUM)(shifted - cell);
-#pragma unroll
-    for (int tap = 0; tap < TAPS; ++tap) {
-        SUM weight = 0;
-#pragma unroll
-        for (int power = POWERS - 1; power >= 0; --power)
-            weight = weight * t + tables[2 * power * WIDTH + tap];
-        weights[tap] = weight;
-        if (slopes) {
-            SUM slope = 0;
-#pragma unroll
-            for (int power = POWERS - 1; power >= 0; --power)
-                slope = slope * t + tables[(2 * power + 1) * WIDTH + tap];
-            slopes[tap] = slope;
-        }
-    }
+    *t = (SUM)(shifted - cell);
     return cell;
 }
 
+// The weights of TAPS nodes; those of the slopes where tables begin with theirs.
+void weigh(SUM t, constant const SUM *tables, SUM *weights)
+{
+#pragma unroll
+    for (int tap = 0; tap < TAPS; ++tap)
+        weights[tap] = tables[2 * (POWERS - 1) * WIDTH + tap];
+#pragma unroll
+    for (int power = POWERS - 2; power >= 0; --power)
+#pragma unroll
+        for (int tap = 0; tap < TAPS; ++tap)
+            weights[tap] = weights[tap] * t + tables[2 * power * WIDTH + tap];
+}
+
+global const SUM *cell_and_rests(const Field *field, const Ray *ray, REAL s, SUM *rests)
+{
+    const Vector place = moved(ray->start, ray->along, s);
+    const int i = cell_of(place.x, field->shift, field->cells_x, rests);
+    const int j = cell_of(place.y, field->shift, field->cells_y, rests + 1);
+    const int k = cell_of(place.z, field->shift, field->cells_z, rests + 2);
+    return field->coefficients + i * field->stride_x + j * field->stride_y + k;
+}
+
+// The innermost loops are over the nodes of a row, so that a compiler can put them into vectors.
 REAL field_at(const Field *field, const Ray *ray, REAL s)
 {
-    SUM wx[TAPS], wy[TAPS], wz[TAPS];
-    const Vector place = moved(ray->start, ray->along, s);
-    const int i = weigh(place.x, field->shift, field->cells_x, field->tables, wx, 0);
-    const int j = weigh(place.y, field->shift, field->cells_y, field->tables, wy, 0);
-    const int k = weigh(place.z, field->shift, field->cells_z, field->tables, wz, 0);
-    global const SUM *start = field->coefficients + i * field->stride_x + j * field->stride_y + k;
-    SUM value = 0;
+    SUM rests[3], wx[TAPS], wy[TAPS], wz[TAPS], rows[TAPS] = {0};
+    global const SUM *start = cell_and_rests(field, ray, s, rests);
+    weigh(rests[0], field->tables, wx);
+    weigh(rests[1], field->tables, wy);
+    weigh(rests[2], field->tables, wz);
 #pragma unroll
-    for (int p = 0; p < TAPS; ++p) {
-        SUM plane = 0;
+    for (int p = 0; p < TAPS; ++p)
 #pragma unroll
         for (int q = 0; q < TAPS; ++q) {
             global const SUM *line = start + p * field->stride_x + q * field->stride_y;
-            SUM level = 0;
+            const SUM weight = wx[p] * wy[q];
 #pragma unroll
             for (int r = 0; r < TAPS; ++r)
-                level += wz[r] * line[r];
-            plane += wy[q] * level;
+                rows[r] += weight * line[r];
         }
-        value += wx[p] * plane;
-    }
+    SUM value = 0;
+#pragma unroll
+    for (int r = 0; r < TAPS; ++r)
+        value += rows[r] * wz[r];
     return value;
 }
 
 // With the gradient, per node.
 REAL field_and_gradient_at(const Field *field, const Ray *ray, REAL s, Vector *gradient)
 {
-    SUM wx[TAPS], wy[TAPS], wz[TAPS], dx[TAPS], dy[TAPS], dz[TAPS];
-    const Vector place = moved(ray->start, ray->along, s);
-    const int i = weigh(place.x, field->shift, field->cells_x, field->tables, wx, dx);
-    const int j = weigh(place.y, field->shift, field->cells_y, field->tables, wy, dy);
-    const int k = weigh(place.z, field->shift, field->cells_z, field->tables, wz, dz);
-    global const SUM *start = field->coefficients + i * field->stride_x + j * field->stride_y + k;
-    SUM value = 0, slope_x = 0, slope_y = 0, slope_z = 0;
+    constant const SUM *slopes = field->tables + WIDTH;
+    SUM rests[3], wx[TAPS], wy[TAPS], wz[TAPS], dx[TAPS], dy[TAPS], dz[TAPS];
+    SUM rows[TAPS] = {0}, rows_x[TAPS] = {0}, rows_y[TAPS] = {0};
+    global const SUM *start = cell_and_rests(field, ray, s, rests);
+    weigh(rests[0], field->tables, wx);
+    weigh(rests[0], slopes, dx);
+    weigh(rests[1], field->tables, wy);
+    weigh(rests[1], slopes, dy);
+    weigh(rests[2], field->tables, wz);
+    weigh(rests[2], slopes, dz);
 #pragma unroll
     for (int p = 0; p < TAPS; ++p) {
-        SUM plane = 0, plane_y = 0, plane_z = 0;
+        SUM plane[TAPS] = {0}, plane_y[TAPS] = {0};
 #pragma unroll
         for (int q = 0; q < TAPS; ++q) {
             global const SUM *line = start + p * field->stride_x + q * field->stride_y;
-            SUM level = 0, slope = 0;
 #pragma unroll
             for (int r = 0; r < TAPS; ++r) {
-                level += wz[r] * line[r];
-                slope += dz[r] * line[r];
+                plane[r] += wy[q] * line[r];
+                plane_y[r] += dy[q] * line[r];
             }
-            plane += wy[q] * level;
-            plane_y += dy[q] * level;
-            plane_z += wy[q] * slope;
         }
-        value += wx[p] * plane;
-        slope_x += dx[p] * plane;
-        slope_y += wx[p] * plane_y;
-        slope_z += wx[p] * plane_z;
+#pragma unroll
+        for (int r = 0; r < TAPS; ++r) {
+            rows[r] += wx[p] * plane[r];
+            rows_x[r] += dx[p] * plane[r];
+            rows_y[r] += wx[p] * plane_y[r];
+        }
     }
-    *gradient = (Vector){slope_x, slope_y, slope_z};
+    SUM value = 0, x = 0, y = 0, z = 0;
+#pragma unroll
+    for (int r = 0; r < TAPS; ++r) {
+        value += rows[r] * wz[r];
+        x += rows_x[r] * wz[r];
+        y += rows_y[r] * wz[r];
+        z += rows[r] * dz[r];
+    }
+    *gradient = (Vector){x, y, z};
     return value;
 }
 
