@@ -14,10 +14,11 @@ from ..errors import InvalidInput
 from .backdrop import Backdrop, Colours, locate
 from .camera import Camera
 from .caster import LOST, cast, medium_of, space_for
+from .caster_opencl import OpenCLCaster
 from .scene import Scene
 from .supersampling import averaged, point_colours, post_refraction_colours
 
-# Rows of the image cast in one call.
+# Rows of the image cast in one call on the CPU.
 TILE_ROWS = 16
 
 SUPERSAMPLING = ("none", "post", "real")
@@ -83,7 +84,13 @@ class Picture:
     weight: Floats
 
 
-def render(scene: Scene, camera: Camera, backdrop: Backdrop, settings: RenderSettings) -> Picture:
+def render(
+    scene: Scene,
+    camera: Camera,
+    backdrop: Backdrop,
+    settings: RenderSettings,
+    caster: OpenCLCaster | None = None,
+) -> Picture:
     """Cast one ray a pixel, or more, and colour each by where it ends on the backdrop.
 
     Args:
@@ -91,6 +98,8 @@ def render(scene: Scene, camera: Camera, backdrop: Backdrop, settings: RenderSet
         camera: ``camera.orthographic`` or ``perspective``.
         backdrop: ``backdrop_of``.
         settings: the rest.
+        caster: follows the rays of this scene on an OpenCL device, ``caster_opencl.on_the_device``; None for
+            this CPU.
     """
     times = settings.degree if settings.supersampling == "real" else 1
     rows, columns = times * settings.rows, times * settings.columns
@@ -99,14 +108,16 @@ def render(scene: Scene, camera: Camera, backdrop: Backdrop, settings: RenderSet
     plane, where = np.empty(rows * columns, dtype=np.int8), np.empty((rows * columns, 2))
     medium = medium_of(scene, settings.structure)
     search = scene.search(settings.structure, settings.roots, settings.step)
+    # A device takes all rays at once.
+    follow, at_once = (cast, TILE_ROWS) if caster is None else (caster.cast, rows)
 
     def tile(part: slice) -> None:
         filled = traced.part(part)
-        cast(medium, search, (camera.origin, camera.direction), places[part], settings.depth, filled)
+        follow(medium, search, (camera.origin, camera.direction), places[part], settings.depth, filled)
         locate(backdrop, filled.point, filled.direction, plane[part], where[part])
 
     with ThreadPoolExecutor(settings.threads) as pool:
-        list(pool.map(tile, _tiles(rows, columns)))
+        list(pool.map(tile, _tiles(rows, columns, at_once)))
     shape = (rows, columns)
     lost = traced.fate == LOST
     plane[lost], where[lost] = -1, np.nan
@@ -131,9 +142,9 @@ def render(scene: Scene, camera: Camera, backdrop: Backdrop, settings: RenderSet
     )
 
 
-def _tiles(rows: int, columns: int) -> Iterator[slice]:
-    for first in range(0, rows, TILE_ROWS):
-        yield slice(first * columns, min(first + TILE_ROWS, rows) * columns)
+def _tiles(rows: int, columns: int, at_once: int) -> Iterator[slice]:
+    for first in range(0, rows, at_once):
+        yield slice(first * columns, min(first + at_once, rows) * columns)
 
 
 def _places(rows: int, columns: int, seed: int | None) -> Floats:
