@@ -25,7 +25,7 @@ class Search(NamedTuple):
 
     Attributes:
         roots: ``CERTAIN``: no crossing is missed, however close to the next one; found by Newton's method.
-            ``CERTAIN_BRENT``: the same by Brent's, where gradients are not those of the values. ``BRENT``: a
+            ``CERTAIN_BRENT``: the same by Brent's, for trilinear values, whose gradients jump. ``BRENT``: a
             cell is searched if the field at its two ends lies on different sides (dissertation, 4.2.3), which
             misses double crossings at grazing rays. ``ANALYTIC``: the cubic of a trilinear cell.
         top: level of the octree at which the descent begins; 0 is the 3-D DDA through all cells.
@@ -97,9 +97,13 @@ def leave_interval(
         out = max(min(out_x, out_y, out_z), s)
         if not skipped:
             end, bend = min(out, stop), octree.bend[node] * speed * speed
-            if slope != 0.0:
+            if slope != 0.0 and (end - s) * speed > SHORTEST:
                 s = _turned(s, end, abs(slope), bend, above - below)
                 slope = 0.0
+            elif slope != 0.0:
+                # The surface lies on a face; where gradients are continuous the next cell has its slope.
+                s = end
+                slope = slope if search.roots == CERTAIN else 0.0
             if s >= end:
                 value = math.nan
                 found, side, gradient = s, 0, UNKNOWN
@@ -114,7 +118,7 @@ def leave_interval(
             if side != 0:
                 return found, side, gradient
         else:
-            value = math.nan
+            value, slope = math.nan, 0.0
         s = out
         # The axis of the face moves to the next node; rounding must not carry the others out of theirs.
         before = p if out_x <= out_y and out_x <= out_z else (q if out_y <= out_z else r)

@@ -61,8 +61,3 @@ def reflectances(cosine: float, behind: float, ratio: float) -> tuple[float, flo
     s = (ratio * cosine - behind) / (ratio * cosine + behind)
     p = (ratio * behind - cosine) / (ratio * behind + cosine)
     return s * s, p * p
-
-
-def critical_angle(ratio: float) -> float:
-    """Angle of incidence beyond which nothing passes, rad; π/2 where ``ratio`` is at most 1."""
-    return math.asin(min(1.0, 1.0 / ratio))

@@ -59,7 +59,6 @@ class Scene:
         open: whether the object may reach the faces of the grid, which then cut it.
         top: highest level of the octree with a node that a ray can skip.
         linear: whether the field is trilinear in each cell.
-        central: whether its gradient comes from central differences.
     """
 
     field: Field
@@ -72,7 +71,6 @@ class Scene:
     open: bool
     top: int
     linear: bool
-    central: bool
 
     @classmethod
     def build(
@@ -113,11 +111,8 @@ class Scene:
         grid = np.array([[0.0] * 3, cells.low.shape])
         box = grid if cut else octree.occupied()
         linear = spline.filter.name in ("trilinear", "central")
-        central = spline.filter.name == "central"
         field = Field(spline.coefficients, spline.stencil)
-        return cls(
-            field, octree, layers, origin, spacing, grid, box, cut, octree.highest_empty(), linear, central
-        )
+        return cls(field, octree, layers, origin, spacing, grid, box, cut, octree.highest_empty(), linear)
 
     def search(self, structure: str = "octree", roots: str = "certain", step: float = 0.1) -> Search:
         """How rays look for surfaces.
@@ -138,8 +133,7 @@ class Scene:
         if not step > 0.0:
             raise InvalidInput("step", step, "a number of nodes > 0")
         top = self.top if structure == "octree" else 0
-        # Central differences are not the slopes of the values between them.
-        certain = CERTAIN_BRENT if self.central else CERTAIN
+        certain = CERTAIN_BRENT if self.linear else CERTAIN
         return Search(
             certain if roots == "certain" else ROOTS[roots], top, step if structure == "steps" else 0.0
         )

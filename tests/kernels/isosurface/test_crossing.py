@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 
 from bentray_kernels.compiled import kernel
 from bentray_kernels.isosurface import BOUNDS, cell_ranges
-from bentray_kernels.isosurface.crossing import ANALYTIC, BRENT, CERTAIN, Search, leave_interval
+from bentray_kernels.isosurface.crossing import (
+    ANALYTIC,
+    BRENT,
+    CERTAIN,
+    CERTAIN_BRENT,
+    Search,
+    leave_interval,
+)
 from bentray_kernels.isosurface.octree import Octree, octree_of
 from bentray_kernels.isosurface.roots import Field, ray_of
 from bentray_kernels.splines import Spline
@@ -71,7 +78,8 @@ class Case:
 
 def searches(case: Case, name: str) -> list[Search]:
     top = len(case.octree.levels) - 1
-    kinds = [Search(CERTAIN, top, 0.0), Search(CERTAIN, 0, 0.0), Search(CERTAIN, 1, 0.0)]
+    certain = CERTAIN_BRENT if name == "trilinear" else CERTAIN
+    kinds = [Search(certain, level, 0.0) for level in (top, 0, 1)]
     return [*kinds, Search(ANALYTIC, top, 0.0)] if name == "trilinear" else kinds
 
 
@@ -114,9 +122,8 @@ def test_from_surface_to_surface_all_crossings_are_met(name):
         layer = int(np.searchsorted(case.isos, values[0]))
         s, slope, met = 0.0, 0.0, 0
         while True:
-            s, side = case.leave(
-                Search(CERTAIN, 3, 0.0), s, (float(levels[layer]), float(levels[layer + 1])), slope
-            )
+            interval = float(levels[layer]), float(levels[layer + 1])
+            s, side = case.leave(searches(case, name)[0], s, interval, slope)
             if side == 0:
                 break
             met, layer = met + 1, layer + side
@@ -170,3 +177,21 @@ def test_steps_find_what_lies_between_two_of_them():
             assert stepped[0] == pytest.approx(exact[0], abs=1e-9)
             agreed += 1
     assert agreed >= 8
+
+
+@pytest.mark.parametrize("name", ["trilinear", "bspline3"])
+def test_a_surface_on_the_face_of_cells_is_left_behind(name):
+    # A ramp whose iso-surface is the plane of nodes x = 4: the ray goes on from there and does not stay.
+    case = Case(0, name)
+    case.spline = Spline.of(np.arange(12.0)[:, None, None] + np.zeros((1, 4, 4)), name)
+    case.isos = np.array([4.0, 7.0])
+    case.octree = octree_of(cell_ranges(case.spline, case.isos, "bernstein"), case.isos)
+    case.origin, case.along = np.array([1.0, 1.3, 1.7]), np.array([9.0, 0.0, 0.0])
+    search = searches(case, name)[0]
+    first, side = case.leave(search, 0.0, (-np.inf, 4.0))
+    assert side == 1
+    assert 1.0 + 9.0 * first == pytest.approx(4.0, abs=1e-4)
+    for start in (first, (4.0 - 1.0) / 9.0):
+        second, side = case.leave(search, start, (4.0, 7.0), 9.0)
+        assert side == 1
+        assert 1.0 + 9.0 * second == pytest.approx(7.0, abs=1e-4)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.compiled import kernel
-from bentray_kernels.refraction.optics import Vector, critical_angle, reflectances, refracted
+from bentray_kernels.refraction.optics import Vector, reflectances, refracted
 
 
 @kernel
@@ -60,10 +60,9 @@ def test_the_way_back_is_the_way_in(seed, ratio):
 @pytest.mark.parametrize("ratio", [1.1, 1.33, 1.5, 2.4])
 def test_total_reflection_begins_at_the_critical_angle(ratio):
     for offset, passes in ((-1e-6, True), (1e-6, False)):
-        angle = critical_angle(ratio) + offset
+        angle = np.arcsin(1.0 / ratio) + offset
         _, _, passed = bend((np.sin(angle), 0.0, np.cos(angle)), (0.0, 0.0, 1.0), ratio)
         assert passed == passes
-    assert critical_angle(0.7) == pytest.approx(np.pi / 2)
 
 
 def test_fresnels_shares_at_known_angles():
