@@ -39,7 +39,7 @@ TRIED, TRIED_DEPTH = 256, 4
 
 # How far a direction may be off then, and the share of rays that may be off farther: a ray that grazes the
 # object, or passes close to one of its edges, may go either way.
-TOLERANCES = {"float64": (1e-6, 0.02), "float32": (1e-2, 0.1)}
+TOLERANCES = {"float64": (1e-6, 0.02), "float32": (1e-2, 0.05)}
 
 
 class OpenCLCaster:

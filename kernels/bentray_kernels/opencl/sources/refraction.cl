@@ -2,10 +2,10 @@
 //
 // REAL: float or double, of places, directions and roots. SUM: the same for the coefficients and their sums.
 // TAPS: nodes that a point reads along one axis. POWERS: of the weights' polynomials. WIDTH: numbers of a row
-// of the tables (Stencil.weights). HOW: CERTAIN, CERTAIN_BRENT, BRENT or ANALYTIC within cells, or STEPS without
-// them. TOLERANCE, SHORTEST: nodes, as in isosurface/crossing.py. DEEPEST: steps of either root finder.
-// Each function does what the one of the same name does there. Scalars only: not every device computes vectors
-// of doubles right. A fraction is written R(0.5), since a bare 0.5 would turn float sums into double ones.
+// of the tables (Stencil.weights). HOW: CERTAIN, CERTAIN_BRENT, BRENT or ANALYTIC within cells, or STEPS
+// without them. TOLERANCE, SHORTEST: nodes, as in isosurface/crossing.py. DEEPEST: steps of a root finder.
+// A function does what the one of its name does in isosurface or refraction. Scalars only: not every device
+// computes vectors of doubles right. A fraction is written R(0.5): a bare one would turn floats into doubles.
 
 #ifdef cl_khr_fp64
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
@@ -51,8 +51,8 @@ typedef struct {
     int top;
 } Octree;
 
-// What of a crossing is sought and found: the interval (below, above) and its bits in the masks; s, the side by
-// which the field leaves, and its gradient there, per node, where it is known.
+// What of a crossing is sought and found: the interval (below, above) and its bits in the masks; s, the side
+// by which the field leaves, and its gradient there, per node, where it is known.
 typedef struct {
     REAL below, above;
     int sought;
@@ -370,8 +370,8 @@ void solve(const Field *field, const Ray *ray, REAL start, REAL stop, Way *way)
 #endif
 
 #if HOW == STEPS
-void leave_interval(const Field *field, const Octree *octree, REAL step, const Ray *ray, REAL start, REAL stop,
-                    REAL slope, Way *way)
+void leave_interval(const Field *field, const Octree *octree, REAL step, const Ray *ray, REAL start,
+                    REAL stop, REAL slope, Way *way)
 {
     const REAL speed = sqrt(dot3(ray->along, ray->along));
     scan(field, ray, speed, start, UNKNOWN, stop, step / speed, 0, way);
@@ -401,8 +401,8 @@ int within(REAL place, int node, int level, int cells)
 
 int cell_at(REAL place, int cells) { return min(max((int)place, 0), cells - 1); }
 
-void leave_interval(const Field *field, const Octree *octree, REAL step, const Ray *ray, REAL start, REAL stop,
-                    REAL slope, Way *way)
+void leave_interval(const Field *field, const Octree *octree, REAL step, const Ray *ray, REAL start,
+                    REAL stop, REAL slope, Way *way)
 {
     const REAL speed = sqrt(dot3(ray->along, ray->along));
     const int cells_x = octree->levels[1], cells_y = octree->levels[2], cells_z = octree->levels[3];
@@ -426,11 +426,16 @@ void leave_interval(const Field *field, const Octree *octree, REAL step, const R
         const REAL out = upper(lower(lower(out_x, out_y), out_z), s);
         if (skipped) {
             value = UNKNOWN;
+            slope = 0;
         } else {
             const REAL end = lower(out, stop), bend = octree->bend[node] * speed * speed;
-            if (slope != 0) {
+            if (slope != 0 && (end - s) * speed > R(SHORTEST)) {
                 s = turned(s, end, fabs(slope), bend, way->above - way->below);
                 slope = 0;
+            } else if (slope != 0) {
+                // The surface lies on a face; where gradients are continuous the next cell has its slope.
+                s = end;
+                slope = HOW == CERTAIN ? slope : 0;
             }
             if (s >= end) {
                 value = UNKNOWN;
