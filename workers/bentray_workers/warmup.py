@@ -9,7 +9,13 @@ import numpy as np
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation import Ring
 from bentray_kernels.eikonal import methods
+from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography import Settings, reconstruct
+
+from .refraction import strip
+from .refraction_view import RefractionView
+from .scene_cache import build, filtered_of
+from .volume_file import Volume
 
 
 def warm_up() -> None:
@@ -25,6 +31,15 @@ def warm_up() -> None:
     reconstruct(water, Settings(rays="straight", nodes=16, sweeps=1))
 
 
+def warm_up_rendering() -> None:
+    """Draw a small ball through the default filter, refracted and shaded; other filters wait."""
+    filtered = filtered_of(Volume.of(sampled(ONE_HOLE, 8), (1e-3,) * 3), "bspline3", 0.0)
+    for mode in ("refract", "shaded"):
+        view = RefractionView(iso=(0.5,), mode=mode, width=4, height=4)
+        strip(build(filtered, view.layers()), view, 0, 4)
+
+
 def dask_setup(worker: Any) -> None:
     """Called by Dask in each worker that preloads this module."""
     warm_up()
+    warm_up_rendering()

@@ -1,0 +1,139 @@
+"""How a volume is looked at as glass: surfaces, camera, backdrop and picture, checked once for every door."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.isosurface.octree import MOST_ISOS
+from bentray_kernels.refraction import Layers
+from bentray_kernels.splines import FILTERS
+from bentray_kernels.splines.prefilter import MOST_SMOOTHING
+
+# Of a side, and of the square of it in rays.
+MOST_PIXELS = 4096
+MOST_RAYS = MOST_PIXELS**2
+
+WITHIN = {
+    "outside": (0.01, 100.0),
+    "smoothing": (0.0, MOST_SMOOTHING),
+    "azimuth_deg": (-36000.0, 36000.0),
+    "elevation_deg": (-90.0, 90.0),
+    "zoom": (0.05, 50.0),
+    "squares": (1, 512),
+    "backdrop_distance": (0.5, 100.0),
+    "degree": (1, 8),
+    "width": (1, MOST_PIXELS),
+    "height": (1, MOST_PIXELS),
+    "depth": (1, 256),
+}
+CHOICES = {
+    "filter": tuple(FILTERS),
+    "camera": ("orthographic", "perspective"),
+    "backdrop": ("checkerboard", "picture"),
+    "supersampling": ("none", "post", "real"),
+    "mode": ("refract", "shaded"),
+}
+
+
+def _asked(default: Any, meaning: str) -> Any:
+    return field(default=default, metadata={"meaning": meaning})
+
+
+@dataclass(frozen=True)
+class RefractionView:
+    """A picture of a volume through its iso-surfaces.
+
+    What each field means is its metadata ``meaning``; query parameters and options are made of them.
+
+    Raises:
+        InvalidInput: naming the first field that is wrong.
+    """
+
+    iso: tuple[float, ...] = _asked(
+        (), "Rising iso-values, unit of the volume; without any, the middle of its range."
+    )
+    index: tuple[float, ...] = _asked((1.5,), "Refractive index above each iso-value.")
+    outside: float = _asked(1.0, "Refractive index below the first iso-value, and of the surroundings.")
+    filter: str = _asked("bspline3", "Filter between the nodes: " + ", ".join(FILTERS) + ".")
+    smoothing: float = _asked(0.0, "How much a B-spline smooths noise away; 0 passes through the nodes.")
+    camera: Literal["orthographic", "perspective"] = _asked("orthographic", "Kind of camera.")
+    azimuth_deg: float = _asked(30.0, "Where the camera stands: angle about the z axis, degrees.")
+    elevation_deg: float = _asked(20.0, "Its height above the x-y plane, degrees.")
+    zoom: float = _asked(1.0, "1 shows the whole volume, 2 half of it.")
+    backdrop: Literal["checkerboard", "picture"] = _asked("checkerboard", "What is seen through the volume.")
+    squares: int = _asked(16, "Squares of the checkerboard across the shorter side of the picture.")
+    backdrop_distance: float = _asked(1.0, "From the middle of the volume, in its diagonals.")
+    supersampling: Literal["none", "post", "real"] = _asked(
+        "post", "post: more samples of the backdrop after refraction; real: more rays."
+    )
+    degree: int = _asked(1, "Samples beside each pixel for post; rays along each side of it for real.")
+    fresnel: bool = _asked(False, "Whether light is weakened by what each surface mirrors away.")
+    mode: Literal["refract", "shaded"] = _asked("refract", "refract, or shaded: the first surface, lit.")
+    width: int = _asked(512, "Pixels.")
+    height: int = _asked(512, "Pixels.")
+    depth: int = _asked(16, "Most surfaces that a ray may meet; what goes on beyond is black.")
+
+    def __post_init__(self) -> None:
+        for name, choices in CHOICES.items():
+            if getattr(self, name) not in choices:
+                raise InvalidInput(name, repr(getattr(self, name)), "one of " + ", ".join(choices))
+        for name, (low, high) in WITHIN.items():
+            # NaN is between nothing.
+            if not low <= getattr(self, name) <= high:
+                raise InvalidInput(name, getattr(self, name), f"a number from {low:g} to {high:g}")
+        if len(self.iso) > MOST_ISOS:
+            raise InvalidInput("iso", f"{len(self.iso)} iso-values", f"at most {MOST_ISOS}")
+        if len(self.index) != max(len(self.iso), 1):
+            raise InvalidInput("index", self.index, f"{max(len(self.iso), 1)}: one for each iso-value")
+        if not all(0.01 <= n <= 100.0 for n in self.index):
+            raise InvalidInput("index", self.index, "refractive indices from 0.01 to 100")
+        if self.iso:
+            self.layers()
+        if self.smoothing and not self.filter.startswith("bspline"):
+            raise InvalidInput("smoothing", self.smoothing, "0, unless the filter is a B-spline")
+        rays = self.width * self.height * self.times**2
+        if rays > MOST_RAYS:
+            raise InvalidInput("width, height, degree", f"{rays} rays", f"at most {MOST_RAYS}")
+
+    @property
+    def times(self) -> int:
+        """Rays along each side of a pixel."""
+        return self.degree if self.supersampling == "real" else 1
+
+    def layers(self) -> Layers:
+        """Iso-values and indices as the ray caster takes them; raises InvalidInput unless the values rise."""
+        return Layers(self.iso, (self.outside, *self.index))
+
+    def within(self, low: float, high: float) -> RefractionView:
+        """The same for a volume with values from ``low`` to ``high``: with an iso-value, if it has none.
+
+        Raises:
+            InvalidInput: for an iso-value out of that range, or a volume that has one value only.
+        """
+        if not low < high:
+            raise InvalidInput("volume", f"{low:.6g} everywhere", "a volume whose values differ")
+        for iso in self.iso:
+            if not low <= iso <= high:
+                raise InvalidInput("iso", f"{iso:g}", f"{low:.6g} to {high:.6g}, the range of the volume")
+        return self if self.iso else replace(self, iso=(0.5 * (low + high),))
+
+    def plain(self) -> dict[str, Any]:
+        """Its fields as JSON has them."""
+        found = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in found.items()}
+
+
+def check_even(shape: tuple[int, ...], spacing_m: tuple[float | None, ...]) -> None:
+    """Refuse what is not a volume in space on an even grid, as the slices of a ring at odd heights are.
+
+    Raises:
+        InvalidInput: naming ``volume``.
+    """
+    accepted = "a volume in space, two nodes or more along each axis, with even spacing"
+    if len(shape) != 3 or min(shape) < 2:
+        raise InvalidInput("volume", f"shape {tuple(shape)}", accepted)
+    if not all(step is not None and math.isfinite(step) for step in spacing_m):
+        raise InvalidInput("volume", f"uneven slices (spacing {list(spacing_m)} m)", accepted)

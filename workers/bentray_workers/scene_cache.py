@@ -1,0 +1,147 @@
+"""Scenes that are kept: made once a process for each file and filter, as long as there is room."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from threading import Lock
+from typing import Any, NamedTuple
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.refraction import Layers, Scene
+from bentray_kernels.splines import Spline
+
+from .bounded_reading import LARGEST_BYTES
+from .hdf5_reading import Limits, opened
+from .refraction_view import RefractionView, check_even
+from .volume_file import Volume
+from .volume_reading import import_volume
+
+# Measured of 128 nodes cubed, rounded up, per node: what a spline keeps, what a scene with it keeps, and what
+# there is at once while one is made.
+SPLINE_BYTES, SCENE_BYTES, BUILDING_BYTES = 9, 15, 48
+# Nodes that filters add along each axis, at most.
+BORDER = 6
+
+# What one scene may take while it is made: the largest volume has about 560 nodes a side.
+MOST_BUILDING_BYTES = 8 * 2**30
+# What a process keeps of them.
+KEPT_BYTES = 4 * 2**30
+
+
+class Kept:
+    """Values by key, the least lately used ones dropped to stay below so many bytes.
+
+    A value is made with the lock held: two tasks that want the same large one must not make it twice.
+    """
+
+    def __init__(self, most_bytes: int) -> None:
+        self._most = most_bytes
+        self._values: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
+        self._lock = Lock()
+
+    def get(self, key: Hashable, size: int, make: Callable[[], Any]) -> Any:
+        """The value of ``key``, made if it is not there; ``size`` bytes are made free before."""
+        with self._lock:
+            if key in self._values:
+                self._values.move_to_end(key)
+                return self._values[key][0]
+            while self._values and self.held() + size > self._most:
+                self._values.popitem(last=False)
+            value = make()
+            if size <= self._most:
+                self._values[key] = value, size
+            return value
+
+    def held(self) -> int:
+        """Bytes of all values."""
+        return sum(size for _, size in self._values.values())
+
+
+class Source(NamedTuple):
+    """What a scene is made of: a file as it was at a time, and the filter."""
+
+    path: Path
+    stamp: int
+    size: int
+    filter: str
+    smoothing: float
+
+
+class Filtered(NamedTuple):
+    """A volume behind its filter."""
+
+    spline: Spline
+    spacing_m: tuple[float, float, float]
+    range: tuple[float, float]
+
+
+# One of each for the process, as ``functools.lru_cache`` would have; a spline serves many iso-values.
+_SPLINES = Kept(KEPT_BYTES // 2)
+_SCENES = Kept(KEPT_BYTES // 2)
+
+
+def needed_bytes(shape: Sequence[int], each: int) -> int:
+    """Bytes for a volume of that shape, at so many a node."""
+    return math.prod(n + BORDER for n in shape) * each
+
+
+def check_size(shape: Sequence[int]) -> None:
+    """Refuse a volume whose scene no worker could make.
+
+    Raises:
+        InvalidInput: naming ``volume``.
+    """
+    needed = needed_bytes(shape, BUILDING_BYTES)
+    if needed > MOST_BUILDING_BYTES:
+        most = f"volumes that need at most {MOST_BUILDING_BYTES} bytes, {BUILDING_BYTES} a node"
+        raise InvalidInput("volume", f"shape {tuple(shape)}, which needs {needed} bytes to render", most)
+
+
+def scene_at(path: Path, view: RefractionView) -> Scene:
+    """The scene of a volume or reconstruction file, from what is kept or made now.
+
+    Raises:
+        InvalidInput: from the file, for a volume that is too large, and for iso-values out of its range.
+    """
+    shape = stored_shape(path)
+    check_size(shape)
+    status = path.stat()
+    source = Source(path, status.st_mtime_ns, status.st_size, view.filter, view.smoothing)
+    filtered: Filtered = _SPLINES.get(
+        source,
+        needed_bytes(shape, SPLINE_BYTES),
+        lambda: filtered_of(import_volume(path), view.filter, view.smoothing),
+    )
+    layers = view.within(*filtered.range).layers()
+    # The octree knows the iso-values alone, so that another glass costs nothing.
+    scene: Scene = _SCENES.get(
+        (source, layers.isos), needed_bytes(shape, SCENE_BYTES), lambda: build(filtered, layers)
+    )
+    return replace(scene, layers=layers)
+
+
+def stored_shape(path: Path) -> tuple[int, ...]:
+    """The shape in a volume or reconstruction file of ours, without reading its values."""
+    with opened(path, Limits(total_bytes=LARGEST_BYTES)) as reader:
+        for place in ("values", "speed_mps"):
+            found = reader.checked(place, "buif", "(nx, ny, nz) numbers")
+            if found is not None:
+                return tuple(int(n) for n in found.shape)
+    raise InvalidInput("values", "nothing", "(nx, ny, nz) numbers")
+
+
+def filtered_of(volume: Volume, filter_name: str, smoothing: float) -> Filtered:
+    """A volume behind a filter, once it is known to fit."""
+    check_even(volume.values.shape, volume.spacing_m)
+    check_size(volume.values.shape)
+    spline = Spline.of(volume.values, filter_name, smoothing=smoothing)
+    return Filtered(spline, volume.spacing_m, volume.range())
+
+
+def build(filtered: Filtered, layers: Layers) -> Scene:
+    """The scene, with the middle of the volume at 0."""
+    return Scene.build(filtered.spline, layers, filtered.spacing_m)
