@@ -1,0 +1,239 @@
+"""The caster on an OpenCL device: all cases of the compiled one, its rays, its pictures, its refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.opencl import OpenCLFallbackWarning, choice, session_or_warning
+from bentray_kernels.refraction import (
+    Layers,
+    Picture,
+    RenderSettings,
+    Scene,
+    backdrop_of,
+    checkerboard,
+    orthographic,
+    perspective,
+    render,
+)
+from bentray_kernels.refraction.caster import REFRACTED, Traced, cast, medium_of, space_for
+from bentray_kernels.refraction.caster_opencl import OpenCLCaster, on_the_device
+from bentray_kernels.splines import Spline
+
+from . import test_caster
+from .solids import distance, squared, through_ball
+from .test_caster import *  # noqa: F403 - every case of the compiled caster, cast by the fixture below
+
+RADIUS = 0.31
+BACKDROP = backdrop_of([checkerboard((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 10)])
+CAMERAS = {
+    "orthographic": orthographic((0.0, 0.0, -2.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0), 1.0),
+    "perspective": perspective((0.3, -0.4, -1.9), (0.0, 0.0, 0.0), (0.0, -1.0, 0.0), 35.0),
+}
+
+
+def caster_of(scene: Scene, precision: str = "float64") -> OpenCLCaster:
+    made = on_the_device(scene, precision)
+    assert made is not None, "no OpenCL device of this machine passes its trial: see `bentray devices`"
+    return made
+
+
+@pytest.fixture(autouse=True)
+def cast_by_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lets the cases of ``test_caster`` ask the device; where it is not trusted its warning is an error."""
+
+    def trace(
+        scene, starts, directions, depth=16, structure="octree", roots="certain", paths=False
+    ) -> Traced:
+        starts, directions = np.atleast_2d(starts).astype(float), np.atleast_2d(directions).astype(float)
+        traced = space_for(len(starts), depth, paths)
+        medium, search = medium_of(scene, structure), scene.search(structure, roots, 0.05)
+        caster, still = caster_of(scene), np.zeros((2, 3))
+        for n, (start, ahead) in enumerate(zip(starts, directions, strict=True)):
+            camera = np.vstack([start, still]), np.vstack([ahead, still])
+            caster.cast(medium, search, camera, np.zeros((1, 2)), depth, traced.part(slice(n, n + 1)))
+        return traced
+
+    monkeypatch.setattr(test_caster, "trace", trace)
+
+
+def nested(n: int = 24, **how) -> Scene:
+    layers = Layers((-(RADIUS**2), -0.04, -0.01), (1.0, 1.4, 1.1, 1.7))
+    return Scene.build(Spline(-squared(n), prefilter=False, **how), layers, 1.0 / (n - 1))
+
+
+def rough(seed: int, name: str, dtype=np.float64) -> Scene:
+    """A volume without any smoothness, some cut by the grid's faces and some not, with two iso-surfaces."""
+    random = np.random.default_rng(seed)
+    volume = np.pad(random.normal(0.0, 1.0, random.integers(3, 9, 3)), seed % 3, constant_values=-3.0)
+    low, high = np.sort(random.normal(0.0, 0.3, 2))
+    indices = tuple(random.uniform(1.0, 1.8, 3))
+    return Scene.build(Spline.of(volume, name, dtype=dtype), Layers((low, high), indices), 0.1)
+
+
+def both(
+    scene: Scene, precision="float64", structure="octree", roots="certain", depth=16, paths=True, seed=0
+) -> tuple[Traced, Traced]:
+    """The same 300 rays of a camera somewhere about the scene by the device and by the compiled caster."""
+    random = np.random.default_rng(seed)
+    eye = 3.0 * np.linalg.norm(scene.spacing * scene.grid[1]) * _unit(random.normal(size=3))
+    camera = perspective(eye, (0.0, 0.0, 0.0), random.normal(size=3), 14.0)
+    places = random.uniform(-0.5, 0.5, (300, 2))
+    medium, search = medium_of(scene, structure), scene.search(structure, roots, 0.1)
+    found, expected = (space_for(300, depth, paths) for _ in range(2))
+    views = camera.origin, camera.direction
+    caster_of(scene, precision).follow(medium, search, views, places, depth, found)
+    cast(medium, search, views, places, depth, expected)
+    return found, expected
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
+
+
+def strays(found: Traced, expected: Traced, far: float) -> int:
+    """Rays that became something else, or are farther off than so much."""
+    same = (found.fate == expected.fate) & (found.crossed == expected.crossed)
+    for name in ("point", "direction", "weight"):
+        off = np.abs(getattr(found, name) - getattr(expected, name)).reshape(len(same), -1).max(axis=1)
+        same &= off <= far
+    return int((~same).sum())
+
+
+@pytest.mark.parametrize("roots", ["certain", "brent"])
+def test_rays_through_nested_surfaces_are_those_of_the_compiled_caster(roots):
+    found, expected = both(nested(), roots=roots)
+    assert (expected.fate == REFRACTED).sum() > 50
+    assert len(set(expected.crossed)) >= 4
+    assert strays(found, expected, 1e-9) == 0
+    np.testing.assert_allclose(found.vertices, expected.vertices, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["central", "trilinear", "catmull-rom", "bspline3", "bspline5"])
+def test_rays_through_rough_volumes_too(name):
+    @given(seed=st.integers(0, 2**32 - 1))
+    @settings(max_examples=12, deadline=None)
+    def holds(seed):
+        scene = rough(seed, name)
+        kinds = [("octree", "certain"), ("dda", "brent"), ("steps", "brent")]
+        for structure, roots in [*kinds, ("octree", "analytic")] if scene.linear else kinds:
+            found, expected = both(scene, structure=structure, roots=roots, depth=3, seed=seed)
+            # What grazes a surface, or a face of a cell where gradients jump, may go either way.
+            assert strays(found, expected, 1e-6) <= 6
+
+    holds()
+
+
+def test_volumes_in_float32_are_summed_in_float32():
+    found, expected = both(nested(dtype=np.float32))
+    assert strays(found, expected, 1e-9) > 0
+    assert strays(found, expected, 1e-4) <= 3
+
+
+def test_float32_finds_directions_to_a_thousandth():
+    for scene in (nested(), rough(1, "bspline3"), rough(3, "trilinear")):
+        found, expected = both(scene, "float32", depth=3, paths=False)
+        assert strays(found, expected, 1e-9) > 0
+        assert strays(found, expected, 1e-3) <= 6
+
+
+def test_the_backdrop_behind_a_ball_is_seen_exactly_where_it_is():
+    layers = Layers((-(RADIUS**2),), (1.0, 1.5))
+    scene = Scene.build(Spline(-squared(24), prefilter=False), layers, 1.0 / 23)
+    how = RenderSettings(64, 64, supersampling="none")
+    u, v = np.meshgrid(*[(np.arange(64) + 0.5) / 64 - 0.5] * 2)
+    radius = np.hypot(u, v)
+    clear, inside = np.abs(radius - RADIUS) > 1e-3, radius < 0.97 * RADIUS
+    exact = through_ball(radius[inside], RADIUS, 1.5, 1.0)[0] / radius[inside]
+    for precision, far in (("float64", 1e-7), ("float32", 1e-3)):
+        made = render(scene, CAMERAS["orthographic"], BACKDROP, how, caster_of(scene, precision))
+        np.testing.assert_array_equal(made.crossed[clear], 2 * (radius < RADIUS)[clear])
+        np.testing.assert_allclose(
+            made.position_m[inside], np.stack([u, v], -1)[inside] * exact[:, None], atol=far
+        )
+
+
+def at_discontinuities(picture: Picture) -> np.ndarray:
+    """Pixels with a neighbour of another colour, or whose ray met another number of interfaces."""
+    seen = np.concatenate([picture.image.astype(int), picture.crossed[..., None]], axis=2)
+    padded = np.pad(seen, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    rows, columns = seen.shape[:2]
+    around = [padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3)]
+    return np.any([(other != seen).any(axis=2) for other in around], axis=0)
+
+
+# Pixels out of 96² that may differ by more than one level of 255: 0.02 % and 0.5 %.
+@pytest.mark.parametrize(("precision", "most"), [("float64", 2), ("float32", 46)])
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("supersampling", ["none", "post", "real"])
+def test_pictures_differ_by_a_level_but_at_discontinuities(precision, most, camera, supersampling):
+    how = RenderSettings(96, 96, supersampling=supersampling, degree=2, fresnel=True)
+    for scene in (nested(), Scene.build(Spline(RADIUS - distance(32)), Layers((0.0,), (1.0, 1.5)), 1.0 / 31)):
+        expected = render(scene, CAMERAS[camera], BACKDROP, how)
+        plain = render(scene, CAMERAS[camera], BACKDROP, RenderSettings(96, 96, supersampling="none"))
+        found = render(scene, CAMERAS[camera], BACKDROP, how, caster_of(scene, precision))
+        off = np.abs(found.image.astype(int) - expected.image).max(axis=2) > 1
+        assert (expected.image != 255).any()
+        assert off.sum() <= most
+        assert at_discontinuities(plain)[off].all()
+
+
+def test_many_rays_are_cast_in_parts(monkeypatch):
+    scene = nested()
+    whole, _ = both(scene)
+    monkeypatch.setattr(type(session_or_warning(instead="cast")), "doubles_at_once", lambda session: 61 * 41)
+    for part, all_at_once in zip(both(scene)[0], whole, strict=True):
+        np.testing.assert_array_equal(part, all_at_once)
+
+
+def test_no_rays_give_nothing():
+    scene, none = nested(), space_for(0, 4, True)
+    view = CAMERAS["orthographic"]
+    caster_of(scene).cast(
+        medium_of(scene, "octree"), scene.search(), (view.origin, view.direction), np.empty((0, 2)), 4, none
+    )
+    assert len(none.point) == 0
+
+
+def test_a_device_that_casts_wrong_is_left_with_a_warning(monkeypatch):
+    scene = nested()
+    caster, right, seen = caster_of(scene), OpenCLCaster.follow, CAMERAS["perspective"]
+
+    def wrong(there, medium, search, camera, places, depth, traced):
+        right(there, medium, search, camera, places, depth, traced)
+        traced.direction[:, 0] += 1e-3
+
+    monkeypatch.setattr(OpenCLCaster, "follow", wrong)
+    how = RenderSettings(24, 24)
+    expected = render(scene, seen, BACKDROP, how)
+    with pytest.warns(OpenCLFallbackWarning, match=r"\(certain\), the CPU takes over: 100% of its") as caught:
+        found = [render(scene, seen, BACKDROP, how, caster) for _ in range(2)]
+    assert len(caught) == 1
+    for picture in found:
+        np.testing.assert_array_equal(picture.image, expected.image)
+    # Each way to look for crossings is a program of its own, and has its own trial.
+    monkeypatch.setattr(OpenCLCaster, "follow", right)
+    brent = RenderSettings(24, 24, roots="brent")
+    render(scene, seen, BACKDROP, brent, caster)
+
+
+def test_without_a_device_there_is_no_caster(monkeypatch):
+    monkeypatch.setattr(choice, "_found", lambda wish: "this machine has no OpenCL device")
+    choice._warn_once.cache_clear()
+    with pytest.warns(OpenCLFallbackWarning, match="takes over: this machine has no"):
+        assert on_the_device(nested()) is None
+    choice._warn_once.cache_clear()
+
+
+def test_what_does_not_belong_to_the_scene_is_refused():
+    one, other = nested(), nested(12)
+    with pytest.raises(InvalidInput) as refusal:
+        render(other, CAMERAS["perspective"], BACKDROP, RenderSettings(8, 8), caster_of(one))
+    assert refusal.value.field == "medium"
+    with pytest.raises(InvalidInput) as refusal:
+        on_the_device(one, "float16")
+    assert refusal.value.field == "precision"
