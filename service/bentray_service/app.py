@@ -15,7 +15,7 @@ from bentray_workers.cluster import open_cluster
 from . import __version__, errors
 from .compute import Cluster, Compute
 from .jobs.runner import Runner
-from .routes import datasets, health, jobs, pages, uploads, volumes
+from .routes import datasets, health, jobs, pages, refraction, uploads, volumes
 from .settings import ServiceSettings
 from .storage.database import open_database
 from .storage.datasets import Datasets
@@ -61,7 +61,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     )
     errors.install(app)
     app.add_middleware(SecurityHeaders)
-    for part in (datasets, jobs, volumes, health, pages):
+    for part in (datasets, jobs, volumes, refraction, health, pages):
         app.include_router(part.router)
     app.mount("/static", StaticFiles(directory=pages.WEB / "static"), name="static")
     return app

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-from bentray_workers import images
+from bentray_workers import images, refraction
 from bentray_workers.lanes import RENDER
+from bentray_workers.refraction_view import RefractionView
 
 from .refusals import Busy
 
@@ -56,8 +57,16 @@ class Compute:
         """The same of an uploaded volume; ``how`` as in ``bentray_workers.images.volume_slice_png``."""
         return self._drawn(images.volume_slice_png, path, how)
 
+    def refraction_png(self, path: Path, view: RefractionView) -> bytes:
+        """A volume or reconstruction file as glass; raises as ``slice_png`` does."""
+        return self._finished(refraction.submit(self.client, path, view, RENDER_PRIORITY))
+
     def _drawn(self, draw: Callable[..., bytes], path: Path, how: dict[str, Any]) -> bytes:
-        future = self.client.submit(draw, path, **how, pure=False, resources=RENDER, priority=RENDER_PRIORITY)
+        return self._finished(
+            self.client.submit(draw, path, **how, pure=False, resources=RENDER, priority=RENDER_PRIORITY)
+        )
+
+    def _finished(self, future: Any) -> bytes:
         try:
             return bytes(future.result(timeout=RENDER_SECONDS))
         except TimeoutError:

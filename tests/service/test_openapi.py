@@ -21,9 +21,11 @@ def test_every_address_of_the_plan_is_there():
         "/v1/jobs",
         "/v1/jobs/{job_id}",
         "/v1/jobs/{job_id}/cancel",
+        "/v1/volumes",
         "/v1/volumes/{volume_id}",
         "/v1/volumes/{volume_id}/slice.png",
         "/v1/volumes/{volume_id}/data",
+        "/v1/volumes/{volume_id}/refraction.png",
         "/health/live",
         "/health/ready",
     ):

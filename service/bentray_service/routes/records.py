@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Any, Literal
 
 from pydantic import BaseModel, Field
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.refraction_view import check_even
 
 from ..errors import Problem
 from ..storage.ids import volume_of
@@ -111,7 +115,7 @@ class VolumeRecord(BaseModel):
     bytes: int = Field(description="Size of the file of a reconstruction, or of what was uploaded.")
     sha256: str | None = Field(description="SHA-256 of what was uploaded.")
     created: datetime
-    links: dict[str, str]
+    links: dict[str, str] = Field(description="refraction is there for volumes in space with even spacing.")
 
 
 class VolumeList(BaseModel):
@@ -158,6 +162,9 @@ def job_record(row: Row) -> JobRecord:
 def volume_record(row: Row) -> VolumeRecord:
     here = f"/v1/volumes/{row['id']}"
     links = {"self": here, "image": f"{here}/slice.png", "data": f"{here}/data"}
+    with suppress(InvalidInput):
+        check_even(row["shape"], row["spacing_m"])
+        links["refraction"] = f"{here}/refraction.png"
     job = row.get("job_id")
     if job is not None:
         links["job"] = f"/v1/jobs/{job}"

@@ -1,0 +1,256 @@
+"""/v1/volumes/{id}/refraction.png: pictures of uploads and results, and every refusal."""
+
+import io
+import time
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from PIL import Image
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.phantoms import ONE_HOLE, sampled
+from bentray_kernels.tomography.result import Reconstruction
+from bentray_service import compute
+from bentray_service.app import create_app
+from bentray_service.asked_view import NAMES
+from bentray_service.settings import ServiceSettings
+from bentray_service.storage.ids import new_id
+from bentray_workers import refraction, scene_cache
+from bentray_workers.cluster import open_cluster
+from bentray_workers.lanes import RECONSTRUCTION
+from bentray_workers.volume_file import Volume, write_volume
+
+SMALL = {"width": 32, "height": 24, "iso": 0.5}
+
+
+def put(http, values=None, spacing=(1e-3,) * 3):
+    """A volume as an upload leaves it, without the process that reads it."""
+    parts = http.app.state.parts
+    volume = Volume.of(sampled(ONE_HOLE, 12) if values is None else values, spacing)
+    volume_id = new_id("volume")
+    write_volume(parts.files.volume(volume_id), volume)
+    summary = {
+        "title": "a ball",
+        "shape": list(volume.values.shape),
+        "spacing_m": list(spacing),
+        "origin_m": [0.0] * 3,
+        "value_range": list(volume.range()),
+    }
+    parts.volumes.add(volume_id, size=1, sha256="0" * 64, summary=summary)
+    return http.get(f"/v1/volumes/{volume_id}").json()["links"]["refraction"]
+
+
+@pytest.fixture
+def http(start):
+    return start()
+
+
+def test_a_picture_is_cast_in_the_render_lane(http, cluster):
+    answer = http.get(put(http), params={**SMALL, "backdrop": "picture", "index": 1.3})
+    assert answer.headers["content-type"] == "image/png"
+    assert Image.open(io.BytesIO(answer.content)).size == (32, 24)
+    assert cluster.submitted[-1] == {"pure": False, "resources": {"render": 1}, "priority": 10}
+
+
+def test_every_parameter_changes_the_picture_or_its_tag(http):
+    here = put(http)
+    other = {
+        "iso": 0.4,
+        "index": 1.2,
+        "outside": 1.1,
+        "filter": "trilinear",
+        "smoothing": 0.1,
+        "camera": "perspective",
+        "backdrop": "picture",
+        "supersampling": "none",
+        "fresnel": True,
+        "mode": "shaded",
+        "degree": 2,
+        "depth": 3,
+        "azimuth_deg": 5,
+        "elevation_deg": 5,
+        "zoom": 2,
+        "squares": 5,
+        "backdrop_distance": 2,
+        "width": 31,
+        "height": 31,
+    }
+    assert set(other) == set(NAMES)
+    tags = {http.get(here, params=SMALL).headers["etag"]}
+    for name, value in other.items():
+        answer = http.get(here, params={**SMALL, name: value})
+        assert answer.status_code == 200, answer.text
+        tags.add(answer.headers["etag"])
+    assert len(tags) == len(other) + 1
+
+
+def test_a_known_picture_is_not_cast_again(http, cluster):
+    here = put(http)
+    first = http.get(here, params=SMALL)
+    assert first.headers["cache-control"] == "private, no-cache"
+    cast = len(cluster.submitted)
+    again = http.get(here, params=SMALL, headers={"If-None-Match": first.headers["etag"]})
+    assert (again.status_code, again.content) == (304, b"")
+    assert len(cluster.submitted) == cast
+
+
+def test_without_an_iso_value_the_middle_of_the_range(http):
+    here, middle = put(http), dict(SMALL, iso=0.5)
+    low, high = sampled(ONE_HOLE, 12).min(), sampled(ONE_HOLE, 12).max()
+    middle["iso"] = 0.5 * (float(np.float32(low)) + float(np.float32(high)))
+    without = {name: value for name, value in SMALL.items() if name != "iso"}
+    assert http.get(here, params=without).headers["etag"] == http.get(here, params=middle).headers["etag"]
+
+
+def test_several_surfaces(http):
+    answer = http.get(put(http), params={**SMALL, "iso": [0.3, 0.8], "index": [1.3, 1.6]})
+    assert answer.status_code == 200
+
+
+def test_a_large_picture_is_cast_in_strips(http, cluster, monkeypatch):
+    monkeypatch.setattr(refraction, "TASK_RAYS", 100)
+    answer = http.get(put(http), params=SMALL)
+    assert Image.open(io.BytesIO(answer.content)).size == (32, 24)
+    assert len(cluster.submitted) == 8 + 1
+
+
+@pytest.mark.parametrize(
+    ("query", "field", "accepted"),
+    [
+        ("iso=7", "iso", "0 to 1, the range of the volume"),
+        ("iso=nan", "iso", "finite"),
+        ("iso=0.8&iso=0.3&index=1.1&index=1.2", "iso", "rising"),
+        ("iso=0.3&iso=0.8", "index", "2: one for each"),
+        ("iso=many", "iso.0", "a valid number"),
+        ("index=-1", "index", "0.01 to 100"),
+        ("outside=0", "outside", "0.01"),
+        ("filter=box", "filter", "catmull-rom"),
+        ("smoothing=-1", "smoothing", "0"),
+        ("smoothing=1&filter=trilinear", "smoothing", "B-spline"),
+        ("camera=fisheye", "camera", "'orthographic' or 'perspective'"),
+        ("azimuth_deg=inf", "azimuth_deg", "36000"),
+        ("elevation_deg=91", "elevation_deg", "90"),
+        ("zoom=0", "zoom", "0.05"),
+        ("backdrop=forest", "backdrop", "'checkerboard' or 'picture'"),
+        ("squares=0", "squares", "1"),
+        ("backdrop_distance=0.1", "backdrop_distance", "0.5"),
+        ("supersampling=prss", "supersampling", "post"),
+        ("degree=9", "degree", "8"),
+        ("fresnel=perhaps", "fresnel", "boolean"),
+        ("mode=wire", "mode", "'refract' or 'shaded'"),
+        ("width=4097", "width", "4096"),
+        ("height=0", "height", "1"),
+        ("width=4096&height=4096&supersampling=real&degree=2", "width, height, degree", "16777216"),
+        ("depth=0", "depth", "1"),
+        ("isos=0.5", "isos", "one of iso, index"),
+    ],
+)
+def test_what_is_refused(http, cluster, query, field, accepted):
+    answer = http.get(f"{put(http)}?{query}")
+    body = answer.json()
+    assert (answer.status_code, body["field"]) == (422, field), body
+    assert accepted in body["accepted"]
+    assert not cluster.submitted
+
+
+def test_a_volume_of_one_value(http):
+    assert http.get(put(http, np.ones((4, 4, 4)))).json()["found"] == "1 everywhere"
+
+
+def test_a_volume_that_no_worker_can_hold(http, cluster, monkeypatch):
+    here = put(http)
+    monkeypatch.setattr(scene_cache, "MOST_BUILDING_BYTES", 1000)
+    body = http.get(here).json()
+    assert (body["status"], body["field"]) == (422, "volume")
+    assert "1000 bytes" in body["accepted"]
+    assert not cluster.submitted
+
+
+def test_an_unknown_volume(http):
+    assert http.get(f"/v1/volumes/{new_id('volume')}/refraction.png").status_code == 404
+
+
+def test_late_is_503(http, cluster, monkeypatch):
+    def late(path, view):
+        raise TimeoutError
+
+    monkeypatch.setattr(refraction, "picture_png", late)
+    answer = http.get(put(http), params=SMALL)
+    assert (answer.status_code, answer.json()["type"]) == (503, "/problems/busy")
+
+
+def test_what_the_worker_refuses_is_422(http, monkeypatch):
+    def refuse(path, view):
+        raise InvalidInput("iso", "0.5", "what the filter leaves")
+
+    monkeypatch.setattr(refraction, "picture_png", refuse)
+    assert http.get(put(http), params=SMALL).json()["accepted"] == "what the filter leaves"
+
+
+def breast(settings, slices, step):
+    """A reconstruction with a fast ball in slow water."""
+    ball = sampled(ONE_HOLE, settings.nodes)[..., :slices]
+    return Reconstruction(
+        speed=1500.0 + 50.0 * ball if slices > 1 else 1500.0 + 50.0 * ball[..., 0],
+        coverage=np.ones(ball.shape if slices > 1 else ball.shape[:2]),
+        spacing_m=(1e-3, 1e-3, step)[: 3 if slices > 1 else 2],
+        origin_m=(0.0,) * (3 if slices > 1 else 2),
+        water_speed_mps=1500.0,
+        settings=settings,
+        history=(),
+        provenance={},
+    )
+
+
+@pytest.mark.parametrize(
+    ("slices", "step", "found"),
+    [(16, 1e-3, None), (1, 1e-3, "shape (16, 16)"), (16, float("nan"), "uneven slices")],
+)
+def test_a_reconstruction_as_glass(http, uploaded, submitted, until, work, monkeypatch, slices, step, found):
+    plain = type(work).__call__
+
+    def in_space(self, *given):
+        return breast(plain(self, *given).settings, slices, step)
+
+    monkeypatch.setattr(type(work), "__call__", in_space)
+    volume = http.get(until(http, submitted(http, uploaded(http))["id"])["links"]["volume"]).json()
+    answer = http.get(f"{volume['links']['self']}/refraction.png", params={"width": 32, "height": 32})
+    if found is None:
+        assert volume["links"]["refraction"] == f"{volume['links']['self']}/refraction.png"
+        assert answer.content.startswith(b"\x89PNG")
+        return
+    assert "refraction" not in volume["links"]
+    assert (answer.status_code, answer.json()["field"]) == (422, "volume")
+    assert found in answer.json()["found"]
+    assert "even spacing" in answer.json()["accepted"]
+
+
+def test_a_picture_beside_reconstructions(tmp_path):
+    """On a real cluster: the lane is free although every other one is busy."""
+    with open_cluster(workers=1, processes=False) as cluster:
+        app = create_app(ServiceSettings(data_dir=tmp_path / "data"), cluster)
+        with TestClient(app) as http:
+            here = put(http)
+            http.get(here, params=SMALL)
+            busy = [
+                cluster.client.submit(time.sleep, 3.0, pure=False, resources=RECONSTRUCTION) for _ in range(3)
+            ]
+            started = time.monotonic()
+            assert http.get(here, params={**SMALL, "index": 1.1}).status_code == 200
+            assert time.monotonic() - started < 3.0
+            assert not any(future.done() for future in busy)
+            for future in busy:
+                future.cancel()
+
+
+def test_a_picture_that_no_worker_takes_is_503(tmp_path, monkeypatch):
+    monkeypatch.setattr(compute, "RENDER_SECONDS", 0.3)
+    with open_cluster(workers=1, processes=False) as cluster:
+        app = create_app(ServiceSettings(data_dir=tmp_path / "data"), cluster)
+        with TestClient(app) as http:
+            here = put(http)
+            busy = cluster.client.submit(time.sleep, 2.0, pure=False, resources={"render": 1})
+            answer = http.get(here, params=SMALL)
+            assert (answer.status_code, answer.json()["type"]) == (503, "/problems/busy")
+            busy.cancel()
