@@ -14,13 +14,13 @@ from bentray_kernels.tomography.settings import Settings
 ADAPTER: TypeAdapter[Settings] = TypeAdapter(Settings)
 
 
-def known_only(given: Any) -> Any:
-    """``given`` if it names no setting that does not exist; what is no mapping is left to others.
+def known_only(given: Any, of: type[Any] = Settings) -> Any:
+    """``given`` if it names no field that the dataclass ``of`` has not; what is no mapping is left to others.
 
     Raises:
         InvalidInput: with the list of those that exist.
     """
-    known = [field.name for field in fields(Settings)]
+    known = [field.name for field in fields(of)]
     for name in given if isinstance(given, Mapping) else ():
         if name not in known:
             raise InvalidInput(name, repr(given[name])[:80], "a known setting: " + ", ".join(known))

@@ -35,7 +35,7 @@ def _signature() -> inspect.Signature:
         default: Any = field.default
         several = isinstance(default, tuple)
         kind: Any = list[float] if several else types[field.name]
-        query = Query(description=field.metadata["meaning"] + (" May be repeated." if several else ""))
+        query = Query(description=field.metadata["description"] + (" May be repeated." if several else ""))
         found.append(
             inspect.Parameter(
                 field.name,

@@ -27,6 +27,8 @@ log = logging.getLogger("bentray.errors")
 MEDIA_TYPE = "application/problem+json"
 LONGEST_FOUND = 120
 
+JOB_KINDS = ("reconstruction", "refraction")
+
 
 class Fault(BaseModel):
     """One wrong value."""
@@ -67,6 +69,7 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.EmptyBody: Kind(422, "empty-body", "The request has no body"),
     refusals.TooLarge: Kind(413, "too-large", "The body is too large"),
     refusals.Finished: Kind(409, "job-finished", "The job has ended already"),
+    refusals.NoAnimation: Kind(404, "no-animation", "The job has no animation"),
     refusals.StorageFull: Kind(507, "storage-full", "The disk of the service is full"),
     refusals.Busy: Kind(503, "busy", "No worker was free in time"),
     refusals.NotReady: Kind(503, "not-ready", "The service cannot work now"),
@@ -106,7 +109,14 @@ def fault_of(error: Mapping[str, Any]) -> Fault:
     where = [str(part) for part in error["loc"]]
     if where and where[0] in ("body", "query", "path", "header") and len(where) > 1:
         where = where[1:]
+        # Pydantic names the kind of a job in the place of an error; the user wrote none there.
+        if where[0] in JOB_KINDS:
+            where = where[1:] or ["body"]
     context = error.get("ctx", {})
+    if error["type"] in ("union_tag_invalid", "union_tag_not_found"):
+        field = str(context["discriminator"]).strip("'")
+        found = repr(context["tag"])[:LONGEST_FOUND] if "tag" in context else "nothing"
+        return Fault(field=field, found=found, accepted=" or ".join(map(repr, JOB_KINDS)))
     cause = context.get("error")
     if isinstance(cause, InvalidInput):
         return Fault(field=".".join([*where, cause.field]), found=cause.value, accepted=cause.accepted)

@@ -36,6 +36,13 @@ class Finished(InvalidInput):
     """The job has ended, so nothing can be asked of it any more."""
 
 
+class NoAnimation(InvalidInput):
+    """The job is none of kind refraction, or has no result."""
+
+    def __init__(self, job_id: str, kind: str, state: str) -> None:
+        super().__init__("job", f"{job_id}, {kind}, {state}", "a job of kind refraction that has succeeded")
+
+
 class StorageFull(InvalidInput):
     """The disk of the service is full."""
 

@@ -13,7 +13,7 @@ from bentray_workers.refraction_view import CHOICES, WITHIN, RefractionView, che
 
 
 def test_every_field_says_what_it_means():
-    assert [one.name for one in fields(RefractionView) if not one.metadata["meaning"].endswith(".")] == []
+    assert [one.name for one in fields(RefractionView) if not one.metadata["description"].endswith(".")] == []
 
 
 def test_the_default_is_one_surface_of_glass():

@@ -38,43 +38,44 @@ CHOICES = {
 }
 
 
-def _asked(default: Any, meaning: str) -> Any:
-    return field(default=default, metadata={"meaning": meaning})
+def asked(default: Any, description: str) -> Any:
+    """A field of a view; its description is what OpenAPI and the options of the command say."""
+    return field(default=default, metadata={"description": description})
 
 
 @dataclass(frozen=True)
 class RefractionView:
     """A picture of a volume through its iso-surfaces.
 
-    What each field means is its metadata ``meaning``; query parameters and options are made of them.
+    What each field means is its metadata ``description``; query parameters and options are made of them.
 
     Raises:
         InvalidInput: naming the first field that is wrong.
     """
 
-    iso: tuple[float, ...] = _asked(
+    iso: tuple[float, ...] = asked(
         (), "Rising iso-values, unit of the volume; without any, the middle of its range."
     )
-    index: tuple[float, ...] = _asked((1.5,), "Refractive index above each iso-value.")
-    outside: float = _asked(1.0, "Refractive index below the first iso-value, and of the surroundings.")
-    filter: str = _asked("bspline3", "Filter between the nodes: " + ", ".join(FILTERS) + ".")
-    smoothing: float = _asked(0.0, "How much a B-spline smooths noise away; 0 passes through the nodes.")
-    camera: Literal["orthographic", "perspective"] = _asked("orthographic", "Kind of camera.")
-    azimuth_deg: float = _asked(30.0, "Where the camera stands: angle about the z axis, degrees.")
-    elevation_deg: float = _asked(20.0, "Its height above the x-y plane, degrees.")
-    zoom: float = _asked(1.0, "1 shows the whole volume, 2 half of it.")
-    backdrop: Literal["checkerboard", "picture"] = _asked("checkerboard", "What is seen through the volume.")
-    squares: int = _asked(16, "Squares of the checkerboard across the shorter side of the picture.")
-    backdrop_distance: float = _asked(1.0, "From the middle of the volume, in its diagonals.")
-    supersampling: Literal["none", "post", "real"] = _asked(
+    index: tuple[float, ...] = asked((1.5,), "Refractive index above each iso-value.")
+    outside: float = asked(1.0, "Refractive index below the first iso-value, and of the surroundings.")
+    filter: str = asked("bspline3", "Filter between the nodes: " + ", ".join(FILTERS) + ".")
+    smoothing: float = asked(0.0, "How much a B-spline smooths noise away; 0 passes through the nodes.")
+    camera: Literal["orthographic", "perspective"] = asked("orthographic", "Kind of camera.")
+    azimuth_deg: float = asked(30.0, "Where the camera stands: angle about the z axis, degrees.")
+    elevation_deg: float = asked(20.0, "Its height above the x-y plane, degrees.")
+    zoom: float = asked(1.0, "1 shows the whole volume, 2 half of it.")
+    backdrop: Literal["checkerboard", "picture"] = asked("checkerboard", "What is seen through the volume.")
+    squares: int = asked(16, "Squares of the checkerboard across the shorter side of the picture.")
+    backdrop_distance: float = asked(1.0, "From the middle of the volume, in its diagonals.")
+    supersampling: Literal["none", "post", "real"] = asked(
         "post", "post: more samples of the backdrop after refraction; real: more rays."
     )
-    degree: int = _asked(1, "Samples beside each pixel for post; rays along each side of it for real.")
-    fresnel: bool = _asked(False, "Whether light is weakened by what each surface mirrors away.")
-    mode: Literal["refract", "shaded"] = _asked("refract", "refract, or shaded: the first surface, lit.")
-    width: int = _asked(512, "Pixels.")
-    height: int = _asked(512, "Pixels.")
-    depth: int = _asked(16, "Most surfaces that a ray may meet; what goes on beyond is black.")
+    degree: int = asked(1, "Samples beside each pixel for post; rays along each side of it for real.")
+    fresnel: bool = asked(False, "Whether light is weakened by what each surface mirrors away.")
+    mode: Literal["refract", "shaded"] = asked("refract", "refract, or shaded: the first surface, lit.")
+    width: int = asked(512, "Pixels.")
+    height: int = asked(512, "Pixels.")
+    depth: int = asked(16, "Most surfaces that a ray may meet; what goes on beyond is black.")
 
     def __post_init__(self) -> None:
         for name, choices in CHOICES.items():

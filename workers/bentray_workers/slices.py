@@ -70,7 +70,7 @@ def _prepared(
 ) -> Path:
     """What ``prepare`` gives; picking may take a while, and a stop does not wait for its end."""
     picking = client.submit(prepare, dataset_path, settings, folder, resources=RECONSTRUCTION, pure=False)
-    while not _finished(client, [picking]):
+    while not finished(client, [picking]):
         if stop is not None and stop():
             picking.cancel()
             raise Cancelled
@@ -126,7 +126,7 @@ def _drive(
                 chain, call = ready.popleft()
                 future = client.submit(call.function, *call.arguments, resources=RECONSTRUCTION, pure=False)
                 running[future] = chain, call
-            for future in _finished(client, list(running)):
+            for future in finished(client, list(running)):
                 chain, call = running.pop(future)
                 failed = future.status != "finished"
                 given = future if call.keep and not failed else future.result()
@@ -141,7 +141,8 @@ def _drive(
             future.cancel()
 
 
-def _finished(client: Client, running: list[Future]) -> list[Future]:
+def finished(client: Client, running: list[Future]) -> list[Future]:
+    """Those that have ended; waits for the first one, ``POLL_S`` at most."""
     # The client is nobody's default, so ``wait`` must be told which it is.
     with client.as_current():
         try:

@@ -15,7 +15,6 @@ from bentray_workers.slices import Cancelled
 
 from ..compute import Compute
 from ..storage.files import Files
-from ..storage.ids import volume_of
 from ..storage.jobs import Jobs
 from .failures import CRASHED, explain
 from .kinds import KINDS, Task
@@ -89,14 +88,14 @@ class Runner:
 
     def _run(self, job: dict[str, Any]) -> None:
         reporter = Reporter(self._jobs, job["id"], self._leaving.is_set)
-        volume_id = volume_of(job["id"])
-        target = self._files.volume(volume_id)
+        kind = KINDS[job["kind"]]
+        target = kind.target(self._files, job)
         try:
             with TemporaryDirectory(dir=self._files.scratch) as work_dir:
-                volume = KINDS[job["kind"]].run(
+                volume = kind.run(
                     Task(
                         client=self._compute.client,
-                        dataset=self._files.dataset(job["dataset_id"]),
+                        source=kind.source(self._files, job),
                         settings=job["settings"],
                         target=target,
                         work_dir=Path(work_dir),
@@ -110,7 +109,7 @@ class Runner:
             problem = explain(job["id"], error).model_dump(exclude_none=True)
             self._settle(lambda: self._failed(job["id"], reporter, problem))
         else:
-            self._settle(lambda: self._succeeded(job["id"], reporter, {"id": volume_id, **volume}))
+            self._settle(lambda: self._succeeded(job["id"], reporter, volume, target))
 
     def _stopped(self, job_id: str, reporter: Reporter) -> None:
         reporter.flush()
@@ -123,10 +122,12 @@ class Runner:
         reporter.flush()
         self._jobs.fail(job_id, problem)
 
-    def _succeeded(self, job_id: str, reporter: Reporter, volume: dict[str, Any]) -> None:
+    def _succeeded(
+        self, job_id: str, reporter: Reporter, volume: dict[str, Any] | None, target: Path
+    ) -> None:
         reporter.flush()
         if not self._jobs.succeed(job_id, volume):
-            self._files.volume(volume["id"]).unlink(missing_ok=True)
+            target.unlink(missing_ok=True)
             self._jobs.cancelled(job_id)
 
     def _settle(self, write_the_end: Callable[[], None]) -> None:

@@ -8,6 +8,9 @@ from typing import Any
 
 from fastapi import Response
 
+from bentray_workers.refraction_view import check_even
+from bentray_workers.scene_cache import check_size
+
 from .. import __version__
 from ..errors import described
 
@@ -17,6 +20,16 @@ PICTURE: dict[int | str, dict[str, Any]] = {
     304: {"description": "The picture that the client has is still right."},
     **described(404, 503),
 }
+
+
+def check_renderable(volume: Mapping[str, Any]) -> None:
+    """Refuse a volume that cannot be shown as glass: not in space, uneven, or too large for any worker.
+
+    Raises:
+        InvalidInput: naming ``volume``.
+    """
+    check_even(volume["shape"], volume["spacing_m"])
+    check_size(volume["shape"])
 
 
 def picture(

@@ -53,7 +53,7 @@ class DatasetList(BaseModel):
 
 
 class ProgressRecord(BaseModel):
-    """Emitter passes done and to do, over all slices and sweeps; 0 of 0 before it is known."""
+    """Emitter passes done and to do, over all slices and sweeps, or pictures; 0 of 0 before it is known."""
 
     done: int
     total: int
@@ -76,11 +76,13 @@ class JobRecord(BaseModel):
     id: str
     kind: str
     state: State
-    dataset: str
+    dataset: str | None = Field(description="Id of the scan that a reconstruction reads.")
     settings: dict[str, Any]
     progress: ProgressRecord
     history: list[SweepRecord]
-    volume: str | None = Field(description="Id of the result, once there is one.")
+    volume: str | None = Field(
+        description="Of a reconstruction its result, once there is one; of a refraction what it shows."
+    )
     error: Problem | None = Field(description="Why it failed.")
     created: datetime
     started: datetime | None
@@ -131,15 +133,21 @@ def dataset_record(row: Row) -> DatasetRecord:
 
 
 def job_record(row: Row) -> JobRecord:
-    links = {"self": f"/v1/jobs/{row['id']}", "dataset": f"/v1/datasets/{row['dataset_id']}"}
-    volume = None
-    if row["state"] == "succeeded":
+    here = f"/v1/jobs/{row['id']}"
+    links, volume, done = {"self": here}, row["volume_id"], row["state"] == "succeeded"
+    if row["dataset_id"] is not None:
+        links["dataset"] = f"/v1/datasets/{row['dataset_id']}"
+    if volume is not None:
+        links["volume"] = f"/v1/volumes/{volume}"
+        if done:
+            links["animation"] = f"{here}/animation"
+    elif done:
         volume = volume_of(row["id"])
         links["volume"] = f"/v1/volumes/{volume}"
         links["image"] = f"/v1/volumes/{volume}/slice.png"
         links["data"] = f"/v1/volumes/{volume}/data"
-    elif row["state"] in ("queued", "running"):
-        links["cancel"] = f"/v1/jobs/{row['id']}/cancel"
+    if row["state"] in ("queued", "running"):
+        links["cancel"] = f"{here}/cancel"
     end = row["finished"] or time.time()
     return JobRecord(
         id=row["id"],

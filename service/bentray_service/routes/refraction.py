@@ -6,12 +6,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
 
-from bentray_workers.refraction_view import check_even
-from bentray_workers.scene_cache import check_size
-
 from ..asked_view import AskedView
 from ..wiring import Service
-from .pictures import PICTURE, picture
+from .pictures import PICTURE, check_renderable, picture
 
 router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
 
@@ -28,8 +25,7 @@ def refraction_png(
     Works for volumes in space with even spacing, reconstructed or uploaded.
     """
     volume = service.volumes.get(volume_id)
-    check_even(volume["shape"], volume["spacing_m"])
-    check_size(volume["shape"])
+    check_renderable(volume)
     view = view.within(*volume["value_range"])
     path = service.files.volume(volume["id"])
     return picture(volume, view.plain(), if_none_match, lambda: service.compute.refraction_png(path, view))

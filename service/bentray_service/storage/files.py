@@ -18,7 +18,8 @@ class Files:
 
     ``incoming/`` holds uploads that no one has checked, ``datasets/`` the canonical files of scans,
     ``volumes/`` results and the canonical files of uploaded volumes, ``exports/`` volumes in other formats,
-    ``scratch/`` what workers need while they work. An upload is a dataset or a volume, as its id tells.
+    ``animations/`` turntables, ``scratch/`` what workers need while they work. An upload is a dataset or a
+    volume, as its id tells.
     """
 
     def __init__(self, data_dir: Path) -> None:
@@ -27,6 +28,7 @@ class Files:
         self._datasets = self.root / "datasets"
         self._volumes = self.root / "volumes"
         self._exports = self.root / "exports"
+        self._animations = self.root / "animations"
         self.scratch = self.root / "scratch"
 
     def prepare(self) -> None:
@@ -36,7 +38,8 @@ class Files:
             InvalidInput: when the folder cannot be made or written.
         """
         try:
-            for folder in (self._incoming, self._datasets, self._volumes, self._exports, self.scratch):
+            results = (self._volumes, self._exports, self._animations)
+            for folder in (self._incoming, self._datasets, *results, self.scratch):
                 folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InvalidInput(
@@ -47,7 +50,7 @@ class Files:
         """Remove what a dead process left half done; call it once the folder is locked."""
         for left in self._incoming.iterdir():
             left.unlink()
-        for folder in (self._volumes, self._exports):
+        for folder in (self._volumes, self._exports, self._animations):
             for left in folder.glob("*.partial"):
                 left.unlink()
         for left in self.scratch.iterdir():
@@ -75,6 +78,10 @@ class Files:
     def export(self, volume_id: str, extension: str) -> Path:
         """A volume in another format; made on demand."""
         return self._exports / f"{checked('volume', volume_id)}.{extension}"
+
+    def animation(self, job_id: str, extension: str) -> Path:
+        """The result of a turntable."""
+        return self._animations / f"{checked('job', job_id)}.{extension}"
 
     def discard_candidate(self, upload_id: str) -> None:
         """Remove a canonical file that was not adopted, also what a killed process left of it."""

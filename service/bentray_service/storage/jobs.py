@@ -23,8 +23,10 @@ class Jobs:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def add(self, kind: str, dataset_id: str, settings: Row) -> Row:
-        """Store a queued job; it survives a crash from the moment this returns."""
+    def add(
+        self, kind: str, settings: Row, dataset_id: str | None = None, volume_id: str | None = None
+    ) -> Row:
+        """Store a queued job on a dataset or a volume; it survives a crash from the moment this returns."""
         job_id = new_id("job")
         with self._database.write() as connection:
             connection.execute(
@@ -32,6 +34,7 @@ class Jobs:
                     id=job_id,
                     kind=kind,
                     dataset_id=dataset_id,
+                    volume_id=volume_id,
                     settings=settings,
                     state="queued",
                     created=time.time(),
@@ -99,13 +102,14 @@ class Jobs:
                 update(jobs).where(jobs.c.id == job_id).values(done=done, total=total, history=history)
             )
 
-    def succeed(self, job_id: str, volume: Row) -> bool:
-        """Store the volume and the success together; False when the job was cancelled in the meantime."""
+    def succeed(self, job_id: str, volume: Row | None) -> bool:
+        """Store the success and the volume, if there is one; False when it was cancelled in the meantime."""
         with self._database.write() as connection:
             now = time.time()
             if not _change(connection, job_id, ("running",), "succeeded", finished=now):
                 return False
-            connection.execute(insert(volumes).values(job_id=job_id, created=now, **volume))
+            if volume is not None:
+                connection.execute(insert(volumes).values(job_id=job_id, created=now, **volume))
             return True
 
     def fail(self, job_id: str, problem: Row) -> None:

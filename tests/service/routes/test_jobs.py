@@ -107,7 +107,11 @@ def test_unknown_dataset(http, dataset):
 
 def test_wrong_kind(http, dataset):
     body = problem(http.post("/v1/jobs", json={"kind": "miracle", "dataset": dataset}))
-    assert (body["status"], body["field"], body["accepted"]) == (422, "kind", "'reconstruction'")
+    assert (body["status"], body["field"], body["accepted"]) == (
+        422,
+        "kind",
+        "'reconstruction' or 'refraction'",
+    )
 
 
 def test_no_json(http):

@@ -60,7 +60,7 @@ def volume(job_id):
 
 
 def test_claimed_in_order_listed_newest_first(jobs, dataset):
-    made = [jobs.add("reconstruction", dataset, {})["id"] for _ in range(3)]
+    made = [jobs.add("reconstruction", {}, dataset)["id"] for _ in range(3)]
     assert [row["id"] for row in jobs.newest(10)] == made[::-1]
     assert [row["id"] for row in jobs.newest(2)] == made[:0:-1]
     assert [jobs.claim()["id"] for _ in range(3)] == made
@@ -68,7 +68,7 @@ def test_claimed_in_order_listed_newest_first(jobs, dataset):
 
 
 def test_no_job_is_claimed_twice(jobs, dataset):
-    made = {jobs.add("reconstruction", dataset, {})["id"] for _ in range(12)}
+    made = {jobs.add("reconstruction", {}, dataset)["id"] for _ in range(12)}
     claimed = []
 
     def take():
@@ -85,7 +85,7 @@ def test_no_job_is_claimed_twice(jobs, dataset):
 
 
 def test_success_comes_with_its_volume(database, jobs, dataset):
-    job = jobs.add("reconstruction", dataset, {"nodes": 16})
+    job = jobs.add("reconstruction", {"nodes": 16}, dataset)
     jobs.claim()
     jobs.progress(job["id"], 4, 4, [{"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 4}])
     assert jobs.succeed(job["id"], volume(job["id"]))
@@ -97,7 +97,7 @@ def test_success_comes_with_its_volume(database, jobs, dataset):
 
 
 def test_a_cancelled_job_cannot_succeed(database, jobs, dataset):
-    job = jobs.add("reconstruction", dataset, {})
+    job = jobs.add("reconstruction", {}, dataset)
     jobs.claim()
     assert jobs.request_cancel(job["id"])["state"] == "cancelling"
     assert not jobs.succeed(job["id"], volume(job["id"]))
@@ -108,7 +108,7 @@ def test_a_cancelled_job_cannot_succeed(database, jobs, dataset):
 
 
 def test_a_queued_job_is_cancelled_at_once(jobs, dataset):
-    job = jobs.add("reconstruction", dataset, {})
+    job = jobs.add("reconstruction", {}, dataset)
     assert jobs.request_cancel(job["id"])["state"] == "cancelled"
     assert jobs.claim() is None
     with pytest.raises(Finished, match="cancelled"):
@@ -116,7 +116,7 @@ def test_a_queued_job_is_cancelled_at_once(jobs, dataset):
 
 
 def test_failure_keeps_the_reason(jobs, dataset):
-    job = jobs.add("reconstruction", dataset, {})
+    job = jobs.add("reconstruction", {}, dataset)
     jobs.claim()
     jobs.fail(job["id"], PROBLEM)
     assert jobs.get(job["id"])["error"] == PROBLEM
@@ -124,7 +124,7 @@ def test_failure_keeps_the_reason(jobs, dataset):
 
 
 def test_release_is_no_attempt(jobs, dataset):
-    job = jobs.add("reconstruction", dataset, {})
+    job = jobs.add("reconstruction", {}, dataset)
     jobs.claim()
     jobs.progress(job["id"], 3, 9, [])
     jobs.release(job["id"])
@@ -134,7 +134,7 @@ def test_release_is_no_attempt(jobs, dataset):
 
 
 def test_a_job_that_kills_the_service_is_given_up(jobs, dataset):
-    job = jobs.add("reconstruction", dataset, {})
+    job = jobs.add("reconstruction", {}, dataset)
     ends = []
     for _ in range(3):
         jobs.claim()
@@ -148,3 +148,13 @@ def test_unknown_ids(jobs, job_id):
     for ask in (jobs.get, jobs.request_cancel):
         with pytest.raises(UnknownId):
             ask(job_id)
+
+
+def test_a_job_on_a_volume_ends_without_one(jobs, database):
+    job = jobs.add("refraction", {"frames": 3}, volume_id="vol-" + "0" * 20)
+    assert (job["dataset_id"], job["volume_id"]) == (None, "vol-" + "0" * 20)
+    jobs.claim()
+    assert jobs.succeed(job["id"], None)
+    assert jobs.state(job["id"]) == "succeeded"
+    with pytest.raises(UnknownId):
+        Volumes(database).get(volume_of(job["id"]))
