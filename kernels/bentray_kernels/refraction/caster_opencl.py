@@ -110,9 +110,14 @@ class OpenCLCaster:
 
     def fault_of(self, medium: Medium, search: Search) -> str:
         """How the device differs from ``caster.cast`` in rays at the object; empty where it does not."""
+        import pyopencl as cl
+
         camera, places = _towards_the_object(self.scene)
         found, expected = (space_for(TRIED, TRIED_DEPTH, False) for _ in range(2))
-        self.follow(medium, search, camera, places, TRIED_DEPTH, found)
+        try:
+            self.follow(medium, search, camera, places, TRIED_DEPTH, found)
+        except cl.Error as error:
+            return f"it ends with {str(error).splitlines()[0]}"
         cast(medium, search, camera, places, TRIED_DEPTH, expected)
         far, allowed = TOLERANCES[self.precision]
         same = (found.fate == expected.fate) & (found.crossed == expected.crossed)
@@ -155,14 +160,11 @@ class OpenCLCaster:
             session.upload(np.ascontiguousarray(array, real))
             for array in (medium.levels, medium.indices, frame, np.stack(camera), places)
         )
-        wanted: list[Any] = [array for array in traced if array.size]
-        here = [np.zeros(array.shape, real if array.dtype.kind == "f" else array.dtype) for array in wanted]
+        filled: list[Any] = [*traced]
+        there = [self._room_for(array) for array in filled]
+        # Vertices that no ray reaches stay as they are.
         if traced.vertices.size:
-            # Those that no ray reaches stay as they are.
-            here[-1][...] = traced.vertices
-        there = [session.upload(array) for array in here]
-        if not traced.vertices.size:
-            there.append(session.reserve(self._real.itemsize))
+            there[-1] = session.upload(traced.vertices.astype(real))
         arguments = (
             *self._volume,
             real(medium.field.stencil.shift),
@@ -184,9 +186,23 @@ class OpenCLCaster:
         )
         set_arguments(kernel, *arguments)
         session.launch(kernel, (-(-len(places) // GROUP) * GROUP,), (GROUP,))
-        for array, filled, buffer in zip(wanted, here, there, strict=False):
-            session.download(filled, buffer)
-            array[...] = filled
+        for array, buffer in zip(filled, there, strict=True):
+            if array.size:
+                self._download(array, buffer)
+
+    def _room_for(self, array: Any) -> Any:
+        # No device gives a buffer of no bytes.
+        return self.session.reserve(max(array.size, 1) * self._kind_of(array).itemsize)
+
+    def _download(self, array: Any, buffer: Any) -> None:
+        kind = self._kind_of(array)
+        here = array if array.dtype == kind and array.flags.c_contiguous else np.empty(array.shape, kind)
+        self.session.download(here, buffer)
+        if here is not array:
+            array[...] = here
+
+    def _kind_of(self, array: Any) -> Any:
+        return self._real if array.dtype.kind == "f" else array.dtype
 
     def _defines(self, medium: Medium, search: Search) -> tuple[str, ...]:
         names = {"float64": "double", "float32": "float"}

@@ -65,6 +65,11 @@ typedef struct {
 // Where a is not a number, b.
 REAL lower(REAL a, REAL b) { return a < b ? a : b; }
 REAL upper(REAL a, REAL b) { return a > b ? a : b; }
+// Written out, since there are compilers that make calls of fabs, min, max, isinf and isnan.
+REAL size_of(REAL a) { return a < 0 ? -a : a; }
+bool endless(REAL a) { return size_of(a) == NONE; }
+int least(int a, int b) { return a < b ? a : b; }
+int most(int a, int b) { return a > b ? a : b; }
 REAL dot3(Vector a, Vector b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 Vector scaled(REAL by, Vector a) { return (Vector){by * a.x, by * a.y, by * a.z}; }
 Vector moved(Vector a, Vector along, REAL s)
@@ -191,9 +196,9 @@ REAL newton(const Field *field, const Ray *ray, REAL target, REAL a, REAL value_
         if (!(a <= s + step && s + step <= b)) {
             // Out of the bracket, or no slope to follow.
             step = R(0.5) * (a + b) - s;
-        } else if (fabs(step) <= tolerance) {
+        } else if (size_of(step) <= tolerance) {
             return s + step;
-        } else if (n > 0 && R(0.5) * bend * step * step <= tolerance * fabs(slope)) {
+        } else if (n > 0 && R(0.5) * bend * step * step <= tolerance * size_of(slope)) {
             *gradient = moved(*gradient, moved(*gradient, before, -1), step / last);
             return s + step;
         }
@@ -211,7 +216,7 @@ REAL brent(const Field *field, const Ray *ray, REAL target, REAL a, REAL value_a
     REAL f_a = value_a - target, f_b = value_b - target;
     if (f_a == 0)
         return a;
-    const REAL close = tolerance * fabs(f_b - f_a) / fabs(b - a);
+    const REAL close = tolerance * size_of(f_b - f_a) / size_of(b - a);
     REAL c = a, f_c = f_a, step = b - a, last = b - a;
     for (int n = 0; n < DEEPEST; ++n) {
         if ((f_b > 0) == (f_c > 0)) {
@@ -219,7 +224,7 @@ REAL brent(const Field *field, const Ray *ray, REAL target, REAL a, REAL value_a
             f_c = f_a;
             step = last = b - a;
         }
-        if (fabs(f_c) < fabs(f_b)) {
+        if (size_of(f_c) < size_of(f_b)) {
             a = b;
             b = c;
             c = a;
@@ -228,9 +233,9 @@ REAL brent(const Field *field, const Ray *ray, REAL target, REAL a, REAL value_a
             f_c = f_a;
         }
         const REAL half_way = R(0.5) * (c - b);
-        if (fabs(half_way) <= tolerance || fabs(f_b) <= close)
+        if (size_of(half_way) <= tolerance || size_of(f_b) <= close)
             break;
-        if (fabs(last) >= tolerance && fabs(f_a) > fabs(f_b)) {
+        if (size_of(last) >= tolerance && size_of(f_a) > size_of(f_b)) {
             const REAL ratio = f_b / f_a;
             REAL p, q;
             if (a == c) {
@@ -242,8 +247,8 @@ REAL brent(const Field *field, const Ray *ray, REAL target, REAL a, REAL value_a
                 q = (u - 1) * (v - 1) * (ratio - 1);
             }
             q = p > 0 ? -q : q;
-            p = fabs(p);
-            if (2 * p < lower(3 * half_way * q - fabs(tolerance * q), fabs(last * q))) {
+            p = size_of(p);
+            if (2 * p < lower(3 * half_way * q - size_of(tolerance * q), size_of(last * q))) {
                 last = step;
                 step = p / q;
             } else {
@@ -254,7 +259,7 @@ REAL brent(const Field *field, const Ray *ray, REAL target, REAL a, REAL value_a
         }
         a = b;
         f_a = f_b;
-        b += fabs(step) > tolerance ? step : copysign(tolerance, half_way);
+        b += size_of(step) > tolerance ? step : copysign(tolerance, half_way);
         f_b = field_at(field, ray, b) - target;
     }
     return b;
@@ -266,7 +271,7 @@ REAL scan(const Field *field, const Ray *ray, REAL speed, REAL start, REAL value
 {
     const REAL below = way->below, above = way->above;
     REAL a = start;
-    if (isnan(value))
+    if (value != value)
         value = field_at(field, ray, a);
     REAL value_a = lower(upper(value, below), above);
     REAL length = step;
@@ -284,11 +289,11 @@ REAL scan(const Field *field, const Ray *ray, REAL speed, REAL start, REAL value
             a = b;
             value_a = value_b;
             length = lower(2 * length, step);
-        } else if (!inside && (shortest || fabs(value_b - value_a) >= 4 * sag)) {
+        } else if (!inside && (shortest || size_of(value_b - value_a) >= 4 * sag)) {
             way->side = value_b >= above ? 1 : -1;
             const REAL target = way->side > 0 ? above : below, tolerance = R(TOLERANCE) / speed;
 #if HOW == CERTAIN
-            if (fabs(value_b - value_a) >= 4 * sag) {
+            if (size_of(value_b - value_a) >= 4 * sag) {
                 way->s = newton(field, ray, target, a, value_a, b, value_b, bend, tolerance, &way->gradient);
                 way->known = true;
                 return target;
@@ -316,9 +321,9 @@ REAL polished(REAL t, REAL c0, REAL c1, REAL c2, REAL c3)
 
 REAL first_root_of_cubic(REAL c0, REAL c1, REAL c2, REAL c3)
 {
-    const REAL scale = upper(upper(fabs(c0), fabs(c1)), upper(fabs(c2), fabs(c3)));
+    const REAL scale = upper(upper(size_of(c0), size_of(c1)), upper(size_of(c2), size_of(c3)));
     REAL first = NONE;
-    if (fabs(c3) > R(1e-9) * scale) {
+    if (size_of(c3) > R(1e-9) * scale) {
         const REAL p = c2 / (3 * c3), q = c1 / c3;
         const REAL third = (q - 3 * p * p) / 3;
         const REAL constant_part = (2 * p * p - q) * p + c0 / c3;
@@ -337,7 +342,7 @@ REAL first_root_of_cubic(REAL c0, REAL c1, REAL c2, REAL c3)
                 first = lower(first, polished(t, c0, c1, c2, c3));
             }
         }
-    } else if (fabs(c2) > R(1e-12) * scale) {
+    } else if (size_of(c2) > R(1e-12) * scale) {
         const REAL discriminant = c1 * c1 - 4 * c2 * c0;
         if (discriminant >= 0) {
             const REAL both = R(-0.5) * (c1 + copysign(sqrt(discriminant), c1));
@@ -359,8 +364,8 @@ void solve(const Field *field, const Ray *ray, REAL start, REAL stop, Way *way)
     const REAL c1 = R(0.5) * (-11 * f0 + 18 * f1 - 9 * f2 + 2 * f3);
     const REAL c2 = R(4.5) * (2 * f0 - 5 * f1 + 4 * f2 - f3);
     const REAL c3 = R(4.5) * (-f0 + 3 * f1 - 3 * f2 + f3);
-    const REAL rising = isinf(way->above) ? NONE : first_root_of_cubic(f0 - way->above, c1, c2, c3);
-    const REAL falling = isinf(way->below) ? NONE : first_root_of_cubic(f0 - way->below, c1, c2, c3);
+    const REAL rising = endless(way->above) ? NONE : first_root_of_cubic(f0 - way->above, c1, c2, c3);
+    const REAL falling = endless(way->below) ? NONE : first_root_of_cubic(f0 - way->below, c1, c2, c3);
     const REAL first = lower(rising, falling);
     const bool found = first <= R(1.0 + 1e-12);
     way->s = found ? start + first * 3 * third : stop;
@@ -388,18 +393,18 @@ REAL turned(REAL s, REAL end, REAL slope, REAL bend, REAL height)
 
 REAL way_out(REAL start, REAL over, int node, int level, int cells)
 {
-    if (isinf(over))
+    if (endless(over))
         return NONE;
-    const int face = over > 0 ? min((node + 1) << level, cells) : node << level;
+    const int face = over > 0 ? least((node + 1) << level, cells) : node << level;
     return (face - start) * over;
 }
 
 int within(REAL place, int node, int level, int cells)
 {
-    return min(max((int)place, node << level), min((node + 1) << level, cells) - 1);
+    return least(most((int)place, node << level), least((node + 1) << level, cells) - 1);
 }
 
-int cell_at(REAL place, int cells) { return min(max((int)place, 0), cells - 1); }
+int cell_at(REAL place, int cells) { return least(most((int)place, 0), cells - 1); }
 
 void leave_interval(const Field *field, const Octree *octree, REAL step, const Ray *ray, REAL start,
                     REAL stop, REAL slope, Way *way)
@@ -430,7 +435,7 @@ void leave_interval(const Field *field, const Octree *octree, REAL step, const R
         } else {
             const REAL end = lower(out, stop), bend = octree->bend[node] * speed * speed;
             if (slope != 0 && (end - s) * speed > R(SHORTEST)) {
-                s = turned(s, end, fabs(slope), bend, way->above - way->below);
+                s = turned(s, end, size_of(slope), bend, way->above - way->below);
                 slope = 0;
             } else if (slope != 0) {
                 // The surface lies on a face; where gradients are continuous the next cell has its slope.
@@ -474,7 +479,7 @@ void leave_interval(const Field *field, const Octree *octree, REAL step, const R
 bool refract(Vector *direction, Vector normal, REAL ratio, REAL *weight)
 {
     const REAL along = dot3(*direction, normal);
-    const REAL cosine = fabs(along);
+    const REAL cosine = size_of(along);
     const REAL square = 1 - ratio * ratio * (1 - cosine * cosine);
     const bool passed = !(square < 0);
     Vector bent;
@@ -501,7 +506,7 @@ Vector unit_normal(Vector gradient, Vector direction)
 void narrow(REAL start, REAL over, REAL low, REAL high, int axis, REAL *near, REAL *far, int *face_in,
             int *face_out)
 {
-    if (isinf(over)) {
+    if (endless(over)) {
         if (!(low <= start && start <= high))
             *far = -NONE;
         return;
