@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from . import bench, demo, devices, reconstruct, serve, simulate, submit
+from . import bench, demo, devices, reconstruct, render, serve, simulate, submit
 from .endings import Commands
 
 __all__ = ["app", "main"]
@@ -26,6 +26,7 @@ for command in (
     submit.submit,
     reconstruct.reconstruct,
     simulate.simulate,
+    render.render,
     bench.bench,
     devices.devices,
 ):

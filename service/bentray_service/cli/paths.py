@@ -8,7 +8,7 @@ from tempfile import TemporaryFile
 from bentray_kernels.errors import InvalidInput
 
 
-def input_file(path: Path) -> Path:
+def input_file(path: Path, accepted: str = "the path of a dataset in HDF5") -> Path:
     """``path`` if it is a file.
 
     Raises:
@@ -16,7 +16,7 @@ def input_file(path: Path) -> Path:
     """
     if not path.is_file():
         found = "a folder" if path.is_dir() else "no such file"
-        raise InvalidInput("file", f"{path} ({found})", "the path of a dataset in HDF5")
+        raise InvalidInput("file", f"{path} ({found})", accepted)
     return path
 
 

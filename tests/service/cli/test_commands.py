@@ -16,7 +16,7 @@ COMMANDS = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-def
 
 
 def test_the_commands_of_the_design_are_there() -> None:
-    assert {"serve", "demo", "reconstruct", "submit", "simulate", "bench"} <= set(COMMANDS)
+    assert {"serve", "demo", "reconstruct", "submit", "simulate", "render", "bench"} <= set(COMMANDS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

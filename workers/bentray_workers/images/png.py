@@ -1,12 +1,15 @@
-"""RGB arrays as PNG and PNG as RGB arrays."""
+"""RGB arrays as PNG, and pictures as RGB arrays."""
 
 from __future__ import annotations
 
 import io
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+
+from bentray_kernels.errors import InvalidInput
 
 Colours = NDArray[np.uint8]
 
@@ -25,3 +28,19 @@ def colours_of(png: bytes) -> Colours:
     """The picture in a PNG of ours, (rows, columns, 3)."""
     with Image.open(io.BytesIO(png), formats=["PNG"]) as image:
         return np.asarray(image.convert("RGB"))
+
+
+def read_picture(path: Path) -> Colours:
+    """A picture file of any kind that Pillow reads, (rows, columns, 3) 8-bit RGB.
+
+    Raises:
+        InvalidInput: for what is absent, no picture, or beyond Pillow's limit.
+    """
+    try:
+        with Image.open(path) as image:
+            return np.asarray(image.convert("RGB"))
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        found = "no such file" if isinstance(error, FileNotFoundError) else "no picture"
+        raise InvalidInput(
+            "backdrop", f"{path} ({found})", "checkerboard, picture, or a picture file"
+        ) from None

@@ -1,0 +1,188 @@
+"""`bentray render`: a volume as glass before a backdrop, without a server."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from bentray_kernels.errors import InvalidInput
+
+from .paths import input_file, output_file
+from .terminal import AsJson, print_json, print_lines, print_table, progress_bar
+from .view_options import AskedView, with_view_options
+
+if TYPE_CHECKING:
+    from bentray_kernels.refraction import Scene
+    from bentray_workers.images.png import Colours
+    from bentray_workers.refraction import Strip
+    from bentray_workers.refraction_view import RefractionView
+    from bentray_workers.volume_file import Volume
+
+ACCEPTED = "a volume: NumPy, NRRD, NIfTI, HDF5 of Bentray, or raw with --shape and --dtype"
+# Rows that a thread draws at a time.
+ROWS = 16
+# Of the cube that a phantom fills.
+PHANTOM_SIDE_M = 0.1
+
+
+class Phantom(StrEnum):
+    """Volumes that need no file."""
+
+    SPHERE = "sphere"
+    ONE_HOLE = "one-hole"
+    TWO_HOLES = "two-holes"
+    MARSCHNER_LOBB = "marschner-lobb"
+
+
+@with_view_options
+def render(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Picture to write (PNG).")],
+    asked: AskedView,
+    file: Annotated[Path | None, typer.Argument(help="Volume; its content tells the format.")] = None,
+    phantom: Annotated[Phantom | None, typer.Option(help="In place of a file.")] = None,
+    nodes: Annotated[int, typer.Option(min=8, max=512, help="Along a side of the phantom.")] = 64,
+    position_map: Annotated[
+        Path | None,
+        typer.Option("--map", help="Also write where on the backdrop each pixel looks (NumPy, m)."),
+    ] = None,
+    shape: Annotated[
+        tuple[int, int, int] | None, typer.Option(help="Of raw bytes, x fastest.", metavar="NX NY NZ")
+    ] = None,
+    dtype: Annotated[str | None, typer.Option(help="Of raw bytes, as uint8, int16-be, float32.")] = None,
+    spacing: Annotated[
+        list[float] | None,
+        typer.Option(
+            help="Between nodes of raw and NumPy files, m; once, or for each axis.", show_default="0.001"
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Render a volume as refracting glass, or its surface, into OUTPUT.
+
+    Example:  bentray render -o glass.png --phantom two-holes --index 1.5 --backdrop picture
+    """
+    if (file is None) == (phantom is None):
+        found = "neither a file nor --phantom" if file is None else "a file and --phantom"
+        raise InvalidInput("file", found, "one of the two")
+    png = output_file(output, force=force)
+    placed = None if position_map is None else output_file(position_map, force=force)
+    view, picture = asked.view()
+    if placed is not None and view.mode == "shaded":
+        raise InvalidInput("--map", placed, "nothing with --mode shaded: it does not look at the backdrop")
+
+    from bentray_workers.atomic import write_bytes
+    from bentray_workers.images.png import png_of, read_picture
+    from bentray_workers.scene_cache import build, filtered_of
+    from bentray_workers.volume_reading import Given, import_volume
+
+    card = None if picture is None else read_picture(picture)
+    if file is None:
+        assert phantom is not None
+        volume = _sampled(phantom, nodes)
+    else:
+        given = Given(spacing_m=tuple(spacing) if spacing else None, shape=shape, dtype=dtype)
+        volume = import_volume(input_file(file, ACCEPTED), given)
+    started = time.perf_counter()
+    view = view.within(*volume.range())
+    scene = build(filtered_of(volume, view.filter, view.smoothing), view.layers())
+    built = time.perf_counter()
+    with progress_bar("Rendering") as step:
+        strips = _drawn(scene, view, card, step)
+    seconds = time.perf_counter() - built
+    image, position = _joined(strips)
+    write_bytes(png, png_of(image))
+    if placed is not None:
+        _save(placed, position)
+    _show(volume, view, png, placed, (built - started, seconds), as_json=as_json)
+
+
+def _sampled(phantom: Phantom, nodes: int) -> Volume:
+    from bentray_kernels.phantoms import ONE_HOLE, TWO_HOLES, CubeField, FringeSphere, MarschnerLobb, sampled
+    from bentray_workers.volume_file import Volume
+
+    fields: dict[Phantom, CubeField] = {
+        Phantom.SPHERE: FringeSphere(0.6, 0.06),
+        Phantom.ONE_HOLE: ONE_HOLE,
+        Phantom.TWO_HOLES: TWO_HOLES,
+        Phantom.MARSCHNER_LOBB: MarschnerLobb(),
+    }
+    return Volume.of(sampled(fields[phantom], nodes), (PHANTOM_SIDE_M / (nodes - 1),) * 3, title=phantom)
+
+
+def _drawn(
+    scene: Scene, view: RefractionView, card: Colours | None, step: Callable[[int, int], None]
+) -> list[Strip]:
+    from bentray_workers.refraction import strip
+
+    found = []
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        drawn = [
+            pool.submit(strip, scene, view, first, min(first + ROWS, view.height), card)
+            for first in range(0, view.height, ROWS)
+        ]
+        for future in drawn:
+            found.append(future.result())
+            step(len(found), len(drawn))
+    return found
+
+
+def _joined(strips: list[Strip]) -> tuple[Colours, Any]:
+    """The picture, and where each pixel looks; of a shaded one nothing."""
+    import numpy as np
+
+    positions = [one.position_m for one in strips if one.position_m is not None]
+    image = np.concatenate([one.image for one in strips])
+    return image, np.concatenate(positions) if positions else None
+
+
+def _save(path: Path, position_m: Any) -> None:
+    import numpy as np
+
+    from bentray_workers.atomic import replacing
+
+    with replacing(path) as partial, partial.open("wb") as file:
+        np.save(file, position_m, allow_pickle=False)
+
+
+def _show(
+    volume: Volume,
+    view: RefractionView,
+    png: Path,
+    placed: Path | None,
+    seconds: tuple[float, float],
+    *,
+    as_json: bool,
+) -> None:
+    rays = view.width * view.height * view.times**2
+    outputs = [str(path) for path in (png, placed) if path is not None]
+    if as_json:
+        found = {
+            "output": str(png),
+            "map": None if placed is None else str(placed),
+            "shape": list(volume.values.shape),
+            "range": list(volume.range()),
+            "rays": rays,
+            "build_seconds": round(seconds[0], 4),
+            "render_seconds": round(seconds[1], 4),
+            "view": view.plain(),
+        }
+        print_json(found)
+        return
+    low, high = volume.range()
+    surfaces = ", ".join(f"{iso:g} (index {n:g})" for iso, n in zip(view.iso, view.index, strict=True))
+    rows = [
+        ("volume", f"{' by '.join(map(str, volume.values.shape))} nodes, {low:g} to {high:g}"),
+        ("surfaces", surfaces),
+        ("filter", view.filter),
+        ("time", f"{seconds[0]:.2f} s to build, {seconds[1]:.2f} s for {rays} rays"),
+    ]
+    print_table(volume.title or "Volume", ("figure", "value"), rows)
+    print_lines(outputs)

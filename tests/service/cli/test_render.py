@@ -1,0 +1,140 @@
+"""`bentray render`: every format in, a picture and a map out, bad words in one line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import nibabel
+import nrrd
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import Result
+
+from bentray_kernels.phantoms import ONE_HOLE, sampled
+from bentray_workers.volume_file import Volume, write_volume
+
+SMALL = ("--width", 32, "--height", 24)
+BALL = sampled(ONE_HOLE, 12).astype(np.float32)
+
+
+def npy(path: Path) -> None:
+    np.save(path.open("wb"), BALL)
+
+
+def raw(path: Path) -> None:
+    path.write_bytes(BALL.tobytes(order="F"))
+
+
+def of_nrrd(path: Path) -> None:
+    nrrd.write(str(path), BALL, {"spacings": [1.0, 1.0, 1.0]})
+
+
+def nifti(path: Path) -> None:
+    path.write_bytes(nibabel.Nifti1Image(BALL, np.eye(4)).to_bytes())
+
+
+def hdf5(path: Path) -> None:
+    write_volume(path, Volume.of(BALL, (1e-3,) * 3))
+
+
+@pytest.fixture
+def volume(tmp_path: Path) -> Path:
+    npy(tmp_path / "ball.npy")
+    return tmp_path / "ball.npy"
+
+
+def test_every_format_gives_the_same_picture(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    seen = set()
+    for write in (npy, raw, of_nrrd, nifti, hdf5):
+        path, png = tmp_path / f"{write.__name__}.volume", tmp_path / f"{write.__name__}.png"
+        write(path)
+        words = ("--shape", 12, 12, 12, "--dtype", "float32") if write is raw else ()
+        result = bentray("render", path, "-o", png, *SMALL, "--iso", 0.5, *words)
+        assert result.exit_code == 0, result.stderr
+        assert result.stdout.splitlines()[-1] == str(png)
+        with Image.open(png) as picture:
+            assert picture.size == (32, 24)
+        seen.add(png.read_bytes())
+    assert len(seen) == 1
+
+
+@pytest.mark.parametrize("phantom", ["sphere", "one-hole", "two-holes", "marschner-lobb"])
+def test_a_phantom_needs_no_file(bentray: Callable[..., Result], tmp_path: Path, phantom: str) -> None:
+    result = bentray(
+        "render", "-o", tmp_path / "p.png", "--phantom", phantom, "--nodes", 12, *SMALL, "--json"
+    )
+    assert result.exit_code == 0, result.stderr
+    said = json.loads(result.stdout)
+    assert (said["shape"], said["rays"], said["view"]["width"]) == ([12, 12, 12], 32 * 24, 32)
+    assert said["view"]["iso"] == [pytest.approx(sum(said["range"]) / 2)]
+    assert said["map"] is None
+    assert (tmp_path / "p.png").stat().st_size > 100
+
+
+def test_the_map_tells_where_each_pixel_looks(
+    bentray: Callable[..., Result], tmp_path: Path, volume: Path
+) -> None:
+    words = ("--iso", 0.5, "--index", 1.0, "--map", tmp_path / "map.npy", "--spacing", 2e-3)
+    assert bentray("render", volume, "-o", tmp_path / "p.png", *SMALL, *words).exit_code == 0
+    found = np.load(tmp_path / "map.npy")
+    assert found.shape == (24, 32, 2)
+    # An index of 1 bends nothing: 1.25 times the side of the volume over 24 pixels.
+    np.testing.assert_allclose(np.diff(found[..., 0], axis=1), 1.25 * 0.022 / 24, rtol=1e-6)
+    bent = (*words[:3], 1.5, *words[4:], "--force")
+    assert bentray("render", volume, "-o", tmp_path / "p.png", *SMALL, *bent).exit_code == 0
+    assert not np.allclose(np.load(tmp_path / "map.npy"), found)
+
+
+def test_a_backdrop_of_ones_own(bentray: Callable[..., Result], tmp_path: Path, volume: Path) -> None:
+    Image.new("RGB", (8, 8), (10, 200, 30)).save(tmp_path / "green.bmp")
+    words = ("--iso", 0.5, "--backdrop", tmp_path / "green.bmp")
+    assert bentray("render", volume, "-o", tmp_path / "p.png", *SMALL, *words).exit_code == 0
+    with Image.open(tmp_path / "p.png") as picture:
+        assert picture.getpixel((0, 0)) == (10, 200, 30)
+
+
+def test_a_file_that_exists_is_kept_without_force(
+    bentray: Callable[..., Result], tmp_path: Path, volume: Path
+) -> None:
+    (tmp_path / "p.png").write_text("mine")
+    refused = bentray("render", volume, "-o", tmp_path / "p.png", *SMALL)
+    assert (refused.exit_code, (tmp_path / "p.png").read_text()) == (2, "mine")
+    assert bentray("render", volume, "-o", tmp_path / "p.png", *SMALL, "--force").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "field"),
+    [
+        (("--iso", 7), "iso"),
+        (("--iso", 0.6, "--iso", 0.4), "index"),
+        (("--index", 0), "index"),
+        (("--camera", "fisheye"), "camera"),
+        (("--filter", "box"), "filter"),
+        (("--backdrop", "absent.jpg"), "backdrop"),
+        (("--width", 0), "width"),
+        (("--phantom", "sphere"), "file"),
+        (("--shape", 2, 2, 2), "dtype"),
+        (("--dtype", "uint8"), "shape"),
+        (("--map", "m.npy", "--mode", "shaded"), "--map"),
+        (("--spacing", 1, "--spacing", 2), "spacing_m"),
+    ],
+)
+def test_bad_words_are_one_line(
+    bentray: Callable[..., Result], tmp_path: Path, volume: Path, words: tuple[object, ...], field: str
+) -> None:
+    result = bentray("render", volume, "-o", tmp_path / "p.png", *words)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"bentray: {field}: found "), result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "p.png").exists()
+
+
+def test_no_file_and_no_volume(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    (tmp_path / "v").write_text("no volume")
+    for words in ((), (tmp_path / "absent",), (tmp_path / "v",)):
+        result = bentray("render", *words, "-o", tmp_path / "p.png")
+        assert result.exit_code == 2
+        assert result.stderr.startswith("bentray: file: found ")
