@@ -103,7 +103,7 @@ class OpenCLCaster:
             self._faults[way] = fault = self.fault_of(medium, search)
             if fault:
                 name = self.session.handle.name
-                message = f"{name} casts rays wrong ({way.lower()}), the CPU takes over: {fault}"
+                message = f"{name} casts rays wrong ({way.lower()}), caster.cast takes over: {fault}"
                 warnings.warn(OpenCLFallbackWarning(message), stacklevel=2)
         follow = cast if self._faults[way] else self.follow
         follow(medium, search, camera, places, depth, traced)
@@ -245,7 +245,16 @@ def on_the_device(scene: Scene, precision: str | None = None) -> OpenCLCaster | 
         InvalidInput: for another precision, or where ``BENTRAY_OPENCL_DEVICE`` names no one device.
 
     Warns:
-        OpenCLFallbackWarning: once, where no device passes its trial.
+        OpenCLFallbackWarning: once, where no device passes its trial; and where it cannot hold the scene.
     """
     session = session_or_warning(instead="caster.cast")
-    return None if session is None else OpenCLCaster(scene, session, precision)
+    if session is None:
+        return None
+    import pyopencl as cl
+
+    try:
+        return OpenCLCaster(scene, session, precision)
+    except cl.Error as error:
+        message = f"{session.handle.name} cannot hold the scene, caster.cast takes over: {error}"
+        warnings.warn(OpenCLFallbackWarning(message), stacklevel=2)
+        return None

@@ -210,7 +210,9 @@ def test_a_device_that_casts_wrong_is_left_with_a_warning(monkeypatch):
     monkeypatch.setattr(OpenCLCaster, "follow", wrong)
     how = RenderSettings(24, 24)
     expected = render(scene, seen, BACKDROP, how)
-    with pytest.warns(OpenCLFallbackWarning, match=r"\(certain\), the CPU takes over: 100% of its") as caught:
+    with pytest.warns(
+        OpenCLFallbackWarning, match=r"\(certain\), caster.cast takes over: 100% of its"
+    ) as caught:
         found = [render(scene, seen, BACKDROP, how, caster) for _ in range(2)]
     assert len(caught) == 1
     for picture in found:
@@ -219,6 +221,27 @@ def test_a_device_that_casts_wrong_is_left_with_a_warning(monkeypatch):
     monkeypatch.setattr(OpenCLCaster, "follow", right)
     brent = RenderSettings(24, 24, roots="brent")
     render(scene, seen, BACKDROP, brent, caster)
+
+
+def test_a_device_that_cannot_build_the_program_is_left_too(monkeypatch):
+    scene = nested()
+    monkeypatch.setattr(OpenCLCaster, "_defines", lambda *_: ("REAL=nonsense",))
+    caster, how = caster_of(scene), RenderSettings(16, 16)
+    with pytest.warns(OpenCLFallbackWarning, match="caster.cast takes over: it ends with "):
+        found = render(scene, CAMERAS["perspective"], BACKDROP, how, caster)
+    expected = render(scene, CAMERAS["perspective"], BACKDROP, how)
+    np.testing.assert_array_equal(found.image, expected.image)
+
+
+def test_a_scene_that_the_device_cannot_hold_is_left_to_the_cpu(monkeypatch):
+    import pyopencl as cl
+
+    def full(*_):
+        raise cl.MemoryError("create_buffer", cl.status_code.MEM_OBJECT_ALLOCATION_FAILURE)
+
+    monkeypatch.setattr(type(session_or_warning(instead="cast")), "upload", full)
+    with pytest.warns(OpenCLFallbackWarning, match="cannot hold the scene"):
+        assert on_the_device(nested()) is None
 
 
 def test_without_a_device_there_is_no_caster(monkeypatch):
