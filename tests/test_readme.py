@@ -18,6 +18,7 @@ from bentray_kernels.tomography import Settings
 from bentray_service.app import create_app
 from bentray_service.cli import app
 from bentray_service.cli.settings_options import OPTIONS
+from bentray_service.jobs.kinds import KINDS
 from bentray_service.settings import ServiceSettings
 from bentray_workers.dataset_file import read_dataset
 
@@ -80,13 +81,13 @@ def test_every_address_of_curl_is_served(tmp_path: Path) -> None:
         for path, methods_of_path in create_app(ServiceSettings(data_dir=tmp_path)).openapi()["paths"].items()
         for method in methods_of_path
     }
-    assert len(lines_of("curl")) == 5
+    assert len(lines_of("curl")) == 8
     for words in lines_of("curl"):
         method = "POST" if {"-d", "--data-binary"} & set(words) else "GET"
         url = next(word for word in words if word.startswith("http://"))
         assert any(m == method and p.fullmatch(urlsplit(url).path) for m, p in served), url
         for body in (words[n + 1] for n, word in enumerate(words) if word == "-d"):
-            assert json.loads(body)["kind"] == "reconstruction"
+            assert json.loads(body)["kind"] in KINDS
 
 
 def table(first: str) -> dict[str, list[str]]:

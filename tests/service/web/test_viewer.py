@@ -1,11 +1,17 @@
 """The page / in a real browser: upload, start, watch, fail in words."""
 
+import io
+from dataclasses import replace
 from pathlib import Path
 
+import httpx
+import numpy as np
 import pytest
 from playwright.sync_api import expect, sync_playwright
 
+from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography.settings import Settings
+from bentray_service.jobs import kinds
 
 CHROMIUM = Path("/usr/bin/chromium")
 
@@ -96,6 +102,58 @@ def test_the_residual_curve_shows_where_a_stage_begins(page, serve, scan, work):
     assert [round(float(point.split(",")[0])) for point in points] == [0, 20, 40, 60, 80, 100]
     border = curve.locator("line.stage")
     assert (border.count(), float(border.get_attribute("x1"))) == (1, 50.0)
+
+
+def test_a_volume_in_space_is_shown_as_glass(page, serve, scan, work, monkeypatch):
+    plain = type(work).__call__
+
+    def in_space(self, *given):
+        result = plain(self, *given)
+        ball = 40.0 * sampled(ONE_HOLE, 16)
+        return replace(
+            result,
+            speed=1500.0 + ball,
+            coverage=np.ones(ball.shape),
+            spacing_m=(1e-3,) * 3,
+            origin_m=(0.0,) * 3,
+        )
+
+    page.goto(serve())
+    page.set_input_files("#file", scan())
+    page.get_by_text("16 emitters").wait_for()
+    page.get_by_role("button", name="Start").click()
+    page.get_by_role("img", name="Speed of sound, Sixteen elements").wait_for()
+    page.wait_for_load_state("networkidle")
+    expect(page.get_by_text("As glass")).to_have_count(0)
+    monkeypatch.setattr(type(work), "__call__", in_space)
+    page.get_by_role("button", name="Start").click()
+    image = page.get_by_role("img", name="As glass, Sixteen elements")
+    image.wait_for()
+    image.scroll_into_view_if_needed()
+    expect(image).to_have_js_property("complete", True)
+    assert image.evaluate("image => image.naturalWidth") == 512
+    expect(page.get_by_text("As glass")).to_have_count(1)
+
+
+def test_a_turntable_is_shown(page, serve, scan, work, monkeypatch):
+    monkeypatch.setattr(kinds, "turn", lambda *given: given[3].write_bytes(b"pictures"))
+    address = serve()
+    values = io.BytesIO()
+    np.save(values, sampled(ONE_HOLE, 12))
+    stream = {"Content-Type": "application/octet-stream"}
+    sent = httpx.post(f"{address}/v1/volumes", content=values.getvalue(), headers=stream, timeout=60).json()
+    asked = {"kind": "refraction", "volume": sent["id"], "settings": {"frames": 5, "index": [1.3]}}
+    httpx.post(f"{address}/v1/jobs", json=asked).raise_for_status()
+    page.goto(address)
+    job = page.locator(".job")
+    job.get_by_role("heading", name="Turntable").wait_for()
+    job.get_by_text("pictures of 512").wait_for()
+    link = job.get_by_role("link", name="Pictures")
+    link.wait_for()
+    assert link.get_attribute("href").endswith("/animation")
+    image = job.get_by_role("img")
+    image.scroll_into_view_if_needed()
+    expect(image).to_have_js_property("naturalWidth", 512)
 
 
 def test_cancel(page, serve, scan, work):

@@ -67,7 +67,7 @@ async function refresh() {
   let wait = IDLE_MS;
   try {
     const { jobs } = await request("/v1/jobs");
-    if (jobs.some((job) => !datasets.has(job.dataset))) await loadDatasets();
+    if (jobs.some((job) => job.dataset && !datasets.has(job.dataset))) await loadDatasets();
     const titles = new Map([...datasets].map(([id, dataset]) => [id, titleOf(dataset)]));
     at("empty").hidden = jobs.length > 0;
     showJobs(at("jobs"), jobs, titles, cancel);

@@ -1,5 +1,5 @@
 // The list of jobs: one card a job, kept and updated in place so that the focus and the pictures stay.
-import { inWords } from "./api.js";
+import { inWords, request } from "./api.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const RAYS = { curved: "Bent rays", straight: "Straight rays", adjoint: "Without rays" };
@@ -67,30 +67,55 @@ function sparkline({ values, begins }) {
   return picture;
 }
 
-function picture(job, title) {
+function drawn(address, words) {
   const frame = make("div", "picture");
-  if (job.state === "succeeded") {
-    const image = make("img");
-    image.src = job.links.image;
-    image.alt = `Speed of sound, ${title}`;
-    image.loading = "lazy";
-    image.onerror = () => frame.replaceChildren("The picture could not be drawn.");
-    const anchor = link("", job.links.image);
-    anchor.append(image);
-    frame.append(anchor);
+  const image = make("img");
+  image.src = address;
+  image.alt = words;
+  image.loading = "lazy";
+  image.onerror = () => frame.replaceChildren("The picture could not be drawn.");
+  const anchor = link("", address);
+  anchor.append(image);
+  frame.append(anchor);
+  return frame;
+}
+
+// A volume in space is also shown as glass, its surface in the middle of its range of speeds.
+async function addGlass(column, job, title) {
+  const { links } = await request(job.links.volume);
+  if (!links.refraction) return;
+  column.append(make("p", "caption", "As glass"), drawn(links.refraction, `As glass, ${title}`));
+}
+
+function pictures(job, title) {
+  const column = make("div", "pictures");
+  if (job.links.image) {
+    column.append(drawn(job.links.image, `Speed of sound, ${title}`));
+    addGlass(column, job, title).catch(() => {});
+  } else if (job.links.animation) {
+    const moving = job.settings.format === "apng";
+    column.append(drawn(moving ? job.links.animation : `${job.links.volume}/refraction.png`, `As glass, ${title}`));
   } else {
     const ended = job.state === "failed" || job.state === "cancelled";
-    frame.textContent = ended ? "No image" : "Image to come";
+    column.append(make("div", "picture", ended ? "No image" : "Image to come"));
   }
-  return frame;
+  return column;
+}
+
+// What was asked for, in a heading and a line.
+function asked({ kind, settings }) {
+  if (kind === "refraction") {
+    return ["Turntable", `${settings.frames} pictures of ${settings.width} × ${settings.height}, index ${settings.index.join(", ")}`];
+  }
+  const { method, rays, nodes, sweeps } = settings;
+  return [method === "auto" ? "Chosen by trial" : RAYS[rays], `${METHODS[method]}, ${nodes} × ${nodes} nodes, ${sweeps} sweeps`];
 }
 
 function facts(job, title, onCancel) {
   const box = make("div");
-  const { method, rays } = job.settings;
-  const heading = make("h3", "", method === "auto" ? "Chosen by trial" : RAYS[rays]);
+  const [what, settings] = asked(job);
+  const heading = make("h3", "", what);
   heading.append(make("span", `state ${job.state}`, job.state));
-  const settings = `${METHODS[method]}, ${job.settings.nodes} × ${job.settings.nodes} nodes, ${job.settings.sweeps} sweeps`;
   box.append(heading, make("p", "", title), make("p", "", settings));
   const { done, total } = job.progress;
   if (job.state === "running" || job.state === "cancelling") {
@@ -115,7 +140,8 @@ function facts(job, title, onCancel) {
   if (values.length > 1) box.append(sparkline(course));
   if (job.error) box.append(make("p", "error", inWords(job.error)));
   const row = make("div", "links");
-  if (job.state === "succeeded") {
+  if (job.links.animation) row.append(link("Pictures", job.links.animation, true));
+  if (job.links.data) {
     row.append(link("HDF5", `${job.links.data}?format=hdf5`, true), link("NumPy", `${job.links.data}?format=npy`, true));
   }
   if (job.links.cancel) {
@@ -137,7 +163,7 @@ export function showJobs(list, jobs, titles, onCancel) {
     }
   }
   jobs.forEach((job, place) => {
-    const title = titles.get(job.dataset) || job.dataset;
+    const title = titles.get(job.dataset) || job.dataset || job.volume;
     const signature = JSON.stringify([job, title]);
     let card = cards.get(job.id);
     if (!card) {
@@ -149,7 +175,7 @@ export function showJobs(list, jobs, titles, onCancel) {
       const focused = card.node.contains(document.activeElement) && document.activeElement.tagName === "BUTTON";
       const fresh = facts(job, title, onCancel);
       if (card.state === job.state) card.node.lastChild.replaceWith(fresh);
-      else card.node.replaceChildren(picture(job, title), fresh);
+      else card.node.replaceChildren(pictures(job, title), fresh);
       if (focused) fresh.querySelector("button")?.focus();
       card.signature = signature;
       card.state = job.state;
