@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -19,10 +18,7 @@ from .problem import Problem
 from .settings import Settings
 
 # Solutions, each with the total variation that the misfit of the one before asks for.
-PASSES, ROBUST_PASSES = 3, 6
-
-# With ``edge_mps``: a difference from node to node, over the range, that begins to count as an edge.
-EDGE_PART = 0.04
+PASSES, ROBUST_PASSES = 3, 12
 
 # More than any tissue has at the frequencies that pass through it, Np/m.
 MOST_NP_M = 500.0
@@ -106,8 +102,6 @@ def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> 
         residual = np.concatenate([part.residual for part in left])
         limit = huber.limit(residual, spreads)
         bounds = (0.0, MOST_NP_M * problem.spacing)
-        # An edge of the attenuation is what an edge of the speed is, as a part of the range.
-        edge = EDGE_PART * float(np.ptp(image[problem.region])) if settings.edge_mps > 0.0 else 0.0
         problem_now = Linearised(
             left,
             image,
@@ -116,7 +110,6 @@ def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> 
             bounds,
             settings.penalty_strength * huber.clipped_rms(residual, limit),
             huber=limit,
-            edge=edge or math.inf,
         )
         image, dual = problem_now.solve(dual)
     return image / problem.spacing
