@@ -80,11 +80,19 @@ function drawn(address, words) {
   return frame;
 }
 
-// A volume in space is also shown as glass, its surface in the middle of its range of speeds.
+// A volume in space is also shown as glass: what is clearly faster than water, which would fill the box otherwise.
 async function addGlass(column, job, title) {
-  const { links } = await request(job.links.volume);
+  const { links, water_speed_mps: water, value_range: [, highest] } = await request(job.links.volume);
   if (!links.refraction) return;
-  column.append(make("p", "caption", "As glass"), drawn(links.refraction, `As glass, ${title}`));
+  const iso = highest > water ? `iso=${Number(((water + highest) / 2).toPrecision(6))}&` : "";
+  column.append(make("p", "caption", "As glass"), drawn(`${links.refraction}?${iso}index=1.2`, `As glass, ${title}`));
+}
+
+// The first picture of a turntable.
+function firstFrame(job) {
+  const { frames, turn_deg: turn, format, ...view } = job.settings;
+  const query = new URLSearchParams(Object.entries(view).flatMap(([name, value]) => [value].flat().map((one) => [name, one])));
+  return `${job.links.volume}/refraction.png?${query}`;
 }
 
 function pictures(job, title) {
@@ -94,7 +102,7 @@ function pictures(job, title) {
     addGlass(column, job, title).catch(() => {});
   } else if (job.links.animation) {
     const moving = job.settings.format === "apng";
-    column.append(drawn(moving ? job.links.animation : `${job.links.volume}/refraction.png`, `As glass, ${title}`));
+    column.append(drawn(moving ? job.links.animation : firstFrame(job), `As glass, ${title}`));
   } else {
     const ended = job.state === "failed" || job.state === "cancelled";
     column.append(make("div", "picture", ended ? "No image" : "Image to come"));
