@@ -15,6 +15,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy import update
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_service.app import create_app
 from bentray_service.settings import ServiceSettings
 from bentray_service.storage import schema
@@ -114,7 +115,24 @@ def test_two_services_cannot_share_a_folder(start):
     assert arriving.exists()
 
 
-def test_a_killed_service_loses_no_job(tmp_path, scan):
+def a_reconstruction(http, scan):
+    content = scan().read_bytes()
+    dataset = http.post("/v1/datasets", content=content, headers={"Content-Type": "application/x-hdf5"})
+    settings = {"rays": "straight", "nodes": 512, "sweeps": 40}
+    return {"kind": "reconstruction", "dataset": dataset.json()["id"], "settings": settings}
+
+
+def a_turntable(http, scan):
+    buffer = io.BytesIO()
+    np.save(buffer, sampled(ONE_HOLE, 24))
+    content = buffer.getvalue()
+    volume = http.post("/v1/volumes", content=content, headers={"Content-Type": "application/octet-stream"})
+    settings = {"frames": 400, "width": 400, "height": 400, "iso": [0.5]}
+    return {"kind": "refraction", "volume": volume.json()["id"], "settings": settings}
+
+
+@pytest.mark.parametrize("asked", [a_reconstruction, a_turntable])
+def test_a_killed_service_loses_no_job(tmp_path, scan, asked):
     """The real thing: SIGKILL while a job runs, then the same folder again."""
     program = (
         "import sys, uvicorn\n"
@@ -133,13 +151,7 @@ def test_a_killed_service_loses_no_job(tmp_path, scan):
         service = subprocess.Popen(command, env=environment)
         try:
             wait_for(lambda: http.get("/health/ready").is_success)
-            content = scan().read_bytes()
-            dataset = http.post(
-                "/v1/datasets", content=content, headers={"Content-Type": "application/x-hdf5"}
-            )
-            settings = {"rays": "straight", "nodes": 512, "sweeps": 40}
-            asked = {"kind": "reconstruction", "dataset": dataset.json()["id"], "settings": settings}
-            job = http.post("/v1/jobs", json=asked).json()
+            job = http.post("/v1/jobs", json=asked(http, scan)).json()
             wait_for(lambda: http.get(job["links"]["self"]).json()["progress"]["done"] > 0)
             service.send_signal(signal.SIGKILL)
             service.wait()
