@@ -28,6 +28,7 @@ class Medium(NamedTuple):
         field, octree: as in ``Scene``.
         levels: (isos + 2,) −∞, the iso-values, +∞: layer m lies between m and m + 1.
         indices: (isos + 1,) refractive indices of the layers.
+        around: the layer that goes on around the grid.
         origin: of node 0, m.
         density: nodes per m along each axis.
         low, high: corners of the box that holds all surfaces, nodes.
@@ -38,6 +39,7 @@ class Medium(NamedTuple):
     octree: Octree
     levels: Floats
     indices: Floats
+    around: int
     origin: Vector
     density: Vector
     low: Vector
@@ -55,6 +57,7 @@ def medium_of(scene: Scene, structure: str) -> Medium:
         scene.octree,
         levels,
         np.array(scene.layers.indices),
+        scene.layers.surroundings,
         _vector(scene.origin),
         _vector(1.0 / scene.spacing),
         _vector(low),
@@ -164,10 +167,10 @@ def _follow(
                 break
             entered = True
             layer = layer_at(medium, ray, start)
-            if layer > 0 and near >= 0.0:
+            if layer != medium.around and near >= 0.0:
                 # The object is cut by the grid's face, which is flat. (A camera within it sees no face.)
                 origin = _moved(origin, direction, start)
-                ratio = medium.indices[0] / medium.indices[layer]
+                ratio = medium.indices[medium.around] / medium.indices[layer]
                 direction, share, passed = refracted(direction, _axis(face_in), ratio)
                 weight, crossed, fate = weight * share, crossed + 1, REFRACTED
                 _note(traced, n, crossed, origin)
@@ -187,14 +190,14 @@ def _follow(
             (1 << layer) | (1 << layer >> 1),
             slope,
         )
-        if side == 0 and layer == 0:
+        if side == 0 and layer == medium.around:
             break
         if crossed == depth:
             fate = LOST
             break
         origin = _moved(origin, direction, s)
         if side == 0:
-            normal, behind = _axis(face_out), 0
+            normal, behind = _axis(face_out), medium.around
             gradient = (0.0, 0.0, 0.0)
         else:
             gradient = gradient_at(medium, ray, s, gradient)
@@ -216,9 +219,10 @@ def _follow(
 @kernel(inline="always")
 def layer_at(medium: Medium, ray: Ray, s: float) -> int:
     """The layer in which a ray begins, at the box or within it."""
-    layer = 0
-    # On the faces of a box within the grid lies layer 0, and most rays begin there.
+    layer = medium.around
+    # On the faces of a box within the grid lies that of the surroundings, and most rays begin there.
     if medium.open or s == 0.0:
+        layer = 0
         value = field_at(medium.field, ray, s)
         while layer + 1 < len(medium.indices) and value > medium.levels[layer + 1]:
             layer += 1

@@ -174,6 +174,7 @@ class OpenCLCaster:
             levels,
             indices,
             np.int32(len(medium.indices)),
+            np.int32(medium.around),
             frames,
             np.int32(medium.open),
             real(search.step),

@@ -27,14 +27,17 @@ class Layers:
     Attributes:
         isos: rising iso-values, unit of the volume.
         indices: refractive index below the first, between them, and above the last; one more than ``isos``.
-            The first one is that of the surroundings too.
+        surroundings: which of these layers goes on around the volume: 0, the one below the first, or in
+            water faster than fat the one between fat and tissue.
 
     Raises:
-        InvalidInput: for none, iso-values that do not rise, another number of indices, or one not above 0.
+        InvalidInput: for none, iso-values that do not rise, another number of indices, one not above 0, or
+            a layer that there is not.
     """
 
     isos: tuple[float, ...]
     indices: tuple[float, ...]
+    surroundings: int = 0
 
     def __post_init__(self) -> None:
         rising = all(a < b for a, b in zip(self.isos, self.isos[1:], strict=False))
@@ -42,6 +45,8 @@ class Layers:
             raise InvalidInput("iso", self.isos, "one or more finite, rising iso-values")
         if len(self.indices) != len(self.isos) + 1 or not all(0.0 < n < math.inf for n in self.indices):
             raise InvalidInput("indices", self.indices, f"{len(self.isos) + 1} refractive indices > 0")
+        if not 0 <= self.surroundings <= len(self.isos):
+            raise InvalidInput("surroundings", self.surroundings, f"a layer, 0 to {len(self.isos)}")
 
 
 @dataclass(frozen=True)
@@ -106,8 +111,9 @@ class Scene:
                 low, high = _range_at_nodes(spline)
                 raise InvalidInput("iso", iso, f"between {low:.6g} and {high:.6g}, the volume's range")
         origin = np.asarray(centre_m, dtype=np.float64) - 0.5 * spacing * (np.array(spline.shape) - 1.0)
-        faces = [cells.high[edge] for axis in range(3) for edge in _ends(axis)]
-        cut = max(float(face.max()) for face in faces) >= layers.isos[0]
+        edges = [edge for axis in range(3) for edge in _ends(axis)]
+        below, above = (-math.inf, *layers.isos, math.inf)[layers.surroundings :][:2]
+        cut = any(cells.high[edge].max() >= above or cells.low[edge].min() <= below for edge in edges)
         grid = np.array([[0.0] * 3, cells.low.shape])
         box = grid if cut else octree.occupied()
         linear = spline.filter.name in ("trilinear", "central")

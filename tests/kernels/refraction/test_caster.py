@@ -54,6 +54,26 @@ def screen_error(scene: Scene, volume_radius: float, index: float, reach: float,
 
 
 @pytest.mark.parametrize("structure", ["octree", "dda", "steps"])
+def test_the_surroundings_may_be_any_layer(structure):
+    """A ball of low values in surroundings of high ones, as fat in water, refracts as its negative does."""
+    dark = scene(squared(24), Layers((RADIUS**2,), (1.5, 1.0), surroundings=1))
+    assert not dark.open
+    assert screen_error(dark, RADIUS, 1.5, 0.99, structure=structure).max() < 1e-7
+    # A second surface, nearer to the faces, of a layer that does not refract; the corners lie beyond it.
+    cut = scene(squared(24), Layers((RADIUS**2, 0.7), (1.5, 1.0, 1.0), surroundings=1))
+    assert cut.open
+    assert screen_error(cut, RADIUS, 1.5, 0.99, structure=structure).max() < 1e-7
+
+
+def test_only_faces_of_another_layer_bend():
+    """Rays past a ball go straight on where what lies beside it goes on around the grid."""
+    past, ahead = [[0.45, 0.45, -2.0]], [[0.02, -0.01, 1.0]]
+    for surroundings, crossed in ((1, 0), (0, 2)):
+        dark = scene(squared(24), Layers((RADIUS**2,), (1.5, 1.0), surroundings))
+        assert trace(dark, past, ahead).crossed[0] == crossed
+
+
+@pytest.mark.parametrize("structure", ["octree", "dda", "steps"])
 def test_a_ball_refracts_exactly_where_the_field_is_exact(structure):
     assert screen_error(ball(), RADIUS, 1.5, 0.99, structure=structure).max() < 1e-7
 

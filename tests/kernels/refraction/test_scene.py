@@ -32,6 +32,12 @@ def test_what_are_no_layers_is_refused(isos, indices, field):
     assert refusal.value.field == field
 
 
+@pytest.mark.parametrize("layer", [-1, 2])
+def test_surroundings_that_are_no_layer_are_refused(layer):
+    with pytest.raises(InvalidInput, match=f"surroundings: found {layer}; accepted: a layer, 0 to 1"):
+        Layers((0.5,), (1.0, 1.5), layer)
+
+
 @pytest.mark.parametrize("iso", [-5.0, 0.31, 400.0])
 def test_an_iso_value_that_the_volume_does_not_have_is_refused_with_the_range(iso):
     with pytest.raises(InvalidInput, match=rf"iso: found {iso}; accepted: between -0.5\d+ and 0.2\d+"):

@@ -554,7 +554,7 @@ void store(global REAL *at, Vector a)
 
 // coefficients, tables, shift, counts   the filtered volume with its border, as in Spline.
 // masks, bend, shapes, top              the octree; the level at which the descent begins.
-// levels, indices, layers               of the medium, and how many layers.
+// levels, indices, layers, around       of the medium, how many layers, and the one around the grid.
 // frame                                 origin, density, low and high of the medium.
 // open                                  whether the object is cut by the grid's faces.
 // camera                                origin and direction, 3 rows each.
@@ -563,10 +563,10 @@ kernel void follow(global const SUM *coefficients, constant const SUM *tables, c
                    const int counts_x, const int counts_y, const int counts_z, global const uchar *masks,
                    global const float *bend, constant const long *shapes, const int top,
                    constant const REAL *levels, constant const REAL *indices, const int layers,
-                   constant const REAL *frame, const int open, const REAL step, constant const REAL *camera,
-                   const int depth, const int kept, const uint count, global const REAL *places,
-                   global REAL *points, global REAL *directions, global uchar *fates, global short *crossings,
-                   global REAL *weights, global REAL *vertices)
+                   const int around, constant const REAL *frame, const int open, const REAL step,
+                   constant const REAL *camera, const int depth, const int kept, const uint count,
+                   global const REAL *places, global REAL *points, global REAL *directions,
+                   global uchar *fates, global short *crossings, global REAL *weights, global REAL *vertices)
 {
     const size_t n = get_global_id(0);
     if (n >= count)
@@ -580,7 +580,7 @@ kernel void follow(global const SUM *coefficients, constant const SUM *tables, c
     Vector direction = affine(camera + 9, places[2 * n], places[2 * n + 1]);
     direction = scaled(1 / sqrt(dot3(direction, direction)), direction);
 
-    int crossed = 0, layer = 0, fate = MISSED;
+    int crossed = 0, layer = around, fate = MISSED;
     bool entered = false, leaving = false;
     REAL weight = 1, slope = 0;
     while (!leaving) {
@@ -589,24 +589,25 @@ kernel void follow(global const SUM *coefficients, constant const SUM *tables, c
         int face_in, face_out;
         Vector normal;
         through_box(&ray, low, high, &near, &far, &face_in, &face_out);
-        int behind = 0;
+        int behind = around;
         bool face = false;
         if (!entered) {
             start = upper(near, 0);
             if (!(far > start))
                 break;
             entered = true;
-            // On the faces of a box within the grid lies layer 0, and most rays begin there.
+            // On the faces of a box within the grid lies that of the surroundings, and most rays begin there.
             if (open || start == 0) {
+                layer = 0;
                 const REAL value = field_at(&field, &ray, start);
                 while (layer + 1 < layers && value > levels[layer + 1])
                     ++layer;
             }
             // The object is cut by the grid's face, which is flat. (A camera within it sees no face.)
-            if (layer > 0 && near >= 0) {
+            if (layer != around && near >= 0) {
                 face = true;
                 behind = layer;
-                layer = 0;
+                layer = around;
                 normal = axis_of(face_in);
                 origin = moved(origin, direction, start);
             }
@@ -616,7 +617,7 @@ kernel void follow(global const SUM *coefficients, constant const SUM *tables, c
             // Iso-value m - 1 lies below layer m, iso-value m above it.
             Way way = {levels[layer], levels[layer + 1], (1 << layer) | (1 << layer >> 1)};
             leave_interval(&field, &octree, step, &ray, start, far, slope, &way);
-            if (way.side == 0 && layer == 0)
+            if (way.side == 0 && layer == around)
                 break;
             if (crossed == depth) {
                 fate = LOST;
