@@ -67,12 +67,13 @@ def nested(n: int = 24, **how) -> Scene:
 
 
 def rough(seed: int, name: str, dtype=np.float64) -> Scene:
-    """A volume without any smoothness, some cut by the grid's faces and some not, with two iso-surfaces."""
+    """A volume without any smoothness, often cut by the grid's faces, in any of its three layers."""
     random = np.random.default_rng(seed)
     volume = np.pad(random.normal(0.0, 1.0, random.integers(3, 9, 3)), seed % 3, constant_values=-3.0)
     low, high = np.sort(random.normal(0.0, 0.3, 2))
     indices = tuple(random.uniform(1.0, 1.8, 3))
-    return Scene.build(Spline.of(volume, name, dtype=dtype), Layers((low, high), indices), 0.1)
+    layers = Layers((low, high), indices, int(random.integers(3)))
+    return Scene.build(Spline.of(volume, name, dtype=dtype), layers, 0.1)
 
 
 def both(
