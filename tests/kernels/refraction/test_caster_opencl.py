@@ -123,8 +123,9 @@ def test_rays_through_rough_volumes_too(name):
         kinds = [("octree", "certain"), ("dda", "brent"), ("steps", "brent")]
         for structure, roots in [*kinds, ("octree", "analytic")] if scene.linear else kinds:
             found, expected = both(scene, structure=structure, roots=roots, depth=3, seed=seed)
-            # What grazes a surface, or a face of a cell where gradients jump, may go either way.
-            assert strays(found, expected, 1e-6) <= 6
+            # What grazes a surface may go either way. Central differences are not the slopes of the values: a
+            # ray may go on in a layer that the values deny, and rounding decides what it meets next.
+            assert strays(found, expected, 1e-6) <= (30 if name == "central" else 3)
 
     holds()
 
