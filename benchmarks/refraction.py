@@ -20,6 +20,7 @@ from _refracting_ball import (
 )
 from _refraction_ladders import cells, filters, ladder, subjects
 from _refraction_mitsuba import Mitsuba
+from _refraction_opencl import rows as opencl_rows
 from _refraction_picture import picture as picture_of_balls
 from _refraction_povray import PovRay
 from eikonal import alternate
@@ -47,6 +48,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
     for k, part in enumerate(parts):
         progress(k, len(parts), part.__name__)
         yield from part(quick)
+    yield from opencl_rows(quick, progress)
     if not quick:
         write_bytes(PICTURE, picture_of_balls())
     progress(len(parts), len(parts), "done")
