@@ -61,7 +61,7 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
                 write_array(file, place, getattr(reconstruction, name))
         history = file.create_group("history")
         for column, dtype in HISTORY.items():
-            rows = np.array([getattr(sweep, column) for sweep in reconstruction.history], dtype=dtype)
+            rows: NDArray[Any] = np.array([getattr(sweep, column) for sweep in reconstruction.history], dtype)
             write_array(history, column, rows)
         if reconstruction.residuals is not None:
             residuals = file.create_group("residuals")
