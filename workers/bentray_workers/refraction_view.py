@@ -59,7 +59,10 @@ class RefractionView:
     index: tuple[float, ...] = asked((1.5,), "Refractive index above each iso-value.")
     outside: float = asked(1.0, "Refractive index below the first iso-value, and of the surroundings.")
     filter: str = asked("bspline3", "Filter between the nodes: " + ", ".join(FILTERS) + ".")
-    smoothing: float = asked(0.0, "How much a B-spline smooths away; 0 passes through the nodes, 10 to 100 takes off the steps of 8 bits.")
+    smoothing: float = asked(
+        0.0,
+        "How much a B-spline smooths away; 0 passes through the nodes, 10 to 100 takes off the steps of 8 bits.",
+    )
     camera: Literal["orthographic", "perspective"] = asked("orthographic", "Kind of camera.")
     azimuth_deg: float = asked(30.0, "Where the camera stands: angle about the z axis, degrees.")
     elevation_deg: float = asked(20.0, "Its height above the x-y plane, degrees.")

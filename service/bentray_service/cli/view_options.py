@@ -20,7 +20,9 @@ OPTIONS = {
     "index": Option("--index", list[float], "1.5", "Refractive index above each iso-value."),
     "outside": Option("--outside", float, "1.0", "Refractive index below the first one, and around."),
     "filter": Option("--filter", str, "bspline3", "central, trilinear, catmull-rom, bspline2 to bspline6."),
-    "smoothing": Option("--smoothing", float, "0.0", "Of a B-spline; 10 to 100 takes off the steps of 8 bits."),
+    "smoothing": Option(
+        "--smoothing", float, "0.0", "Of a B-spline; 10 to 100 takes off the steps of 8 bits."
+    ),
     "camera": Option("--camera", str, "orthographic", "orthographic or perspective."),
     "azimuth_deg": Option("--azimuth", float, "30.0", "Of the camera about the z axis, degrees."),
     "elevation_deg": Option("--elevation", float, "20.0", "Of the camera above the x-y plane, degrees."),
