@@ -53,6 +53,8 @@ def test_nan_is_out_of_every_range(name):
         ({"iso": (math.nan,)}, "iso"),
         ({"iso": tuple(map(float, range(9))), "index": (1.5,) * 9}, "iso"),
         ({"iso": (1.0, 2.0)}, "index"),
+        ({"surroundings": -1}, "surroundings"),
+        ({"surroundings": 2}, "surroundings"),
         ({"index": ()}, "index"),
         ({"index": (0.0,)}, "index"),
         ({"index": (math.inf,)}, "index"),
@@ -69,6 +71,11 @@ def test_what_does_not_fit_together(given, field):
 def test_an_iso_value_out_of_range_is_told_the_range():
     with pytest.raises(InvalidInput, match="iso: found 7; accepted: 1400 to 1600, the range of the volume"):
         RefractionView(iso=(7.0,)).within(1400.0, 1600.0)
+
+
+def test_water_may_lie_between_two_surfaces():
+    layers = RefractionView(iso=(1.0, 2.0), index=(1.0, 0.9), outside=1.2, surroundings=1).layers()
+    assert (layers.indices, layers.surroundings) == ((1.2, 1.0, 0.9), 1)
 
 
 def test_a_volume_of_one_value_has_no_surface():

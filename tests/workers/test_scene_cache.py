@@ -73,6 +73,13 @@ def test_another_glass_shares_the_octree(path):
     assert scene_at(path, RefractionView(iso=(0.4,), filter="trilinear")).field is not one.field
 
 
+def test_other_surroundings_are_another_scene(path):
+    air, glass = (scene_at(path, RefractionView(iso=(0.4,), surroundings=n)) for n in (0, 1))
+    assert (air.layers.surroundings, glass.layers.surroundings) == (0, 1)
+    assert glass.open
+    assert not air.open
+
+
 def test_a_new_file_is_read_anew(path):
     before = scene_at(path, RefractionView(iso=(0.4,)))
     write_volume(path, Volume.of(0.9 * BALL, (1e-3,) * 3))

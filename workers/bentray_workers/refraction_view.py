@@ -57,11 +57,14 @@ class RefractionView:
         (), "Rising iso-values, unit of the volume; without any, the middle of its range."
     )
     index: tuple[float, ...] = asked((1.5,), "Refractive index above each iso-value.")
-    outside: float = asked(1.0, "Refractive index below the first iso-value, and of the surroundings.")
+    outside: float = asked(1.0, "Refractive index below the first iso-value.")
+    surroundings: int = asked(
+        0, "Which layer goes on around the volume: 0 the one below the first iso-value, 1 the next, ..."
+    )
     filter: str = asked("bspline3", "Filter between the nodes: " + ", ".join(FILTERS) + ".")
     smoothing: float = asked(
         0.0,
-        "How much a B-spline smooths away; 0 passes through the nodes, 10 to 100 takes off the steps of 8 bits.",
+        "How much a B-spline smooths away; 0 passes through the nodes, 10 to 100 takes off steps of 8 bits.",
     )
     camera: Literal["orthographic", "perspective"] = asked("orthographic", "Kind of camera.")
     azimuth_deg: float = asked(30.0, "Where the camera stands: angle about the z axis, degrees.")
@@ -94,6 +97,8 @@ class RefractionView:
             raise InvalidInput("index", self.index, f"{max(len(self.iso), 1)}: one for each iso-value")
         if not all(0.01 <= n <= 100.0 for n in self.index):
             raise InvalidInput("index", self.index, "refractive indices from 0.01 to 100")
+        if not 0 <= self.surroundings <= len(self.index):
+            raise InvalidInput("surroundings", self.surroundings, f"a layer, 0 to {len(self.index)}")
         if self.iso:
             self.layers()
         if self.smoothing and not self.filter.startswith("bspline"):
@@ -109,7 +114,7 @@ class RefractionView:
 
     def layers(self) -> Layers:
         """Iso-values and indices as the ray caster takes them; raises InvalidInput unless the values rise."""
-        return Layers(self.iso, (self.outside, *self.index))
+        return Layers(self.iso, (self.outside, *self.index), self.surroundings)
 
     def within(self, low: float, high: float) -> RefractionView:
         """The same for a volume with values from ``low`` to ``high``: with an iso-value, if it has none.

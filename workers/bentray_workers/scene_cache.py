@@ -117,9 +117,11 @@ def scene_at(path: Path, view: RefractionView) -> Scene:
         lambda: filtered_of(import_volume(path), view.filter, view.smoothing),
     )
     layers = view.within(*filtered.range).layers()
-    # The octree knows the iso-values alone, so that another glass costs nothing.
+    # The octree and its box know iso-values and surroundings alone, so that another glass costs nothing.
     scene: Scene = _SCENES.get(
-        (source, layers.isos), needed_bytes(shape, SCENE_BYTES), lambda: build(filtered, layers)
+        (source, layers.isos, layers.surroundings),
+        needed_bytes(shape, SCENE_BYTES),
+        lambda: build(filtered, layers),
     )
     return replace(scene, layers=layers)
 

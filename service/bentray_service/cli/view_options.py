@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 OPTIONS = {
     "iso": Option("--iso", list[float], "the middle of the range", "Rising iso-values; may be repeated."),
     "index": Option("--index", list[float], "1.5", "Refractive index above each iso-value."),
-    "outside": Option("--outside", float, "1.0", "Refractive index below the first one, and around."),
+    "outside": Option("--outside", float, "1.0", "Refractive index below the first one."),
+    "surroundings": Option(
+        "--surroundings", int, "0", "Layer that goes on around: 0 is below the first one."
+    ),
     "filter": Option("--filter", str, "bspline3", "central, trilinear, catmull-rom, bspline2 to bspline6."),
     "smoothing": Option(
         "--smoothing", float, "0.0", "Of a B-spline; 10 to 100 takes off the steps of 8 bits."

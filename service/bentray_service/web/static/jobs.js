@@ -4,6 +4,8 @@ import { inWords, request } from "./api.js";
 const SVG = "http://www.w3.org/2000/svg";
 const RAYS = { curved: "Bent rays", straight: "Straight rays", adjoint: "Without rays" };
 const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton", auto: "auto" };
+// Part of the speed of water that a speed must be off it to be shown as glass.
+const LEAST = 0.005;
 const cards = new Map();
 
 function make(tag, className, text) {
@@ -80,19 +82,37 @@ function drawn(address, words) {
   return frame;
 }
 
-// A volume in space is also shown as glass: what is clearly faster than water, which would fill the box otherwise.
+// A volume in space is also shown as glass in water, which bends light as much as it bends sound.
+function glassOf({ water_speed_mps: water, value_range: [lowest, highest] }) {
+  const between = (speed) => Number(((water + speed) / 2).toPrecision(6));
+  const index = (speed) => Number((water / speed).toPrecision(4));
+  const slower = lowest < (1 - LEAST) * water;
+  const faster = highest > (1 + LEAST) * water;
+  if (!slower && !faster) return {};
+  return {
+    iso: [...(slower ? [between(lowest)] : []), ...(faster ? [between(highest)] : [])],
+    outside: slower ? index(lowest) : 1,
+    index: [...(slower ? [1] : []), ...(faster ? [index(highest)] : [])],
+    surroundings: slower ? 1 : 0,
+    elevation_deg: 35,
+  };
+}
+
+function queryOf(view) {
+  return new URLSearchParams(Object.entries(view).flatMap(([name, value]) => [value].flat().map((one) => [name, one])));
+}
+
 async function addGlass(column, job, title) {
-  const { links, water_speed_mps: water, value_range: [, highest] } = await request(job.links.volume);
-  if (!links.refraction) return;
-  const iso = highest > water ? `iso=${Number(((water + highest) / 2).toPrecision(6))}&` : "";
-  column.append(make("p", "caption", "As glass"), drawn(`${links.refraction}?${iso}index=1.2`, `As glass, ${title}`));
+  const volume = await request(job.links.volume);
+  if (!volume.links.refraction) return;
+  const address = `${volume.links.refraction}?${queryOf(glassOf(volume))}`;
+  column.append(make("p", "caption", "As glass"), drawn(address, `As glass, ${title}`));
 }
 
 // The first picture of a turntable.
 function firstFrame(job) {
   const { frames, turn_deg: turn, format, ...view } = job.settings;
-  const query = new URLSearchParams(Object.entries(view).flatMap(([name, value]) => [value].flat().map((one) => [name, one])));
-  return `${job.links.volume}/refraction.png?${query}`;
+  return `${job.links.volume}/refraction.png?${queryOf(view)}`;
 }
 
 function pictures(job, title) {
