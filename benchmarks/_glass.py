@@ -85,7 +85,7 @@ def glass(
 
 def drawn(
     scene: Scene,
-    supersampling: str = "post",
+    supersampling: str = "prss",
     backdrop: Backdrop = CHECKERBOARD,
     camera: Camera = FRONT,
     degree: int = 1,

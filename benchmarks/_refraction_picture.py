@@ -24,7 +24,7 @@ from bentray_kernels.splines import Spline
 NODES = 64
 
 # Without; after refraction; 64 rays a pixel.
-COLUMNS = (("none", 1), ("post", 1), ("real", 8))
+COLUMNS = (("none", 1), ("prss", 1), ("real", 8))
 
 
 def picture() -> bytes:

@@ -37,7 +37,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             continue
         image, nine = drawn(scene, "real", degree=3, pixels=pixels)
         many.append(Panel(f"{name}\n{1e3 * nine:.0f} ms", image))
-        image, one = drawn(scene, "post", pixels=pixels)
+        image, one = drawn(scene, "prss", pixels=pixels)
         post.append(Panel(f"{name}\n{1e3 * one:.0f} ms", image))
         theirs = THEIRS_MS[name][0] / THEIRS_MS[name][1]
         detail = f"{pixels}², one core: {1e3 * nine:.0f} over {1e3 * one:.0f} ms; theirs {theirs:.1f}"

@@ -20,7 +20,7 @@ SMOOTH = "B-spline 3, smooth λ = 1"
 
 # Seconds of Table 1: without supersampling, with four rays a pixel, after refraction.
 TABLE1 = {"Catmull-Rom": (7.63, 28.02, 7.72), SMOOTH: (6.65, 26.83, 6.71)}
-WAYS = {"none": ("one ray a pixel", 1), "real": ("four rays a pixel", 2), "post": ("after refraction", 1)}
+WAYS = {"none": ("one ray a pixel", 1), "real": ("four rays a pixel", 2), "prss": ("after refraction", 1)}
 
 # m/s: where the fat of the breast begins, and its tissue.
 FAT, TISSUE = 1420.0, 1490.0
@@ -36,12 +36,12 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             progress(k, len(WAYS), f"{name}, {words}")
             image, seconds[way] = drawn(scene, way, degree=degree, pixels=pixels)
             panels17.append(Panel(f"{name}\n{words}, {1e3 * seconds[way]:.0f} ms", image))
-        for way, of_theirs in (("real", theirs[1]), ("post", theirs[2])):
+        for way, of_theirs in (("real", theirs[1]), ("prss", theirs[2])):
             extra, their_extra = seconds[way] / seconds["none"], of_theirs / theirs[0]
             ours = f"{1e3 * seconds[way]:.0f} over {1e3 * seconds['none']:.0f} ms, one core"
             detail = f"{ours}; theirs {their_extra:.2f}"
             label = f"Table 1 {WAYS[way][0]} / one ray, {name}"
-            yield Row(label, extra, 1.05 if way == "post" else 5.0, "<=", "", detail)
+            yield Row(label, extra, 1.05 if way == "prss" else 5.0, "<=", "", detail)
     if quick:
         return
     landscape = backdrop_of([hills()])

@@ -75,8 +75,8 @@ def test_the_frame_is_right_handed_with_z_up():
     "how",
     [
         {"supersampling": "none"},
-        {"supersampling": "post"},
-        {"supersampling": "post", "degree": 3, "backdrop": "picture", "camera": "perspective"},
+        {"supersampling": "prss"},
+        {"supersampling": "prss", "degree": 3, "backdrop": "picture", "camera": "perspective"},
         {"mode": "shaded"},
     ],
     ids=str,

@@ -112,7 +112,7 @@ def strip(scene: Scene, view: RefractionView, first: int, last: int, card: Colou
         card: picture for the backdrop, 8-bit RGB; None: our test card.
     """
     # Post-refraction supersampling looks at the rows beside.
-    margin = 1 if view.supersampling == "post" else 0
+    margin = 1 if view.supersampling == "prss" else 0
     top, bottom = max(first - margin, 0), min(last + margin, view.height)
     camera = _part(camera_of(scene, view), top / view.height, bottom / view.height)
     rows = bottom - top

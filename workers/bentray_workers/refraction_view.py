@@ -33,7 +33,7 @@ CHOICES = {
     "filter": tuple(FILTERS),
     "camera": ("orthographic", "perspective"),
     "backdrop": ("checkerboard", "picture"),
-    "supersampling": ("none", "post", "real"),
+    "supersampling": ("none", "prss", "real"),
     "mode": ("refract", "shaded"),
 }
 
@@ -73,10 +73,11 @@ class RefractionView:
     backdrop: Literal["checkerboard", "picture"] = asked("checkerboard", "What is seen through the volume.")
     squares: int = asked(16, "Squares of the checkerboard across the shorter side of the picture.")
     backdrop_distance: float = asked(1.0, "From the middle of the volume, in its diagonals.")
-    supersampling: Literal["none", "post", "real"] = asked(
-        "post", "post: more samples of the backdrop after refraction; real: more rays."
+    supersampling: Literal["none", "prss", "real"] = asked(
+        "prss",
+        "prss: more samples of the backdrop after refraction; real: more rays.",
     )
-    degree: int = asked(1, "Samples beside each pixel for post; rays along each side of it for real.")
+    degree: int = asked(1, "Samples beside each pixel for prss; rays along each side of it for real.")
     fresnel: bool = asked(False, "Whether light is weakened by what each surface mirrors away.")
     mode: Literal["refract", "shaded"] = asked("refract", "refract, or shaded: the first surface, lit.")
     width: int = asked(512, "Pixels.")

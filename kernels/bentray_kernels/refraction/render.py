@@ -21,7 +21,7 @@ from .supersampling import averaged, point_colours, post_refraction_colours
 # Rows of the image cast in one call on the CPU.
 TILE_ROWS = 16
 
-SUPERSAMPLING = ("none", "post", "real")
+SUPERSAMPLING = ("none", "prss", "real")
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class RenderSettings:
     Attributes:
         rows, columns: pixels.
         depth: most interfaces that a ray may meet; what is lost beyond it is black.
-        supersampling: "none"; "post", after refraction (4.3.3); "real", more rays.
-        degree: for "post" as in ``post_refraction_colours``; for "real" rays a pixel along each axis.
+        supersampling: "none"; "prss", after refraction (4.3.3); "real", more rays.
+        degree: for "prss" as in ``post_refraction_colours``; for "real" rays a pixel along each axis.
         fresnel: whether light is weakened by what each interface mirrors away.
         structure, roots, step: as in ``Scene.search``.
         seed: of the jitter of real supersampling; None leaves the rays in even rows.
@@ -45,7 +45,7 @@ class RenderSettings:
     rows: int = 256
     columns: int = 256
     depth: int = 16
-    supersampling: str = "post"
+    supersampling: str = "prss"
     degree: int = 1
     fresnel: bool = False
     structure: str = "octree"
@@ -126,7 +126,7 @@ def render(
     grid = (backdrop, plane.reshape(shape), where.reshape(*shape, 2))
     crossed = traced.crossed.reshape(shape)
     image = np.empty((*shape, 3), dtype=np.uint8)
-    if settings.supersampling == "post":
+    if settings.supersampling == "prss":
         post_refraction_colours(*grid, crossed, light, settings.degree, image)
     else:
         point_colours(*grid, light, image)

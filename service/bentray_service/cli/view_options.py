@@ -36,7 +36,7 @@ OPTIONS = {
     "squares": Option("--squares", int, "16", "Of the checkerboard, across the shorter side."),
     "backdrop_distance": Option("--distance", float, "1.0", "Of the backdrop, in diagonals of the volume."),
     "supersampling": Option(
-        "--supersampling", str, "post", "none, post (after refraction), real (more rays)."
+        "--supersampling", str, "prss", "none, prss (after refraction), real (more rays)."
     ),
     "degree": Option("--degree", int, "1", "Of the supersampling."),
     "fresnel": Option("--fresnel", bool, "False", "Weaken light by what each surface mirrors away."),

@@ -171,7 +171,7 @@ def at_discontinuities(picture: Picture) -> np.ndarray:
 # Pixels out of 96² that may differ by more than one level of 255: 0.02 % and 0.5 %.
 @pytest.mark.parametrize(("precision", "most"), [("float64", 2), ("float32", 46)])
 @pytest.mark.parametrize("camera", CAMERAS)
-@pytest.mark.parametrize("supersampling", ["none", "post", "real"])
+@pytest.mark.parametrize("supersampling", ["none", "prss", "real"])
 def test_pictures_differ_by_a_level_but_at_discontinuities(precision, most, camera, supersampling):
     how = RenderSettings(96, 96, supersampling=supersampling, degree=2, fresnel=True)
     for scene in (nested(), Scene.build(Spline(RADIUS - distance(32)), Layers((0.0,), (1.0, 1.5)), 1.0 / 31)):

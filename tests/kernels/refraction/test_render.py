@@ -61,9 +61,9 @@ def test_supersampling_comes_nearer_to_the_picture_of_64_samples(scene):
         error = picture(scene, **options).image - truth
         return float(10.0 * np.log10(255.0**2 / (error**2).mean()))
 
-    none, post = psnr(supersampling="none"), psnr(supersampling="post")
+    none, post = psnr(supersampling="none"), psnr(supersampling="prss")
     assert post > none + 3.0
-    assert psnr(supersampling="post", degree=3) > post
+    assert psnr(supersampling="prss", degree=3) > post
     assert psnr(supersampling="real", degree=3) > post
 
 

@@ -137,7 +137,7 @@ def test_a_large_picture_is_cast_in_strips(http, cluster, monkeypatch):
         ("backdrop=forest", "backdrop", "'checkerboard' or 'picture'"),
         ("squares=0", "squares", "1"),
         ("backdrop_distance=0.1", "backdrop_distance", "0.5"),
-        ("supersampling=prss", "supersampling", "post"),
+        ("supersampling=post", "supersampling", "prss"),
         ("degree=9", "degree", "8"),
         ("fresnel=perhaps", "fresnel", "boolean"),
         ("mode=wire", "mode", "'refract' or 'shaded'"),
