@@ -14,7 +14,7 @@ from bentray_kernels.phantoms import TABLE7_SIDE_M, table7
 from bentray_kernels.tomography.emitter_pass import EmitterPass
 from bentray_workers.simulation import Ring, ring_radius
 
-REPEATS = 20
+REPEATS = 60
 
 
 @dataclass(frozen=True)
@@ -62,16 +62,18 @@ def split(nodes: int, elements: int) -> Split:
     def update() -> None:
         work.update(slowness.copy(), coverage, region, spacing, 0.1, 1.0, (1e-4, 1e-3))
 
-    both, first, last = least(look), least(front), least(update)
+    both, first, last = least(look, front, update)
     return Split(first, both - first, last)
 
 
-def least(run: Callable[[], None]) -> float:
-    """Seconds of the fastest run, after one that compiles."""
-    run()
+def least(*runs: Callable[[], None]) -> list[float]:
+    """Seconds of the fastest run of each, in turn, after one that compiles."""
     seconds = []
-    for _ in range(REPEATS):
-        started = time.perf_counter()
-        run()
-        seconds.append(time.perf_counter() - started)
-    return min(seconds)
+    for _ in range(REPEATS + 1):
+        took = []
+        for run in runs:
+            started = time.perf_counter()
+            run()
+            took.append(time.perf_counter() - started)
+        seconds.append(took)
+    return [min(of_one) for of_one in zip(*seconds[1:], strict=True)]
