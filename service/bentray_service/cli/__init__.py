@@ -8,6 +8,7 @@ import typer
 
 from . import bench, demo, devices, reconstruct, render, serve, simulate, submit
 from .endings import Commands
+from .repeated_words import SpacingInRow
 
 __all__ = ["app", "main"]
 
@@ -26,11 +27,11 @@ for command in (
     submit.submit,
     reconstruct.reconstruct,
     simulate.simulate,
-    render.render,
     bench.bench,
     devices.devices,
 ):
     app.command()(command)
+app.command(cls=SpacingInRow)(render.render)
 
 
 def _version(asked: bool) -> None:

@@ -14,7 +14,7 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .paths import input_file, output_file
+from .paths import check_apart, input_file, output_file
 from .terminal import AsJson, print_json, print_lines, print_table, progress_bar
 from .view_options import AskedView, with_view_options
 
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from bentray_workers.volume_file import Volume
 
 ACCEPTED = "a volume: NumPy, NRRD, NIfTI, HDF5 of Bentray, or raw with --shape and --dtype"
-# Rows that a thread draws at a time.
-ROWS = 16
+# What a thread draws at a time: rows, fewer of those with many rays, since Ctrl-C waits for what is begun.
+ROWS, RAYS = 16, 2**15
 # Of the cube that a phantom fills.
 PHANTOM_SIDE_M = 0.1
 
@@ -59,7 +59,9 @@ def render(
     spacing: Annotated[
         list[float] | None,
         typer.Option(
-            help="Between nodes of raw and NumPy files, m; once, or for each axis.", show_default="0.001"
+            help="Between nodes of raw and NumPy files, m: for all axes, or for each.",
+            show_default="0.001",
+            metavar="DX [DY DZ]",
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
@@ -72,9 +74,13 @@ def render(
     if (file is None) == (phantom is None):
         found = "neither a file nor --phantom" if file is None else "a file and --phantom"
         raise InvalidInput("file", found, "one of the two")
-    png = output_file(output, force=force)
-    placed = None if position_map is None else output_file(position_map, force=force)
+    if phantom is not None:
+        _refuse({"--shape": shape, "--dtype": dtype, "--spacing": spacing})
     view, picture = asked.view()
+    outputs = {"--output": output, "--map": position_map}
+    check_apart(outputs, {"the volume": file, "the backdrop": picture})
+    png = output_file(output, force=force, suffix=".png")
+    placed = None if position_map is None else output_file(position_map, force=force, suffix=".npy")
     if placed is not None and view.mode == "shaded":
         raise InvalidInput("--map", placed, "nothing with --mode shaded: it does not look at the backdrop")
 
@@ -104,6 +110,12 @@ def render(
     _show(volume, view, png, placed, (built - started, seconds), as_json=as_json)
 
 
+def _refuse(given: dict[str, object]) -> None:
+    for option, value in given.items():
+        if value:
+            raise InvalidInput(option, value, "nothing with --phantom: it tells its own")
+
+
 def _sampled(phantom: Phantom, nodes: int) -> Volume:
     from bentray_kernels.phantoms import ONE_HOLE, TWO_HOLES, CubeField, FringeSphere, MarschnerLobb, sampled
     from bentray_workers.volume_file import Volume
@@ -122,15 +134,20 @@ def _drawn(
 ) -> list[Strip]:
     from bentray_workers.refraction import strip
 
-    found = []
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    found: list[Strip] = []
+    rows = min(ROWS, max(1, RAYS // (view.width * view.times**2)))
+    pool = ThreadPoolExecutor(len(os.sched_getaffinity(0)))
+    try:
         drawn = [
-            pool.submit(strip, scene, view, first, min(first + ROWS, view.height), card)
-            for first in range(0, view.height, ROWS)
+            pool.submit(strip, scene, view, first, min(first + rows, view.height), card)
+            for first in range(0, view.height, rows)
         ]
         for future in drawn:
             found.append(future.result())
             step(len(found), len(drawn))
+    finally:
+        # After Ctrl-C nothing more is begun.
+        pool.shutdown(cancel_futures=True)
     return found
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.cli.paths import input_file, output_file, output_folder
+from bentray_service.cli.paths import check_apart, input_file, output_file, output_folder
 
 
 def test_an_input_must_be_a_file(tmp_path: Path) -> None:
@@ -50,3 +50,21 @@ def test_an_output_file_needs_a_folder_and_is_none(tmp_path: Path) -> None:
 def test_a_folder_that_takes_no_file_is_refused_before_the_work() -> None:
     with pytest.raises(InvalidInput, match="a folder that can be written"):
         output_folder(Path("/proc/self"))
+
+
+def test_a_file_that_cannot_be_written_or_has_another_name_is_refused_before_the_work(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="a folder that can be written"):
+        output_file(Path("/proc/self/p.png"), force=False)
+    with pytest.raises(InvalidInput, match=r"ends in \.png"):
+        output_file(tmp_path / "p.jpg", force=False, suffix=".png")
+    assert output_file(tmp_path / "P.PNG", force=False, suffix=".png").name == "P.PNG"
+
+
+def test_outputs_and_inputs_lie_apart(tmp_path: Path) -> None:
+    (tmp_path / "a").touch()
+    (tmp_path / "link").symlink_to(tmp_path / "a")
+    check_apart({"-o": tmp_path / "b", "--map": None}, {"file": tmp_path / "a", "other": tmp_path / "a"})
+    with pytest.raises(InvalidInput, match="which is file too"):
+        check_apart({"-o": tmp_path / "link"}, {"file": tmp_path / "a"})
+    with pytest.raises(InvalidInput, match=r"--map: .*which is -o too"):
+        check_apart({"-o": tmp_path / "b", "--map": tmp_path / ".." / tmp_path.name / "b"}, {})

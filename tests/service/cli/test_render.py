@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from PIL import Image
 from typer.testing import Result
 
 from bentray_kernels.phantoms import ONE_HOLE, sampled
+from bentray_workers import refraction
 from bentray_workers.volume_file import Volume, write_volume
 
 SMALL = ("--width", 32, "--height", 24)
@@ -120,6 +122,10 @@ def test_a_file_that_exists_is_kept_without_force(
         (("--dtype", "uint8"), "shape"),
         (("--map", "m.npy", "--mode", "shaded"), "--map"),
         (("--spacing", 1, "--spacing", 2), "spacing_m"),
+        (("--spacing", 1, 2), "spacing_m"),
+        (("-o", "p.jpg"), "output"),
+        (("--map", "map.txt"), "output"),
+        (("-o", "/proc/self/p.png"), "output"),
     ],
 )
 def test_bad_words_are_one_line(
@@ -129,6 +135,61 @@ def test_bad_words_are_one_line(
     assert result.exit_code == 2
     assert result.stderr.startswith(f"bentray: {field}: found "), result.stderr
     assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "p.png").exists()
+
+
+def test_a_spacing_is_one_word_or_three(bentray: Callable[..., Result], tmp_path: Path, volume: Path) -> None:
+    maps = []
+    for words in ((2e-3,), (2e-3, 2e-3, 2e-3), (2e-3, 2e-3, 1e-3)):
+        place = ("-o", tmp_path / "p.png", "--map", tmp_path / "m.npy", "--force")
+        result = bentray("render", "--spacing", *words, volume, *place, *SMALL, "--iso", 0.5)
+        assert result.exit_code == 0, result.stderr
+        maps.append(np.load(tmp_path / "m.npy"))
+    np.testing.assert_array_equal(maps[0], maps[1])
+    assert not np.array_equal(maps[0], maps[2])
+
+
+@pytest.mark.parametrize("words", [("--shape", 2, 2, 2), ("--spacing", 1), ("--dtype", "uint8")])
+def test_a_phantom_tells_its_own_grid(
+    bentray: Callable[..., Result], tmp_path: Path, words: tuple[object, ...]
+) -> None:
+    result = bentray("render", "-o", tmp_path / "p.png", "--phantom", "sphere", *words)
+    assert (result.exit_code, result.stderr.split()[1]) == (2, f"{words[0]}:")
+
+
+def test_no_output_replaces_another_or_an_input(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    volume, link = tmp_path / "v.png", tmp_path / "link.png"
+    npy(volume)
+    link.symlink_to(volume)
+    before = volume.read_bytes()
+    same = tmp_path / "p.png"
+    for words, field in (
+        (("-o", volume), "--output"),
+        (("-o", link), "--output"),
+        (("-o", same, "--map", same), "--map"),
+        (("-o", same, "--map", volume), "--map"),
+        (("-o", same, "--backdrop", same), "--output"),
+    ):
+        result = bentray("render", volume, *words, "--force", *SMALL)
+        assert (result.exit_code, result.stderr.split()[1]) == (2, f"{field}:"), result.stderr
+    assert volume.read_bytes() == before
+
+
+def test_an_interrupt_begins_no_more_strips(
+    bentray: Callable[..., Result], tmp_path: Path, volume: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun = []
+
+    def interrupted(*given: object) -> None:
+        begun.append(given)
+        if len(begun) == 1:
+            raise KeyboardInterrupt
+        time.sleep(0.05)
+
+    monkeypatch.setattr(refraction, "strip", interrupted)
+    many = ("--width", 16, "--height", 4096)
+    assert bentray("render", volume, "-o", tmp_path / "p.png", "--iso", 0.5, *many).exit_code == 130
+    assert 0 < len(begun) < 20
     assert not (tmp_path / "p.png").exists()
 
 
