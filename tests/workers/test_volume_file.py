@@ -70,6 +70,19 @@ def test_a_spacing_must_be_three_distances(steps):
         Volume.of(np.zeros((2, 2, 2)), steps)
 
 
+@pytest.mark.parametrize("step", [1e-300, 0.99e-9, 1.01e3, 1e300, float("inf")])
+@pytest.mark.parametrize("axis", range(3))
+def test_a_spacing_that_nothing_has_is_refused(step, axis):
+    steps = [1e-3] * 3
+    steps[axis] = step
+    with pytest.raises(InvalidInput, match=r"spacing_m: .* three even distances from 1e-09 to 1000 m"):
+        Volume.of(np.zeros((2, 2, 2)), steps)
+
+
+def test_the_closest_and_the_farthest_spacing_are_kept():
+    assert Volume.of(np.zeros((2, 2, 2)), (1e-9, 1.0, 1e3)).spacing_m == (1e-9, 1.0, 1e3)
+
+
 def test_an_origin_must_be_finite():
     with pytest.raises(InvalidInput, match="origin_m"):
         Volume.of(np.zeros((2, 2, 2)), STEPS, (0.0, float("inf"), 0.0))

@@ -21,6 +21,9 @@ VERSION = "1.0"
 
 # Types that are kept; every other one becomes float32.
 KEPT = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
+
+# Between nodes, m. Far beyond these, the volumes and squares that are made of them leave the range of numbers.
+LEAST_SPACING_M, MOST_SPACING_M = 1e-9, 1e3
 Triple = tuple[float, float, float]
 
 
@@ -30,7 +33,7 @@ class Volume:
 
     Attributes:
         values: (nx, ny, nz), uint8, uint16 or float32, finite, any unit.
-        spacing_m: between nodes along each axis, m.
+        spacing_m: between nodes along each axis, 1e-9 to 1e3 m.
         origin_m: place of node 0, m.
         title: what it is.
 
@@ -48,8 +51,10 @@ class Volume:
         if not np.isfinite(self.values).all():
             place = tuple(int(k) for k in np.argwhere(~np.isfinite(self.values))[0])
             raise InvalidInput("values", f"{self.values[place]} at node {place}", "finite numbers")
-        if len(self.spacing_m) != 3 or not all(0.0 < step < math.inf for step in self.spacing_m):
-            raise InvalidInput("spacing_m", self.spacing_m, "three finite distances > 0 m, all even")
+        sane = [LEAST_SPACING_M <= step <= MOST_SPACING_M for step in self.spacing_m]
+        if len(sane) != 3 or not all(sane):
+            accepted = f"three even distances from {LEAST_SPACING_M:g} to {MOST_SPACING_M:g} m"
+            raise InvalidInput("spacing_m", self.spacing_m, accepted)
         if len(self.origin_m) != 3 or not all(math.isfinite(place) for place in self.origin_m):
             raise InvalidInput("origin_m", self.origin_m, "three finite places, m")
 
