@@ -60,8 +60,41 @@ def test_what_is_not_real_is_refused(values):
 def test_a_number_too_large_for_float32_is_named():
     values = np.zeros((2, 2, 2))
     values[1, 0, 1] = 1e300
-    with pytest.raises(InvalidInput, match=r"inf at node \(1, 0, 1\)"):
+    with pytest.raises(InvalidInput, match=r"found 1e\+300, beyond float32"):
         Volume.of(values, STEPS)
+    values[1, 0, 0] = np.inf
+    with pytest.raises(InvalidInput, match=r"found inf at node \(1, 0, 0\)"):
+        Volume.of(values, STEPS)
+
+
+@pytest.mark.parametrize(
+    ("values", "dtype"),
+    [
+        (1e9 + np.arange(8) / 7, "<f8"),
+        (16777216 + np.arange(8) % 4, "<i4"),
+        (16777216 + np.arange(8) % 4, ">u4"),
+        (-(2**62) + np.arange(8), "<i8"),
+        (1.0 + np.arange(8) * 1e-9, ">f8"),
+    ],
+)
+def test_values_that_float32_cannot_tell_apart_are_refused(values, dtype):
+    with pytest.raises(InvalidInput, match=r"cannot tell apart; accepted: .*subtract an offset first"):
+        Volume.of(values.astype(dtype).reshape(2, 2, 2), STEPS)
+
+
+@pytest.mark.parametrize(
+    ("values", "dtype"),
+    [
+        (16777216 + 2 * np.arange(8), "i4"),
+        (np.full(8, 0.1), "f8"),
+        (1e9 * np.arange(8) / 7, "f8"),
+        (1.0 + np.arange(8) * 1e-4, "f8"),
+        (np.arange(8) * 2**60 - 2**62, "i8"),
+    ],
+)
+def test_values_that_float32_can_tell_apart_are_taken(values, dtype):
+    volume = Volume.of(values.astype(dtype).reshape(2, 2, 2), STEPS)
+    assert len(np.unique(volume.values)) == len(np.unique(values))
 
 
 @pytest.mark.parametrize("steps", [(1.0, 1.0), (1.0, 0.0, 1.0), (1.0, float("nan"), 1.0), (1.0, 1.0, -1.0)])
