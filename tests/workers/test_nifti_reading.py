@@ -85,10 +85,11 @@ def spoilt(name, value):
         (gzip.compress(b"\0" * 100_000_000), "file"),
     ],
 )
-def test_what_is_refused(tmp_path, content, field):
+def test_what_is_refused(tmp_path, content, field, capfd, caplog):
     (tmp_path / "v").write_bytes(content)
     error = refused(tmp_path / "v")
     assert error.field == field, error
+    assert (caplog.text, *capfd.readouterr()) == ("", "", "")
 
 
 def test_a_bomb_gives_what_was_declared_and_no_more(tmp_path):

@@ -53,6 +53,15 @@ def test_units(tmp_path, more, spacing):
     np.testing.assert_allclose(import_volume(write(tmp_path / "v", PLAIN + more)).spacing_m, (spacing,) * 3)
 
 
+def test_each_axis_has_its_own_unit(tmp_path):
+    fields = PLAIN + 'spacings: 1 2 3\nunits: "mm" "m" "cm"\n'
+    np.testing.assert_allclose(import_volume(write(tmp_path / "v", fields)).spacing_m, (1e-3, 2.0, 3e-2))
+    turned = "space dimension: 3\nspace directions: (0,2,0) (3,0,0) (3,0,4)\nspace origin: (1,1,1)\n"
+    volume = import_volume(write(tmp_path / "v", PLAIN + turned + 'space units: "mm" "m" "mm"\n'))
+    np.testing.assert_allclose(volume.spacing_m, (2.0, 3e-3, 5e-3))
+    np.testing.assert_allclose(volume.origin_m, (1e-3, 1.0, 1e-3))
+
+
 def test_lines_may_end_as_on_windows(tmp_path):
     fields = PLAIN.replace("\n", "\r\n")
     path = tmp_path / "v"
@@ -80,6 +89,7 @@ def test_lines_may_end_as_on_windows(tmp_path):
         (PLAIN.replace("sizes: 3 4 5\n", ""), "file"),
         (PLAIN + "kinds: RGB-color domain domain\n", "kinds"),
         (PLAIN + 'units: "inch" "inch" "inch"\n', "units"),
+        (PLAIN + 'spacings: 1 1 1\nunits: "mm" "mm" "inch"\n', "units"),
         (PLAIN + "spacings: 0 1 1\n", "spacing_m"),
         (PLAIN + "spacings: nan nan nan\n", "spacing_m"),
         ("nonsense\n", "file"),

@@ -7,6 +7,8 @@ from contextlib import suppress
 from dataclasses import replace
 
 import h5py
+import nibabel
+import nrrd
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -14,6 +16,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers import bounded_reading
+from bentray_workers.hdf5_reading import Reader
 from bentray_workers.reconstruction_file import write_reconstruction
 from bentray_workers.volume_file import Volume, write_volume
 from bentray_workers.volume_reading import RAW_TYPES, SPACING_M, Given, import_volume
@@ -137,6 +140,27 @@ def test_more_than_the_limit_is_refused_before_it_is_read(tmp_path, monkeypatch)
     error = refused(tmp_path / "v.npy")
     assert "60 bytes" in error.value
     assert "59" in error.accepted
+
+
+def test_a_shape_without_use_is_refused_before_the_values_are_read(tmp_path, monkeypatch):
+    def nothing_else(shape):
+        raise InvalidInput("volume", f"shape {tuple(shape)}", "another")
+
+    def read(*given, **how):
+        raise AssertionError("values were read")
+
+    np.save(tmp_path / "v.npy", ramp())
+    (tmp_path / "v.raw").write_bytes(ramp().tobytes())
+    nrrd.write(str(tmp_path / "v.nrrd"), ramp())
+    (tmp_path / "v.nii").write_bytes(nibabel.Nifti1Image(ramp(), np.eye(4)).to_bytes())
+    write_volume(tmp_path / "v.h5", Volume.of(ramp(), (1e-3,) * 3))
+    write_reconstruction(tmp_path / "r.h5", replace(made(3, 5), spacing_m=(2e-3, 2e-3, 3e-3)))
+    monkeypatch.setattr(Volume, "of", read)
+    monkeypatch.setattr(Reader, "array", read)
+    for path in sorted(tmp_path.iterdir()):
+        given = Given(shape=(3, 4, 5), dtype="uint8") if path.suffix == ".raw" else None
+        with pytest.raises(InvalidInput, match=r"volume: found shape \(3, [34], 5\)"):
+            import_volume(path, given, nothing_else)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -22,10 +22,19 @@ LONGEST_HEADER = 2**20
 UNITS_M = {"m": 1.0, "meter": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "micron": 1e-6}
 
 
-def declared(field: str, shape: Sequence[int], dtype: np.dtype[Any]) -> int:
+# Raises InvalidInput for a shape that the one who asks for the volume has no use for.
+ShapeCheck = Callable[[Sequence[int]], None]
+
+
+def any_shape(shape: Sequence[int]) -> None:
+    """The shape check of those who can use every volume."""
+
+
+def declared(field: str, shape: Sequence[int], dtype: np.dtype[Any], check: ShapeCheck = any_shape) -> int:
     """Bytes of the values, once shape and type are ones that are taken."""
     check_type(field, dtype)
     check_shape(field, shape)
+    check(shape)
     count = math.prod(int(n) for n in shape) * dtype.itemsize
     if count > LARGEST_BYTES:
         raise InvalidInput(field, f"shape {tuple(shape)}, {count} bytes", f"at most {LARGEST_BYTES} bytes")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,18 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .bounded_reading import LONGEST_HEADER, UNITS_M, declared, refusing, whole
+from .bounded_reading import LONGEST_HEADER, UNITS_M, ShapeCheck, any_shape, declared, refusing, whole
 from .volume_file import Volume
 
+# Takes what nibabel says of a header while it checks it: the refusal says the same in one line.
+_unheard = logging.Logger("nibabel's checks, unheard", logging.CRITICAL + 1)
 
-def read_nifti(file: Any) -> Volume:
-    """The volume in an open file, unpacked; raises InvalidInput for anything else."""
+
+def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
+    """The volume in an open file, unpacked; raises InvalidInput for anything else.
+
+    ``check`` is called with the shape before the values are read.
+    """
     from nibabel.nifti1 import Nifti1Header
     from nibabel.nifti2 import Nifti2Header
     from nibabel.spatialimages import HeaderDataError
@@ -25,7 +32,8 @@ def read_nifti(file: Any) -> Volume:
         if b"n+" not in (start[344:346], start[4:6]):
             raise InvalidInput("file", f"packed content of another kind ({start[:8]!r})", "NIfTI")
         try:
-            header: Any = kind(start[:size], check=True)
+            header: Any = kind(start[:size], check=False)
+            header.check_fix(_unheard)
             dtype, shape = header.get_data_dtype(), tuple(int(n) for n in header.get_data_shape())
             slope, intercept = header.get_slope_inter()
             affine, unit = header.get_best_affine(), header.get_xyzt_units()[0]
@@ -34,7 +42,7 @@ def read_nifti(file: Any) -> Volume:
         # A volume of one moment often has a fourth axis of length 1.
         while len(shape) > 3 and shape[-1] == 1:
             shape = shape[:-1]
-        count = declared("dim", shape, dtype)
+        count = declared("dim", shape, dtype, check)
         offset = int(header["vox_offset"])
         if not size <= offset <= LONGEST_HEADER:
             raise InvalidInput("vox_offset", offset, f"{size} to {LONGEST_HEADER} bytes")

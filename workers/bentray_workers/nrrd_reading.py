@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import gzip
+from collections.abc import Sequence
 from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .bounded_reading import LONGEST_HEADER, UNITS_M, declared, refusing, whole
+from .bounded_reading import LONGEST_HEADER, UNITS_M, ShapeCheck, any_shape, declared, refusing, whole
 from .volume_file import Volume
 
 NRRD_TYPES = {
@@ -26,8 +28,11 @@ NRRD_TYPES = {
 }
 
 
-def read_nrrd(file: IO[bytes]) -> Volume:
-    """The volume in an NRRD file with its values after the header; raises InvalidInput for anything else."""
+def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
+    """The volume in an NRRD file with its values after the header; raises InvalidInput for anything else.
+
+    ``check`` is called with the shape before the values are read.
+    """
     import nrrd
 
     start = file.read(LONGEST_HEADER)
@@ -52,7 +57,7 @@ def read_nrrd(file: IO[bytes]) -> Volume:
             raise InvalidInput("type", repr(header["type"]), "a type of numbers")
         dtype = dtype.newbyteorder(">" if header.get("endian") == "big" else "<")
         shape = tuple(int(n) for n in header["sizes"])
-        count = declared("sizes", shape, dtype)
+        count = declared("sizes", shape, dtype, check)
         file.seek(min(ends))
         encoding = header["encoding"]
         if encoding == "raw":
@@ -68,11 +73,24 @@ def read_nrrd(file: IO[bytes]) -> Volume:
 
 def _nrrd_grid(header: Any) -> tuple[list[float], list[float]]:
     """Spacing and origin, m."""
-    named = header.get("space units") or header.get("units") or ["mm"]
-    unit = str(named[0]).strip('" ') or "mm"
-    if unit not in UNITS_M:
-        raise InvalidInput("units", repr(unit), "one of " + ", ".join(UNITS_M))
+    # Spacings are told in the units of the array's axes, directions and origin in those of space.
+    own, space = header.get("units"), header.get("space units")
+    around = _metres(space or own)
     directions = header.get("space directions")
-    steps = header.get("spacings", [1.0] * 3) if directions is None else np.linalg.norm(directions, axis=1)
-    origin = header.get("space origin", [0.0] * 3)
-    return [float(s) * UNITS_M[unit] for s in steps], [float(x) * UNITS_M[unit] for x in origin]
+    if directions is None:
+        steps = np.multiply(header.get("spacings", [1.0] * 3), _metres(own or space))
+    else:
+        steps = np.linalg.norm(directions * around, axis=1)
+    origin = np.multiply(header.get("space origin", [0.0] * 3), around)
+    return steps.tolist(), origin.tolist()
+
+
+def _metres(names: Sequence[str] | None) -> NDArray[np.float64]:
+    """What each of three axes is measured in, m; mm where the header does not tell."""
+    units = [str(name).strip('" ') or "mm" for name in names or ["mm"] * 3]
+    for unit in units:
+        if unit not in UNITS_M:
+            raise InvalidInput("units", repr(unit), "one of " + ", ".join(UNITS_M))
+    if len(units) != 3:
+        raise InvalidInput("units", ", ".join(units), "three, one for each axis")
+    return np.array([UNITS_M[unit] for unit in units])

@@ -12,7 +12,7 @@ import numpy as np
 
 from bentray_kernels.errors import InvalidInput
 
-from .bounded_reading import LARGEST_BYTES, declared, refusing
+from .bounded_reading import LARGEST_BYTES, ShapeCheck, any_shape, declared, refusing
 from .hdf5_reading import SIGNATURE, Limits, opened, printable
 from .nifti_reading import read_nifti
 from .nrrd_reading import read_nrrd
@@ -50,7 +50,7 @@ class Given:
     dtype: str | None = None
 
 
-def import_volume(path: Path, given: Given | None = None) -> Volume:
+def import_volume(path: Path, given: Given | None = None, check: ShapeCheck = any_shape) -> Volume:
     """Read a volume in any of the formats.
 
     Axes stay in the order of the file, x first; how the grid is turned in space is not kept. What NRRD and
@@ -59,59 +59,60 @@ def import_volume(path: Path, given: Given | None = None) -> Volume:
     Args:
         path: of the file.
         given: what it does not say.
+        check: of the shape, called before the values are read.
 
     Raises:
-        InvalidInput: for anything else, for more than ``LARGEST_BYTES``, for values that are not real and
-            finite, and for uneven slices.
+        InvalidInput: from ``check``, for anything else, for more than ``LARGEST_BYTES``, for values that are
+            not real and finite or that float32 cannot tell apart, and for uneven slices.
     """
     given = given or Given()
     try:
         with path.open("rb") as file:
             start = file.read(540)
             file.seek(0)
-            volume = _read(path, file, start, given)
+            volume = _read(path, file, start, given, check)
     except OSError as error:
         raise InvalidInput("file", f"{path.name}: {error.strerror or error}", ACCEPTED) from None
     return replace(volume, title=printable(given.title)[:200]) if given.title else volume
 
 
-def _read(path: Path, file: IO[bytes], start: bytes, given: Given) -> Volume:
+def _read(path: Path, file: IO[bytes], start: bytes, given: Given, check: ShapeCheck) -> Volume:
     if given.shape is not None or given.dtype is not None:
-        return _raw(path, given)
+        return _raw(path, given, check)
     if start.startswith(b"\x93NUMPY"):
-        return _numpy(path, file, given)
+        return _numpy(path, file, given, check)
     if given.spacing_m is not None:
         raise InvalidInput(
             "spacing_m", given.spacing_m, "nothing: this file tells it, or is of no known format"
         )
     if start.startswith(SIGNATURE):
-        return _hdf5(path)
+        return _hdf5(path, check)
     if start.startswith(b"NRRD000"):
-        return read_nrrd(file)
+        return read_nrrd(file, check)
     if start.startswith(b"\x1f\x8b"):
         with refusing("file", "a whole NIfTI file packed with gzip"), gzip.open(file) as unpacked:
-            return read_nifti(unpacked)
+            return read_nifti(unpacked, check)
     if start[344:348] == b"n+1\0" or start[4:8] == b"n+2\0":
-        return read_nifti(file)
+        return read_nifti(file, check)
     found = "an empty file" if not start else f"a file of another kind (it begins with {start[:8]!r})"
     raise InvalidInput("file", found, ACCEPTED)
 
 
-def _raw(path: Path, given: Given) -> Volume:
+def _raw(path: Path, given: Given, check: ShapeCheck) -> Volume:
     if given.shape is None or given.dtype is None:
         missing = "shape" if given.shape is None else "dtype"
         raise InvalidInput(missing, "nothing", "both shape and dtype for raw bytes")
     if given.dtype not in RAW_TYPES:
         raise InvalidInput("dtype", repr(given.dtype), "one of " + ", ".join(RAW_TYPES))
     dtype, size = RAW_TYPES[given.dtype], path.stat().st_size
-    count = declared("shape", given.shape, dtype)
+    count = declared("shape", given.shape, dtype, check)
     if size != count:
         raise InvalidInput("file", f"{size} bytes", f"{count} bytes, as shape and dtype say")
     values = np.memmap(path, dtype, "r", shape=tuple(given.shape), order="F")
     return Volume.of(values, _spacing(given))
 
 
-def _numpy(path: Path, file: IO[bytes], given: Given) -> Volume:
+def _numpy(path: Path, file: IO[bytes], given: Given, check: ShapeCheck) -> Volume:
     with refusing("file", "a whole NumPy file of numbers"):
         version = np.lib.format.read_magic(file)
         if version == (1, 0):
@@ -122,7 +123,7 @@ def _numpy(path: Path, file: IO[bytes], given: Given) -> Volume:
             raise InvalidInput(
                 "file", f"NumPy's format {version}", "1.0 or 2.0, as numpy.save writes numbers"
             )
-        count = declared("values", shape, dtype)
+        count = declared("values", shape, dtype, check)
         left = path.stat().st_size - file.tell()
         if left < count:
             raise InvalidInput("file", f"{left} bytes of values", f"{count}, as its header says")
@@ -130,10 +131,14 @@ def _numpy(path: Path, file: IO[bytes], given: Given) -> Volume:
         return Volume.of(values, _spacing(given))
 
 
-def _hdf5(path: Path) -> Volume:
+def _hdf5(path: Path, check: ShapeCheck) -> Volume:
     limits = Limits(total_bytes=LARGEST_BYTES)
     with opened(path, limits) as reader:
         kind = reader.text("", "format")
+        place = "values" if kind == FORMAT else "speed_mps"
+        values = reader.checked(place, "buif", "(nx, ny, nz) numbers")
+        if values is not None:
+            check(values.shape)
         if kind == FORMAT:
             return volume_in(reader)
     if kind != RECONSTRUCTION:

@@ -86,7 +86,7 @@ def render(
 
     from bentray_workers.atomic import write_bytes
     from bentray_workers.images.png import png_of, read_picture
-    from bentray_workers.scene_cache import build, filtered_of
+    from bentray_workers.scene_cache import build, check_size, filtered_of
     from bentray_workers.volume_reading import Given, import_volume
 
     card = None if picture is None else read_picture(picture)
@@ -95,7 +95,7 @@ def render(
         volume = _sampled(phantom, nodes)
     else:
         given = Given(spacing_m=tuple(spacing) if spacing else None, shape=shape, dtype=dtype)
-        volume = import_volume(input_file(file, ACCEPTED), given)
+        volume = import_volume(input_file(file, ACCEPTED), given, check_size)
     started = time.perf_counter()
     view = view.within(*volume.range())
     scene = build(filtered_of(volume, view.filter, view.smoothing), view.layers())
