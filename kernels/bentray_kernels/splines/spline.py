@@ -82,8 +82,7 @@ class Spline:
     def _read(
         self, volume: ArrayLike, read: Filter, prefilter: bool, smoothing: float, dtype: DTypeLike
     ) -> None:
-        if dtype not in (np.float64, np.float32):
-            raise InvalidInput("dtype", np.dtype(dtype), "float64 or float32")
+        kind = _type_of(dtype)
         nodes = _checked(volume)
         if read.order and prefilter:
             nodes = coefficients_of(nodes, read.order, smoothing)
@@ -92,14 +91,12 @@ class Spline:
         self.shape = nodes.shape
         self._last = tuple(n - 1.0 for n in nodes.shape)
         self.filter = read
-        self.stencil: Stencil = stencil_of(read, dtype)
+        self.stencil: Stencil = stencil_of(read, kind)
         self.pad = border_of(read)[0]
         with np.errstate(over="ignore"):
-            nodes = nodes.astype(dtype)
+            nodes = nodes.astype(kind)
         if not np.isfinite(nodes).all():
-            raise InvalidInput(
-                "volume", "values too large to filter", f"values that {np.dtype(dtype)} can hold"
-            )
+            raise InvalidInput("volume", "values too large to filter", f"values that {kind} can hold")
         self.coefficients: Any = np.ascontiguousarray(np.pad(nodes, border_of(read), mode="reflect"))
 
     def value(self, points: ArrayLike) -> Floats:
@@ -137,6 +134,17 @@ class Spline:
         if places.ndim != 2 or places.shape[1] != len(self.shape):
             raise InvalidInput("points", f"shape {places.shape}", f"shape (m, {len(self.shape)}), nodes")
         return places
+
+
+def _type_of(dtype: DTypeLike) -> np.dtype[Any]:
+    accepted = "float64 or float32"
+    try:
+        kind = np.dtype(dtype)
+    except TypeError:
+        raise InvalidInput("dtype", repr(dtype), accepted) from None
+    if kind not in (np.float64, np.float32):
+        raise InvalidInput("dtype", kind, accepted)
+    return kind
 
 
 def _checked(volume: ArrayLike) -> Floats:

@@ -40,6 +40,15 @@ def test_an_order_may_be_any_kind_of_whole_number():
         assert np.array_equal(Spline(volume, order).coefficients, Spline(volume, 4).coefficients)
 
 
+@pytest.mark.parametrize("dtype", [np.float32, "float32", "f4", np.dtype("f4"), "float64", "d", float])
+def test_a_type_may_be_named_in_any_way_that_numpy_knows(dtype):
+    volume = rough_volume(0, (6, 5, 7))
+    points = np.random.default_rng(1).uniform(0.0, 4.0, (9, 3))
+    made, expected = Spline(volume, dtype=dtype), Spline(volume, dtype=np.dtype(dtype).type)
+    assert made.coefficients.dtype == np.dtype(dtype)
+    assert np.array_equal(made.value(points), expected.value(points))
+
+
 def test_the_cubic_is_the_default():
     assert Spline(rough_volume(0, (4, 4))).filter.name == "bspline3"
 
@@ -88,6 +97,8 @@ NAN = np.where(np.arange(12).reshape(3, 4) == 6, np.nan, 1.0)
         ({"volume": VOLUME, "smoothing": float("nan")}, "smoothing.*nan"),
         ({"volume": VOLUME, "smoothing": 1.0, "prefilter": False}, "smoothing"),
         ({"volume": VOLUME, "dtype": np.int32}, "dtype.*int32"),
+        ({"volume": VOLUME, "dtype": ">f8"}, "dtype.*>f8"),
+        ({"volume": VOLUME, "dtype": "wide"}, "dtype.*wide"),
         ({"volume": np.full((3, 4), 1e300), "dtype": np.float32}, "volume.*float32"),
         ({"volume": 1e308 * (-1.0) ** np.arange(9), "order": 6}, "volume.*float64"),
     ],
