@@ -55,7 +55,7 @@ def smoothing_for_noise(volume: ArrayLike, order: int, sigma: float | None = Non
     half; there the cosine transform turns the prefilter into a product, so that no λ needs a spline.
 
     Args:
-        volume: (x[, y[, z]]), finite, at least two nodes along each axis.
+        volume: (x[, y[, z]]), finite, at least two nodes along each axis; three without sigma.
         order: of the B-spline, 2 to 6.
         sigma: standard deviation of the noise, in the volume's unit; by ``noise_of`` if it is not known.
             For data rounded to whole numbers it is 1/√12.
@@ -64,12 +64,19 @@ def smoothing_for_noise(volume: ArrayLike, order: int, sigma: float | None = Non
         λ for ``Spline``: 0 where there is no noise, at most 1e6.
 
     Raises:
-        InvalidInput: for a sigma below 0 or NaN.
+        InvalidInput: for a sigma that is not finite or below 0, another order, fewer nodes, and values that
+            are not finite.
     """
-    sigma = noise_of(volume) if sigma is None else sigma
-    if not sigma >= 0.0:
-        raise InvalidInput("sigma", sigma, "a number >= 0")
+    if order not in range(2, 7):
+        raise InvalidInput("order", order, "a whole number from 2 to 6")
     nodes = np.asarray(volume, dtype=np.float64)
+    if min(nodes.shape, default=0) < 2:
+        raise InvalidInput("volume", f"shape {nodes.shape}", "at least two nodes along each axis")
+    if not np.isfinite(nodes).all():
+        raise InvalidInput("volume", "values that are not finite", "finite values")
+    sigma = noise_of(volume) if sigma is None else sigma
+    if not 0.0 <= sigma < math.inf:
+        raise InvalidInput("sigma", sigma, "a finite number >= 0")
     power = dctn(nodes - nodes.mean(), type=1) ** 2
     for axis, n in enumerate(nodes.shape):
         shares = np.full(n, 2.0)

@@ -1,5 +1,7 @@
 """The smoothing that fits the noise: what is left over, and how the noise is found."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -89,8 +91,27 @@ def test_the_response_is_the_fourier_transform():
         assert found[0] == pytest.approx(waves @ coefficients, abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        ({"sigma": -0.1}, "sigma: found -0.1"),
+        ({"sigma": math.nan}, "sigma: found nan"),
+        ({"sigma": math.inf}, "sigma: found inf"),
+        ({"order": 7}, "order: found 7"),
+        ({"order": 1}, "order: found 1"),
+        ({"volume": np.ones((1, 5, 5))}, r"volume: found shape \(1, 5, 5\)"),
+        ({"volume": np.ones((1, 5, 5)), "sigma": None}, r"volume: found shape \(1, 5, 5\)"),
+        ({"volume": np.ones((2, 5, 5)), "sigma": None}, r"volume: found shape \(2, 5, 5\).*three"),
+        ({"volume": np.float64(3.0)}, r"volume: found shape \(\)"),
+        ({"volume": np.full((4, 4), np.nan)}, "volume: found values that are not finite"),
+        ({"volume": np.full((4, 4), np.inf), "sigma": None}, "volume: found values that are not finite"),
+    ],
+)
+def test_what_no_smoothing_fits_is_refused(words, named):
+    with pytest.raises(InvalidInput, match=named):
+        smoothing_for_noise(**{"volume": np.ones((4, 4)), "order": 3, "sigma": 0.1} | words)
+
+
 def test_what_has_no_noise_level_is_refused():
-    with pytest.raises(InvalidInput, match="sigma"):
-        smoothing_for_noise(np.ones((4, 4)), 3, -0.1)
     with pytest.raises(InvalidInput, match=r"volume.*\(2, 5\)"):
         noise_of(np.ones((2, 5)))
