@@ -24,6 +24,9 @@ KEPT = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
 
 # Between nodes, m. Far beyond these, what is made of them leaves the range of numbers.
 LEAST_SPACING_M, MOST_SPACING_M = 1e-9, 1e3
+MOST_FLOAT32 = float(np.finfo(np.float32).max)
+# Parts of its range that a volume must still show when it becomes float32, as many as 8 bits have.
+LEVELS = 256
 Triple = tuple[float, float, float]
 
 
@@ -66,13 +69,16 @@ class Volume:
         origin_m: Sequence[float] = (0.0, 0.0, 0.0),
         title: str = "",
     ) -> Volume:
-        """A volume of numbers of any real type, in a type that is kept."""
+        """A volume of numbers of any real type, in a type that is kept.
+
+        Raises:
+            InvalidInput: as the volume itself, and for values that float32 cannot hold or tell apart.
+        """
         given = np.asarray(values)
         check_type("values", given.dtype)
+        check_shape("values", given.shape)
         kept = given.dtype.newbyteorder("=")
-        # Numbers beyond float32 become infinite, which is refused above.
-        with np.errstate(over="ignore"):
-            stored = np.ascontiguousarray(given, dtype=kept if kept in KEPT else np.float32)
+        stored = np.ascontiguousarray(given, dtype=kept) if kept in KEPT else _as_float32(given)
         return cls(
             stored,
             tuple(float(step) for step in spacing_m),  # type: ignore[arg-type]
@@ -83,6 +89,31 @@ class Volume:
     def range(self) -> tuple[float, float]:
         """Least and greatest value."""
         return float(self.values.min()), float(self.values.max())
+
+
+def _as_float32(given: NDArray[Any]) -> NDArray[np.float32]:
+    """The same in float32; raises InvalidInput where that spoils the values."""
+    low, high = given.min().item(), given.max().item()
+    biggest = max(abs(low), abs(high))
+    if MOST_FLOAT32 < biggest < math.inf:
+        found = low if abs(low) == biggest else high
+        raise InvalidInput(
+            "values", f"{found:g}, beyond float32", f"numbers up to {MOST_FLOAT32:.2g} in size"
+        )
+    # A number too large beside an infinite one: both are refused with the volume.
+    with np.errstate(over="ignore"):
+        stored = np.ascontiguousarray(given, dtype=np.float32)
+    if not math.isfinite(biggest) or not 0 < high - low < LEVELS * np.spacing(np.float32(biggest)):
+        return stored
+    # The finest steps that float32 has there are coarse; values that lie on them are no worse for it.
+    lost = max(
+        float(np.abs(np.subtract(mine, theirs, dtype=np.longdouble)).max())
+        for mine, theirs in zip(given, stored, strict=True)
+    )
+    if lost > (high - low) / LEVELS:
+        found = f"{low} to {high}, values that float32 cannot tell apart"
+        raise InvalidInput("values", found, "numbers near 0 beside their range; subtract an offset first")
+    return stored
 
 
 def check_shape(field: str, shape: Sequence[int]) -> None:
