@@ -16,7 +16,7 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
-from starlette.routing import Match
+from starlette.routing import Match, Mount
 
 from bentray_kernels.errors import InvalidInput
 
@@ -26,6 +26,7 @@ log = logging.getLogger("bentray.errors")
 
 MEDIA_TYPE = "application/problem+json"
 LONGEST_FOUND = 120
+METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
 
 JOB_KINDS = ("reconstruction", "refraction")
 
@@ -190,8 +191,14 @@ def _http(request: Request, error: Exception) -> Response:
 
 def _methods(request: Request) -> list[str]:
     """What can be asked of this address; the router itself names the first route alone."""
-    routes = [route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE]
-    return sorted({method for route in routes for method in getattr(route, "methods", None) or ()})
+    # A mount takes every method at first; it holds static files, which can only be read.
+    routes = [route for route in request.app.routes if not isinstance(route, Mount)]
+    found = [
+        method
+        for method in METHODS
+        if any(route.matches({**request.scope, "method": method})[0] is Match.FULL for route in routes)
+    ]
+    return found or ["GET", "HEAD"]
 
 
 def _gone(request: Request, error: Exception) -> Response:

@@ -4,7 +4,8 @@ import logging
 import re
 
 import pytest
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
+from fastapi.staticfiles import StaticFiles
 from fastapi.testclient import TestClient
 from starlette.requests import ClientDisconnect
 
@@ -83,6 +84,29 @@ def test_router_errors_are_problems_too(http):
     assert (wrong.status_code, wrong.json()["type"]) == (405, "/problems/method-not-allowed")
     assert wrong.headers["allow"] == "GET, POST"
     assert "accepted: GET, POST" in wrong.json()["detail"]
+
+
+def test_methods_are_told_of_included_routers_and_static_files_too(tmp_path):
+    router = APIRouter(prefix="/v1")
+
+    @router.head("/things/{name}")
+    @router.get("/things/{name}")
+    def thing(name: str):
+        return name
+
+    @router.post("/things/{name}")
+    def change(name: str):
+        return name
+
+    app = FastAPI()
+    errors.install(app)
+    app.include_router(router)
+    app.mount("/static", StaticFiles(directory=tmp_path))
+    http = TestClient(app)
+    for address, allowed in (("/v1/things/one", "GET, HEAD, POST"), ("/static/app.js", "GET, HEAD")):
+        answer = http.delete(address)
+        assert (answer.status_code, answer.headers["allow"]) == (405, allowed)
+        assert answer.json()["detail"].endswith(f"accepted: {allowed}")
 
 
 @pytest.mark.parametrize("body", [b"\xff", b"[" * 50_000, b"9" * 5000], ids=["bytes", "nesting", "digits"])

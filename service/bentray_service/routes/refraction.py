@@ -13,6 +13,7 @@ from .pictures import PICTURE, check_renderable, picture
 router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
 
 
+@router.head("/{volume_id}/refraction.png", include_in_schema=False)
 @router.get("/{volume_id}/refraction.png", response_class=Response, responses=PICTURE)
 def refraction_png(
     volume_id: str,

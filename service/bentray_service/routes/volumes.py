@@ -81,6 +81,7 @@ def show_volume(volume_id: str, service: Service) -> VolumeRecord:
     return volume_record(service.volumes.get(volume_id))
 
 
+@router.head("/{volume_id}/slice.png", include_in_schema=False)
 @router.get("/{volume_id}/slice.png", response_class=Response, responses=PICTURE)
 def slice_png(
     volume_id: str,

@@ -96,6 +96,24 @@ def test_a_known_picture_is_not_cast_again(http, cluster):
     assert len(cluster.submitted) == cast
 
 
+def test_any_picture_is_known_by_a_star(http, cluster):
+    here = put(http)
+    cast = len(cluster.submitted)
+    assert http.get(here, params=SMALL, headers={"If-None-Match": "*"}).status_code == 304
+    assert len(cluster.submitted) == cast
+
+
+def test_the_head_of_a_picture(http):
+    here = put(http)
+    whole, head = http.get(here, params=SMALL), http.head(here, params=SMALL)
+    assert head.status_code == 200
+    for name in ("etag", "content-type", "content-length"):
+        assert head.headers[name] == whole.headers[name]
+    assert http.head(here, params={"iso": 7}).status_code == 422
+    refused = http.delete(here)
+    assert (refused.status_code, refused.headers["allow"]) == (405, "GET, HEAD")
+
+
 def test_without_an_iso_value_the_middle_of_the_range(http):
     here, middle = put(http), dict(SMALL, iso=0.5)
     low, high = sampled(ONE_HOLE, 12).min(), sampled(ONE_HOLE, 12).max()

@@ -47,6 +47,13 @@ def test_a_known_picture_is_not_drawn_again(http, here, cluster):
     assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", tag)
     assert len(cluster.submitted) == drawn
     assert http.get(f"{here}/slice.png?low=1400", headers={"If-None-Match": tag}).status_code == 200
+    assert http.get(f"{here}/slice.png?low=1300", headers={"If-None-Match": "*"}).status_code == 304
+
+
+def test_the_head_of_a_slice(http, here):
+    whole, head = http.get(f"{here}/slice.png"), http.head(f"{here}/slice.png")
+    assert (head.status_code, head.headers["etag"]) == (200, whole.headers["etag"])
+    assert head.headers["content-length"] == str(len(whole.content))
 
 
 @pytest.mark.parametrize(
