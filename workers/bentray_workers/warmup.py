@@ -12,6 +12,7 @@ from bentray_kernels.eikonal import methods
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography import Settings, reconstruct
 
+from . import refusal_log
 from .refraction import strip
 from .refraction_view import RefractionView
 from .scene_cache import build, filtered_of
@@ -41,5 +42,6 @@ def warm_up_rendering() -> None:
 
 def dask_setup(worker: Any) -> None:
     """Called by Dask in each worker that preloads this module."""
+    refusal_log.install()
     warm_up()
     warm_up_rendering()
