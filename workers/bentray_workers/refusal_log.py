@@ -13,7 +13,7 @@ def shorten(record: logging.LogRecord) -> bool:
     if message.startswith("Compute Failed") and isinstance(given, tuple) and len(given) == 5:
         key, refused = given[0], str(given[3])
         if refused.startswith(InvalidInput.__name__):
-            record.levelno, record.levelname = logging.INFO, "INFO"
+            record.levelno, record.levelname = logging.WARNING, "WARNING"
             record.msg, record.args = "Refused: %s in %s", (refused, key)
     return True
 
