@@ -38,6 +38,8 @@ class Commands(TyperGroup):
             context = getattr(error, "ctx", None)
             hint = f" (see {context.command_path} --help)" if context is not None else ""
             _end(error.format_message().rstrip(".") + hint, error.exit_code)
+        except MemoryError as error:
+            _end(f"memory is too short: {str(error) or 'no more can be had'}", WORK_FAILED)
         except OSError as error:
             _end(f"{error.filename or 'the system'}: {error.strerror or error}", WORK_FAILED)
         sys.exit(code if isinstance(code, int) else 0)

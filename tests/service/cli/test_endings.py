@@ -37,6 +37,8 @@ def ending(raised: BaseException | None) -> Result:
         (InvalidInput("nodes", 3, "16 to 2048"), 2, "bentray: nodes: found 3; accepted: 16 to 2048\n"),
         (WorkFailed("no worker\nis left"), 1, "bentray: no worker is left\n"),
         (PermissionError(13, "Permission denied", "out/x"), 1, "bentray: out/x: Permission denied\n"),
+        (MemoryError("9 GiB"), 1, "bentray: memory is too short: 9 GiB\n"),
+        (MemoryError(), 1, "bentray: memory is too short: no more can be had\n"),
         (OSError("odd"), 1, "bentray: the system: odd\n"),
         (KeyboardInterrupt(), 130, ""),
         (typer.Exit(3), 3, ""),
