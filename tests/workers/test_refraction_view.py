@@ -73,6 +73,14 @@ def test_an_iso_value_out_of_range_is_told_the_range():
         RefractionView(iso=(7.0,)).within(1400.0, 1600.0)
 
 
+def test_smoothing_leaves_the_iso_value_to_the_range_behind_the_filter():
+    view = RefractionView(smoothing=10.0).within(0.0, 255.0)
+    assert view.iso == ()
+    assert view.filtered_within(-8.0, 100.0).iso == (46.0,)
+    with pytest.raises(InvalidInput, match="accepted: -8 to 100, the range of the volume after smoothing"):
+        RefractionView(iso=(127.5,), smoothing=10.0).filtered_within(-8.0, 100.0)
+
+
 def test_water_may_lie_between_two_surfaces():
     layers = RefractionView(iso=(1.0, 2.0), index=(1.0, 0.9), outside=1.2, surroundings=1).layers()
     assert (layers.indices, layers.surroundings) == ((1.2, 1.0, 0.9), 1)

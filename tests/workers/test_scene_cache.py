@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import ONE_HOLE, sampled
+from bentray_kernels.splines import Spline
 from bentray_workers import scene_cache
 from bentray_workers.reconstruction_file import write_reconstruction
 from bentray_workers.refraction_view import RefractionView
@@ -61,6 +62,19 @@ def test_a_scene_has_the_middle_of_its_volume_at_0(path):
     scene = scene_at(path, RefractionView())
     np.testing.assert_allclose(scene.origin, -0.5 * 11 * np.array([1e-3, 1e-3, 2e-3]))
     assert scene.layers.isos[0] == pytest.approx(0.5 * (BALL.min() + BALL.max()))
+
+
+def test_the_default_surface_of_a_smoothed_volume_lies_within_it(tmp_path):
+    """A small cube loses more than half of its height, and the middle of the stored range is above all."""
+    cube = np.zeros((32, 32, 32), np.uint8)
+    cube[12:20, 12:20, 12:20] = 255
+    write_volume(tmp_path / "cube.h5", Volume.of(cube, (1e-3,) * 3))
+    scene = scene_at(tmp_path / "cube.h5", RefractionView(smoothing=100.0))
+    nodes = Spline(cube, smoothing=100.0).value(np.argwhere(np.ones(cube.shape)))
+    assert nodes.max() < 127.5
+    assert scene.layers.isos[0] == pytest.approx(0.5 * (nodes.min() + nodes.max()))
+    with pytest.raises(InvalidInput, match=r"iso: found 127\.5; .*, the range of the volume after smoothing"):
+        scene_at(tmp_path / "cube.h5", RefractionView(iso=(127.5,), smoothing=100.0))
 
 
 def test_another_glass_shares_the_octree(path):

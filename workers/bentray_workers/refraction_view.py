@@ -54,7 +54,7 @@ class RefractionView:
     """
 
     iso: tuple[float, ...] = asked(
-        (), "Rising iso-values, unit of the volume; without any, the middle of its range."
+        (), "Rising iso-values, unit of the volume; without any, the middle of its range after smoothing."
     )
     index: tuple[float, ...] = asked((1.5,), "Refractive index above each iso-value.")
     outside: float = asked(1.0, "Refractive index below the first iso-value.")
@@ -120,15 +120,34 @@ class RefractionView:
     def within(self, low: float, high: float) -> RefractionView:
         """The same for a volume with values from ``low`` to ``high``: with an iso-value, if it has none.
 
+        With smoothing it gets none yet: that changes the range, and ``filtered_within`` takes the middle of
+        the new one.
+
         Raises:
             InvalidInput: for an iso-value out of that range, or a volume that has one value only.
         """
+        self._check_range(low, high, "the range of the volume")
+        return self if self.iso or self.smoothing else self._at_middle(low, high)
+
+    def filtered_within(self, low: float, high: float) -> RefractionView:
+        """The same for a volume whose nodes lie from ``low`` to ``high`` behind the filter, as ``within``.
+
+        Raises:
+            InvalidInput: as ``within``.
+        """
+        words = "the range of the volume after smoothing" if self.smoothing else "the range of the volume"
+        self._check_range(low, high, words)
+        return self if self.iso else self._at_middle(low, high)
+
+    def _check_range(self, low: float, high: float, words: str) -> None:
         if not low < high:
             raise InvalidInput("volume", f"{low:.6g} everywhere", "a volume whose values differ")
         for iso in self.iso:
             if not low <= iso <= high:
-                raise InvalidInput("iso", f"{iso:g}", f"{low:.6g} to {high:.6g}, the range of the volume")
-        return self if self.iso else replace(self, iso=(0.5 * (low + high),))
+                raise InvalidInput("iso", f"{iso:g}", f"{low:.6g} to {high:.6g}, {words}")
+
+    def _at_middle(self, low: float, high: float) -> RefractionView:
+        return replace(self, iso=(0.5 * (low + high),))
 
     def plain(self) -> dict[str, Any]:
         """Its fields as JSON has them."""

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.refraction import Layers, Scene
+from bentray_kernels.refraction.scene import range_at_nodes
 from bentray_kernels.splines import Spline
 
 from .bounded_reading import LARGEST_BYTES
@@ -72,7 +73,7 @@ class Source(NamedTuple):
 
 
 class Filtered(NamedTuple):
-    """A volume behind its filter."""
+    """A volume behind its filter; the range is that at the nodes, which smoothing changes."""
 
     spline: Spline
     spacing_m: tuple[float, float, float]
@@ -116,7 +117,7 @@ def scene_at(path: Path, view: RefractionView) -> Scene:
         needed_bytes(shape, SPLINE_BYTES),
         lambda: filtered_of(import_volume(path), view.filter, view.smoothing),
     )
-    layers = view.within(*filtered.range).layers()
+    layers = view.filtered_within(*filtered.range).layers()
     # The octree and its box know iso-values and surroundings alone, so that another glass costs nothing.
     scene: Scene = _SCENES.get(
         (source, layers.isos, layers.surroundings),
@@ -141,7 +142,8 @@ def filtered_of(volume: Volume, filter_name: str, smoothing: float) -> Filtered:
     check_even(volume.values.shape, volume.spacing_m)
     check_size(volume.values.shape)
     spline = Spline.of(volume.values, filter_name, smoothing=smoothing)
-    return Filtered(spline, volume.spacing_m, volume.range())
+    # Where nothing is smoothed the filter passes through the nodes, but for rounding.
+    return Filtered(spline, volume.spacing_m, range_at_nodes(spline) if smoothing else volume.range())
 
 
 def build(filtered: Filtered, layers: Layers) -> Scene:

@@ -108,7 +108,7 @@ class Scene:
         octree = octree_of(cells, layers.isos)
         for bit, iso in enumerate(layers.isos):
             if not octree.masks[-1] >> bit & 1:
-                low, high = _range_at_nodes(spline)
+                low, high = range_at_nodes(spline)
                 raise InvalidInput("iso", iso, f"between {low:.6g} and {high:.6g}, the volume's range")
         origin = np.asarray(centre_m, dtype=np.float64) - 0.5 * spacing * (np.array(spline.shape) - 1.0)
         edges = [edge for axis in range(3) for edge in _ends(axis)]
@@ -151,8 +151,8 @@ def _ends(axis: int) -> tuple[tuple[slice | int, ...], tuple[slice | int, ...]]:
     return (*before, 0), (*before, -1)
 
 
-def _range_at_nodes(spline: Spline) -> tuple[float, float]:
-    """Least and greatest value at the nodes; plane by plane, since volumes may be large."""
+def range_at_nodes(spline: Spline) -> tuple[float, float]:
+    """Least and greatest value of (nx, ny, nz) nodes; plane by plane, since volumes may be large."""
     x, y, z = spline.shape
     plane = np.stack(np.meshgrid(np.arange(y), np.arange(z), indexing="ij"), axis=-1).reshape(-1, 2)
     ends = []

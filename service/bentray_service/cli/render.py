@@ -98,7 +98,9 @@ def render(
         volume = import_volume(input_file(file, ACCEPTED), given, check_size)
     started = time.perf_counter()
     view = view.within(*volume.range())
-    scene = build(filtered_of(volume, view.filter, view.smoothing), view.layers())
+    filtered = filtered_of(volume, view.filter, view.smoothing)
+    view = view.filtered_within(*filtered.range)
+    scene = build(filtered, view.layers())
     built = time.perf_counter()
     with progress_bar("Rendering") as step:
         strips = _drawn(scene, view, card, step)
