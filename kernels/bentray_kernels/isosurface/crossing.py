@@ -19,6 +19,11 @@ UNKNOWN = (math.nan, math.nan, math.nan)
 TOLERANCE = 1e-9
 SHORTEST = 1e-7
 
+# Halvings that a ray may take; each comes with two readings of the field at most. Most rays take fewer than
+# ten, a grazing one some twenty at each surface, and one through noise, met by surfaces everywhere, some
+# hundreds. On a plateau of the field at an iso-value there would be no end of them.
+MOST_HALVINGS = 512
+
 
 class Search(NamedTuple):
     """How crossings are found.
@@ -49,7 +54,8 @@ def leave_interval(
     above: float,
     sought: int,
     slope: float,
-) -> tuple[float, int, Vector]:
+    halvings: int,
+) -> tuple[float, int, Vector, int]:
     """First s, start < s < stop, where the field is no longer between ``below`` and ``above``.
 
     A ray is in a layer of the object; the iso-values about it are the interval. So nested iso-surfaces, and
@@ -64,18 +70,20 @@ def leave_interval(
         below, above: the interval, in which the field lies just after start.
         sought: bits of the two in ``Octree.masks``.
         slope: of the field along the ray at start, per unit of s, if start lies on an iso-surface; else 0.
+        halvings: how often a piece of the ray may still be halved.
 
     Returns:
-        s; +1 where the field rises above the interval, −1 where it falls below it, 0 if it does not; and the
-        gradient there, per node, NaN where it was not needed.
+        s; +1 where the field rises above the interval, −1 where it falls below it, 0 if it does not; the
+        gradient there, per node, NaN where it was not needed; and the halvings that are left, −1 where one
+        more was needed: then nothing is known beyond s.
     """
     speed = math.sqrt(ray.along_x**2 + ray.along_y**2 + ray.along_z**2)
     if search.step > 0.0:
         step = search.step / speed
-        found, side, gradient, _ = _scan(
-            field, ray, False, speed, start, math.nan, stop, step, 0.0, below, above
+        found, side, gradient, _, halvings = _scan(
+            field, ray, False, speed, start, math.nan, stop, step, 0.0, below, above, halvings
         )
-        return found, side, gradient
+        return found, side, gradient, halvings
     cells_x, cells_y, cells_z = octree.levels[0, 1], octree.levels[0, 2], octree.levels[0, 3]
     i = min(max(int(ray.x + start * ray.along_x), 0), cells_x - 1)
     j = min(max(int(ray.y + start * ray.along_y), 0), cells_y - 1)
@@ -112,11 +120,11 @@ def leave_interval(
             else:
                 certain = bend if search.roots != BRENT else 0.0
                 smooth = search.roots == CERTAIN
-                found, side, gradient, value = _scan(
-                    field, ray, smooth, speed, s, value, end, end - s, certain, below, above
+                found, side, gradient, value, halvings = _scan(
+                    field, ray, smooth, speed, s, value, end, end - s, certain, below, above, halvings
                 )
-            if side != 0:
-                return found, side, gradient
+            if side != 0 or halvings < 0:
+                return found, side, gradient, halvings
         else:
             value, slope = math.nan, 0.0
         s = out
@@ -154,7 +162,7 @@ def leave_interval(
         while changed > 1 and level < search.top:
             changed >>= 1
             level += 1
-    return stop, 0, UNKNOWN
+    return stop, 0, UNKNOWN, halvings
 
 
 @kernel(inline="always")
@@ -199,7 +207,8 @@ def _scan(
     bend: float,
     below: float,
     above: float,
-) -> tuple[float, int, Vector, float]:
+    halvings: int,
+) -> tuple[float, int, Vector, float, int]:
     """The first way out of the interval between start and stop, in steps that are halved where in doubt.
 
     Over a length h the field departs from its chord by at most bend·h²/8. So it stays in the interval where
@@ -209,9 +218,10 @@ def _scan(
     Args:
         smooth: whether the gradient is the values' own.
         value: the field at start, NaN where unknown.
+        halvings: as in ``leave_interval``.
 
     Returns:
-        As ``leave_interval``, and the field where the search ended.
+        As ``leave_interval``, with the field where the search ended before the halvings that are left.
     """
     a = start
     if math.isnan(value):
@@ -228,18 +238,22 @@ def _scan(
             length = min(2.0 * length, step)
         elif not inside and (abs(value_b - value_a) >= 4.0 * sag or (b - a) * speed <= SHORTEST):
             target, side = (above, 1) if value_b >= above else (below, -1)
-            if smooth and abs(value_b - value_a) >= 4.0 * sag:
+            # Where the field stays on the bound, Newton's method has no slope to follow.
+            if smooth and abs(value_b - value_a) > 4.0 * sag:
                 found, gradient = newton(field, ray, target, a, value_a, b, value_b, bend, TOLERANCE / speed)
             else:
                 found = brent(field, ray, target, a, value_a, b, value_b, TOLERANCE / speed)
                 gradient = UNKNOWN
-            return found, side, gradient, target
+            return found, side, gradient, target, halvings
         elif (b - a) * speed <= SHORTEST:
             a, value_a = b, value_b
             length = min(2.0 * length, step)
         else:
+            halvings -= 1
+            if halvings < 0:
+                return a, 0, UNKNOWN, value_a, halvings
             length = 0.5 * (b - a)
-    return stop, 0, UNKNOWN, value_a
+    return stop, 0, UNKNOWN, value_a, halvings
 
 
 @kernel(inline="always")

@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..compiled import kernel
-from ..isosurface.crossing import Search, leave_interval
+from ..isosurface.crossing import MOST_HALVINGS, Search, leave_interval
 from ..isosurface.octree import Octree
 from ..isosurface.roots import Field, Ray, field_at, point_at, ray_of
 from ..splines.sampling import value_and_gradient_at
 from .optics import Vector, refracted
 from .scene import Scene
 
-# What became of a ray: it met nothing; it was refracted; it did not leave within the depth limit.
+# What became of a ray: it met nothing; it was refracted; it did not leave within the depth limit, or ran
+# along an iso-surface so closely that the search for crossings was given up.
 MISSED, REFRACTED, LOST = 0, 1, 2
 
 
@@ -157,6 +158,7 @@ def _follow(
 ) -> None:
     crossed, weight = 0, 1.0
     layer, entered, slope = 0, False, 0.0
+    halvings = MOST_HALVINGS
     fate = MISSED
     while True:
         ray = in_nodes(medium, origin, direction)
@@ -177,7 +179,7 @@ def _follow(
                 if not passed:
                     break
                 continue
-        s, side, gradient = leave_interval(
+        s, side, gradient, halvings = leave_interval(
             medium.field,
             medium.octree,
             search,
@@ -189,10 +191,11 @@ def _follow(
             # Iso-value m − 1 lies below layer m, iso-value m above it.
             (1 << layer) | (1 << layer >> 1),
             slope,
+            halvings,
         )
-        if side == 0 and layer == medium.around:
+        if side == 0 and halvings >= 0 and layer == medium.around:
             break
-        if crossed == depth:
+        if crossed == depth or halvings < 0:
             fate = LOST
             break
         origin = _moved(origin, direction, s)

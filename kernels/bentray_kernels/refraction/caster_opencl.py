@@ -218,6 +218,7 @@ class OpenCLCaster:
             f"HOW={_way(search)}",
             f"TOLERANCE={tolerance}",
             f"SHORTEST={shortest}",
+            f"MOST_HALVINGS={crossing.MOST_HALVINGS}",
             f"DEEPEST={STEPS}",
         )
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Floats
 from ..compiled import kernel
 from ..errors import InvalidInput
-from ..isosurface.crossing import Search, leave_interval
+from ..isosurface.crossing import MOST_HALVINGS, Search, leave_interval
 from .backdrop import Colours
 from .camera import Camera
 from .caster import Medium, affine, gradient_at, in_nodes, layer_at, medium_of, through_box, unit_normal
@@ -99,7 +99,7 @@ def _shade(
             if not far > near:
                 continue
             layer = layer_at(medium, ray, near)
-            s, side, gradient = leave_interval(
+            s, side, gradient, _ = leave_interval(
                 medium.field,
                 medium.octree,
                 search,
@@ -110,6 +110,7 @@ def _shade(
                 medium.levels[layer + 1],
                 (1 << layer) | (1 << layer >> 1),
                 0.0,
+                MOST_HALVINGS,
             )
             if side == 0:
                 continue

@@ -8,12 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.compiled import kernel
-from bentray_kernels.isosurface import BOUNDS, cell_ranges
+from bentray_kernels.isosurface import BOUNDS, cell_ranges, crossing
 from bentray_kernels.isosurface.crossing import (
     ANALYTIC,
     BRENT,
     CERTAIN,
     CERTAIN_BRENT,
+    MOST_HALVINGS,
     Search,
     leave_interval,
 )
@@ -35,12 +36,13 @@ def leave(
     span: tuple[float, float],
     interval: tuple[float, float],
     slope: float,
-) -> tuple[float, int]:
+    halvings: int,
+) -> tuple[float, int, int]:
     ray = ray_of(origin, along)
-    s, side, _ = leave_interval(
-        field, octree, search, ray, span[0], span[1], interval[0], interval[1], 255, slope
+    s, side, _, left = leave_interval(
+        field, octree, search, ray, span[0], span[1], interval[0], interval[1], 255, slope, halvings
     )
-    return s, side
+    return s, side, left
 
 
 class Case:
@@ -71,9 +73,19 @@ class Case:
 
     def leave(self, search: Search, start: float, interval: tuple[float, float], slope: float = 0.0):
         field = Field(self.spline.coefficients, self.spline.stencil)
-        return leave(
-            field, self.octree, search, tuple(self.origin), tuple(self.along), (start, 1.0), interval, slope
+        s, side, left = leave(
+            field,
+            self.octree,
+            search,
+            tuple(self.origin),
+            tuple(self.along),
+            (start, 1.0),
+            interval,
+            slope,
+            MOST_HALVINGS,
         )
+        assert left >= 0
+        return s, side
 
 
 def searches(case: Case, name: str) -> list[Search]:
@@ -195,3 +207,46 @@ def test_a_surface_on_the_face_of_cells_is_left_behind(name):
         second, side = case.leave(search, start, (4.0, 7.0), 9.0)
         assert side == 1
         assert 1.0 + 9.0 * second == pytest.approx(7.0, abs=1e-4)
+
+
+def plateau(seed: int) -> Case:
+    """A 0/1 volume whose filter leaves ripples about an iso-value of 0 everywhere."""
+    case = Case(seed, "bspline3")
+    axis = np.arange(24.0) - 11.5
+    solid = axis[:, None, None] ** 2 + axis[:, None] ** 2 + axis**2 < 36.0
+    case.spline = Spline(solid.astype(np.uint8))
+    case.isos = np.array([0.0])
+    case.octree = octree_of(cell_ranges(case.spline, case.isos, "bernstein"), case.isos)
+    ends = np.random.default_rng(seed).uniform(0.0, 23.0, (2, 3))
+    ends[:, 0] = 0.0, 23.0
+    case.origin, case.along = ends[0], ends[1] - ends[0]
+    return case
+
+
+@pytest.mark.parametrize("halvings", [0, 20, MOST_HALVINGS])
+def test_a_ray_on_a_plateau_is_given_up_after_so_many_readings(monkeypatch, halvings):
+    readings, given_up = [], 0
+    read = crossing.field_at
+    monkeypatch.setattr(crossing, "field_at", lambda *args: readings.append(1) or read(*args))
+    monkeypatch.setattr(crossing, "_scan", crossing._scan.py_func)
+    for seed in range(20):
+        case = plateau(seed)
+        field, ray = (
+            Field(case.spline.coefficients, case.spline.stencil),
+            ray_of(tuple(case.origin), tuple(case.along)),
+        )
+        search, s, side, left = Search(CERTAIN, 5, 0.0), 0.0, 1, halvings
+        interval = (-np.inf, 0.0) if float(case.field([0.0])[0]) <= 0.0 else (0.0, np.inf)
+        readings.clear()
+        calls = 0
+        while side != 0 and left >= 0 and calls < 16:
+            s, side, _, left = crossing.leave_interval.py_func(
+                field, case.octree, search, ray, s, 1.0, *interval, 1, 0.0, left
+            )
+            interval, calls = ((-np.inf, 0.0) if side < 0 else (0.0, np.inf)), calls + 1
+        # Two beside each halving; of cells the ray meets at most 69, and one again in each call.
+        assert len(readings) <= 2 * (halvings + 1) + 2 * (69 + calls)
+        assert left >= -1
+        assert side == 0 or left >= 0
+        given_up += left < 0
+    assert given_up >= 5

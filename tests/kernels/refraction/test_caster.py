@@ -200,3 +200,30 @@ def test_a_point_without_a_normal_lets_rays_straight_through():
     traced = trace(made, [[-0.999, 0.999, 0.0]], [[1.0, -1.0, 0.0]])
     assert np.isfinite(traced.direction).all()
     assert np.linalg.norm(traced.direction[0]) == pytest.approx(1.0)
+
+
+def plateaus() -> list[Scene]:
+    """Volumes that are 0, or 1, over large parts, looked at by just that iso-value."""
+    half_open = (100.0 * (0.4 - distance(24))).clip(0.0, 40.0)
+    mask = (distance(24) < 0.3).astype(np.uint8)
+    ways = [(half_open, 0.0, "bspline3"), (mask, 0.0, "bspline3"), (mask, 1.0, "bspline6")]
+    ways += [(mask, 0.0, "catmull-rom"), (mask, 1.0, "catmull-rom"), (mask, 0.0, "trilinear")]
+    return [
+        Scene.build(Spline.of(volume, name), Layers((iso,), (1.0, 1.5)), 1.0 / 23)
+        for volume, iso, name in ways
+    ]
+
+
+def test_rays_that_run_along_a_surface_for_long_are_lost():
+    random = np.random.default_rng(5)
+    starts = np.column_stack([random.uniform(-0.45, 0.45, (40, 2)), np.full(40, -2.0)])
+    ahead = random.normal([0, 0, 1], 0.05, (40, 3))
+    for made in plateaus():
+        traced = trace(made, starts, ahead, depth=200)
+        assert (traced.fate == LOST).any()
+        assert np.isfinite(traced.point).all()
+        assert np.isfinite(traced.direction).all()
+    # Given up by the search, short of the most interfaces.
+    first = trace(plateaus()[1], starts, ahead, depth=200)
+    given_up = (first.fate == LOST) & (first.crossed < 200)
+    assert given_up.sum() >= 10

@@ -20,7 +20,7 @@ from bentray_kernels.refraction import (
     perspective,
     render,
 )
-from bentray_kernels.refraction.caster import REFRACTED, Traced, cast, medium_of, space_for
+from bentray_kernels.refraction.caster import LOST, REFRACTED, Traced, cast, medium_of, space_for
 from bentray_kernels.refraction.caster_opencl import OpenCLCaster, on_the_device
 from bentray_kernels.splines import Spline
 
@@ -141,6 +141,20 @@ def test_float32_finds_directions_to_a_thousandth():
         found, expected = both(scene, "float32", depth=3, paths=False)
         assert strays(found, expected, 1e-9) > 0
         assert strays(found, expected, 1e-3) <= 6
+
+
+def test_rays_that_run_along_a_surface_for_long_are_lost():
+    """In place of the case above: with the most interfaces there, rounding decides what those rays meet."""
+    mask = (distance(24) < 0.3).astype(np.uint8)
+    scene = Scene.build(Spline.of(mask, "bspline6"), Layers((1.0,), (1.0, 1.5)), 1.0 / 23)
+    found, expected = both(scene, depth=200)
+    given_up = (expected.fate == LOST) & (expected.crossed < 200)
+    assert given_up.sum() >= 10
+    assert strays(found, expected, 1e-6) <= 3
+    # Where hardly any ray is sure, the device is not believed.
+    rippled = Scene.build(Spline(mask), Layers((0.0,), (1.0, 1.5)), 1.0 / 23)
+    with pytest.warns(OpenCLFallbackWarning, match="caster.cast takes over"):
+        test_caster.trace(rippled, [[0.1, 0.1, -2.0]], [[0.0, 0.0, 1.0]])
 
 
 def test_the_backdrop_behind_a_ball_is_seen_exactly_where_it_is():

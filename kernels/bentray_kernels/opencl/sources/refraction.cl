@@ -3,7 +3,8 @@
 // REAL: float or double, of places, directions and roots. SUM: the same for the coefficients and their sums.
 // TAPS: nodes that a point reads along one axis. POWERS: of the weights' polynomials. WIDTH: numbers of a row
 // of the tables (Stencil.weights). HOW: CERTAIN, CERTAIN_BRENT, BRENT or ANALYTIC within cells, or STEPS
-// without them. TOLERANCE, SHORTEST: nodes, as in isosurface/crossing.py. DEEPEST: steps of a root finder.
+// without them. TOLERANCE, SHORTEST (nodes) and MOST_HALVINGS: as in isosurface/crossing.py. DEEPEST: steps of
+// a root finder.
 // A function does what the one of its name does in isosurface or refraction. Scalars only: not every device
 // computes vectors of doubles right. A fraction is written R(0.5): a bare one would turn floats into doubles.
 
@@ -51,11 +52,13 @@ typedef struct {
     int top;
 } Octree;
 
-// What of a crossing is sought and found: the interval (below, above) and its bits in the masks; s, the side
-// by which the field leaves, and its gradient there, per node, where it is known.
+// What of a crossing is sought and found: the interval (below, above) and its bits in the masks; the halvings
+// that are left, -1 where one more was needed; s, the side by which the field leaves, and its gradient there,
+// per node, where it is known.
 typedef struct {
     REAL below, above;
     int sought;
+    int halvings;
     REAL s;
     int side;
     bool known;
@@ -293,7 +296,8 @@ REAL scan(const Field *field, const Ray *ray, REAL speed, REAL start, REAL value
             way->side = value_b >= above ? 1 : -1;
             const REAL target = way->side > 0 ? above : below, tolerance = R(TOLERANCE) / speed;
 #if HOW == CERTAIN
-            if (size_of(value_b - value_a) >= 4 * sag) {
+            // Where the field stays on the bound, Newton's method has no slope to follow.
+            if (size_of(value_b - value_a) > 4 * sag) {
                 way->s = newton(field, ray, target, a, value_a, b, value_b, bend, tolerance, &way->gradient);
                 way->known = true;
                 return target;
@@ -301,6 +305,8 @@ REAL scan(const Field *field, const Ray *ray, REAL speed, REAL start, REAL value
 #endif
             way->s = brent(field, ray, target, a, value_a, b, value_b, tolerance);
             return target;
+        } else if (--way->halvings < 0) {
+            return value_a;
         } else {
             length = R(0.5) * (b - a);
         }
@@ -450,7 +456,7 @@ void leave_interval(const Field *field, const Octree *octree, REAL step, const R
 #else
                 value = scan(field, ray, speed, s, value, end, end - s, HOW == BRENT ? 0 : bend, way);
 #endif
-                if (way->side != 0)
+                if (way->side != 0 || way->halvings < 0)
                     return;
             }
         }
@@ -580,7 +586,7 @@ kernel void follow(global const SUM *coefficients, constant const SUM *tables, c
     Vector direction = affine(camera + 9, places[2 * n], places[2 * n + 1]);
     direction = scaled(1 / sqrt(dot3(direction, direction)), direction);
 
-    int crossed = 0, layer = around, fate = MISSED;
+    int crossed = 0, layer = around, fate = MISSED, halvings = MOST_HALVINGS;
     bool entered = false, leaving = false;
     REAL weight = 1, slope = 0;
     while (!leaving) {
@@ -615,11 +621,12 @@ kernel void follow(global const SUM *coefficients, constant const SUM *tables, c
         Vector gradient = {0, 0, 0};
         if (!face) {
             // Iso-value m - 1 lies below layer m, iso-value m above it.
-            Way way = {levels[layer], levels[layer + 1], (1 << layer) | (1 << layer >> 1)};
+            Way way = {levels[layer], levels[layer + 1], (1 << layer) | (1 << layer >> 1), halvings};
             leave_interval(&field, &octree, step, &ray, start, far, slope, &way);
-            if (way.side == 0 && layer == around)
+            halvings = way.halvings;
+            if (way.side == 0 && halvings >= 0 && layer == around)
                 break;
-            if (crossed == depth) {
+            if (crossed == depth || halvings < 0) {
                 fate = LOST;
                 break;
             }
