@@ -48,6 +48,9 @@ class CellRanges(NamedTuple):
 def cell_ranges(spline: Spline, isos: Sequence[float], bound: str) -> CellRanges:
     """Bound the field in every cell; no cell with one of the iso-values is ever missed.
 
+    This holds for fields within the range of float32, in which the bounds are kept; ``Scene.build`` refuses
+    others.
+
     The range of the coefficients ("bmcc") is taken first; cells where it holds an iso-value get a closer
     bound. So the ranges hold for every iso-value, and are close for those named.
 

@@ -19,6 +19,10 @@ from ..splines.spline import Spline
 ROOTS = {"certain": CERTAIN, "brent": BRENT, "analytic": ANALYTIC}
 STRUCTURES = ("octree", "dda", "steps")
 
+# The largest coefficient of a field, in size. Cells are bounded in float32, with room for their bends above,
+# and below for differences between values.
+LEAST_BIGGEST, MOST_BIGGEST = 1e-30, 1e35
+
 
 @dataclass(frozen=True)
 class Layers:
@@ -96,11 +100,15 @@ class Scene:
             bound: as in ``isosurface.cell_ranges``.
 
         Raises:
-            InvalidInput: for a volume not in space, an iso-value that the field nowhere has, a spacing that
-                is not above 0, or an unknown bound.
+            InvalidInput: for a volume not in space or beyond the range of float32, an iso-value that the
+                field nowhere has, a spacing that is not above 0, or an unknown bound.
         """
         if len(spline.shape) != 3:
             raise InvalidInput("volume", f"{len(spline.shape)} dimensions", "3 dimensions")
+        biggest = float(max(spline.coefficients.max(), -spline.coefficients.min()))
+        if not (biggest == 0.0 or LEAST_BIGGEST <= biggest <= MOST_BIGGEST):
+            accepted = f"values up to {MOST_BIGGEST:g}, the largest at least {LEAST_BIGGEST:g}"
+            raise InvalidInput("volume", f"values behind its filter up to {biggest:g} in size", accepted)
         spacing = np.broadcast_to(np.asarray(spacing_m, dtype=np.float64), 3).copy()
         if not ((spacing > 0.0) & np.isfinite(spacing)).all():
             raise InvalidInput("spacing_m", spacing.tolist(), "finite distances > 0 m")

@@ -62,6 +62,21 @@ def test_impossible_spacings_are_refused(spacing):
         Scene.build(Spline(VOLUME), Layers((0.0,), (1.0, 1.5)), spacing)
 
 
+@pytest.mark.parametrize("scale", [1e-31, 1e36, 1e300])
+def test_volumes_beyond_float32_are_refused(scale):
+    with pytest.raises(InvalidInput, match=r"volume: found .*; accepted: values up to 1e\+35, .* 1e-30"):
+        Scene.build(Spline(scale * VOLUME), Layers((0.1 * scale,), (1.0, 1.5)))
+
+
+@pytest.mark.parametrize("scale", [1e-28, 1e34])
+def test_volumes_within_float32_have_the_same_surfaces(scale):
+    scaled = Scene.build(Spline(scale * VOLUME), Layers((0.1 * scale,), (1.0, 1.5)))
+    np.testing.assert_array_equal(
+        scaled.octree.masks, Scene.build(Spline(VOLUME), Layers((0.1,), (1.0, 1.5))).octree.masks
+    )
+    assert np.isfinite(scaled.octree.bend).all()
+
+
 def test_flat_volumes_are_refused():
     with pytest.raises(InvalidInput, match="volume: found 2 dimensions"):
         Scene.build(Spline(VOLUME[0]), Layers((0.0,), (1.0, 1.5)))
