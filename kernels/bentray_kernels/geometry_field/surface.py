@@ -1,0 +1,94 @@
+"""A mesh as rays need it: its triangles in the order of a hierarchy of boxes, with their neighbours."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Ints
+from ..errors import InvalidInput
+from .hierarchy import build_hierarchy
+from .mesh import Chart
+
+Words = NDArray[np.int32]
+Reals = NDArray[np.float32]
+
+# 4-byte words of a triangle and of a node: a line of the cache each.
+WORDS = 16
+
+
+class Surface(NamedTuple):
+    """A mesh in the unit cube, its faces in an order in which near ones stand together.
+
+    Attributes:
+        triangles: (faces, 16) float32: three corners of x, y, z; then words of ``links``.
+        links: the same memory as int32: words 9, 10, 11 are the faces across the edges 01, 12, 20, −1 for
+            none, all in this order of faces.
+        nodes: (nodes, 16) float32: lower and upper corner of the first child's box, of the second's.
+        children: the same memory as int32: words 12 and 13 are the children: a node, or the complement of
+            8·first face + number of faces.
+        normals: (faces, 3 corners, 3) float32 unit vectors outward, smooth over the mesh.
+        uv: (faces, 3 corners, 2) float32, as ``Chart.uv``.
+        order: (faces,) rows of the chart's mesh.
+    """
+
+    triangles: Reals
+    links: Words
+    nodes: Reals
+    children: Words
+    normals: Reals
+    uv: Reals
+    order: Words
+
+
+def surface_of(chart: Chart) -> Surface:
+    """Sort a mesh's faces into boxes and link each with its neighbours.
+
+    Args:
+        chart: its mesh in the unit cube, closed or open.
+
+    Raises:
+        InvalidInput: for a mesh without faces, with too many, or outside the unit cube.
+    """
+    mesh = chart.mesh
+    if not 1 <= len(mesh.faces) < 1 << 27:
+        raise InvalidInput("faces", len(mesh.faces), f"1 to {(1 << 27) - 1} faces")
+    corners = mesh.corners.astype(np.float32)
+    if not (corners.min() >= -1e-6 and corners.max() <= 1.0 + 1e-6):
+        found = f"{corners.min():.6g} to {corners.max():.6g}"
+        raise InvalidInput("vertices", found, "a mesh in the unit cube (TriangleMesh.in_unit_cube)")
+    order = np.arange(len(corners), dtype=np.int32)
+    nodes = np.zeros((max(2 * len(corners), 2), WORDS), dtype=np.float32)
+    lows, highs = corners.min(axis=1), corners.max(axis=1)
+    used = build_hierarchy(lows, highs, order, nodes, nodes.view(np.int32))
+    nodes, loose = _lines(used), nodes
+    nodes[:] = loose[:used]
+    triangles = _lines(len(corners))
+    triangles[:, :9] = corners[order].reshape(-1, 9)
+    links = triangles.view(np.int32)
+    links[:, 9:12] = _neighbours(mesh.faces[order])
+    normals = mesh.vertex_normals[mesh.faces[order]].astype(np.float32)
+    uv = np.ascontiguousarray(chart.uv[order], dtype=np.float32)
+    return Surface(triangles, links, nodes, nodes.view(np.int32), normals, uv, order)
+
+
+def _lines(count: int) -> Reals:
+    """(count, 16) zeros, each row one line of the cache: near misses are what a lookup spends its time on."""
+    room = np.zeros(count * WORDS + WORDS, dtype=np.float32)
+    start = -room.ctypes.data % (4 * WORDS) // 4
+    return room[start : start + count * WORDS].reshape(count, WORDS)
+
+
+def _neighbours(faces: NDArray[np.int32]) -> Ints:
+    """(faces, 3) the face across each edge, −1 where there is none or more than one."""
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].astype(np.int64), axis=2).reshape(-1, 2)
+    _, place, count = np.unique(edges[:, 0] << 32 | edges[:, 1], return_inverse=True, return_counts=True)
+    sides = np.argsort(place, kind="stable")
+    first = np.concatenate([[0], np.cumsum(count)[:-1]])
+    pair = count == 2
+    a, b = sides[first[pair]], sides[first[pair] + 1]
+    across = np.full(len(edges), -1, dtype=np.int64)
+    across[a], across[b] = b // 3, a // 3
+    return across.reshape(-1, 3)
