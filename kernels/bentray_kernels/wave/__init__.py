@@ -1,0 +1,29 @@
+"""Acoustic waves in a plane: a finite-difference simulator, its adjoint, waveform refinement of an image."""
+
+from .adjoint import Slope, slope, stored_bytes
+from .chain import Image, Standing, WaveChain, WaveScan
+from .continuation import Refined, refine
+from .medium import Medium
+from .preparation import prepare
+from .problem import WaveProblem
+from .settings import Band, WaveSettings, bands
+from .simulation import simulate
+
+__all__ = [
+    "Band",
+    "Image",
+    "Medium",
+    "Refined",
+    "Slope",
+    "Standing",
+    "WaveChain",
+    "WaveProblem",
+    "WaveScan",
+    "WaveSettings",
+    "bands",
+    "prepare",
+    "refine",
+    "simulate",
+    "slope",
+    "stored_bytes",
+]

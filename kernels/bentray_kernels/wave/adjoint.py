@@ -1,0 +1,137 @@
+"""The adjoint of the simulator: how a misfit changes with the speed at every node, from one reverse run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..compiled import kernel
+from ..errors import InvalidInput
+from .medium import Medium
+from .points import Points
+from .simulation import forward, placed
+from .stencil import weights
+from .stepping import advance, inject
+
+# A misfit of simulated traces (nrx, nt): its value, and its derivative by every sample.
+Misfit = Callable[[NDArray[Any]], tuple[float, Floats]]
+
+
+class Slope(NamedTuple):
+    """What one emitter says of the image.
+
+    Attributes:
+        misfit: its value.
+        gradient: (nx, ny), of the misfit by the speed, s/m.
+        illumination: (nx, ny), energy of what a change would radiate; large near the emitter.
+    """
+
+    misfit: float
+    gradient: Floats
+    illumination: Floats
+
+
+def stored_bytes(medium: Medium, samples: int, every: int = 1) -> int:
+    """Bytes of wave field that ``slope`` keeps: the image every ``every``-th of ``samples`` steps."""
+    return -(-samples // every) * medium.speed.size * medium.keep.dtype.itemsize
+
+
+def slope(
+    medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floats, misfit: Misfit, every: int = 1
+) -> Slope:
+    """Misfit of one emitter's traces and its gradient (Plessix, Geophys. J. Int. 167, 2006).
+
+    The gradient is that of the discrete scheme: exact for ``every = 1``. A larger step keeps less of the wave
+    field, and is as good while it samples the highest frequency more than twice a period. The damping of
+    the medium is held fixed; so are the edges.
+
+    Args:
+        emitter: (2,), m.
+        receivers: (nrx, 2), m.
+        wavelet: (nt,), as for ``simulate``.
+        misfit: of the traces.
+        every: time steps from one stored field to the next.
+
+    Raises:
+        InvalidInput: as ``simulate``; a step between fields below 1.
+    """
+    if every < 1:
+        raise InvalidInput("every", every, "at least 1 step")
+    source, heard = placed(medium, np.atleast_2d(emitter), wavelet), placed(medium, receivers)
+    traces, scattered = forward(medium, source, heard, wavelet, every)
+    value, residual = misfit(traces)
+    image, light = backward(medium, heard, residual, scattered, every)
+    c = medium.speed
+    return Slope(value, 2.0 * every * float(np.abs(wavelet).max()) * image / c, light)
+
+
+def backward(
+    medium: Medium, heard: Points, residual: Floats, scattered: NDArray[Any], every: int
+) -> tuple[Floats, Floats]:
+    """The adjoint field correlated with a stored one: (nx, ny), and the energy of the stored one.
+
+    Args:
+        heard: the receivers.
+        residual: (nrx, nt), derivative of the misfit by every sample.
+        scattered: as ``forward`` gives it.
+    """
+    kind = medium.keep.dtype
+    fields = np.zeros((2, *medium.keep.shape), kind)
+    image, light = np.zeros(medium.speed.shape), np.zeros(medium.speed.shape)
+    scale = float(np.abs(residual).max())
+    _backward(
+        fields[0],
+        fields[1],
+        medium.keep,
+        medium.fade,
+        medium.drive,
+        weights().astype(kind),
+        heard.first,
+        heard.weights,
+        (residual / (scale or 1.0)).astype(kind),
+        medium.margin,
+        every,
+        scattered,
+        image,
+        light,
+    )
+    return scale * image, light
+
+
+@kernel
+def _backward(
+    now: Any,
+    old: Any,
+    keep: Any,
+    fade: Any,
+    drive: Any,
+    weights: Any,
+    first: Any,
+    along: Any,
+    residual: Any,
+    margin: int,
+    every: int,
+    scattered: Any,
+    image: Any,
+    light: Any,
+) -> None:
+    # At the top of turn n, ``now`` is the adjoint field of equation n. Every equation of the scheme is
+    # symmetric but for the order of time, so the field runs backwards under the same step.
+    nx, ny = image.shape
+    for n in range(residual.shape[1] - 1, -1, -1):
+        if n % every == 0:
+            for i in range(nx):
+                adjoint = now[i + margin, margin:]
+                wave = scattered[n // every, i]
+                out, energy = image[i], light[i]
+                for j in range(ny):
+                    out[j] += adjoint[j] * wave[j]
+                    energy[j] += wave[j] * wave[j]
+        advance(now, old, keep, fade, drive, weights)
+        for r in range(residual.shape[0]):
+            inject(old, drive, first[r], along[r], residual[r, n])
+        now, old = old, now

@@ -1,0 +1,59 @@
+"""Elements between nodes: the Kaiser-windowed sinc that spreads a source and reads a field."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import InvalidInput
+
+# Nodes on either side of an element, and the shape of the window (Hicks, Geophysics 67, 2002): with 5, waves
+# of 3.5 nodes and more are read to 0.3 % along each axis. Larger shapes are better only from 4 nodes on: 6.3
+# leaves 1.7 % at 3.5.
+REACH = 4
+SHAPE = 5.0
+
+
+class Points(NamedTuple):
+    """Elements on a grid.
+
+    Attributes:
+        first: (elements, 2), the first node that each one touches.
+        weights: (elements, 2, 2 REACH), along x and along y; a node's weight is the product.
+    """
+
+    first: Ints
+    weights: Floats
+
+
+def place(positions: Floats, spacing: float, shape: tuple[int, int], margin: int) -> Points:
+    """Elements of an image as they lie on the padded grid.
+
+    A source spread with these weights and a field read with them are transposes of each other, so that
+    emitter and receiver may change places.
+
+    Args:
+        positions: (elements, 2), m, node 0 of the image at 0.
+        spacing: of the nodes, m.
+        shape: of the image, nodes.
+        margin: nodes of the padding on every side.
+
+    Raises:
+        InvalidInput: for an element outside the image.
+    """
+    where = np.asarray(positions, dtype=np.float64) / spacing
+    if where.ndim != 2 or where.shape[1] != 2:
+        raise InvalidInput("element_position_m", f"shape {where.shape}", "(elements, 2)")
+    outside = ~((where >= 0.0) & (where <= np.array(shape) - 1.0)).all(axis=1)
+    if outside.any():
+        k = int(np.flatnonzero(outside)[0])
+        raise InvalidInput(
+            "element_position_m", f"{positions[k]} for element {k}", "positions inside the image"
+        )
+    below = np.floor(where).astype(np.int64)
+    offset = (where - below)[:, :, None] + (REACH - 1 - np.arange(2 * REACH))
+    inside = np.sqrt(np.clip(1.0 - (offset / REACH) ** 2, 0.0, None))
+    window = np.where(np.abs(offset) <= REACH, np.i0(SHAPE * inside) / np.i0(SHAPE), 0.0)
+    return Points(below - (REACH - 1) + margin, np.sinc(offset) * window)

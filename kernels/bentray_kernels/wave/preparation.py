@@ -1,0 +1,117 @@
+"""A problem from a dataset: grid, clock, pairs, the draw of emitters."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..acquisition import Dataset
+from ..arrays import Floats, Ints
+from ..errors import InvalidInput
+from ..tomography.roi import inside
+from .points import REACH
+from .problem import WaveProblem
+from .sampling import FALL, Clock, Water
+from .settings import WaveSettings
+from .sounding import Mapping, WaterShots, sounded
+from .stencil import longest_step
+
+# Part of the stable time step that is used, for the absorbing edges shorten it.
+SAFE = 0.95
+
+# Times the period of the upper corner that the filter may spread ahead of the first sample.
+LEAD = 2.0
+
+
+def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mapping = map) -> WaveProblem:
+    """The problem of a slice in band ``number``, its wavelet and its water's phase read from water shots.
+
+    Args:
+        dataset: one slice with traces of object and water.
+        settings: how to refine.
+        number: of the band, from 0.
+        run: what runs the simulated water shots.
+
+    Raises:
+        InvalidInput: for a dataset that lacks one of the above or, where it is asked for, a region of
+            interest; with all emitters held out, or no node inside the array.
+    """
+    recorded = dataset.waveform
+    if recorded is None or recorded.water is None or dataset.sampling_rate_hz is None:
+        raise InvalidInput("waveform/water", "none", "traces of object and water to refine from")
+    if recorded.object.ndim != 3 or dataset.element_position_m.shape[1] != 2:
+        raise InvalidInput("waveform/object", f"shape {recorded.object.shape}", "one slice in a plane")
+    band, spacing = settings.bands[number], settings.bands[number].spacing_m
+    flat = dataset.element_position_m
+    centre = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
+    nodes = 2 * math.ceil(float(np.abs(flat - centre).max()) / spacing + REACH) + 1
+    axis = spacing * (np.arange(nodes) - 0.5 * (nodes - 1))
+    nearest = float(np.linalg.norm(flat - centre, axis=1).min()) - REACH * spacing
+    origin = centre + axis[0]
+    place = (float(origin[0]), float(origin[1]))
+    region = np.hypot(axis[:, None], axis[None, :]) <= nearest
+    if settings.roi:
+        region &= inside(dataset, region.shape, spacing, place)
+    if not region.any():
+        raise InvalidInput("spacing_m", spacing, "nodes inside the array and the region of interest")
+    samples = dataset.t0_s + np.arange(recorded.object.shape[-1]) / dataset.sampling_rate_hz
+    step = SAFE * longest_step(settings.speed_bounds_mps[1], spacing)
+    begin = dataset.t0_s - LEAD / band.high_hz
+    clock = Clock(begin, step, int((samples[-1] - begin) / step))
+    gain, water_gain = (
+        recorded.scale * (np.ones(recorded.object.shape[:2]) if factor is None else factor)
+        for factor in (recorded.object_scale, recorded.water_scale)
+    )
+    weight = _weight(dataset, settings) * (np.isfinite(gain) & np.isfinite(water_gain))
+    used, held = _drawn(np.flatnonzero(weight.any(axis=1)), settings, number)
+    problem = WaveProblem(
+        band=band,
+        emitters=flat[dataset.tx] - origin,
+        receivers=flat[dataset.rx] - origin,
+        region=region,
+        origin=place,
+        clock=clock,
+        wavelet=np.zeros(clock.steps),
+        water=Water(dataset.water_speed_mps),
+        likeness=0.0,
+        weight=weight,
+        arrival_s=dataset.distance_m() / dataset.water_speed_mps,
+        traces=recorded.object,
+        gain=gain,
+        sampler=np.empty((0, 0), dtype=np.float32),
+        used=used,
+        held=held,
+        # The product of two fields ends at twice the filter's end; twice that is sampled.
+        every=max(1, int(1.0 / (2.2 * (1.0 + FALL) * band.high_hz) / step)),
+    )
+    return sounded(problem, WaterShots(recorded.water, water_gain, samples, settings.window_s), run)
+
+
+def _weight(dataset: Dataset, settings: WaveSettings) -> Floats:
+    """(ntx, nrx): 1 for the pairs to use: valid, far enough, neither of their traces dead."""
+    assert dataset.waveform is not None
+    assert dataset.waveform.water is not None
+    use = dataset.distance_m() >= settings.nearest_m
+    if dataset.valid is not None:
+        use &= dataset.valid
+    for traces in (dataset.waveform.object, dataset.waveform.water):
+        use &= (traces != 0).any(axis=-1)
+    return use.astype(np.float64)
+
+
+def _drawn(sounding: Ints, settings: WaveSettings, number: int) -> tuple[Ints, Ints]:
+    """The emitters of a band, other ones in each, and those held out, the same in all.
+
+    The circle is cut into as many parts as emitters are wanted, and one is drawn from each.
+    """
+    places = np.linspace(0, sounding.size, settings.held_out, endpoint=False).astype(np.int64)
+    held = sounding[np.unique(places)] if sounding.size else sounding
+    rest = np.setdiff1d(sounding, held)
+    if rest.size == 0:
+        raise InvalidInput("held_out", settings.held_out, f"fewer than the {sounding.size} emitters")
+    wanted = min(settings.bands[number].emitters, rest.size)
+    edges = np.linspace(0, rest.size, wanted + 1)
+    chance = np.random.default_rng((settings.seed, number)).random(wanted)
+    drawn = (edges[:-1] + chance * np.diff(edges)).astype(np.int64)
+    return rest[np.unique(np.minimum(drawn, rest.size - 1))], held

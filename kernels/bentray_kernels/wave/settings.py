@@ -1,0 +1,112 @@
+"""The settings of a waveform refinement: bands of frequency from low to high, and what holds in all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from ..acquisition.dataset import PLAUSIBLE_SPEED_MPS
+from ..errors import InvalidInput
+from .misfits import measure
+
+
+@dataclass(frozen=True)
+class Band:
+    """One step of the continuation in frequency.
+
+    Attributes:
+        low_hz, high_hz: corners of the filter, Hz.
+        spacing_m: of the grid, m; the shortest wave needs 2.5 nodes.
+        iterations: at most.
+        emitters: how many are used, drawn at random; all where there are no more.
+        smoothing_m: standard deviation of the Gaussian on gradients, m; it should shrink with the frequency.
+    """
+
+    low_hz: float
+    high_hz: float
+    spacing_m: float
+    iterations: int = 10
+    emitters: int = 32
+    smoothing_m: float = 2e-3
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.low_hz < self.high_hz < float("inf"):
+            raise InvalidInput("band_hz", (self.low_hz, self.high_hz), "0 < low_hz < high_hz, in Hz")
+        if not 0.0 < self.spacing_m < float("inf"):
+            raise InvalidInput("spacing_m", self.spacing_m, "a finite spacing > 0 m")
+        if self.iterations < 1 or self.emitters < 1:
+            raise InvalidInput("iterations, emitters", (self.iterations, self.emitters), "at least 1 of each")
+        if not 0.0 <= self.smoothing_m < float("inf"):
+            raise InvalidInput("smoothing_m", self.smoothing_m, "a finite length >= 0 m")
+
+
+def bands(centre_hz: float, water_mps: float = 1500.0) -> tuple[Band, ...]:
+    """The continuation for a pulse: half its centre frequency, three quarters, one and an eighth, 1.5 times.
+
+    Grids have 5 to 4.5 nodes in the water's wave at the upper corner.
+
+    Args:
+        centre_hz: of the pulse, Hz.
+        water_mps: speed of the water, m/s.
+    """
+    wave = water_mps / centre_hz
+    return (
+        Band(0.25 * centre_hz, 0.5 * centre_hz, wave / 2.5, 8, 32, 0.8 * wave),
+        Band(0.25 * centre_hz, 0.75 * centre_hz, wave / 3.75, 12, 32, 0.53 * wave),
+        Band(0.25 * centre_hz, 1.125 * centre_hz, wave / 5.0, 16, 40, 0.2 * wave),
+        Band(0.25 * centre_hz, 1.5 * centre_hz, wave / 6.8, 8, 32, 0.13 * wave),
+    )
+
+
+@dataclass(frozen=True)
+class WaveSettings:
+    """How to refine.
+
+    Attributes:
+        bands: gone through in order, each from the image of the one before.
+        misfit: a name of ``misfits.MEASURES``.
+        window_s: (before, after) the arrival in water that traces are compared within, s.
+        nearest_m: pairs nearer than this are left out, m.
+        speed_bounds_mps: (lowest, highest) speed that a node may take, m/s.
+        largest_step_mps: highest rms change of the image in one iteration, m/s.
+        first_step_mps: rms of the first change of a band, m/s, before anything is known of the curvature.
+        memory: pairs of changes that the curvature is read from (L-BFGS).
+        held_out: emitters that only judge.
+        seed: of the draw of emitters.
+        roi: let only the dataset's region of interest change (``mask/roi``).
+    """
+
+    bands: tuple[Band, ...]
+    misfit: Literal["correlation", "least-squares"] = "correlation"
+    window_s: tuple[float, float] = (60e-6, 40e-6)
+    nearest_m: float = 0.03
+    speed_bounds_mps: tuple[float, float] = (1350.0, 1650.0)
+    largest_step_mps: float = 12.0
+    first_step_mps: float = 2.0
+    memory: int = 8
+    held_out: int = 4
+    seed: int = 0
+    roi: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.bands:
+            raise InvalidInput("bands", "none", "at least one band")
+        measure(self.misfit)
+        low, high = self.speed_bounds_mps
+        least, most = PLAUSIBLE_SPEED_MPS
+        if not least <= low < high <= most:
+            raise InvalidInput(
+                "speed_bounds_mps", self.speed_bounds_mps, f"{least:g} <= lowest < highest <= {most:g} m/s"
+            )
+        if min(self.window_s) <= 0.0:
+            raise InvalidInput("window_s", self.window_s, "two times > 0 s")
+        if self.nearest_m < 0.0:
+            raise InvalidInput("nearest_m", self.nearest_m, "a distance >= 0 m")
+        if min(self.largest_step_mps, self.first_step_mps) <= 0.0:
+            raise InvalidInput(
+                "largest_step_mps, first_step_mps",
+                (self.largest_step_mps, self.first_step_mps),
+                "speeds > 0 m/s",
+            )
+        if self.memory < 1 or self.held_out < 0:
+            raise InvalidInput("memory, held_out", (self.memory, self.held_out), "memory >= 1, held_out >= 0")

@@ -1,0 +1,141 @@
+"""Pressure traces of one emitter, and with them the wave field that a gradient needs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..compiled import kernel
+from ..errors import InvalidInput
+from .medium import Medium
+from .points import Points, place
+from .stencil import weights
+from .stepping import advance, curvature, inject, read, spread
+
+# Nodes that the shortest wave of a source must have. Of the phase, space alone takes 6.3 % at 2.5 nodes,
+# 2.2 % at 3, 0.34 % at 4, 0.07 % at 5 (``stencil.phase_error``, which a test measures); ``sampling`` takes
+# out what water has of it, so that a refinement may work near the limit.
+LEAST_POINTS = 2.5
+
+# A source's spectrum is taken to end where its amplitude falls below this part of the highest.
+BAND_EDGE = 0.03
+
+
+def simulate(medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floats) -> Floats:
+    """Traces of a point source.
+
+    Order 2 in time and 8 in space; free of temporal dispersion where wavelet and traces are taken through
+    ``sampling.resampler``. Releases the GIL.
+
+    Args:
+        medium: to travel through.
+        emitter: (2,), m, node 0 of the image at 0.
+        receivers: (nrx, 2), m.
+        wavelet: (nt,), the source s(t) of (1/c^2) p'' - laplacian p = s(t) delta(x), a sample a time step.
+
+    Returns:
+        (nrx, nt), of the medium's type; sample n is the pressure at n time steps.
+
+    Raises:
+        InvalidInput: elements outside the image, a wavelet with waves too short for the grid.
+    """
+    source, heard = placed(medium, np.atleast_2d(emitter), wavelet), placed(medium, receivers)
+    return forward(medium, source, heard, wavelet, 0)[0]
+
+
+def placed(medium: Medium, positions: Floats, wavelet: Floats | None = None) -> Points:
+    """Elements on the medium's grid, in its type; a wavelet is held against the grid as well."""
+    if wavelet is not None:
+        points = points_per_wavelength(medium, wavelet)
+        if points < LEAST_POINTS:
+            raise InvalidInput(
+                "spacing",
+                f"{points:.2f} nodes in the shortest wave",
+                f"at least {LEAST_POINTS:g}: a finer grid or a lower frequency",
+            )
+    found = place(positions, medium.spacing, (medium.speed.shape[0], medium.speed.shape[1]), medium.margin)
+    return Points(found.first, found.weights.astype(medium.keep.dtype))
+
+
+def points_per_wavelength(medium: Medium, wavelet: Floats) -> float:
+    """Nodes in the shortest wave that a wavelet makes."""
+    if wavelet.ndim != 1 or wavelet.size < 2 or not np.isfinite(wavelet).all() or not wavelet.any():
+        raise InvalidInput("wavelet", f"shape {wavelet.shape}", "(nt,) of finite numbers, not all 0")
+    spectrum = np.abs(np.fft.rfft(wavelet, 2 * wavelet.size))
+    frequency = np.fft.rfftfreq(2 * wavelet.size, medium.time_step_s)
+    highest = float(frequency[spectrum >= BAND_EDGE * spectrum.max()].max())
+    return float(medium.speed.min() / (max(highest, frequency[1]) * medium.spacing))
+
+
+def forward(
+    medium: Medium, source: Points, heard: Points, wavelet: Floats, every: int
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Traces, and the source of scattered waves in the image at every ``every``-th step.
+
+    Args:
+        source, heard: as ``placed`` gives them.
+        every: 0: keep nothing.
+
+    Returns:
+        traces: (nrx, nt).
+        scattered: (ceil(nt / every), nx, ny), h^2 (laplacian p + s) over the wavelet's highest value: what
+            a change of 1/c^2 would radiate.
+    """
+    kind = medium.keep.dtype
+    nt = wavelet.size
+    traces = np.empty((len(heard.first), nt), kind)
+    kept = -(-nt // every) if every else 0
+    scattered = np.empty((kept, *medium.speed.shape), kind)
+    fields = np.zeros((2, *medium.keep.shape), kind)
+    scale = float(np.abs(wavelet).max())
+    _forward(
+        fields[0],
+        fields[1],
+        medium.keep,
+        medium.fade,
+        medium.drive,
+        weights().astype(kind),
+        source.first[0],
+        source.weights[0],
+        heard.first,
+        heard.weights,
+        (wavelet / scale).astype(kind),
+        medium.margin,
+        every,
+        traces,
+        scattered,
+    )
+    traces *= kind.type(scale)
+    return traces, scattered
+
+
+@kernel
+def _forward(
+    now: Any,
+    old: Any,
+    keep: Any,
+    fade: Any,
+    drive: Any,
+    weights: Any,
+    first: Any,
+    along: Any,
+    heard_first: Any,
+    heard_along: Any,
+    wavelet: Any,
+    margin: int,
+    every: int,
+    traces: Any,
+    scattered: Any,
+) -> None:
+    for n in range(wavelet.size):
+        for r in range(traces.shape[0]):
+            traces[r, n] = read(now, heard_first[r], heard_along[r])
+        if every > 0 and n % every == 0:
+            curvature(now, weights, margin, scattered[n // every])
+            spread(scattered[n // every], margin, first, along, wavelet[n])
+        advance(now, old, keep, fade, drive, weights)
+        inject(old, drive, first, along, wavelet[n])
+        now, old = old, now

@@ -1,0 +1,131 @@
+"""The adjoint: its gradient against finite differences, the dot products of both directions."""
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.wave import misfits
+from bentray_kernels.wave.adjoint import backward, slope, stored_bytes
+from bentray_kernels.wave.medium import Medium
+from bentray_kernels.wave.simulation import forward, placed, simulate
+
+SPACING, STEP, STEPS = 1e-3, 2e-7, 180
+EMITTER = np.array([0.0123, 0.0201])
+RECEIVERS = np.array([[0.0301, 0.0311], [0.0202, 0.0352], [0.031, 0.012]])
+TIME = np.arange(STEPS) * STEP
+WAVELET = np.exp(-(((TIME - 6e-6) * 2e5) ** 2)) * np.sin(2.0 * np.pi * 2e5 * (TIME - 6e-6))
+
+
+def medium(speed, dtype=np.float64, loss=None):
+    return Medium.of(speed, SPACING, STEP, attenuation=loss, edge_nodes=8, dtype=dtype)
+
+
+def speeds(seed=0, shape=(40, 42)):
+    return 1500.0 + 40.0 * np.random.default_rng(seed).standard_normal(shape)
+
+
+def change(seed, shape=(40, 42)):
+    """A change of the image that leaves its rim, which the edges continue, as it is."""
+    found = np.random.default_rng(seed).standard_normal(shape)
+    found[[0, -1]] = found[:, [0, -1]] = 0.0
+    return found
+
+
+def windows():
+    arrival = np.linalg.norm(RECEIVERS - EMITTER, axis=1) / 1500.0 + 6e-6
+    return misfits.around(arrival, TIME, 6e-6, 8e-6)
+
+
+@pytest.mark.parametrize("name", sorted(misfits.MEASURES))
+@pytest.mark.parametrize("windowed", [False, True])
+def test_gradient_of_every_misfit_is_that_of_finite_differences(name, windowed):
+    weight = windows() if windowed else np.ones((3, 1))
+    recorded = simulate(medium(speeds(1)), EMITTER, RECEIVERS, WAVELET)
+    kind = misfits.measure(name)
+
+    def misfit(traces):
+        return kind(traces, recorded, weight)
+
+    def value(speed):
+        return misfit(simulate(medium(speed), EMITTER, RECEIVERS, WAVELET))[0]
+
+    speed, way = speeds(0), change(2)
+    found = slope(medium(speed), EMITTER, RECEIVERS, WAVELET, misfit)
+    small = 3e-2
+    near = (value(speed + small * way) - value(speed - small * way)) / (2.0 * small)
+    far = (value(speed + 2.0 * small * way) - value(speed - 2.0 * small * way)) / (4.0 * small)
+    assert (found.gradient * way).sum() == pytest.approx((4.0 * near - far) / 3.0, rel=1e-6)
+    assert found.misfit == value(speed) > 0.0
+
+
+def test_gradient_holds_with_loss():
+    loss = np.full((40, 42), 15.0)
+    loss[:20] = 0.0
+    speed, way = speeds(3), change(4)
+
+    def misfit(traces):
+        return 0.5 * float((traces**2).sum()), traces
+
+    # The loss is held as a rate in time, so that the loss over distance changes with the speed.
+    def at(c):
+        return medium(c, loss=loss * speed / c)
+
+    found = slope(at(speed), EMITTER, RECEIVERS, WAVELET, misfit)
+    values = [misfit(simulate(at(speed + s * way), EMITTER, RECEIVERS, WAVELET))[0] for s in (1e-2, -1e-2)]
+    assert (found.gradient * way).sum() == pytest.approx((values[0] - values[1]) / 2e-2, rel=1e-6)
+
+
+def test_source_to_traces_and_back_are_transposes():
+    rng = np.random.default_rng(6)
+    host = medium(speeds(5))
+    source, heard = placed(host, EMITTER[None]), placed(host, RECEIVERS)
+    wavelet, residual = rng.standard_normal(STEPS), rng.standard_normal((3, STEPS))
+    traces, _ = forward(host, source, heard, wavelet, 0)
+    # Read at the emitter, the adjoint field is the transpose of the whole run.
+    turned = np.zeros(STEPS)
+    for r in range(3):
+        one = placed(host, RECEIVERS[r : r + 1])
+        turned += forward(host, one, source, residual[r, ::-1].copy(), 0)[0][0][::-1]
+    assert (traces * residual).sum() == pytest.approx(wavelet @ turned, rel=1e-10)
+
+
+def test_born_modelling_and_the_gradient_are_transposes():
+    rng = np.random.default_rng(8)
+    speed, way = speeds(7), change(9)
+    host = medium(speed)
+    source, heard = placed(host, EMITTER[None]), placed(host, RECEIVERS)
+    _, scattered = forward(host, source, heard, WAVELET, 1)
+    residual = rng.standard_normal((3, STEPS))
+    image, _ = backward(host, heard, residual, scattered, 1)
+    gradient = 2.0 * np.abs(WAVELET).max() * image / speed
+    small = 0.1
+
+    def traces(factor):
+        return simulate(medium(speed + factor * small * way), EMITTER, RECEIVERS, WAVELET)
+
+    born = (8.0 * (traces(1) - traces(-1)) - (traces(2) - traces(-2))) / (12.0 * small)
+    assert (born * residual).sum() == pytest.approx((gradient * way).sum(), rel=1e-7)
+
+
+def test_fewer_stored_fields_and_single_precision_change_the_gradient_little():
+    recorded = simulate(medium(speeds(1)), EMITTER, RECEIVERS, WAVELET)
+
+    def misfit(traces):
+        return misfits.least_squares(traces, recorded, np.ones((3, 1)))
+
+    smooth = np.full((40, 42), 1500.0)
+    exact = slope(medium(smooth), EMITTER, RECEIVERS, WAVELET, misfit).gradient
+    cheap = slope(medium(smooth, np.float32), EMITTER, RECEIVERS, WAVELET, misfit, 4).gradient
+    assert np.sqrt(((cheap - exact) ** 2).sum() / (exact**2).sum()) < 2e-2
+
+
+def test_bytes_are_known_before():
+    host = medium(speeds(0), np.float32)
+    source, heard = placed(host, EMITTER[None]), placed(host, RECEIVERS)
+    _, scattered = forward(host, source, heard, WAVELET, 7)
+    assert scattered.nbytes == stored_bytes(host, STEPS, 7)
+
+
+def test_a_step_of_nothing_is_refused():
+    with pytest.raises(InvalidInput, match="every"):
+        slope(medium(speeds(0)), EMITTER, RECEIVERS, WAVELET, lambda traces: (0.0, traces), 0)

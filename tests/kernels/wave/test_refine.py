@@ -1,0 +1,86 @@
+"""One step of a refinement, from looks that were made up: shortening, the guard, the end."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from bentray_kernels.wave.preparation import prepare
+from bentray_kernels.wave.refine import MOST_SHORTENINGS, PATIENCE, Look, begin, step
+from bentray_kernels.wave.settings import Band, WaveSettings
+
+from .scans import WATER, scan
+
+SETTINGS = WaveSettings((Band(8e4, 1.7e5, 2e-3, iterations=6, emitters=6),), nearest_m=0.012, held_out=2)
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return prepare(scan(), SETTINGS, 0)
+
+
+def told(problem, misfit, held, seed=0):
+    """A look of all emitters with a mean misfit and some gradient."""
+    shape = problem.region.shape
+    gradient = np.random.default_rng(seed).standard_normal(shape) * 1e-4
+    return [Look(misfit * problem.used.size, held * problem.held.size, gradient, np.ones(shape))]
+
+
+def first(problem):
+    state = begin(np.full(problem.region.shape, WATER))
+    return step(problem, SETTINGS, state, told(problem, 1.0, 1.0))
+
+
+def test_the_first_step_has_the_asked_size_and_goes_downhill(problem):
+    state = first(problem)
+    way = state.speed - WATER
+    assert np.sqrt((way[problem.region] ** 2).mean()) == pytest.approx(SETTINGS.first_step_mps)
+    assert (way * state.gradient).sum() < 0.0
+    assert not way[~problem.region].any()
+
+
+def test_a_step_that_makes_it_worse_is_shortened_and_then_given_up(problem):
+    state = first(problem)
+    sizes = [np.abs(state.way).max()]
+    while not state.done:
+        state = step(problem, SETTINGS, state, told(problem, 2.0, 1.0))
+        sizes.append(np.abs(state.way).max())
+    assert len(state.history) == 2 + MOST_SHORTENINGS
+    assert all(later < earlier for earlier, later in pairwise(sizes[:-1]))
+    assert (state.speed == WATER).all()
+    assert not state.skipped
+
+
+def test_it_stops_and_says_so_when_held_out_emitters_are_predicted_worse(problem):
+    state = step(problem, SETTINGS, first(problem), told(problem, 0.9, 0.9, 1))
+    liked = state.base
+    for k in range(PATIENCE):
+        assert not state.done
+        state = step(problem, SETTINGS, state, told(problem, 0.8 - 0.1 * k, 1.5, 2 + k))
+    assert state.done
+    assert state.skipped
+    assert np.array_equal(state.speed, liked)
+
+
+def test_one_rise_alone_does_not_stop_it(problem):
+    state = step(problem, SETTINGS, first(problem), told(problem, 0.9, 1.5, 1))
+    state = step(problem, SETTINGS, state, told(problem, 0.8, 0.9, 2))
+    state = step(problem, SETTINGS, state, told(problem, 0.7, 1.5, 3))
+    assert not state.done
+
+
+def test_it_ends_after_its_iterations(problem):
+    state = first(problem)
+    for k in range(SETTINGS.bands[0].iterations):
+        assert not state.done
+        state = step(problem, SETTINGS, state, told(problem, 0.9 - 0.1 * k, 0.9, k + 1))
+    assert state.done
+    assert np.array_equal(state.speed, state.base)
+
+
+def test_bounds_hold(problem):
+    tight = WaveSettings(SETTINGS.bands, nearest_m=0.012, held_out=2, speed_bounds_mps=(1499.5, 1500.5))
+    state = begin(np.full(problem.region.shape, WATER))
+    state = step(problem, tight, state, told(problem, 1.0, 1.0))
+    assert state.speed.min() == 1499.5
+    assert state.speed.max() == 1500.5

@@ -1,0 +1,172 @@
+"""The simulator: against the Green function, orders, edges, reciprocity, loss, arrival, limits."""
+
+import numpy as np
+import pytest
+from scipy.special import hankel2
+
+from bentray_kernels import eikonal
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.wave.medium import Medium
+from bentray_kernels.wave.simulation import simulate
+from bentray_kernels.wave.stencil import longest_step
+
+WATER = 1500.0
+
+
+def pulse(time, centre=2e5):
+    """A Gaussian pulse, as good as nothing beyond twice its centre frequency."""
+    late = (time - 3.0 / centre) * centre
+    return np.exp(-((0.8 * late) ** 2)) * np.sin(2.0 * np.pi * late)
+
+
+def analytic(distance, time, wavelet):
+    """Pressure of a line source in a uniform fluid: (i/4) of the Hankel function, frequency by frequency."""
+    padded = 4 * time.size
+    turn = 2.0 * np.pi * np.fft.rfftfreq(padded, time[1] - time[0])
+    green = np.zeros(turn.size, dtype=complex)
+    green[1:] = -0.25j * hankel2(0, turn[1:] * distance / WATER)
+    return np.fft.irfft(green * np.fft.rfft(wavelet, padded), padded)[: time.size]
+
+
+def against_green(spacing, step):
+    """Relative rms error of a trace at elements between nodes."""
+    side = 0.032
+    nodes = round(side / spacing) + 1
+    medium = Medium.of(
+        np.full((nodes, nodes), WATER), spacing, step, edge_nodes=round(0.02 / spacing), dtype=np.float64
+    )
+    time = np.arange(round(3.6e-5 / step)) * step
+    wavelet = pulse(time)
+    source, receiver = np.array([0.0081, 0.0077]), np.array([[0.0233, 0.0214]])
+    found = simulate(medium, source, receiver, wavelet)[0]
+    expected = analytic(float(np.linalg.norm(receiver[0] - source)), time, wavelet)
+    return np.sqrt(((found - expected) ** 2).sum() / (expected**2).sum())
+
+
+def test_traces_are_those_of_the_green_function():
+    assert against_green(1e-3, 2.5e-8) < 0.02
+
+
+def test_error_falls_as_the_square_of_the_time_step():
+    steps = np.array([3.2e-7, 1.6e-7])
+    errors = [against_green(1e-3, step) for step in steps]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
+
+
+def test_phase_error_in_space_falls_with_the_eighth_power():
+    """Long enough a path of waves of few nodes, so that space alone errs."""
+
+    def error(spacing):
+        nodes = round(0.048 / spacing) + 1
+        traces = []
+        for fine in (1, 2):
+            count = (nodes - 1) * fine + 1
+            medium = Medium.of(
+                np.full((count, count), WATER), spacing / fine, 5e-8, edge_nodes=12 * fine, dtype=np.float64
+            )
+            time = np.arange(900) * 5e-8
+            source = np.array([0.006, 0.024])
+            traces.append(simulate(medium, source, np.array([[0.042, 0.024]]), pulse(time, 2.1e5))[0])
+        return np.sqrt(((traces[0] - traces[1]) ** 2).sum() / (traces[1] ** 2).sum())
+
+    assert np.log2(error(1.5e-3) / error(0.75e-3)) > 5.0
+
+
+def test_little_comes_back_from_the_edges():
+    time = np.arange(500) * 3e-7
+    wavelet = pulse(time)
+    source = np.array([0.020, 0.020])
+    receivers = np.array([[0.035, 0.020], [0.030, 0.030], [0.020, 0.005]])
+    small = Medium.of(np.full((41, 41), WATER), 1e-3, 3e-7)
+    large = Medium.of(np.full((241, 241), WATER), 1e-3, 3e-7)
+    found = simulate(small, source, receivers, wavelet)
+    open_space = simulate(large, source + 0.1, receivers + 0.1, wavelet)
+    assert np.abs(found - open_space).max() < 6e-3 * np.abs(open_space).max()
+
+
+def test_energy_leaves_through_the_edges():
+    time = np.arange(900) * 3e-7
+    medium = Medium.of(np.full((41, 41), WATER), 1e-3, 3e-7)
+    trace = simulate(medium, np.array([0.02, 0.02]), np.array([[0.012, 0.031]]), pulse(time))[0]
+    assert (trace[-300:] ** 2).sum() < 1e-5 * (trace**2).sum()
+
+
+def test_emitter_and_receiver_may_change_places():
+    rng = np.random.default_rng(5)
+    speed = rng.uniform(1400.0, 1600.0, (40, 44))
+    medium = Medium.of(speed, 1e-3, 2e-7, attenuation=rng.uniform(0.0, 20.0, speed.shape), dtype=np.float64)
+    time = np.arange(250) * 2e-7
+    a, b = np.array([0.0123, 0.0304]), np.array([0.0311, 0.0087])
+    there = simulate(medium, a, b[None], pulse(time))[0]
+    back = simulate(medium, b, a[None], pulse(time))[0]
+    assert np.abs(there - back).max() < 1e-10 * np.abs(there).max()
+
+
+@pytest.mark.parametrize("centre", [1.2e5, 2e5])
+def test_loss_is_the_given_one_at_every_frequency_and_delays_nothing(centre):
+    time = np.arange(300) * 2.5e-7
+    speed = np.full((50, 30), WATER)
+    source, receivers = np.array([0.008, 0.015]), np.array([[0.018, 0.015], [0.043, 0.015]])
+    traces = [
+        simulate(
+            Medium.of(speed, 1e-3, 2.5e-7, attenuation=np.full(speed.shape, loss), dtype=np.float64),
+            source,
+            receivers,
+            pulse(time, centre),
+        )
+        for loss in (0.0, 10.0)
+    ]
+    size = [np.sqrt((trace**2).sum(axis=1)) for trace in traces]
+    ratio = np.log((size[0] / size[1])[1] / (size[0] / size[1])[0])
+    assert ratio == pytest.approx(10.0 * 0.025, rel=0.02)
+
+
+def test_a_slab_delays_as_the_eikonal_solver_says():
+    spacing = 5e-4
+    speed = np.full((121, 81), WATER)
+    speed[40:80] = 1580.0
+    time = np.arange(700) * 1.25e-7
+    source, receiver = np.array([0.006, 0.020]), np.array([[0.054, 0.020]])
+    with_slab, without = (
+        simulate(Medium.of(c, spacing, 1.25e-7), source, receiver, pulse(time, 3e5))[0].astype(float)
+        for c in (speed, np.full_like(speed, WATER))
+    )
+    lags = np.arange(1 - time.size, time.size)
+    alike = np.correlate(with_slab, without, "full")
+    k = int(alike.argmax())
+    bend = alike[k - 1] - 2.0 * alike[k] + alike[k + 1]
+    delay = (lags[k] + 0.5 * (alike[k - 1] - alike[k + 1]) / bend) * 1.25e-7
+    node = tuple(np.rint(receiver[0] / spacing).astype(int))
+    tof = [eikonal.solve(c, spacing, source)[node] for c in (speed, np.full_like(speed, WATER))]
+    assert delay == pytest.approx(tof[0] - tof[1], abs=5e-8)
+
+
+def test_too_long_a_step_names_the_longest():
+    limit = longest_step(1500.0, 1e-3)
+    with pytest.raises(InvalidInput, match="time_step_s"):
+        Medium.of(np.full((20, 20), 1500.0), 1e-3, 1.01 * limit)
+
+
+def test_waves_too_short_for_the_grid_are_refused():
+    medium = Medium.of(np.full((40, 40), WATER), 2e-3, 3e-7)
+    time = np.arange(300) * 3e-7
+    with pytest.raises(InvalidInput, match="nodes in the shortest wave"):
+        simulate(medium, np.array([0.02, 0.02]), np.array([[0.03, 0.03]]), pulse(time, 4e5))
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"speed": np.full((5, 5), -1.0)}, "speed"),
+        ({"speed": np.ones(5)}, "speed"),
+        ({"spacing": 0.0}, "spacing"),
+        ({"edge_nodes": 0}, "edge_nodes"),
+        ({"attenuation": np.full((5, 5), np.nan)}, "attenuation"),
+        ({"time_step_s": 0.0}, "time_step_s"),
+    ],
+)
+def test_bad_media_are_refused(change, field):
+    words = {"speed": np.full((5, 5), 1500.0), "spacing": 1e-3, "time_step_s": 1e-7} | change
+    with pytest.raises(InvalidInput) as caught:
+        Medium.of(**words)
+    assert caught.value.field == field
