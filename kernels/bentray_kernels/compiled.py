@@ -1,26 +1,13 @@
-"""The decorator of every compiled kernel: no GIL, cached on disk, stale as soon as any kernel changed."""
+"""The decorator of every compiled kernel: no GIL, cached on disk, stale as soon as what it calls changed."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar, overload
 
 from numba import njit
 
-
-def _stamp() -> str:
-    digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(source.read_bytes())
-    return digest.hexdigest()
-
-
-# Numba's own cache looks at the time and size of a function's file, not at the files of what it calls:
-# after an edit or an upgrade it would go on running the old inner function. So the content of all decides.
-SOURCES = _stamp()
-
+from .sources import digest
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -51,5 +38,7 @@ def _compiled(function: Callable[..., Any], inner: bool) -> Any:
     dispatcher = njit(cache=True, nogil=True, error_model="numpy", forceinline=inner, _nrt=not inner)(
         function
     )
-    dispatcher._cache._cache_file._source_stamp = SOURCES
+    # Numba's own stamp is the time and size of the function's file: after an edit of what it calls, or an
+    # upgrade, it would go on running the old inner function. So the content of all that it imports decides.
+    dispatcher._cache._cache_file._source_stamp = digest(function.__module__)
     return dispatcher

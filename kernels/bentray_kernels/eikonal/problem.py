@@ -16,6 +16,11 @@ from ..errors import InvalidInput
 # A source closer to a node than this, in nodes, is taken to sit on it.
 ON_NODE = 1e-9
 
+Node = tuple[int, ...]
+
+# Nodes around a source with their multilinear weights.
+Cell = list[tuple[Node, float]]
+
 
 @dataclass(frozen=True)
 class Medium:
@@ -59,15 +64,7 @@ class Medium:
         Raises:
             InvalidInput: for a source that is not in the grid.
         """
-        point = np.asarray(position, dtype=np.float64)
-        shape = self.slowness.shape
-        if point.shape != (len(shape),):
-            raise InvalidInput("source", f"shape {point.shape}", f"{len(shape)} coordinates in metres")
-        extent = self.spacing * (np.array(shape) - 1)
-        slack = ON_NODE * self.spacing
-        if not np.all((point >= -slack) & (point <= extent + slack)):
-            raise InvalidInput("source", point.tolist(), f"a point in the grid, 0 to {extent.tolist()} m")
-        return PointSource(self, np.clip(point, 0.0, extent))
+        return PointSource(self, placed(position, self.slowness.shape, self.spacing))
 
 
 @dataclass(frozen=True)
@@ -141,14 +138,12 @@ class PointSource:
 
         A source on a node gives that node alone, at time 0.
         """
-        at_source = self.source_slowness()
-        nodes, times = [], []
-        strides = self.strides
-        for node, _ in self._cell:
-            distance = math.dist([i * self.spacing for i in node], self.source)
-            nodes.append(sum((i + 1) * stride for i, stride in zip(node, strides, strict=True)))
-            times.append(distance * 0.5 * (at_source + self.slowness[node]))
-        return np.array(nodes, dtype=np.int64), np.array(times)
+        at_nodes = [self.slowness[node] for node, _ in self._cell]
+        found = straight_times(self._cell, at_nodes, self.spacing, self.source)
+        nodes = [
+            sum((i + 1) * stride for i, stride in zip(node, self.strides, strict=True)) for node in found
+        ]
+        return np.array(nodes, dtype=np.int64), np.array(list(found.values()))
 
     def surroundings(self, radius: int, contrast: float) -> tuple[Ints, Floats] | None:
         """As ``seeds``, for the box of nodes up to ``radius`` from the source, all along straight lines.
@@ -167,16 +162,53 @@ class PointSource:
         return nodes, distance * 0.5 * (self.source_slowness() + box.ravel())
 
     @cached_property
-    def _cell(self) -> list[tuple[tuple[int, ...], float]]:
-        """The nodes around the source with their multilinear weights, those of weight 0 left out."""
-        corners: list[tuple[tuple[int, ...], float]] = [((), 1.0)]
-        for axis, n in enumerate(self.slowness.shape):
-            place = float(self.source[axis]) / self.spacing
-            low = min(int(place), n - 1)
-            part = place - low
-            if part < ON_NODE or part > 1.0 - ON_NODE or low + 1 >= n:
-                ends = [(min(round(place), n - 1), 1.0)]
-            else:
-                ends = [(low, 1.0 - part), (low + 1, part)]
-            corners = [((*node, i), weight * w) for node, weight in corners for i, w in ends]
-        return corners
+    def _cell(self) -> Cell:
+        return cell_of(self.source, self.slowness.shape, self.spacing)
+
+
+def placed(position: ArrayLike, shape: tuple[int, ...], spacing: float) -> Floats:
+    """A source, (ndim,), m, checked to be in a grid; rounding at the rim is forgiven.
+
+    Raises:
+        InvalidInput: for a source that is not in the grid.
+    """
+    point = np.asarray(position, dtype=np.float64)
+    if point.shape != (len(shape),):
+        raise InvalidInput("source", f"shape {point.shape}", f"{len(shape)} coordinates in metres")
+    extent = spacing * (np.array(shape) - 1)
+    slack = ON_NODE * spacing
+    if not np.all((point >= -slack) & (point <= extent + slack)):
+        raise InvalidInput("source", point.tolist(), f"a point in the grid, 0 to {extent.tolist()} m")
+    return np.clip(point, 0.0, extent)
+
+
+def cell_of(source: Floats, shape: tuple[int, ...], spacing: float) -> Cell:
+    """The nodes around a source with their multilinear weights, those of weight 0 left out."""
+    corners: list[tuple[Node, float]] = [((), 1.0)]
+    for axis, n in enumerate(shape):
+        place = float(source[axis]) / spacing
+        low = min(int(place), n - 1)
+        part = place - low
+        if part < ON_NODE or part > 1.0 - ON_NODE or low + 1 >= n:
+            ends = [(min(round(place), n - 1), 1.0)]
+        else:
+            ends = [(low, 1.0 - part), (low + 1, part)]
+        corners = [((*node, i), weight * w) for node, weight in corners for i, w in ends]
+    return corners
+
+
+def straight_times(
+    cell: Cell, slowness: Sequence[float], spacing: float, source: Floats
+) -> dict[Node, float]:
+    """Travel time along straight lines to the nodes of the source's cell, s.
+
+    Args:
+        cell: from ``cell_of``.
+        slowness: of its nodes, s/m.
+    """
+    at_source = float(sum(weight * s for (_, weight), s in zip(cell, slowness, strict=True)))
+    times = {}
+    for (node, _), at_node in zip(cell, slowness, strict=True):
+        distance = math.dist([i * spacing for i in node], source)
+        times[node] = distance * 0.5 * (at_source + at_node)
+    return times

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,10 @@ from .problem import PointSource
 
 # The sides of a block in the order of Faces: axis, and whether its high end.
 Side = tuple[int, bool]
+
+# Where a block stands among the blocks, and which nodes it holds.
+Place = tuple[int, ...]
+Box = tuple[slice, ...]
 
 # A block's neighbouring nodes beyond each side, s: (low x, high x, low y, high y[, low z, high z]), each in
 # the block's shape without that axis; None at the rim of the grid.
@@ -93,26 +97,20 @@ def solve_by_blocks(problem: PointSource, blocks: Sequence[int], *, tolerance: f
         InvalidInput: for numbers of blocks that do not fit the grid.
     """
     shape = problem.slowness.shape
-    if len(blocks) != len(shape) or not all(1 <= b <= n for b, n in zip(blocks, shape, strict=True)):
-        raise InvalidInput("blocks", tuple(blocks), f"a number from 1 along each axis, at most {shape}")
-    cuts = [[n * k // b for k in range(b + 1)] for n, b in zip(shape, blocks, strict=True)]
-    boxes = {
-        place: tuple(slice(c[k], c[k + 1]) for c, k in zip(cuts, place, strict=True))
-        for place in itertools.product(*(range(b) for b in blocks))
-    }
+    boxes = cut(shape, blocks)
     start = np.full(problem.padded_slowness.size, math.inf)
     seeds, times = problem.seeds()
     start[seeds] = times
     time = problem.interior(start)
-    held: dict[tuple[int, ...], list[Floats | None]] = {}
+    held: dict[Place, list[Floats | None]] = {}
     for place in boxes:
         held[place] = [None for _ in _sides(len(shape))]
     seeded = [place for place, box in boxes.items() if (time[box] < math.inf).any()]
     waiting = set(seeded)
     # Seeds at a face are news to the block beyond.
     for place in seeded:
-        for side, beyond in _neighbours(place, boxes):
-            held[beyond][_opposite(side)] = _face(time[boxes[place]], _sides(len(shape))[side]).copy()
+        for side, beyond in neighbours(place, boxes):
+            held[beyond][opposite(side)] = _face(time[boxes[place]], _sides(len(shape))[side]).copy()
             waiting.add(beyond)
     while waiting:
         sent = {
@@ -124,18 +122,34 @@ def solve_by_blocks(problem: PointSource, blocks: Sequence[int], *, tolerance: f
         waiting = set()
         for place, swept in sent.items():
             time[boxes[place]] = swept.times
-            for side, beyond in _neighbours(place, boxes):
+            for side, beyond in neighbours(place, boxes):
                 if swept.changed[side]:
-                    held[beyond][_opposite(side)] = swept.faces[side]
+                    held[beyond][opposite(side)] = swept.faces[side]
                     waiting.add(beyond)
     return time
+
+
+def cut(shape: tuple[int, ...], blocks: Sequence[int]) -> dict[Place, Box]:
+    """The nodes of each block, by its place among the blocks.
+
+    Raises:
+        InvalidInput: for numbers of blocks that do not fit the grid.
+    """
+    if len(blocks) != len(shape) or not all(1 <= b <= n for b, n in zip(blocks, shape, strict=True)):
+        raise InvalidInput("blocks", tuple(blocks), f"a number from 1 along each axis, at most {shape}")
+    cuts = [[n * k // b for k in range(b + 1)] for n, b in zip(shape, blocks, strict=True)]
+    return {
+        place: tuple(slice(c[k], c[k + 1]) for c, k in zip(cuts, place, strict=True))
+        for place in itertools.product(*(range(b) for b in blocks))
+    }
 
 
 def _sides(axes: int) -> list[Side]:
     return [(axis, high) for axis in range(axes) for high in (False, True)]
 
 
-def _opposite(side: int) -> int:
+def opposite(side: int) -> int:
+    """The number of the side that meets this one from beyond."""
     return side ^ 1
 
 
@@ -145,9 +159,7 @@ def _face(block: Floats, side: Side) -> Floats:
     return face
 
 
-def _neighbours(
-    place: tuple[int, ...], boxes: dict[tuple[int, ...], tuple[slice, ...]]
-) -> list[tuple[int, tuple[int, ...]]]:
+def neighbours(place: Place, boxes: Mapping[Place, Box]) -> list[tuple[int, Place]]:
     """Numbers of the sides that have a block beyond, and where it is."""
     found = []
     for side, (axis, high) in enumerate(_sides(len(place))):

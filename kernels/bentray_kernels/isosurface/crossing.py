@@ -24,6 +24,10 @@ SHORTEST = 1e-7
 # hundreds. On a plateau of the field at an iso-value there would be no end of them.
 MOST_HALVINGS = 512
 
+# How many of them the shortest piece counts for where nothing is proved of it. A ray that touches a surface
+# has two or three of these, one along a plateau nothing else.
+UNPROVED = 32
+
 
 class Search(NamedTuple):
     """How crossings are found.
@@ -74,8 +78,8 @@ def leave_interval(
 
     Returns:
         s; +1 where the field rises above the interval, −1 where it falls below it, 0 if it does not; the
-        gradient there, per node, NaN where it was not needed; and the halvings that are left, −1 where one
-        more was needed: then nothing is known beyond s.
+        gradient there, per node, NaN where it was not needed; and the halvings that are left, −1 where
+        more were needed: then nothing is known beyond s.
     """
     speed = math.sqrt(ray.along_x**2 + ray.along_y**2 + ray.along_z**2)
     if search.step > 0.0:
@@ -92,6 +96,9 @@ def leave_interval(
     s, level = start, search.top if slope == 0.0 else 0
     # The field at s, where it is known.
     value = math.nan
+    # Of the bound on which the ray starts: how far off the field is at s, and how fast it goes off.
+    leaving, near, far = slope != 0.0, 0.0, 0.0
+    slowest = fastest = abs(slope)
     while s < stop:
         p, q, r = i >> level, j >> level, k >> level
         node = octree.levels[level, 0] + (p * octree.levels[level, 2] + q) * octree.levels[level, 3] + r
@@ -105,13 +112,22 @@ def leave_interval(
         out = max(min(out_x, out_y, out_z), s)
         if not skipped:
             end, bend = min(out, stop), octree.bend[node] * speed * speed
-            if slope != 0.0 and (end - s) * speed > SHORTEST:
-                s = _turned(s, end, abs(slope), bend, above - below)
-                slope = 0.0
-            elif slope != 0.0:
-                # The surface lies on a face; where gradients are continuous the next cell has its slope.
-                s = end
-                slope = slope if search.roots == CERTAIN else 0.0
+            if leaving:
+                length = end - s
+                sag = 0.5 * bend * length * length
+                least, most = near + slowest * length - sag, far + fastest * length + sag
+                # A surface may lie on a face: then all is as it was where the next cell begins.
+                on_face = near == 0.0 and length * speed <= SHORTEST
+                leaving = on_face or (least > 0.0 and most < above - below)
+                if leaving:
+                    if not on_face:
+                        near, far = least, most
+                        slowest, fastest = slowest - bend * length, fastest + bend * length
+                    s = end
+                    # Where gradients are continuous the next cell begins with this slope.
+                    leaving = search.roots == CERTAIN
+                elif near == 0.0:
+                    s = _turned(s, end, slowest, bend, above - below)
             if s >= end:
                 value = math.nan
                 found, side, gradient = s, 0, UNKNOWN
@@ -126,37 +142,19 @@ def leave_interval(
             if side != 0 or halvings < 0:
                 return found, side, gradient, halvings
         else:
-            value, slope = math.nan, 0.0
+            value, leaving = math.nan, False
         s = out
         # The axis of the face moves to the next node; rounding must not carry the others out of theirs.
-        before = p if out_x <= out_y and out_x <= out_z else (q if out_y <= out_z else r)
-        if out_x <= out_y and out_x <= out_z:
-            i = ((p + 1) << level) if ray.along_x > 0.0 else (p << level) - 1
-            j, k = (
-                _within(ray.y + s * ray.along_y, q, level, cells_y),
-                _within(ray.z + s * ray.along_z, r, level, cells_z),
-            )
-            after = i
-            if i < 0 or i >= cells_x:
-                break
-        elif out_y <= out_z:
-            j = ((q + 1) << level) if ray.along_y > 0.0 else (q << level) - 1
-            i, k = (
-                _within(ray.x + s * ray.along_x, p, level, cells_x),
-                _within(ray.z + s * ray.along_z, r, level, cells_z),
-            )
-            after = j
-            if j < 0 or j >= cells_y:
-                break
-        else:
-            k = ((r + 1) << level) if ray.along_z > 0.0 else (r << level) - 1
-            i, j = (
-                _within(ray.x + s * ray.along_x, p, level, cells_x),
-                _within(ray.y + s * ray.along_y, q, level, cells_y),
-            )
-            after = k
-            if k < 0 or k >= cells_z:
-                break
+        by_x = out_x <= out_y and out_x <= out_z
+        by_y = not by_x and out_y <= out_z
+        before = p if by_x else (q if by_y else r)
+        along = ray.along_x if by_x else (ray.along_y if by_y else ray.along_z)
+        after = (before + 1) << level if along > 0.0 else (before << level) - 1
+        if after < 0 or after >= (cells_x if by_x else (cells_y if by_y else cells_z)):
+            break
+        i = after if by_x else _within(ray.x + s * ray.along_x, p, level, cells_x)
+        j = after if by_y else _within(ray.y + s * ray.along_y, q, level, cells_y)
+        k = _within(ray.z + s * ray.along_z, r, level, cells_z) if by_x or by_y else after
         # Above the highest level at which the node changed, nothing is new.
         changed = (after >> level) ^ before
         while changed > 1 and level < search.top:
@@ -167,15 +165,11 @@ def leave_interval(
 
 @kernel(inline="always")
 def _turned(s: float, end: float, slope: float, bend: float, height: float) -> float:
-    """How far the field surely stays in the interval from one of its bounds, s, which it leaves with a slope.
+    """Where the field is surely off one of the interval's bounds, s, which it leaves with a slope.
 
     Within slope·h ± bend·h²/2 of that bound, it can be back only where bend·h reaches 2·slope, and at the
-    other bound only where the rise reaches the height. If not to the end, then to where it is farthest off.
+    other bound only where the rise reaches the height. Half as far it is farthest off.
     """
-    length = end - s
-    rise = slope * length + 0.5 * bend * length * length
-    if bend * length < 2.0 * slope and rise < height:
-        return end
     return min(s + slope / max(bend, 2.0 * slope * slope / height), end)
 
 
@@ -245,14 +239,16 @@ def _scan(
                 found = brent(field, ray, target, a, value_a, b, value_b, TOLERANCE / speed)
                 gradient = UNKNOWN
             return found, side, gradient, target, halvings
-        elif (b - a) * speed <= SHORTEST:
-            a, value_a = b, value_b
-            length = min(2.0 * length, step)
         else:
-            halvings -= 1
+            shortest = (b - a) * speed <= SHORTEST
+            halvings -= UNPROVED if shortest else 1
             if halvings < 0:
-                return a, 0, UNKNOWN, value_a, halvings
-            length = 0.5 * (b - a)
+                return a, 0, UNKNOWN, value_a, -1
+            if shortest:
+                a, value_a = b, value_b
+                length = min(2.0 * length, step)
+            else:
+                length = 0.5 * (b - a)
     return stop, 0, UNKNOWN, value_a, halvings
 
 

@@ -1,6 +1,6 @@
 """OpenCL with care: a device is chosen by name, tried in a child process, and only then used."""
 
-from .choice import Choice, OpenCLFallbackWarning, choose, session_or_warning
+from .choice import Choice, OpenCLFallbackWarning, choose, scene_or_warning, session_or_warning
 from .devices import WISH, Device, find_devices
 from .session import Session
 from .verdict import Verdict, verdict_on
@@ -14,6 +14,7 @@ __all__ = [
     "Verdict",
     "choose",
     "find_devices",
+    "scene_or_warning",
     "session_or_warning",
     "verdict_on",
 ]

@@ -108,7 +108,7 @@ def _advance_until_settled(
         row[: len(listed)] = sorted(listed)
         queued[list(listed)] = 1
     ndim = len(blocks.shape)
-    kernel = session.kernel("fast_iterative", "advance", f"DIMS={ndim}", f"EDGE={blocks.edge}")
+    kernel = session.kernel(("fast_iterative",), "advance", f"DIMS={ndim}", f"EDGE={blocks.edge}")
     group = (blocks.edge,) * ndim
     sides = (*blocks.counts, 1)[:3]
     with session.lock:

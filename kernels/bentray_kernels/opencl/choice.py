@@ -5,12 +5,16 @@ from __future__ import annotations
 import os
 import threading
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import TypeVar
 
 from .devices import WISH, Device, find_devices, wished
 from .session import Session
 from .verdict import verdict_on
+
+Placed = TypeVar("Placed")
 
 
 class OpenCLFallbackWarning(UserWarning):
@@ -60,6 +64,30 @@ def session_or_warning(instead: str) -> Session | None:
         if isinstance(found, Session):
             return found
         _warn_once(instead, found)
+        return None
+
+
+def scene_or_warning(build: Callable[[Session], Placed], instead: str) -> Placed | None:
+    """What ``build`` puts on the chosen device; or None after a warning, also if it cannot hold it.
+
+    Args:
+        build: makes it in an open session.
+        instead: what takes over.
+
+    Raises:
+        InvalidInput: as ``choose``, and what ``build`` raises.
+    """
+    session = session_or_warning(instead)
+    if session is None:
+        return None
+    # Here, so that whoever has no device never loads it.
+    import pyopencl as cl
+
+    try:
+        return build(session)
+    except cl.Error as error:
+        message = f"{session.handle.name} cannot hold the scene, {instead} takes over: {error}"
+        warnings.warn(OpenCLFallbackWarning(message), stacklevel=3)
         return None
 
 

@@ -29,21 +29,21 @@ class Session:
         self.handle = handle_of(device)
         self.context = cl.Context([self.handle])
         self.queue = cl.CommandQueue(self.context)
-        self._kernels: dict[tuple[str, str, tuple[str, ...]], Any] = {}
+        self._kernels: dict[tuple[tuple[str, ...], str, tuple[str, ...]], Any] = {}
 
-    def kernel(self, source: str, name: str, *defines: str) -> Any:
-        """A kernel of ``sources/<source>.cl``, built on first use.
+    def kernel(self, sources: tuple[str, ...], name: str, *defines: str) -> Any:
+        """A kernel of the files ``sources/<source>.cl``, built as one program on first use.
 
         Args:
-            source: name of the file.
+            sources: names of the files, in the order in which the compiler reads them.
             name: name of the kernel.
             defines: ``NAME=VALUE`` for the compiler.
         """
         import pyopencl as cl
 
-        key = (source, name, defines)
+        key = (sources, name, defines)
         if key not in self._kernels:
-            text = resources.files(__package__).joinpath("sources", f"{source}.cl").read_text()
+            text = "".join(_named(source) for source in sources)
             with warnings.catch_warnings():
                 # Remarks of a compiler about a program that then passes its trial.
                 warnings.simplefilter("ignore", cl.CompilerWarning)
@@ -84,6 +84,13 @@ class Session:
         return int(min(self.handle.max_mem_alloc_size, self.handle.global_mem_size // 4)) // 8
 
 
+def _named(source: str) -> str:
+    """A file's text, which the compiler's remarks then name."""
+    file = f"{source}.cl"
+    text = resources.files(__package__).joinpath("sources", *file.split("/")).read_text()
+    return f'#line 1 "{file}"\n{text}\n'
+
+
 def set_arguments(kernel: Any, *arguments: Any) -> None:
     """Set buffers and numpy scalars in order, without the launcher that pyopencl would write and cache."""
     for place, argument in enumerate(arguments):
@@ -97,7 +104,7 @@ def probe(session: Session, width: int, a: Floats, b: Floats) -> tuple[Floats, F
         a, b: (n,), n a multiple of ``width``.
     """
     real = "double" if width == 1 else f"double{width}"
-    kernel = session.kernel("probe", "probe", f"REAL={real}")
+    kernel = session.kernel(("probe",), "probe", f"REAL={real}")
     root, lower = np.empty_like(a), np.empty_like(a)
     with session.lock:
         buffers = [session.upload(array) for array in (a, b, root, lower)]

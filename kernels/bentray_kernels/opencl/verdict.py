@@ -112,7 +112,7 @@ def _file(device: Device) -> Path:
     package = resources.files(__package__)
     for name in ("trial.py", "blocks.py", "session.py"):
         digest.update(package.joinpath(name).read_bytes())
-    for source in sorted(package.joinpath("sources").iterdir(), key=lambda entry: entry.name):
+    for source in sorted(Path(str(package / "sources")).rglob("*.cl")):
         digest.update(source.read_bytes())
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return home / "bentray" / f"opencl-{digest.hexdigest()[:32]}.json"

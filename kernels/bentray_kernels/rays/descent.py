@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 
-# Length of a step, nodes. Half of it gives the same error on Table 6, 3.7 %, in more time.
+# Length of a step, nodes. Half of it gives the same error on Table 6, 3.7 %, in more time, and
+# steps halved where the direction turns change the time along a ray by 2 % of its error, past bone too.
 STEP = 1.0
 
 # Parts of a step that are read for themselves: longer ones would pass nodes by.

@@ -12,11 +12,14 @@ from ..errors import InvalidInput
 from ..isosurface import crossing
 from ..isosurface.crossing import Search
 from ..isosurface.roots import STEPS
-from ..opencl import OpenCLFallbackWarning, Session, session_or_warning
+from ..opencl import OpenCLFallbackWarning, Session, scene_or_warning
 from ..opencl.session import set_arguments
 from .camera import perspective
 from .caster import Medium, Traced, cast, space_for
 from .scene import Scene
+
+# Each is written in terms of those before it.
+SOURCES = tuple(f"refraction/{job}" for job in ("rays", "field", "roots", "crossing", "optics", "caster"))
 
 # Rays of a work-group.
 GROUP = 64
@@ -137,7 +140,7 @@ class OpenCLCaster:
         """As ``cast``, but on the device, whatever it computes."""
         # Place, point, direction, weight and the two whole numbers of a ray; its path.
         at_once = max(1, self.session.doubles_at_once() // (10 + 3 * traced.vertices.shape[1]))
-        kernel = self.session.kernel("refraction", "follow", *self._defines(medium, search))
+        kernel = self.session.kernel(SOURCES, "follow", *self._defines(medium, search))
         for start in range(0, len(places), at_once):
             rays = slice(start, start + at_once)
             with self.session.lock:
@@ -219,6 +222,7 @@ class OpenCLCaster:
             f"TOLERANCE={tolerance}",
             f"SHORTEST={shortest}",
             f"MOST_HALVINGS={crossing.MOST_HALVINGS}",
+            f"UNPROVED={crossing.UNPROVED}",
             f"DEEPEST={STEPS}",
         )
 
@@ -249,14 +253,4 @@ def on_the_device(scene: Scene, precision: str | None = None) -> OpenCLCaster | 
     Warns:
         OpenCLFallbackWarning: once, where no device passes its trial; and where it cannot hold the scene.
     """
-    session = session_or_warning(instead="caster.cast")
-    if session is None:
-        return None
-    import pyopencl as cl
-
-    try:
-        return OpenCLCaster(scene, session, precision)
-    except cl.Error as error:
-        message = f"{session.handle.name} cannot hold the scene, caster.cast takes over: {error}"
-        warnings.warn(OpenCLFallbackWarning(message), stacklevel=2)
-        return None
+    return scene_or_warning(lambda session: OpenCLCaster(scene, session, precision), "caster.cast")

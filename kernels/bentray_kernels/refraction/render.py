@@ -30,7 +30,8 @@ class RenderSettings:
 
     Attributes:
         rows, columns: pixels.
-        depth: most interfaces that a ray may meet; what is lost beyond it is black.
+        depth: most interfaces that a ray may meet; where one meets more, the picture shows the
+            backdrop's colour beyond all planes.
         supersampling: "none"; "prss", after refraction (4.3.3); "real", more rays.
         degree: for "prss" as in ``post_refraction_colours``; for "real" rays a pixel along each axis.
         fresnel: whether light is weakened by what each interface mirrors away.

@@ -65,7 +65,7 @@ class OpenCLSpline:
         dims, taps = len(spline.shape), spline.filter.taps
         name = "float" if real == np.float32 else "double"
         sizes = f"DIMS={dims}", f"TAPS={taps}", f"WIDTH={spline.stencil.weights.shape[-1]}"
-        kernel = session.kernel("splines", "sample", f"REAL={name}", *sizes)
+        kernel = session.kernel(("splines",), "sample", f"REAL={name}", *sizes)
         values, gradients = np.empty(len(places), real), np.empty(places.shape, real)
         nodes = (1,) * (3 - dims) + spline.shape
         border = spline.coefficients.shape[0] - spline.shape[0]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
 from ..arrays import Floats, Ints
@@ -51,6 +51,25 @@ class Call(NamedTuple):
     keep: bool = False
 
 
+@dataclass(frozen=True)
+class ChainState:
+    """Where a chain stands; all that is needed to go on, to the bit.
+
+    Attributes:
+        number: of the stage under way, from 0.
+        over: emitter passes of the stages before it.
+        history: of the stages before it.
+        state: where it stands.
+        found: what each call after the last stage gave; None: nothing yet.
+    """
+
+    number: int
+    over: int
+    history: tuple[Sweep, ...]
+    state: sart.State | gauss_newton.Iterate
+    found: tuple[Floats | float | None, ...]
+
+
 class Chain:
     """All stages of one slice, then its attenuation and resolution where they are wanted.
 
@@ -63,7 +82,7 @@ class Chain:
         self._plans = scan.stages()
         self._history: tuple[Sweep, ...] = ()
         self._over = 0
-        self._stage = self._staged(0, None)
+        self._stage = self._staged(0, start(scan.problem(index, 0), None))
         self._finish = self._gatherings()
         self.total = sum(
             len(scan.problem(index, number).sounding) * plan.sweeps for number, plan in enumerate(self._plans)
@@ -99,9 +118,23 @@ class Chain:
         """Of all stages so far."""
         return self._history + self._stage.history
 
+    @property
+    def standing(self) -> ChainState:
+        """Where the chain stands; rows of an iteration that is not finished are not in it."""
+        found = tuple(part.value for part in self._finish)
+        return ChainState(self._stage.number, self._over, self._history, self._stage.state, found)
+
+    def restore(self, standing: ChainState) -> None:
+        """Go on from where a chain of the same scan and index stood; to be called before ``first``."""
+        self._history, self._over = standing.history, standing.over
+        self._stage = self._staged(standing.number, standing.state.slowness)
+        self._stage.state = standing.state
+        for part, value in zip(self._finish, standing.found, strict=True):
+            part.value = value
+
     def first(self) -> list[Call]:
-        """Calls to begin with."""
-        return self._stage.first()
+        """Calls to begin with, or to go on with after ``restore``."""
+        return self._next() if self._stage.state.done else self._stage.first()
 
     def after(self, call: Call, given: Any) -> list[Call]:
         """Calls that may follow one that has finished.
@@ -114,19 +147,21 @@ class Chain:
             if call.function in (part.look, part.then):
                 return part.after(call, given)
         follow = self._stage.after(call, given)
-        if follow or not self._stage.state.done:
-            return follow
-        image = self._stage.state.slowness
-        if self._stage.number + 1 < len(self._plans):
-            self._history = self.history
-            self._over += self._stage.total
-            self._stage = self._staged(self._stage.number + 1, image)
-            return self._stage.first()
-        return [call for part in self._finish for call in part.first(self._scan, self._index, image)]
+        return follow if follow or not self._stage.state.done else self._next()
 
-    def _staged(self, number: int, before: Floats | None) -> Stage:
-        earlier = self._scan.problem(self._index, number - 1) if number else None
-        begun = start(self._scan.problem(self._index, number), before, earlier)
+    def _next(self) -> list[Call]:
+        """What follows a stage that is done."""
+        image, number = self._stage.state.slowness, self._stage.number + 1
+        if number == len(self._plans):
+            wanted = [part for part in self._finish if part.value is None]
+            return [call for part in wanted for call in part.first(self._scan, self._index, image)]
+        self._history = self.history
+        self._over += self._stage.total
+        earlier, problem = (self._scan.problem(self._index, k) for k in (number - 1, number))
+        self._stage = self._staged(number, start(problem, image, earlier))
+        return self._stage.first()
+
+    def _staged(self, number: int, begun: Floats) -> Stage:
         kind = GaussNewtonStage if self._plans[number].method == "gauss-newton" else SartStage
         return kind(self._scan, self._index, number, begun)
 
@@ -137,16 +172,21 @@ class Gathering:
     Attributes:
         look, then: the two calls.
         sizes: emitters of each part.
-        done: emitters looked at.
         value: what ``then`` gave.
     """
 
     def __init__(self, look: Callable[..., Rows], then: Callable[..., Any], emitters: Ints) -> None:
         self.look, self.then = look, then
         self.sizes = [len(part) for part in cut(emitters)]
-        self.done = 0
         self.value: Any = None
         self._rows: dict[int, Any] = {}
+
+    @property
+    def done(self) -> int:
+        """Emitters looked at."""
+        return sum(
+            self.sizes[part] for part in (range(len(self.sizes)) if self.value is not None else self._rows)
+        )
 
     def first(self, scan: Scan, index: int, image: Floats) -> list[Call]:
         """Calls to begin with; without emitters the one that uses their rows, which are none."""
@@ -161,7 +201,6 @@ class Gathering:
             return []
         scan, index, _, part = call.arguments
         self._rows[part] = given
-        self.done += self.sizes[part]
         if len(self._rows) < len(self.sizes):
             return []
         return [Call(self.then, (scan, index, [rows for _, rows in sorted(self._rows.items())]))]

@@ -11,6 +11,10 @@ from ..arrays import Floats
 # The median of |x| over the standard deviation of x, for a normal distribution.
 MEDIAN_PART = 0.6745
 
+# The limit is at least this part of the mean size. Of a small object in exact times most rays pass nothing
+# but water and fit from the start; were the spread theirs alone, the others would have no say.
+LEAST_PART = 0.7
+
 
 def limit(residual: Floats, spreads: float, most: float = math.inf) -> float:
     """Beyond which residuals count by their size, in their unit.
@@ -21,7 +25,9 @@ def limit(residual: Floats, spreads: float, most: float = math.inf) -> float:
         most: no more than this.
     """
     if spreads > 0.0:
-        most = min(most, spreads * float(np.median(np.abs(residual))) / MEDIAN_PART)
+        size = np.abs(residual)
+        spread = float(np.median(size)) / MEDIAN_PART
+        most = min(most, max(spreads * spread, LEAST_PART * float(size.mean())))
     # All residuals zero: none is an outlier.
     return most or math.inf
 

@@ -177,6 +177,44 @@ def test_a_grazing_ray_crosses_twice_within_a_cell(peak):
         assert case.leave(Search(BRENT, 0, 0.1), 0.0, (below, above))[1] == 0
 
 
+def loosened(octree: Octree) -> Octree:
+    """Every cell may hold a surface, so that a ray must prove of each that it does not."""
+    masks, bend, levels = octree
+    return Octree(np.full_like(masks, 255), np.full_like(bend, bend.max()), levels)
+
+
+@pytest.mark.parametrize("loose", [False, True])
+@pytest.mark.parametrize(("peak", "above"), [(0.3, np.inf), (2.0, np.inf), (2.0, 1.99), (2.0, 0.4)])
+def test_a_ray_that_leaves_a_surface_comes_to_the_next_one_cells_away(peak, above, loose):
+    """On the crest of ``grazing``, ``peak`` high: down to the same surface, or first up to another one."""
+    case = grazing(peak)
+    below = float(case.isos[0])
+    if np.isfinite(above):
+        case.isos = np.array([below, below + above])
+        case.octree = octree_of(cell_ranges(case.spline, case.isos, "bernstein"), case.isos)
+    if loose:
+        case.octree = loosened(case.octree)
+    start = (9.37 - np.sqrt(8.0 * peak) - 3.0) / 12.0
+    slope = float(case.spline.gradient(np.array([[3.0 + 12.0 * start, 1.2, 1.7]]))[0, 0] * 12.0)
+    s, side = case.leave(Search(CERTAIN, 5, 0.0), start, (below, below + above), slope)
+    assert side == (1 if np.isfinite(above) else -1)
+    expected = 9.37 - np.sqrt(8.0 * (peak - above)) if np.isfinite(above) else 9.37 + np.sqrt(8.0 * peak)
+    assert 3.0 + 12.0 * s == pytest.approx(expected, abs=1e-7)
+
+
+def test_a_ray_that_rises_ever_faster_meets_the_next_surface_in_time():
+    """In the valley (x − 9.37)²/8, from 0.5 to 2.4."""
+    case = grazing(1.0)
+    coefficients = 0.125 * ((np.arange(20.0) - 9.37) ** 2 - 1.0 / 3.0)
+    case.spline = Spline(coefficients[:, None, None] + np.zeros((1, 4, 4)), prefilter=False)
+    case.isos = np.array([0.5, 2.4])
+    case.octree = loosened(octree_of(cell_ranges(case.spline, case.isos, "bernstein"), case.isos))
+    start = (11.37 - 3.0) / 12.0
+    s, side = case.leave(Search(CERTAIN, 5, 0.0), start, (0.5, 2.4), 0.5 * 12.0)
+    assert side == 1
+    assert 3.0 + 12.0 * s == pytest.approx(9.37 + np.sqrt(8.0 * 2.4), abs=1e-7)
+
+
 def test_steps_find_what_lies_between_two_of_them():
     agreed = 0
     for seed in range(20):
@@ -249,4 +287,6 @@ def test_a_ray_on_a_plateau_is_given_up_after_so_many_readings(monkeypatch, halv
         assert left >= -1
         assert side == 0 or left >= 0
         given_up += left < 0
+        # Pieces of the shortest length, of which nothing is proved, use up the halvings sooner.
+        assert left >= 0 or len(readings) <= 2 * (69 + calls) + MOST_HALVINGS
     assert given_up >= 5

@@ -1,5 +1,7 @@
 """An open device builds our programs once and computes what they say."""
 
+from importlib import resources
+
 import numpy as np
 import pyopencl as cl
 import pytest
@@ -8,14 +10,25 @@ from bentray_kernels.opencl.session import probe
 
 
 def test_a_kernel_is_built_once(session):
-    first = session.kernel("probe", "probe", "REAL=double")
-    assert session.kernel("probe", "probe", "REAL=double") is first
-    assert session.kernel("probe", "probe", "REAL=double2") is not first
+    first = session.kernel(("probe",), "probe", "REAL=double")
+    assert session.kernel(("probe",), "probe", "REAL=double") is first
+    assert session.kernel(("probe",), "probe", "REAL=double2") is not first
 
 
 def test_a_source_that_does_not_compile_is_an_error(session):
     with pytest.raises(cl.RuntimeError):
-        session.kernel("probe", "probe", "REAL=no_such_type")
+        session.kernel(("probe",), "probe", "REAL=no_such_type")
+
+
+def test_a_program_of_several_files_names_the_one_that_does_not_compile(session):
+    text = resources.files("bentray_kernels.opencl").joinpath("sources", "splines.cl").read_text()
+    line = 1 + text[: text.index("tap < TAPS")].count("\n")
+    with pytest.raises(cl.RuntimeError, match=rf"splines\.cl:{line}:"):
+        session.kernel(("probe", "splines"), "probe", "REAL=double")
+
+
+def test_later_files_know_what_earlier_ones_define(session):
+    assert session.kernel(("refraction/rays", "probe"), "probe", "REAL=double").function_name == "probe"
 
 
 def test_buffers_come_back_as_they_went(session):

@@ -91,14 +91,17 @@ def test_fresnels_weights_darken_the_rim(scene):
     assert dim.weight.min() < 0.7
 
 
-def test_lost_rays_show_nothing(scene):
-    made = picture(scene, depth=1)
+def test_lost_rays_show_what_lies_beyond_the_backdrop(scene):
+    beyond = (90, 60, 30)
+    board = backdrop_of([checkerboard((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 10)], beyond)
+    made = render(scene, CAMERA, board, RenderSettings(rows=48, columns=48, depth=1))
     lost = made.fate == LOST
     assert lost.sum() > 500
     assert (made.plane[lost] == -1).all()
     assert np.isnan(made.position_m[lost]).all()
     inner = lost & np.roll(lost, 1, 0) & np.roll(lost, -1, 0)
-    assert (made.image[inner] == 0).all()
+    assert inner.sum() > 400
+    assert (made.image[inner] == beyond).all()
 
 
 @pytest.mark.parametrize(
