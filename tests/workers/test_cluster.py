@@ -1,13 +1,19 @@
 """The cluster provider: an embedded cluster, a given scheduler, and what is refused."""
 
+import os
 import socket
 import threading
+from types import SimpleNamespace
+from urllib.parse import urlsplit
 
 import pytest
+from distributed import LocalCluster
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.cluster import open_cluster
+from bentray_workers.cluster import Cluster, open_cluster
 from bentray_workers.lanes import RENDER
+
+from ..listening import beyond_loopback, listening, pages
 
 
 def test_embedded_cluster_offers_both_lanes(cluster):
@@ -28,14 +34,54 @@ def test_given_scheduler_is_joined_and_survives_leaving(cluster):
     assert cluster.client.submit(sum, [2, 2]).result() == 4
 
 
-def test_workers_in_processes_are_warm_and_isolated(tmp_path):
-    import os
+@pytest.fixture(scope="module")
+def own(tmp_path_factory):
+    """A cluster whose worker is a process, as the service starts it, and where it listens."""
+    before = listening(os.getpid())
+    with open_cluster(workers=1, local_directory=tmp_path_factory.mktemp("own")) as cluster:
+        yield cluster, listening(os.getpid()) - before
 
-    with open_cluster(workers=1, local_directory=tmp_path) as own:
-        pid = own.client.submit(os.getpid).result()
-        assert pid != os.getpid()
-        compiled = own.client.submit(_compiled_methods).result()
+
+def test_workers_in_processes_are_warm_and_isolated(own):
+    own, _ = own
+    pid = own.client.submit(os.getpid).result()
+    assert pid != os.getpid()
+    compiled = own.client.submit(_compiled_methods).result()
     assert "accurate" in compiled
+
+
+def test_it_listens_on_loopback_only_and_shows_no_page(own):
+    own, sockets = own
+    scheduler = own.describe()["scheduler"]
+    assert int(scheduler.rsplit(":", 1)[1]) in {port for _, port in sockets}
+    assert len(sockets) >= 4, "a web server each beside Dask's own ports, and they are looked at"
+    assert beyond_loopback(sockets) == set()
+    assert pages(sockets) == []
+
+
+def test_the_search_for_pages_finds_those_that_dask_shows_by_default(tmp_path):
+    """Guards the test above."""
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", local_directory=str(tmp_path)
+    ):
+        shown = pages(listening(os.getpid()))
+    assert {"/health", "/json/counts.json"} <= {urlsplit(page).path for page in shown}
+
+
+def test_a_scheduler_that_was_started_again_is_found_again():
+    clients = [SimpleNamespace(status="closed", close=lambda: None), SimpleNamespace(status="running")]
+    offered = iter([clients[0], InvalidInput("scheduler_address", "gone", "there"), clients[1]])
+
+    def connect():
+        if isinstance(found := next(offered), InvalidInput):
+            raise found
+        return found
+
+    cluster = Cluster(connect)
+    with pytest.raises(ConnectionError, match="gone"):
+        _ = cluster.client
+    assert cluster.client is clients[1]
+    assert cluster.client is clients[1], "kept while it runs"
 
 
 def _compiled_methods():

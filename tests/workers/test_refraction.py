@@ -8,12 +8,13 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import ONE_HOLE, FringeSphere, sampled
-from bentray_workers import refraction
+from bentray_workers import refraction, strips
 from bentray_workers.images.png import colours_of
 from bentray_workers.lanes import RECONSTRUCTION
-from bentray_workers.refraction import frame_of, joined_png, picture_png, strip, strip_image, strips_of
+from bentray_workers.refraction import frame_of, picture_png, strip, strip_image
 from bentray_workers.refraction_view import RefractionView
 from bentray_workers.scene_cache import scene_at
+from bentray_workers.strips import joined_png, strips_of
 from bentray_workers.volume_file import Volume, write_volume
 
 SMALL = RefractionView(iso=(0.5,), width=48, height=32)
@@ -62,6 +63,13 @@ def test_a_ball_of_glass_bends_as_snell_says(tmp_path):
     np.testing.assert_allclose(found[near], expected * offset[near] / apart[near], atol=0.005 * edge)
     assert near.sum() > 8
     assert np.sign(found[near]).tolist() == (-np.sign(offset[near])).tolist()
+
+
+def test_rays_that_meet_more_surfaces_than_allowed_show_dark_grey(path):
+    """As the description of ``depth`` says."""
+    image = whole(path, replace(SMALL, depth=1)).image
+    assert (image[14:18, 22:26] == refraction.BEYOND).all()
+    assert (whole(path, SMALL).image[14:18, 22:26] != refraction.BEYOND).any()
 
 
 def test_the_frame_is_right_handed_with_z_up():
@@ -129,7 +137,7 @@ def test_a_task_has_about_a_second_of_work(view, rows):
 
 @pytest.mark.parametrize("rays", [2**19, 200])
 def test_on_a_cluster(cluster, path, rays, monkeypatch):
-    monkeypatch.setattr(refraction, "TASK_RAYS", rays)
+    monkeypatch.setattr(strips, "TASK_RAYS", rays)
     png = refraction.submit(cluster.client, path, SMALL, 0).result(timeout=60)
     image = whole(path, SMALL).image
     assert (colours_of(png) != image).any(axis=-1).mean() < 0.005

@@ -1,6 +1,7 @@
 """Slices on a cluster: the same bits as in one process, progress, stopping, failure."""
 
 import threading
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -110,4 +111,43 @@ def test_missing_file_is_named(cluster, tmp_path):
 def test_nothing_is_left_on_the_cluster(cluster, path, plan):
     before = set(cluster.client.futures)
     slices.reconstruct(cluster.client, path, plan)
-    assert set(cluster.client.futures) <= before
+    # A client lets go of futures in a thread of its own.
+    deadline = time.monotonic() + 10.0
+    while not set(cluster.client.futures) <= before:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+class Torn(Exception):
+    """What takes the driver away half-way."""
+
+
+@pytest.mark.parametrize("plan", [*METHODS, *OTHERS.values()], ids=[*(p.method for p in METHODS), *OTHERS])
+def test_a_torn_run_is_gone_on_from_to_the_same_bits(cluster, scan, path, tmp_path, plan):
+    expected = reconstruct_here(scan, plan)
+    reached = []
+
+    def go_on(patience):
+        """What a run gives that is torn after so many reports; None where it was."""
+        seen = []
+
+        def tear(progress):
+            seen.append(progress.done)
+            if len(seen) > patience:
+                raise Torn
+
+        try:
+            return slices.reconstruct(cluster.client, path, plan, tear, work_dir=tmp_path / "work")
+        except Torn:
+            return None
+        finally:
+            reached.append(seen[0])
+
+    result = next(found for patience in (4, 12, 8, 20, 10**6) if (found := go_on(patience)) is not None)
+    assert reached[0] == 0
+    assert reached == sorted(reached)
+    assert reached[-1] > 0, "something was restored"
+    for name in ("speed", "coverage", "recovery", "residuals"):
+        assert np.array_equal(getattr(result, name), getattr(expected, name)), name
+    for name in ("history", "settings", "trials"):
+        assert getattr(result, name) == getattr(expected, name), name

@@ -1,70 +1,75 @@
-"""Where the workers are: a local cluster of processes, or one that is already running."""
+"""A client of a cluster: of one that is already running, or of one that a provider starts."""
 
 from __future__ import annotations
 
 import asyncio
-import os
+import threading
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import dask
-from distributed import Client, LocalCluster
+from distributed import Client
 from distributed.core import rpc
 from distributed.security import Security
 
 from bentray_kernels.errors import InvalidInput
 
-from .lanes import OFFERED, THREADS
-
-PRELOAD = "bentray_workers.warmup"
-
-EMBEDDED = {
-    # A queue without workers fails its tasks after this long instead of waiting for ever.
-    "distributed.scheduler.no-workers-timeout": "60s",
-    # Dask's sampling profiler wakes every process a hundred times a second, work or no work.
-    "distributed.worker.profile.enabled": False,
-    # Dask lets workers hand back every 64 KiB they free, and glibc then maps each array above 128 KiB anew:
-    # page faults took nearly half of a straight-ray reconstruction. These are glibc's own limits, in bytes.
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
-    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**25,
-}
+from .providers import Deployed, Wanted, deploy
+from .tls import security_of
 
 # What tells that nothing, or something else, is at an address; other protocols look like huge messages.
 NO_SCHEDULER = (OSError, TimeoutError, ValueError, MemoryError)
 
 
 class Cluster:
-    """A client of a running scheduler, and the scheduler itself where it is ours.
+    """A client of a running scheduler, and the scheduler itself where it is ours."""
 
-    Attributes:
-        client: ``distributed.Client``; tasks name their lane by ``resources=``.
-    """
+    def __init__(self, connect: Callable[[], Client], deployed: Deployed | None = None) -> None:
+        self._connect = connect
+        self._deployed = deployed
+        self._client = connect()
+        self._changing = threading.Lock()
 
-    def __init__(self, client: Client, local: LocalCluster | None = None) -> None:
-        self.client = client
-        self._local = local
+    @property
+    def client(self) -> Client:
+        """A ``distributed.Client``; tasks name their lane by ``resources=``.
+
+        A client gives up when its scheduler stays away for longer than the time to connect. The next call
+        then makes a new one, so that a scheduler that was started again is found again.
+
+        Raises:
+            ConnectionError: while there is no scheduler.
+        """
+        with self._changing:
+            if self._client.status == "closed":
+                try:
+                    self._client = self._connect()
+                except InvalidInput as error:
+                    raise ConnectionError(str(error)) from error
+            return self._client
 
     def describe(self) -> dict[str, Any]:
         """What there is now: scheduler address, workers, threads and the lanes offered."""
-        workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
+        client = self.client
+        workers = client.scheduler_info(n_workers=-1)["workers"].values()
         lanes: dict[str, float] = {}
         for worker in workers:
             for lane, amount in worker.get("resources", {}).items():
                 lanes[lane] = lanes.get(lane, 0) + amount
         return {
-            "scheduler": self.client.scheduler.address,
-            "embedded": self._local is not None,
+            "scheduler": client.scheduler.address,
+            "embedded": self._deployed is not None,
             "workers": len(workers),
             "threads": sum(worker["nthreads"] for worker in workers),
             "lanes": lanes,
         }
 
     def close(self) -> None:
-        """Leave; an embedded cluster ends with it."""
-        self.client.close()
-        if self._local is not None:
-            self._local.close()
+        """Leave; a cluster that was started for us ends with it."""
+        self._client.close()
+        if self._deployed is not None:
+            self._deployed.close()
 
     def __enter__(self) -> Cluster:
         return self
@@ -80,51 +85,64 @@ def open_cluster(
     workers: int | None = None,
     local_directory: Path | None = None,
     *,
+    kind: str = "embedded",
+    template: Path | None = None,
+    tls: Path | None = None,
     processes: bool = True,
     connect_timeout_s: float = 10.0,
 ) -> Cluster:
-    """A cluster by its scheduler's address, or an embedded one on this machine.
+    """A cluster by its scheduler's address, or one that is started for us.
 
     Args:
-        scheduler_address: as ``tcp://host:port``; None starts an embedded cluster.
-        workers: worker processes of an embedded cluster; None: one a core.
+        scheduler_address: as ``tcp://host:port``; None starts a cluster.
+        workers: worker processes of a cluster that is started; None: what its kind thinks right.
         local_directory: where embedded workers keep their scratch files.
+        kind: of the cluster that is started, a key of ``providers.PROVIDERS``.
+        template: what that kind must be told about this site.
+        tls: a folder of certificates, see ``security_of``.
         processes: False keeps embedded workers in this process (for tests).
         connect_timeout_s: how long to try an address, s.
 
     Raises:
-        InvalidInput: when no scheduler answers at the address, or ``workers`` is not positive.
+        InvalidInput: when no scheduler answers at the address, or from the provider.
     """
-    if scheduler_address is not None:
-        try:
-            asyncio.run(_answers(scheduler_address, connect_timeout_s))
-            return Cluster(Client(scheduler_address, timeout=connect_timeout_s, set_as_default=False))
-        except NO_SCHEDULER as error:
-            reason = f"no answer in {connect_timeout_s:g} s" if isinstance(error, TimeoutError) else error
-            raise InvalidInput(
-                "scheduler_address",
-                f"{scheduler_address} ({reason})",
-                "the address of a running Dask scheduler",
-            ) from error
-    count = workers if workers is not None else len(os.sched_getaffinity(0))
-    if count < 1:
-        raise InvalidInput("workers", workers, "at least 1")
-    with dask.config.set(EMBEDDED):
-        local = LocalCluster(
-            n_workers=count,
-            threads_per_worker=THREADS,
-            processes=processes,
-            resources=OFFERED,
-            dashboard_address="127.0.0.1:0",
-            preload=PRELOAD,
-            local_directory=None if local_directory is None else str(local_directory),
+    if scheduler_address is None:
+        deployed = deploy(kind, Wanted(workers, local_directory, template, tls, processes))
+        return Cluster(lambda: Client(deployed, set_as_default=False), deployed)
+    security = security_of(tls)
+
+    def connect() -> Client:
+        # A scheduler that accepts and stays silent would hold a client for ever, so it is asked first.
+        identity_of(scheduler_address, security, connect_timeout_s)
+        return Client(scheduler_address, timeout=connect_timeout_s, security=security, set_as_default=False)
+
+    return Cluster(connect)
+
+
+def identity_of(address: str, security: Security, timeout_s: float, workers: int = 0) -> dict[str, Any]:
+    """What the scheduler at an address says of itself, with so many of its workers, -1 for all.
+
+    Raises:
+        InvalidInput: when there is none, with the reason.
+    """
+    encrypted = address.startswith("tls://")
+    if (encrypted and security.tls_ca_file is None) or (security.require_encryption and not encrypted):
+        found = f"{address} with{'out' if encrypted else ''} certificates"
+        raise InvalidInput(
+            "scheduler_address", found, "tls://host:port with certificates, else tcp://host:port"
         )
-    return Cluster(Client(local, set_as_default=False), local)
+    try:
+        return asyncio.run(_identity(address, security, timeout_s, workers))
+    except NO_SCHEDULER as error:
+        reason = f"no answer in {timeout_s:g} s" if isinstance(error, TimeoutError) else error
+        raise InvalidInput(
+            "scheduler_address", f"{address} ({reason})", "the address of a running Dask scheduler"
+        ) from error
 
 
-async def _answers(address: str, timeout_s: float) -> None:
-    """Ask the scheduler who it is. A ``Client`` would wait for ever for one that accepts and stays silent."""
+async def _identity(address: str, security: Security, timeout_s: float, workers: int) -> dict[str, Any]:
     async with asyncio.timeout(timeout_s):
-        secrets = Security().get_connection_args("client")
+        secrets = security.get_connection_args("client")
         async with rpc(address, connection_args=secrets, timeout=timeout_s) as scheduler:
-            await scheduler.identity(n_workers=0)
+            found: dict[str, Any] = await scheduler.identity(n_workers=workers)
+            return found

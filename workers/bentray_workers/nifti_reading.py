@@ -3,24 +3,37 @@
 from __future__ import annotations
 
 import logging
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 
 from .bounded_reading import LONGEST_HEADER, UNITS_M, ShapeCheck, any_shape, declared, refusing, whole
 from .volume_file import Volume
+
+# Cosine between two axes; rounding of headers leaves far less.
+MOST_SHEAR = 1e-3
 
 # Takes what nibabel says of a header while it checks it: the refusal says the same in one line.
 _unheard = logging.Logger("nibabel's checks, unheard", logging.CRITICAL + 1)
 
 
 def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
-    """The volume in an open file, unpacked; raises InvalidInput for anything else.
+    """The volume in an open file, unpacked, its axes turned to the right, front and up of the body.
 
-    ``check`` is called with the shape before the values are read.
+    Axes change places and sense so that they come nearest to these; values are never resampled, so what is
+    left of a tilt is not kept. A file that says nothing of directions (both codes 0) stays as it is stored.
+
+    Args:
+        file: at its beginning.
+        check: called with the shape in the file before the values are read.
+
+    Raises:
+        InvalidInput: for anything else, and for axes that are not at right angles.
     """
     from nibabel.nifti1 import Nifti1Header
     from nibabel.nifti2 import Nifti2Header
@@ -36,7 +49,7 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
             header.check_fix(_unheard)
             dtype, shape = header.get_data_dtype(), tuple(int(n) for n in header.get_data_shape())
             slope, intercept = header.get_slope_inter()
-            affine, unit = header.get_best_affine(), header.get_xyzt_units()[0]
+            affine, unit = _affine(header), header.get_xyzt_units()[0]
         except HeaderDataError as error:
             raise InvalidInput("file", f"a damaged NIfTI header ({error})", "a whole NIfTI file") from None
         # A volume of one moment often has a fourth axis of length 1.
@@ -51,9 +64,35 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
         if (slope or 1.0, intercept or 0.0) != (1.0, 0.0):
             with np.errstate(over="ignore", invalid="ignore"):
                 values = values * np.float32(slope) + np.float32(intercept)
+        values, affine = _turned(values, affine)
         scale = UNITS_M["mm" if unit == "unknown" else unit]
         spacing = scale * np.linalg.norm(affine[:3, :3], axis=0)
-        return Volume.of(values, spacing, scale * affine[:3, 3], _text(header["descrip"]))
+        return Volume.of(values, spacing.tolist(), (scale * affine[:3, 3]).tolist(), _text(header["descrip"]))
+
+
+def _affine(header: Any) -> Floats:
+    """(4, 4) from nodes to places, unit of the file, x to the right, y to the front, z up."""
+    if header["sform_code"] == 0 and header["qform_code"] == 0:
+        # Nibabel would mirror x, as another format has it.
+        return np.diag([*np.asarray(header["pixdim"][1:4], dtype=np.float64), 1.0])
+    return np.asarray(header.get_best_affine(), dtype=np.float64)
+
+
+def _turned(values: NDArray[Any], affine: Floats) -> tuple[NDArray[Any], Floats]:
+    """The same with axes in the order of space; one without directions stays, for ``Volume`` to refuse."""
+    from nibabel.orientations import apply_orientation, inv_ornt_aff, io_orientation
+
+    lengths = np.linalg.norm(affine[:3, :3], axis=0)
+    if values.ndim != 3 or not (np.isfinite(affine).all() and lengths.all()):
+        return values, affine
+    axes = affine[:3, :3] / lengths
+    cosine = float(np.abs(axes.T @ axes - np.eye(3)).max())
+    if cosine > MOST_SHEAR:
+        angle = math.degrees(math.acos(min(cosine, 1.0)))
+        accepted = "axes at right angles; resample the volume on such a grid"
+        raise InvalidInput("affine", f"a sheared grid: axes {angle:.2f} degrees apart", accepted)
+    order = io_orientation(affine)
+    return apply_orientation(values, order), affine @ inv_ornt_aff(order, values.shape)
 
 
 def _text(field: NDArray[Any]) -> str:

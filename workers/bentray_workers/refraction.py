@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -28,14 +27,11 @@ from bentray_kernels.refraction import (
 )
 from bentray_kernels.refraction.supersampling import averaged
 
+from . import strips
 from .images.backdrop_card import backdrop_card
 from .images.png import Colours, png_of
-from .lanes import RENDER
 from .refraction_view import RefractionView
 from .scene_cache import scene_at
-
-# Of one task: about a second of work.
-TASK_RAYS = 2**19
 
 # Of what is shown at zoom 1, over the longest side of the volume.
 ROOM = 1.25
@@ -71,35 +67,9 @@ def strip_image(path: Path, view: RefractionView, first: int, last: int) -> Colo
     return strip(scene_at(path, view), view, first, last).image
 
 
-def joined_png(strips: Sequence[Colours]) -> bytes:
-    """Task: strips, one below the other, as PNG."""
-    return png_of(np.concatenate(strips))
-
-
 def submit(client: Client, path: Path, view: RefractionView, priority: int) -> Future:
-    """Start a picture on a cluster: one task, or a task a strip and one that joins them.
-
-    Args:
-        client: of the cluster.
-        path: of the file, readable by every worker.
-        view: what to draw.
-        priority: above or below that of other tasks.
-
-    Returns:
-        Of the PNG; once it is released, tasks that have not begun are dropped.
-    """
-    how = {"pure": False, "resources": RENDER, "priority": priority}
-    parts = strips_of(view)
-    if len(parts) == 1:
-        return client.submit(picture_png, path, view, **how)
-    drawn = [client.submit(strip_image, path, view, first, last, **how) for first, last in parts]
-    return client.submit(joined_png, drawn, **how)
-
-
-def strips_of(view: RefractionView) -> list[tuple[int, int]]:
-    """First and last row, the last one not included, of strips that are one task each."""
-    rows = max(1, TASK_RAYS // (view.width * view.times**2))
-    return [(first, min(first + rows, view.height)) for first in range(0, view.height, rows)]
+    """Start a picture of a file on a cluster; see ``strips.submit``."""
+    return strips.submit(client, picture_png, strip_image, path, view, priority)
 
 
 def strip(scene: Scene, view: RefractionView, first: int, last: int, card: Colours | None = None) -> Strip:
@@ -114,7 +84,7 @@ def strip(scene: Scene, view: RefractionView, first: int, last: int, card: Colou
     # Post-refraction supersampling looks at the rows beside.
     margin = 1 if view.supersampling == "prss" else 0
     top, bottom = max(first - margin, 0), min(last + margin, view.height)
-    camera = _part(camera_of(scene, view), top / view.height, bottom / view.height)
+    camera = part_of(camera_of(scene, view), top / view.height, bottom / view.height)
     rows = bottom - top
     own = slice(first - top, last - top)
     if view.mode == "shaded":
@@ -178,7 +148,7 @@ def _light(view: RefractionView) -> Light:
     return Light(tuple((towards / np.linalg.norm(towards)).tolist()), background=BEYOND)
 
 
-def _part(camera: Camera, top: float, bottom: float) -> Camera:
+def part_of(camera: Camera, top: float, bottom: float) -> Camera:
     """The camera of a strip, from and to a part of the height."""
     middle, share = 0.5 * (top + bottom) - 0.5, bottom - top
     origin, direction = camera.origin.copy(), camera.direction.copy()

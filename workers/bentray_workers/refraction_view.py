@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
@@ -12,9 +12,7 @@ from bentray_kernels.refraction import Layers
 from bentray_kernels.splines import FILTERS
 from bentray_kernels.splines.prefilter import MOST_SMOOTHING
 
-# Of a side, and of the square of it in rays.
-MOST_PIXELS = 4096
-MOST_RAYS = MOST_PIXELS**2
+from .asked_fields import MOST_PIXELS, MOST_RAYS, asked, check
 
 WITHIN = {
     "outside": (0.01, 100.0),
@@ -36,11 +34,6 @@ CHOICES = {
     "supersampling": ("none", "prss", "real"),
     "mode": ("refract", "shaded"),
 }
-
-
-def asked(default: Any, description: str) -> Any:
-    """A field of a view; its description is what OpenAPI and the options of the command say."""
-    return field(default=default, metadata={"description": description})
 
 
 @dataclass(frozen=True)
@@ -82,16 +75,12 @@ class RefractionView:
     mode: Literal["refract", "shaded"] = asked("refract", "refract, or shaded: the first surface, lit.")
     width: int = asked(512, "Pixels.")
     height: int = asked(512, "Pixels.")
-    depth: int = asked(16, "Most surfaces that a ray may meet; what goes on beyond is black.")
+    depth: int = asked(
+        16, "Most surfaces that a ray may meet; where it would meet more, the picture is dark grey."
+    )
 
     def __post_init__(self) -> None:
-        for name, choices in CHOICES.items():
-            if getattr(self, name) not in choices:
-                raise InvalidInput(name, repr(getattr(self, name)), "one of " + ", ".join(choices))
-        for name, (low, high) in WITHIN.items():
-            # NaN is between nothing.
-            if not low <= getattr(self, name) <= high:
-                raise InvalidInput(name, getattr(self, name), f"a number from {low:g} to {high:g}")
+        check(self, CHOICES, WITHIN)
         if len(self.iso) > MOST_ISOS:
             raise InvalidInput("iso", f"{len(self.iso)} iso-values", f"at most {MOST_ISOS}")
         if len(self.index) != max(len(self.iso), 1):

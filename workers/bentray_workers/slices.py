@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import tempfile
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
+from itertools import count
 from pathlib import Path
 
 from distributed import Client, Future, wait
@@ -18,8 +19,10 @@ from bentray_kernels.tomography import (
 from bentray_kernels.tomography.chains import Call, Chain
 from bentray_kernels.tomography.reconstruction import carried_out, measured
 
+from .attempts import Attempts
+from .checkpoints import Checkpoints
 from .dataset_file import read_dataset, write_dataset
-from .lanes import RECONSTRUCTION
+from .offers import resources_for
 from .scan import FileScan
 
 # Tasks in flight for each worker: one at work and one ready.
@@ -39,6 +42,7 @@ def reconstruct(
     on_progress: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
     work_dir: Path | None = None,
+    on_saved: Callable[[], None] = lambda: None,
 ) -> Reconstruction:
     """Reconstruct a dataset file, on a cluster or in this process; both give the same bits.
 
@@ -51,54 +55,78 @@ def reconstruct(
         settings: see ``Settings``.
         on_progress: called after each batch.
         stop: polled between batches, and while a cluster picks; true ends with ``Cancelled``.
-        work_dir: where picked travel times are kept while it runs, readable by every worker; None: a
+        work_dir: where picked travel times and checkpoints are kept, readable by every worker; one that an
+            unfinished run of the same dataset and settings left is gone on from, to the same bits. None: a
             temporary folder of this machine.
+        on_saved: called after each checkpoint.
 
     Raises:
         Cancelled: when ``stop`` said so.
-        InvalidInput: from the file or the settings.
+        InvalidInput: from the file or the settings, and for a device that no worker offers.
     """
     if client is None:
         return _reconstruct_here(dataset_path, settings, on_progress, stop)
     with _folder(work_dir) as folder:
-        path = _prepared(client, dataset_path, settings, Path(folder), stop)
-        return _carried_out(client, path, settings, on_progress, stop)
+        attempts = Attempts(client, Path(folder), resources_for(client, settings))
+        path = _prepared(client, attempts, dataset_path, settings, Path(folder), stop)
+        checkpoints = Checkpoints(Path(folder) / "checkpoints", on_saved)
+        return _carried_out(client, attempts, path, settings, checkpoints, on_progress, stop)
 
 
 def _prepared(
-    client: Client, dataset_path: Path, settings: Settings, folder: Path, stop: Callable[[], bool] | None
+    client: Client,
+    attempts: Attempts,
+    dataset_path: Path,
+    settings: Settings,
+    folder: Path,
+    stop: Callable[[], bool] | None,
 ) -> Path:
     """What ``prepare`` gives; picking may take a while, and a stop does not wait for its end."""
-    picking = client.submit(prepare, dataset_path, settings, folder, resources=RECONSTRUCTION, pure=False)
-    while not finished(client, [picking]):
-        if stop is not None and stop():
-            picking.cancel()
-            raise Cancelled
-    path: Path = picking.result()
+    picking: Future | None = attempts.submit(prepare, dataset_path, settings, folder)
+    while picking is not None:
+        last = picking
+        while not finished(client, [last]):
+            if stop is not None and stop():
+                last.cancel()
+                raise Cancelled
+        picking = attempts.again(last)
+    path: Path = last.result()
     return path
 
 
 def prepare(dataset_path: Path, settings: Settings, folder: Path) -> Path:
     """Task: a file with travel times, which is the dataset itself unless they must be picked first."""
+    picked = folder / "picked.h5"
+    if picked.exists():
+        return picked
     dataset = read_dataset(dataset_path)
     if dataset.picked:
         return dataset_path
-    picked = folder / "picked.h5"
     write_dataset(picked, pick(dataset, settings.picker))
     return picked
 
 
 def _carried_out(
     client: Client,
+    attempts: Attempts,
     path: Path,
     settings: Settings,
+    checkpoints: Checkpoints,
     on_progress: Callable[[Progress], None] | None,
     stop: Callable[[], bool] | None,
 ) -> Reconstruction:
     stamp = path.stat().st_mtime_ns
+    drives = count()
 
     def drive(chains: Sequence[Chain], before: int, after: int) -> None:
-        _drive(client, chains, before, after, on_progress, stop)
+        # What is driven first, as the trials of ``auto``, is restored as a whole and so decides as it did.
+        number = next(drives)
+        named = {f"{number}-{k:05d}": chain for k, chain in enumerate(chains)}
+        for name, chain in named.items():
+            standing = checkpoints.last(name)
+            if standing is not None:
+                chain.restore(standing)
+        _drive(client, attempts, named, before, after, checkpoints, on_progress, stop)
 
     return carried_out(
         read_dataset(path, traces=False),
@@ -110,30 +138,42 @@ def _carried_out(
 
 def _drive(
     client: Client,
-    chains: Sequence[Chain],
+    attempts: Attempts,
+    chains: Mapping[str, Chain],
     before: int,
     after: int,
+    checkpoints: Checkpoints,
     on_progress: Callable[[Progress], None] | None,
     stop: Callable[[], bool] | None,
 ) -> None:
-    """Run chains to their end, a few calls at a time."""
-    ready = deque((chain, call) for chain in chains for call in chain.first())
-    running: dict[Future, tuple[Chain, Call]] = {}
+    """Run chains, each with its name among the checkpoints, to their end, a few calls at a time."""
+    ready = deque((name, call) for name, chain in chains.items() for call in chain.first())
+    running: dict[Future, tuple[str, Call]] = {}
     window = IN_FLIGHT * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+
+    def report() -> None:
+        if on_progress is not None:
+            on_progress(measured(list(chains.values()), before, after))
+
+    # Chains that are restored at their end are no news where others follow: progress would seem to go back.
+    if ready or not after:
+        report()
     try:
         while ready or running:
             while ready and len(running) < window:
-                chain, call = ready.popleft()
-                future = client.submit(call.function, *call.arguments, resources=RECONSTRUCTION, pure=False)
-                running[future] = chain, call
+                name, call = ready.popleft()
+                running[attempts.submit(call.function, *call.arguments)] = name, call
             for future in finished(client, list(running)):
-                chain, call = running.pop(future)
-                failed = future.status != "finished"
-                given = future if call.keep and not failed else future.result()
+                name, call = running.pop(future)
+                again = attempts.again(future)
+                if again is not None:
+                    running[again] = name, call
+                    continue
+                given = future if call.keep and future.status == "finished" else future.result()
                 # Before other slices begin: what an iteration keeps is freed by its end.
-                ready.extendleft((chain, later) for later in reversed(chain.after(call, given)))
-                if on_progress is not None:
-                    on_progress(measured(chains, before, after))
+                ready.extendleft((name, later) for later in reversed(chains[name].after(call, given)))
+                checkpoints.keep(name, chains[name].standing)
+                report()
             if stop is not None and stop():
                 raise Cancelled
     finally:

@@ -15,10 +15,11 @@ from PIL import Image
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Progress
 
-from .atomic import replacing
+from .asked_fields import asked
+from .atomic import replacing, write_bytes
 from .lanes import RENDER
 from .refraction import submit
-from .refraction_view import RefractionView, asked
+from .refraction_view import RefractionView
 from .slices import IN_FLIGHT, Cancelled, finished
 
 FORMATS = ("zip", "apng")
@@ -75,6 +76,7 @@ def turn(
     target: Path,
     work_dir: Path,
     on_progress: Callable[[Progress], None],
+    on_saved: Callable[[], None],
     stop: Callable[[], bool],
 ) -> None:
     """Draw all pictures on a cluster and write them to one file.
@@ -84,8 +86,10 @@ def turn(
         path: of a volume or reconstruction file, readable by every worker.
         turntable: what to draw.
         target: the file to write, by a worker, whole or not at all.
-        work_dir: an empty folder for the pictures, readable by every worker.
+        work_dir: a folder for the pictures, readable by every worker; those that an unfinished run of the
+            same turntable left there are not drawn again.
         on_progress: called after each picture.
+        on_saved: the same.
         stop: polled between pictures; true ends with ``Cancelled``.
 
     Raises:
@@ -93,18 +97,20 @@ def turn(
         InvalidInput: from the file or the view.
     """
     frames = [work_dir / f"{number:04d}.png" for number in range(turntable.frames)]
-    waiting, drawn = deque(enumerate(frames)), 0
+    waiting = deque((number, frame) for number, frame in enumerate(frames) if not frame.exists())
+    drawn = len(frames) - len(waiting)
     running: dict[Future, Path] = {}
     window = IN_FLIGHT * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
-    on_progress(Progress(0, len(frames)))
+    on_progress(Progress(drawn, len(frames)))
     try:
         while waiting or running:
             while waiting and len(running) < window:
                 number, frame = waiting.popleft()
                 running[submit(client, path, turntable.frame(number), PRIORITY)] = frame
             for future in finished(client, list(running)):
-                running.pop(future).write_bytes(future.result())
+                write_bytes(running.pop(future), future.result())
                 drawn += 1
+                on_saved()
                 on_progress(Progress(drawn, len(frames)))
             if stop():
                 raise Cancelled

@@ -15,6 +15,7 @@ from bentray_kernels.errors import InvalidInput
 from .bounded_reading import LARGEST_BYTES, ShapeCheck, any_shape, declared, refusing
 from .hdf5_reading import SIGNATURE, Limits, opened, printable
 from .nifti_reading import read_nifti
+from .npy_headers import PARSING
 from .nrrd_reading import read_nrrd
 from .reconstruction_file import FORMAT as RECONSTRUCTION
 from .reconstruction_file import read_reconstruction
@@ -53,8 +54,9 @@ class Given:
 def import_volume(path: Path, given: Given | None = None, check: ShapeCheck = any_shape) -> Volume:
     """Read a volume in any of the formats.
 
-    Axes stay in the order of the file, x first; how the grid is turned in space is not kept. What NRRD and
-    NIfTI give in mm becomes m. A reconstruction of ours becomes its speed, m/s.
+    Axes stay in the order of the file, x first; how an NRRD is turned in space is not kept. Those of a NIfTI
+    are put in the order right, front, up (``read_nifti``). What both give in mm becomes m. A reconstruction
+    of ours becomes its speed, m/s.
 
     Args:
         path: of the file.
@@ -115,14 +117,15 @@ def _raw(path: Path, given: Given, check: ShapeCheck) -> Volume:
 def _numpy(path: Path, file: IO[bytes], given: Given, check: ShapeCheck) -> Volume:
     with refusing("file", "a whole NumPy file of numbers"):
         version = np.lib.format.read_magic(file)
-        if version == (1, 0):
-            shape, columns_first, dtype = np.lib.format.read_array_header_1_0(file)
-        elif version == (2, 0):
-            shape, columns_first, dtype = np.lib.format.read_array_header_2_0(file)
-        else:
+        if version not in {(1, 0), (2, 0)}:
             raise InvalidInput(
                 "file", f"NumPy's format {version}", "1.0 or 2.0, as numpy.save writes numbers"
             )
+        with PARSING:
+            if version == (1, 0):
+                shape, columns_first, dtype = np.lib.format.read_array_header_1_0(file)
+            else:
+                shape, columns_first, dtype = np.lib.format.read_array_header_2_0(file)
         count = declared("values", shape, dtype, check)
         left = path.stat().st_size - file.tell()
         if left < count:

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,10 +15,20 @@ import numpy as np
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation import Ring
 from bentray_kernels.eikonal import methods
+from bentray_kernels.geometry_field.inner_field import build_inner_rows, inner_field, spread_points
+from bentray_kernels.geometry_field.mesh import Chart
+from bentray_kernels.geometry_field.outer_field import build_rows, outer_field
+from bentray_kernels.geometry_field.scene import Shape
+from bentray_kernels.geometry_field.surface import surface_of
+from bentray_kernels.geometry_field.tracing import TraceSettings, trace
+from bentray_kernels.geometry_field.world import world_of
 from bentray_kernels.phantoms import ONE_HOLE, sampled
+from bentray_kernels.phantoms.surfaces import sphere
 from bentray_kernels.tomography import Settings, reconstruct
 
 from . import refusal_log
+from .field_scenes import camera_of, scene_of
+from .field_view import FieldView
 from .refraction import strip
 from .refraction_view import RefractionView
 from .scene_cache import build, filtered_of
@@ -40,8 +56,30 @@ def warm_up_rendering() -> None:
         strip(build(filtered, view.layers()), view, 0, 4)
 
 
+def warm_up_tracing() -> None:
+    """Trace a ball through a geometry field of its own; laying meshes out waits for the first job."""
+    mesh = sphere(4, 5).in_unit_cube()
+    surface = surface_of(Chart(mesh, mesh.corners[..., :2]))
+    points, starts = spread_points(surface, 2)
+    outer = outer_field(4, [build_rows(surface, 4, 0, 96)])
+    inner = inner_field(4, starts, [build_inner_rows(surface, 4, points)])
+    view = FieldView(scene="mirror-ball", width=4, height=4)
+    scene = scene_of(Shape(surface, outer, inner), None, view)
+    trace(world_of(scene), camera_of(view), TraceSettings(view.height, view.width))
+
+
 def dask_setup(worker: Any) -> None:
     """Called by Dask in each worker that preloads this module."""
     refusal_log.install()
-    warm_up()
-    warm_up_rendering()
+    with _one_at_a_time():
+        warm_up()
+        warm_up_rendering()
+        warm_up_tracing()
+
+
+@contextmanager
+def _one_at_a_time() -> Iterator[None]:
+    """The first worker of a machine compiles, which takes a minute; the others then load what it has made."""
+    with (Path(tempfile.gettempdir()) / f"bentray-warm-up-{os.getuid()}.lock").open("ab") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield

@@ -1,0 +1,22 @@
+"""The settings of Dask that every scheduler and worker of ours runs under."""
+
+from __future__ import annotations
+
+SETTINGS = {
+    # A queue without workers fails its tasks after this long instead of waiting for ever.
+    "distributed.scheduler.no-workers-timeout": "60s",
+    # Workers that a task may kill besides the one that gives it up: each takes seconds to come back.
+    "distributed.scheduler.allowed-failures": 1,
+    # Dask's sampling profiler wakes every process a hundred times a second, work or no work.
+    "distributed.worker.profile.enabled": False,
+    # Dask lets workers hand back every 64 KiB they free, and glibc then maps each array above 128 KiB anew:
+    # page faults took nearly half of a straight-ray reconstruction. These are glibc's own limits, in bytes.
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**25,
+    # Dask starts a web server in every process and has no way to ask who calls: it is given no pages.
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+}
+
+# Where that web server listens, since it cannot be left out: a free port of loopback.
+NO_DASHBOARD = "127.0.0.1:0"

@@ -1,0 +1,60 @@
+"""Pictures of geometry fields: scenes traced whole or strip by strip, geometry images and normal maps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from distributed import Client, Future
+
+from bentray_kernels.geometry_field.tracing import TraceSettings, trace
+from bentray_kernels.refraction.supersampling import averaged
+
+from . import strips
+from .field_cache import world_at
+from .field_files import FieldFiles
+from .field_scenes import camera_of
+from .field_view import LOOKUPS, FieldView
+from .geometry_image_file import colour_png, normal_png, position_png, read_geometry_image
+from .images.png import Colours, png_of
+from .refraction import part_of
+
+
+def strip_image(folder: Path, view: FieldView, first: int, last: int) -> Colours:
+    """Task: rows of a field's picture, the last one not included.
+
+    Raises:
+        InvalidInput: as ``world_at``.
+    """
+    settings = TraceSettings(
+        rows=(last - first) * view.rays,
+        columns=view.width * view.rays,
+        depth=view.depth,
+        way=LOOKUPS[view.lookup],
+        eye=LOOKUPS[view.eye],
+    )
+    camera = part_of(camera_of(view), first / view.height, last / view.height)
+    return averaged(trace(world_at(folder, view), camera, settings), view.rays)
+
+
+def picture_png(folder: Path, view: FieldView) -> bytes:
+    """Task: the whole picture, as PNG."""
+    return png_of(strip_image(folder, view, 0, view.height))
+
+
+def submit(client: Client, folder: Path, view: FieldView, priority: int) -> Future:
+    """Start a picture of the field in a folder on a cluster; see ``strips.submit``."""
+    return strips.submit(client, picture_png, strip_image, folder, view, priority)
+
+
+def map_png(folder: Path, what: str) -> bytes:
+    """Task: the geometry image of a field as PNG.
+
+    Args:
+        folder: of the field.
+        what: "positions", "normals" or "colours".
+
+    Raises:
+        InvalidInput: for colours that the mesh has not.
+    """
+    drawn = {"positions": position_png, "normals": normal_png, "colours": colour_png}
+    return drawn[what](read_geometry_image(FieldFiles(folder).image))
