@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import AsyncIterator
 from contextlib import ExitStack, asynccontextmanager
 
@@ -15,12 +16,26 @@ from bentray_workers.cluster import open_cluster
 from . import __version__, errors
 from .compute import Cluster, Compute
 from .jobs.runner import Runner
-from .routes import datasets, health, jobs, pages, refraction, uploads, volumes
+from .metrics import Metrics
+from .routes import (
+    datasets,
+    events,
+    geometry_fields,
+    health,
+    jobs,
+    meshes,
+    pages,
+    refraction,
+    uploads,
+    volumes,
+)
 from .settings import ServiceSettings
 from .storage.database import open_database
 from .storage.datasets import Datasets
 from .storage.files import Files, lock
+from .storage.geometry_fields import GeometryFields
 from .storage.jobs import Jobs
+from .storage.meshes import Meshes
 from .storage.volumes import Volumes
 from .web.headers import SecurityHeaders
 from .wiring import Parts
@@ -45,6 +60,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
         stack = ExitStack()
         try:
             app.state.parts = await run_in_threadpool(_open, settings, cluster, stack)
+            app.state.metrics.watch(app.state.parts)
             app.state.ingest_limiter = anyio.CapacityLimiter(uploads.INGESTS_AT_ONCE)
             yield
         finally:
@@ -59,10 +75,15 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
         redoc_url=None,
         responses=errors.described("default"),
     )
+    # Set by whoever stops the server, so that endless answers end before it waits for them.
+    app.state.leaving = threading.Event()
     errors.install(app)
     app.add_middleware(SecurityHeaders)
-    for part in (datasets, jobs, volumes, refraction, health, pages):
+    app.state.metrics = Metrics()
+    app.add_middleware(app.state.metrics.middleware)
+    for part in (datasets, jobs, events, volumes, refraction, meshes, geometry_fields, health, pages):
         app.include_router(part.router)
+    app.include_router(health.metrics_router)
     app.mount("/static", StaticFiles(directory=pages.WEB / "static"), name="static")
     return app
 
@@ -77,10 +98,25 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
     stack.callback(database.close)
     if cluster is None:
         cluster = stack.enter_context(
-            open_cluster(settings.dask_scheduler_address, settings.workers, local_directory=files.scratch)
+            open_cluster(
+                settings.dask_scheduler_address,
+                settings.workers,
+                files.scratch,
+                kind=settings.cluster,
+                template=settings.cluster_template,
+                tls=settings.tls_dir,
+            )
         )
     store, compute = Jobs(database), Compute(cluster)
-    runner = Runner(store, files, compute, settings.jobs_at_once)
+    runner = Runner(
+        store,
+        files,
+        compute,
+        settings.jobs_at_once,
+        settings.min_free_bytes,
+        # The lock on the folder keeps other services away from the database that lies in it.
+        alone=settings.database_url is None,
+    )
     runner.start()
     stack.callback(runner.stop)
     return Parts(
@@ -90,6 +126,8 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
         datasets=Datasets(database),
         jobs=store,
         volumes=Volumes(database),
+        meshes=Meshes(database),
+        geometry_fields=GeometryFields(database),
         compute=compute,
         runner=runner,
     )

@@ -3,50 +3,60 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from dataclasses import fields
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, TypeVar, get_type_hints
 
 from fastapi import Depends, Query, Request
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.field_view import FieldView
 from bentray_workers.refraction_view import RefractionView
 
-NAMES = [field.name for field in fields(RefractionView)]
+View = TypeVar("View")
 
 
-def view_of(request: Request, **given: Any) -> RefractionView:
-    """The view that a query asks for.
+def asked_of(kind: type[View]) -> Callable[..., View]:
+    """A dependency that gives the view of a query.
 
-    Raises:
-        InvalidInput: for a parameter that does not exist, and from the view itself.
+    Args:
+        kind: a dataclass whose fields have a ``description`` in their metadata.
+
+    Returns:
+        Raises InvalidInput for a parameter that does not exist, and from the view itself.
     """
-    for name in request.query_params:
-        if name not in NAMES:
-            raise InvalidInput(name, repr(request.query_params[name])[:80], "one of " + ", ".join(NAMES))
-    asked: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in given.items()}
-    return RefractionView(**asked)
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+
+    def view_of(request: Request, **given: Any) -> View:
+        for name in request.query_params:
+            if name not in names:
+                raise InvalidInput(name, repr(request.query_params[name])[:80], "one of " + ", ".join(names))
+        asked: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in given.items()}
+        return kind(**asked)
+
+    view_of.__signature__ = _signature(kind)  # type: ignore[attr-defined]
+    return view_of
 
 
-def _signature() -> inspect.Signature:
+def _signature(kind: type[Any]) -> inspect.Signature:
     """What FastAPI reads the parameters from: those of the view, with their meanings."""
-    types = get_type_hints(RefractionView)
+    types = get_type_hints(kind)
     found = [inspect.Parameter("request", inspect.Parameter.KEYWORD_ONLY, annotation=Request)]
-    for field in fields(RefractionView):
+    for field in fields(kind):
         default: Any = field.default
         several = isinstance(default, tuple)
-        kind: Any = list[float] if several else types[field.name]
+        annotation: Any = list[float] if several else types[field.name]
         query = Query(description=field.metadata["description"] + (" May be repeated." if several else ""))
         found.append(
             inspect.Parameter(
                 field.name,
                 inspect.Parameter.KEYWORD_ONLY,
                 default=list(default) if several else default,
-                annotation=Annotated[kind, query],
+                annotation=Annotated[annotation, query],
             )
         )
     return inspect.Signature(found)
 
 
-view_of.__signature__ = _signature()  # type: ignore[attr-defined]
-
-AskedView = Annotated[RefractionView, Depends(view_of)]
+AskedView = Annotated[RefractionView, Depends(asked_of(RefractionView))]
+AskedFieldView = Annotated[FieldView, Depends(asked_of(FieldView))]

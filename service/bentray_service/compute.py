@@ -6,8 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-from bentray_workers import images, refraction
+from bentray_kernels.tomography.settings import Settings
+from bentray_workers import field_picture, images, planning, refraction
+from bentray_workers.dataset_summary import summary_of
+from bentray_workers.field_view import FieldView
+from bentray_workers.isosurface_mesh import mesh_volume
 from bentray_workers.lanes import RENDER
+from bentray_workers.offers import prepared_offers
 from bentray_workers.refraction_view import RefractionView
 
 from .refusals import Busy
@@ -44,6 +49,19 @@ class Compute:
         except (OSError, TimeoutError):
             return 0
 
+    def plan(self, path: Path, settings: Settings) -> dict[str, Any]:
+        """How a dataset file would be reconstructed by the workers that are connected now.
+
+        Raises:
+            InvalidInput: for tasks that none of them can hold, or a lane that none offers.
+        """
+        try:
+            offers = prepared_offers(self.client, settings)
+        except (OSError, TimeoutError):
+            # The scheduler is gone; the job waits until it is back, on workers of which nothing is known.
+            offers = ()
+        return planning.plan(summary_of(path, settings), settings, offers).to_dict()
+
     def slice_png(self, path: Path, **how: Any) -> bytes:
         """One slice of a reconstruction file as PNG; ``how`` as in ``bentray_workers.images.slice_png``.
 
@@ -61,14 +79,30 @@ class Compute:
         """A volume or reconstruction file as glass; raises as ``slice_png`` does."""
         return self._finished(refraction.submit(self.client, path, view, RENDER_PRIORITY))
 
+    def field_png(self, folder: Path, view: FieldView) -> bytes:
+        """A scene with a geometry field; raises as ``slice_png`` does."""
+        return self._finished(field_picture.submit(self.client, folder, view, RENDER_PRIORITY))
+
+    def field_map_png(self, folder: Path, what: str) -> bytes:
+        """The geometry image of a field, as ``bentray_workers.field_picture.map_png``."""
+        return self._drawn(field_picture.map_png, folder, {"what": what})
+
+    def mesh_volume(self, path: Path, iso: float | None, step: int, target: Path) -> dict[str, Any]:
+        """The iso-surface of a volume as a mesh file; as ``bentray_workers.isosurface_mesh.mesh_volume``."""
+        return dict(self._done(self._begun(mesh_volume, path, {"iso": iso, "step": step, "target": target})))
+
     def _drawn(self, draw: Callable[..., bytes], path: Path, how: dict[str, Any]) -> bytes:
-        return self._finished(
-            self.client.submit(draw, path, **how, pure=False, resources=RENDER, priority=RENDER_PRIORITY)
-        )
+        return self._finished(self._begun(draw, path, how))
+
+    def _begun(self, task: Callable[..., Any], path: Path, how: dict[str, Any]) -> Any:
+        return self.client.submit(task, path, **how, pure=False, resources=RENDER, priority=RENDER_PRIORITY)
 
     def _finished(self, future: Any) -> bytes:
+        return bytes(self._done(future))
+
+    def _done(self, future: Any) -> Any:
         try:
-            return bytes(future.result(timeout=RENDER_SECONDS))
+            return future.result(timeout=RENDER_SECONDS)
         except TimeoutError:
             raise Busy(
                 "workers", f"no answer in {RENDER_SECONDS:g} s", "another try, or more workers"

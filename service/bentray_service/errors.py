@@ -26,9 +26,11 @@ log = logging.getLogger("bentray.errors")
 
 MEDIA_TYPE = "application/problem+json"
 LONGEST_FOUND = 120
+# Seconds after which it is worth another try, where workers or the queue are full.
+RETRY_AFTER = "10"
 METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
 
-JOB_KINDS = ("reconstruction", "refraction")
+JOB_KINDS = ("reconstruction", "refraction", "geometry-field")
 
 
 class Fault(BaseModel):
@@ -70,6 +72,8 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.EmptyBody: Kind(422, "empty-body", "The request has no body"),
     refusals.TooLarge: Kind(413, "too-large", "The body is too large"),
     refusals.Finished: Kind(409, "job-finished", "The job has ended already"),
+    refusals.KeyReused: Kind(409, "key-reused", "The key belongs to another request"),
+    refusals.QueueFull: Kind(429, "queue-full", "Too many jobs wait"),
     refusals.NoAnimation: Kind(404, "no-animation", "The job has no animation"),
     refusals.StorageFull: Kind(507, "storage-full", "The disk of the service is full"),
     refusals.Busy: Kind(503, "busy", "No worker was free in time"),
@@ -152,7 +156,8 @@ def _respond(problem: Problem, headers: Mapping[str, str] | None = None) -> Resp
 
 def _refused(request: Request, error: Exception) -> Response:
     assert isinstance(error, InvalidInput)
-    return _respond(from_exception(error, request.url.path))
+    later = {"Retry-After": RETRY_AFTER} if isinstance(error, refusals.Busy | refusals.QueueFull) else None
+    return _respond(from_exception(error, request.url.path), later)
 
 
 def _not_ready(request: Request, error: Exception) -> Response:

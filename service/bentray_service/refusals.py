@@ -6,12 +6,16 @@ from collections.abc import Sequence
 
 from bentray_kernels.errors import InvalidInput
 
+# Where things are listed that are not called as their ids are.
+LISTED = {"mesh": "meshes", "field": "geometry-fields"}
+
 
 class UnknownId(InvalidInput):
-    """No dataset, job or volume has this id."""
+    """Nothing of this kind has this id."""
 
     def __init__(self, field: str, value: str) -> None:
-        super().__init__(field, repr(value[:80]), f"the id of a {field} that exists; see GET /v1/{field}s")
+        listed = LISTED.get(field, f"{field}s")
+        super().__init__(field, repr(value[:80]), f"the id of a {field} that exists; see GET /v1/{listed}")
 
     def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
         return InvalidInput, (self.field, self.value, self.accepted)
@@ -34,6 +38,14 @@ class TooLarge(InvalidInput):
 
 class Finished(InvalidInput):
     """The job has ended, so nothing can be asked of it any more."""
+
+
+class KeyReused(InvalidInput):
+    """The idempotency key came with another request before."""
+
+
+class QueueFull(InvalidInput):
+    """So many jobs wait already that no more are taken for now."""
 
 
 class NoAnimation(InvalidInput):

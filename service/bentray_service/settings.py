@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from pydantic import AliasChoices, Field, ValidationError
 from pydantic_settings import BaseSettings, SettingsConfigDict
+from sqlalchemy.engine import make_url
+from sqlalchemy.exc import ArgumentError
 
 from bentray_kernels.errors import InvalidInput
 
@@ -33,11 +35,26 @@ class ServiceSettings(BaseSettings):
         validation_alias=AliasChoices("dask_scheduler_address", "DASK_SCHEDULER_ADDRESS"),
         description="Scheduler of an existing Dask cluster; without it the service starts its own workers.",
     )
+    cluster: Literal["embedded", "slurm", "kubernetes"] = Field(
+        "embedded", description="What starts the workers where no scheduler is given."
+    )
+    cluster_template: Path | None = Field(
+        None, description="YAML file that tells slurm or kubernetes about this site."
+    )
+    tls_dir: Path | None = Field(
+        None, description="Folder of the certificates for the scheduler and the workers; no TLS without it."
+    )
     workers: int | None = Field(None, gt=0, description="Worker processes to start; one a core without it.")
     database_url: str | None = Field(
         None, description="SQLAlchemy address of the database; an SQLite file in data_dir without it."
     )
+    database_password_file: Path | None = Field(
+        None, description="File whose first line is the password of database_url, which then holds none."
+    )
     jobs_at_once: int = Field(2, ge=1, le=64, description="Jobs that run at the same time; the others wait.")
+    max_queued_jobs: int = Field(
+        1000, ge=1, description="Jobs that may wait, of each tenant; a further one is refused with 429."
+    )
     ingest_memory_bytes: int = Field(
         4 * GIB,
         ge=GIB // 2,
@@ -47,7 +64,7 @@ class ServiceSettings(BaseSettings):
     min_free_bytes: int = Field(
         GIB // 2,
         ge=0,
-        description="Free disk space below which the service reports itself not ready, in bytes.",
+        description="Free disk space below which the service is not ready and begins no job, in bytes.",
     )
 
     @classmethod
@@ -69,5 +86,23 @@ class ServiceSettings(BaseSettings):
 
     @property
     def database(self) -> str:
-        """The address of the database that is really used."""
-        return self.database_url or f"sqlite:///{self.data_dir.resolve() / 'bentray.sqlite'}"
+        """The address of the database that is really used, with its password.
+
+        Raises:
+            InvalidInput: when the password cannot be read, or there is nothing that it belongs to.
+        """
+        if self.database_password_file is None:
+            return self.database_url or f"sqlite:///{self.data_dir.resolve() / 'bentray.sqlite'}"
+        if self.database_url is None:
+            raise InvalidInput(
+                "BENTRAY_DATABASE_PASSWORD_FILE", self.database_password_file, "none without a database_url"
+            )
+        try:
+            password = self.database_password_file.read_text().partition("\n")[0]
+            address = make_url(self.database_url).set(password=password)
+        except OSError as error:
+            found = f"{self.database_password_file} ({error.strerror})"
+            raise InvalidInput("BENTRAY_DATABASE_PASSWORD_FILE", found, "a file that can be read") from error
+        except ArgumentError as error:
+            raise InvalidInput("BENTRAY_DATABASE_URL", self.database_url, "a SQLAlchemy address") from error
+        return address.render_as_string(hide_password=False)

@@ -13,7 +13,9 @@ from .settings import ServiceSettings
 from .storage.database import Database
 from .storage.datasets import Datasets
 from .storage.files import Files
+from .storage.geometry_fields import GeometryFields
 from .storage.jobs import Jobs
+from .storage.meshes import Meshes
 from .storage.volumes import Volumes
 
 
@@ -27,6 +29,8 @@ class Parts:
     datasets: Datasets
     jobs: Jobs
     volumes: Volumes
+    meshes: Meshes
+    geometry_fields: GeometryFields
     compute: Compute
     runner: Runner
 

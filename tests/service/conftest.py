@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import uvicorn
 
-from bentray_kernels.tomography.result import Progress, Reconstruction, Sweep
+from bentray_kernels.tomography.result import Progress, Reconstruction, Sweep, Trial
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.app import create_app
 from bentray_service.settings import ServiceSettings
@@ -57,6 +57,7 @@ class FakeCluster:
 
     def __init__(self) -> None:
         self.workers = 1
+        self.memory_bytes = 0
         self.closed = False
         self.submitted: list[dict[str, Any]] = []
 
@@ -76,6 +77,14 @@ class FakeCluster:
     def describe(self) -> dict[str, Any]:
         return {"workers": self.workers}
 
+    @property
+    def cluster(self) -> None:
+        """It was not started for us."""
+
+    def scheduler_info(self, n_workers: int) -> dict[str, Any]:
+        one = {"memory_limit": self.memory_bytes, "resources": {"recon": 1, "render": 1}}
+        return {"workers": {str(k): one for k in range(self.workers)}}
+
     def close(self) -> None:
         self.closed = True
 
@@ -89,6 +98,7 @@ class FakeWork:
         self.hold.set()
         self.error: Exception | None = None
         self.stages = 1
+        self.trials: tuple[Trial, ...] = ()
 
     def __call__(
         self,
@@ -98,6 +108,7 @@ class FakeWork:
         on_progress: Callable[[Progress], None],
         stop: Callable[[], bool],
         work_dir: Path,
+        on_saved: Callable[[], None],
     ) -> Reconstruction:
         self.calls.append((path, settings))
         assert work_dir.is_dir()
@@ -111,6 +122,7 @@ class FakeWork:
                 if self.hold.wait(0.01):
                     break
             history += (Sweep(0, sweep, 2e-6 / sweep, 8, stage),)
+            on_saved()
             on_progress(Progress(8 * len(history), 8 * len(passes), history))
         if self.error is not None:
             raise self.error
@@ -124,6 +136,7 @@ class FakeWork:
             water_speed_mps=1500.0,
             settings=replace(settings, method="sart") if settings.method == "auto" else settings,
             history=history,
+            trials=self.trials,
             provenance={"bentray": "test"},
         )
 

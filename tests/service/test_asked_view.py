@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import fields
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 from fastapi import Request
 from fastapi.params import Query
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.asked_view import view_of
+from bentray_service.asked_view import asked_of
+from bentray_workers.field_view import FieldView
 from bentray_workers.refraction_view import RefractionView
 
 
@@ -19,11 +20,12 @@ def asked(query: bytes) -> Request:
     return Request({"type": "http", "query_string": query, "headers": []})
 
 
-def test_every_field_is_a_parameter() -> None:
-    parameters = dict(inspect.signature(view_of).parameters)
+@pytest.mark.parametrize("kind", [RefractionView, FieldView])
+def test_every_field_is_a_parameter(kind: type[Any]) -> None:
+    parameters = dict(inspect.signature(asked_of(kind)).parameters)
     del parameters["request"]
-    assert list(parameters) == [field.name for field in fields(RefractionView)]
-    for field in fields(RefractionView):
+    assert list(parameters) == [field.name for field in fields(kind)]
+    for field in fields(kind):
         query = next(one for one in get_args(parameters[field.name].annotation) if isinstance(one, Query))
         assert query.description
         assert query.description.startswith(field.metadata["description"])
@@ -32,10 +34,12 @@ def test_every_field_is_a_parameter() -> None:
 
 
 def test_lists_become_tuples() -> None:
-    view = view_of(asked(b"iso=1&iso=2"), iso=[1.0, 2.0], index=[1.1, 1.2])
+    view = asked_of(RefractionView)(asked(b"iso=1&iso=2"), iso=[1.0, 2.0], index=[1.1, 1.2])
     assert view == RefractionView(iso=(1.0, 2.0), index=(1.1, 1.2))
 
 
 def test_a_parameter_that_does_not_exist_is_named() -> None:
     with pytest.raises(InvalidInput, match=r"isos: found '1'; accepted: one of iso, index"):
-        view_of(asked(b"isos=1"))
+        asked_of(RefractionView)(asked(b"isos=1"))
+    with pytest.raises(InvalidInput, match=r"iso: found '1'; accepted: one of scene, mode"):
+        asked_of(FieldView)(asked(b"iso=1"))

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from sqlalchemy.engine import make_url
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.settings import ServiceSettings
@@ -35,3 +36,27 @@ def test_a_wrong_value_names_its_variable(monkeypatch, name, value):
         ServiceSettings.load()
     assert caught.value.field == name
     assert value in caught.value.value
+
+
+def test_the_password_of_the_database_comes_from_its_file(tmp_path):
+    (tmp_path / "password").write_text("p@ss/word:#?\n")
+    settings = ServiceSettings(
+        database_url="postgresql+psycopg://bentray@db:5432/bentray",
+        database_password_file=tmp_path / "password",
+    )
+    address = make_url(settings.database)
+    assert (address.password, address.host, address.database) == ("p@ss/word:#?", "db", "bentray")
+    assert "p@ss" not in repr(settings)
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"database_url": "postgresql+psycopg://a@b/c"}, "BENTRAY_DATABASE_PASSWORD_FILE"),
+        ({}, "BENTRAY_DATABASE_PASSWORD_FILE"),
+    ],
+)
+def test_a_password_that_cannot_be_read_or_used_is_refused(tmp_path, given, field):
+    with pytest.raises(InvalidInput) as refusal:
+        _ = ServiceSettings(**given, database_password_file=tmp_path / "absent").database
+    assert refusal.value.field == field

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from . import bench, demo, devices, reconstruct, render, serve, simulate, submit
+from . import bench, demo, devices, geometry_field, reconstruct, render, serve, simulate, submit, worker
 from .endings import Commands
 from .repeated_words import SpacingInRow
 
@@ -24,10 +24,12 @@ app = typer.Typer(
 for command in (
     demo.demo,
     serve.serve,
+    worker.worker,
     submit.submit,
     reconstruct.reconstruct,
     simulate.simulate,
     bench.bench,
+    geometry_field.geometry_field,
     devices.devices,
 ):
     app.command()(command)

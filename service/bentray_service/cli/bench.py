@@ -65,16 +65,20 @@ def load(name: str, folder: Path) -> Rows:
         InvalidInput: for a name that is no benchmark; lists those that are.
         WorkFailed: when the file does not define ``rows``.
     """
-    known = sorted(path.stem for path in folder.glob("*.py") if not path.stem.startswith("_"))
-    if name not in known:
+    # A benchmark called as a package is has an underscore behind its name, so as not to stand in for it.
+    files = (path.stem for path in folder.glob("*.py") if not path.stem.startswith("_"))
+    known = {stem.rstrip("_"): stem for stem in sorted(files)}
+    # A hyphen is what a command line has between words, an underscore what a module has.
+    stem = name.replace("-", "_")
+    if stem not in known:
         raise InvalidInput("name", repr(name), "one of " + ", ".join(known))
     # As a script would see it: benchmarks share files whose names begin with an underscore.
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
-    module = importlib.import_module(name)
+    module = importlib.import_module(known[stem])
     measure: Rows | None = getattr(module, "rows", None)
     if measure is None:
-        raise WorkFailed(f"benchmarks/{name}.py defines no rows(quick, progress)")
+        raise WorkFailed(f"benchmarks/{stem}.py defines no rows(quick, progress)")
     return measure
 
 

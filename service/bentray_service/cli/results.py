@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +17,17 @@ if TYPE_CHECKING:
 
 
 def write_results(
-    folder: Path, result: Reconstruction, dataset: Dataset, seconds: float, **more: object
+    folder: Path,
+    result: Reconstruction,
+    dataset: Dataset,
+    seconds: float,
+    draw: Callable[[], bytes] | None = None,
+    **more: object,
 ) -> dict[str, Any]:
-    """Write the three files, each whole or not at all, and return the figures, ``more`` first among them."""
+    """Write the three files, each whole or not at all, and return the figures, ``more`` first among them.
+
+    The picture is drawn here, unless ``draw`` gives it once the ``.h5`` is there; the ``.json`` comes last.
+    """
     from bentray_workers.images import report_png
     from bentray_workers.reconstruction_file import write_reconstruction
 
@@ -31,7 +40,8 @@ def write_results(
         "outputs": {kind: str(path) for kind, path in paths.items()},
     }
     write_reconstruction(paths["h5"], result)
-    write_bytes(paths["png"], report_png(result, dataset.truth, dataset.roi))
+    png = report_png(result, dataset.truth, dataset.roi) if draw is None else draw()
+    write_bytes(paths["png"], png)
     write_bytes(paths["json"], (json.dumps(without_nan(found), indent=2, allow_nan=False) + "\n").encode())
     return found
 

@@ -117,7 +117,12 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
                 remark(f"Bentray is at {url} (data in {settings.data_dir}); Ctrl-C stops it.")
                 remark(_reach(host))
 
-    app = _Starting(create_app(settings))
+        async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+            made.state.leaving.set()
+            await super().shutdown(sockets)
+
+    made = create_app(settings)
+    app = _Starting(made)
     server = Announcing(uvicorn.Config(app, log_level="warning", lifespan="on"))
     # Uvicorn ends the process when the application cannot start; here the reason has the last word.
     with suppress(SystemExit):

@@ -1,9 +1,9 @@
-"""`bentray submit`: send a scan to a running service, wait for the image and fetch it."""
+"""`bentray submit`: send a scan to a running service and fetch its image; or a folder to a cluster."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,34 +13,98 @@ from .endings import service_answers
 from .paths import input_file, output_folder
 from .results import show_results, write_results
 from .settings_options import Asked, settings_from, with_settings_options
-from .terminal import AsJson, Step, print_json, print_lines, progress_bar, residual_note
+from .terminal import AsJson, Step, print_json, print_lines, progress_bar, remark, residual_note
+from .worker import Tls
+
+if TYPE_CHECKING:
+    from bentray_kernels.tomography import Settings
 
 
 @with_settings_options
 def submit(
-    file: Annotated[Path, typer.Argument(help="Dataset file (HDF5, format uct-transmission).")],
+    *,
+    file: Annotated[
+        Path | None,
+        typer.Argument(
+            help="Dataset file (HDF5, format uct-transmission).", show_default="with --batch, none"
+        ),
+    ] = None,
     asked: Asked,
     url: Annotated[str, typer.Option(help="Address of the service.")] = "http://127.0.0.1:8000",
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Folder for the results.", show_default="do not fetch them"),
+        typer.Option(
+            "--output",
+            "--out",
+            "-o",
+            help="Folder for the results.",
+            show_default="do not fetch them; of a batch, DIR/results",
+        ),
     ] = None,
     wait: Annotated[
         bool, typer.Option("--wait/--no-wait", help="Wait for the end, or return at once.")
     ] = True,
+    batch: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            show_default=False,
+            help="Reconstruct every *.h5 in DIR on --scheduler, in place of FILE.",
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            show_default=False, help="Cluster of a batch, as tcp://head:8786; its workers must see DIR too."
+        ),
+    ] = None,
+    at_once: Annotated[
+        int | None,
+        typer.Option(
+            min=1, show_default="workers + 1", help="Datasets of a batch under way at the same time."
+        ),
+    ] = None,
+    tls: Tls = None,
     as_json: AsJson = False,
 ) -> None:
     """Upload a scan, reconstruct it on the service and download the result.
 
+    With --batch, reconstruct a folder of scans on a Dask cluster without the service. What has a sound result
+    of the same file and settings is left out, so that a batch that was stopped can be given again; one that
+    fails leaves the others alone and makes the exit code 1. As in:
+    bentray submit --batch scans --scheduler tcp://head:8786 --out results
+
     Example:  bentray submit scan.h5 --url http://127.0.0.1:8000 -o result
     """
+    if (file is None) == (batch is None):
+        raise InvalidInput(
+            "file", "nothing" if file is None else f"{file} with --batch", "FILE or --batch DIR"
+        )
+    if batch is None and scheduler is not None:
+        raise InvalidInput(
+            "scheduler", f"{scheduler} without --batch", "--url of a service, which has its own"
+        )
+    if batch is not None and (scheduler is None or not wait):
+        found = "none" if scheduler is None else f"{scheduler} with --no-wait"
+        raise InvalidInput("scheduler", found, "the address of a Dask scheduler, and to wait, for --batch")
     if output is not None and not wait:
         raise InvalidInput(
             "output", f"{output} with --no-wait", "one of the two: there is no result to fetch yet"
         )
+    settings = settings_from(asked)
+    if file is not None:
+        _submit(file, settings, url, output, wait=wait, as_json=as_json)
+    if batch is not None and scheduler is not None:
+        from .batch import submit_batch
+
+        submit_batch(batch, scheduler, settings, output, at_once, tls, as_json=as_json)
+
+
+def _submit(
+    file: Path, settings: Settings, url: str, output: Path | None, *, wait: bool, as_json: bool
+) -> None:
     source = input_file(file)
     folder = None if output is None else output_folder(output)
-    settings = settings_from(asked)
 
     from ..client import Client
 
@@ -48,6 +112,8 @@ def submit(
         with progress_bar("Uploading") as step:
             dataset = client.upload(source, step)
         job = client.submit(dataset["id"], settings.to_dict())
+        if job.get("plan"):
+            remark(job["plan"]["why"])
         if wait:
             with progress_bar("Reconstructing") as step:
                 job = client.wait(job["id"], lambda record: show_job(record, step))

@@ -112,7 +112,7 @@ class Client:
         with self._request("GET", f"/v1/volumes/{volume_id}/slice.png", params=how) as response:
             return response.read()
 
-    def download(self, volume_id: str, format: Literal["hdf5", "npy"], path: Path | str) -> Path:  # noqa: A002
+    def download(self, volume_id: str, format: Literal["hdf5", "nifti", "npy"], path: Path | str) -> Path:  # noqa: A002
         """Fetch a result into ``path``; the file is there whole or not at all."""
         path = Path(path)
         partial = path.with_name(f"{path.name}.partial")

@@ -1,6 +1,6 @@
 """The process that opens an uploaded file: limits itself, reads, rewrites, and prints one line of JSON.
 
-``python -m bentray_service.ingest.child dataset|volume IN OUT --memory BYTES --seconds SECONDS --given JSON``
+``python -m bentray_service.ingest.child WHAT IN OUT --memory BYTES --seconds SECONDS --given JSON``
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ OPEN_FILES = 64
 ACCEPTED = {
     "dataset": "an HDF5 file in the format uct-transmission",
     "volume": "a volume as NumPy (.npy), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype",
+    "mesh": "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB",
 }
 
 
@@ -63,6 +64,7 @@ def convert(what: str, source: Path, target: Path, given: dict[str, Any]) -> dic
     try:
         from bentray_kernels.errors import InvalidInput
         from bentray_workers.dataset_file import read_dataset, write_dataset
+        from bentray_workers.mesh_file import StoredMesh, summary_of, write_mesh
         from bentray_workers.volume_file import write_volume
         from bentray_workers.volume_reading import Given, import_volume
     except MemoryError:
@@ -72,6 +74,13 @@ def convert(what: str, source: Path, target: Path, given: dict[str, Any]) -> dic
             dataset = read_dataset(source)
             write_dataset(target, dataset)
             return {"ok": summary(dataset)}
+        if what == "mesh":
+            from bentray_workers.mesh_reading import read_mesh
+
+            found = read_mesh(source.read_bytes())
+            stored = StoredMesh(found.surface.mesh, found.colours)
+            write_mesh(target, stored)
+            return {"ok": summary_of(stored, found.surface, found.format) | {"title": text(given["title"])}}
         volume = import_volume(source, Given(**given))
         write_volume(target, volume)
         return {"ok": volume_summary(volume)}

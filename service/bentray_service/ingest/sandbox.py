@@ -46,15 +46,15 @@ def ingest(
     """Check ``source`` in a process of its own and write the canonical ``target``.
 
     Args:
-        what: "dataset" or "volume".
+        what: a key of ``ACCEPTED``.
         source, target: paths of this machine.
         memory_bytes, seconds: what the process may use of address space, of processor and of wall time.
         scratch: the folder it runs in.
-        given: what the user says of a volume, as ``volume_reading.Given``.
+        given: what the user says of it: of a volume as ``volume_reading.Given``, of a mesh its title.
         started: told the id of the process.
 
     Returns:
-        The summary of the dataset or the volume.
+        The summary of what it holds.
 
     Raises:
         InvalidInput: when the file is refused, and also when reading it crashed, hung or ate the memory.

@@ -7,8 +7,6 @@ import logging
 import secrets
 
 from distributed import KilledWorker
-from distributed.comm import CommClosedError
-from distributed.scheduler import NoValidWorkerError
 
 from bentray_kernels.errors import InvalidInput
 
@@ -29,12 +27,6 @@ def explain(job_id: str, error: BaseException) -> Problem:
     if isinstance(error, KilledWorker):
         words = "the workers that ran this job died one after the other, most often for lack of memory"
         return make(FAILED, words, instance=instance)
-    if isinstance(error, NoValidWorkerError):
-        return make(FAILED, "no worker was there to run this job; see /health/ready", instance=instance)
-    if isinstance(error, CommClosedError):
-        return make(
-            FAILED, "the connection to the Dask scheduler was lost; send the job again", instance=instance
-        )
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         return make(FAILED, "the disk of the service is full", instance=instance)
     number = secrets.token_hex(8)

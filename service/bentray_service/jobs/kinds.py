@@ -11,12 +11,16 @@ from typing import Any, Protocol
 
 from pydantic import TypeAdapter
 
+from bentray_kernels.tomography.advice import reason
 from bentray_kernels.tomography.result import Progress, Reconstruction
 from bentray_kernels.tomography.settings import Settings
-from bentray_workers import slices
+from bentray_workers import geometry_field, slices
+from bentray_workers.field_settings import FieldSettings
 from bentray_workers.reconstruction_file import write_reconstruction
-from bentray_workers.turntable import Turntable, turn
+from bentray_workers.render_tasks import ClusterTasks
+from bentray_workers.turntable import PRIORITY, Turntable, turn
 
+from ..storage import schema
 from ..storage.files import Files
 from ..storage.ids import volume_of
 
@@ -32,8 +36,10 @@ class Task:
         source: the file that it reads, as ``Kind.source`` says.
         settings: as stored with the job.
         target: the file to write, atomically, as ``Kind.target`` says.
-        work_dir: an empty folder for the time it runs, which every worker can read and write.
+        work_dir: a folder of its own, which every worker can read and write. What an unfinished run left in
+            it is still there, and is gone on from.
         on_progress: told how far it is; may be called often.
+        on_saved: told whenever it has kept something to go on from.
         stop: whether to give up, by raising ``slices.Cancelled``.
     """
 
@@ -43,11 +49,19 @@ class Task:
     target: Path
     work_dir: Path
     on_progress: Callable[[Progress], None]
+    on_saved: Callable[[], None]
     stop: Callable[[], bool]
 
 
 class Kind(Protocol):
-    """A kind of job."""
+    """A kind of job.
+
+    Attributes:
+        table: the name of that in which its results are.
+    """
+
+    @property
+    def table(self) -> str: ...
 
     def source(self, files: Files, job: Row) -> Path:
         """The file that the job reads."""
@@ -56,12 +70,16 @@ class Kind(Protocol):
         """The file that it writes; fixed, so that a job which is run again writes the same one."""
 
     def run(self, task: Task) -> Row | None:
-        """Do the work, write ``task.target``, and return the row of the volume that it is, if it is one."""
+        """Do the work, write ``task.target``, and return the row that tells of it, if there is one."""
+
+    def discard(self, target: Path) -> None:
+        """Remove what was written, of a job that was cancelled at its very end."""
 
 
 class ReconstructionKind:
     """Speed of sound from one dataset."""
 
+    table = schema.volumes.name
     settings: TypeAdapter[Settings] = TypeAdapter(Settings)
 
     def source(self, files: Files, job: Row) -> Path:
@@ -73,15 +91,19 @@ class ReconstructionKind:
     def run(self, task: Task) -> Row | None:
         settings = self.settings.validate_python(task.settings)
         result = slices.reconstruct(
-            task.client, task.source, settings, task.on_progress, task.stop, task.work_dir
+            task.client, task.source, settings, task.on_progress, task.stop, task.work_dir, task.on_saved
         )
         write_reconstruction(task.target, result)
         return {"id": task.target.stem, **_describe(result), "bytes": task.target.stat().st_size}
 
+    def discard(self, target: Path) -> None:
+        target.unlink(missing_ok=True)
+
 
 class RefractionKind:
-    """A turntable of one volume."""
+    """A turntable of one volume; it has no row but the job's."""
 
+    table = schema.volumes.name
     settings: TypeAdapter[Turntable] = TypeAdapter(Turntable)
 
     def source(self, files: Files, job: Row) -> Path:
@@ -99,13 +121,53 @@ class RefractionKind:
             task.target,
             task.work_dir,
             task.on_progress,
+            task.on_saved,
             task.stop,
         )
         return None
 
+    def discard(self, target: Path) -> None:
+        target.unlink(missing_ok=True)
+
+
+class GeometryFieldKind:
+    """The geometry field of one mesh."""
+
+    table = schema.geometry_fields.name
+    settings: TypeAdapter[FieldSettings] = TypeAdapter(FieldSettings)
+
+    def source(self, files: Files, job: Row) -> Path:
+        return files.mesh(job["mesh_id"])
+
+    def target(self, files: Files, job: Row) -> Path:
+        return files.field(job["field_id"])
+
+    def run(self, task: Task) -> Row | None:
+        settings = self.settings.validate_python(task.settings)
+        figures = geometry_field.build(
+            ClusterTasks(task.client, PRIORITY),
+            task.source,
+            settings,
+            task.target,
+            task.work_dir,
+            task.on_progress,
+            task.on_saved,
+            task.stop,
+        )
+        size = geometry_field.bytes_of(task.target)
+        found = {"id": task.target.name, "mesh_id": task.source.stem, "bytes": size}
+        return {**found, "settings": settings.plain(), "figures": figures}
+
+    def discard(self, target: Path) -> None:
+        """Keep it: it is named by its content, and may be another job's too."""
+
 
 KINDS: Mapping[str, Kind] = MappingProxyType(
-    {"reconstruction": ReconstructionKind(), "refraction": RefractionKind()}
+    {
+        "reconstruction": ReconstructionKind(),
+        "refraction": RefractionKind(),
+        "geometry-field": GeometryFieldKind(),
+    }
 )
 
 
@@ -117,7 +179,7 @@ def _describe(result: Reconstruction) -> Row:
         "origin_m": [finite(value) for value in result.origin_m],
         "speed_range_mps": [float(result.speed.min()), float(result.speed.max())],
         "water_speed_mps": float(result.water_speed_mps),
-        "provenance": dict(result.provenance),
+        "provenance": {**result.provenance, **({"advice": reason(result.trials)} if result.trials else {})},
     }
 
 

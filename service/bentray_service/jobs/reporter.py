@@ -21,7 +21,11 @@ INTERVAL_SECONDS = 0.3
 
 
 class Reporter:
-    """Stores the progress of one job and asks whether to stop, both at most every ``INTERVAL_SECONDS``."""
+    """Stores the progress of one job and asks whether to stop, both at most every ``INTERVAL_SECONDS``.
+
+    Attributes:
+        lost: whether another service runs the job by now.
+    """
 
     def __init__(
         self,
@@ -36,7 +40,8 @@ class Reporter:
         self._clock = clock
         self._written = self._asked = -INTERVAL_SECONDS
         self._pending: Progress | None = None
-        self._cancelled = False
+        self._stopped = self._further = False
+        self.lost = False
 
     def report(self, progress: Progress) -> None:
         """Keep the newest progress; write it when the last write is long enough ago."""
@@ -61,14 +66,25 @@ class Reporter:
         self._jobs.progress(self._job_id, kept.done, kept.total, history)
         self._pending = None
 
+    def saved(self) -> None:
+        """Say once that the job has kept something to go on from."""
+        if not self._further:
+            try:
+                self._jobs.got_further(self._job_id)
+                self._further = True
+            except SQLAlchemyError:
+                log.warning("that %s got further could not be stored", self._job_id, exc_info=True)
+
     def stop(self) -> bool:
-        """Whether the job should give up: it was cancelled, or the service leaves."""
-        if self._leaving() or self._cancelled:
+        """Whether the job should give up: it was cancelled or lost to another service, or this one leaves."""
+        if self._leaving() or self._stopped:
             return True
         if self._clock() - self._asked >= INTERVAL_SECONDS:
             self._asked = self._clock()
             try:
-                self._cancelled = self._jobs.state(self._job_id) == "cancelling"
+                told = self._jobs.told(self._job_id)
+                self.lost = told is None
+                self._stopped = told != "running"
             except SQLAlchemyError:
                 log.warning("whether %s is cancelled could not be read", self._job_id, exc_info=True)
-        return self._cancelled
+        return self._stopped

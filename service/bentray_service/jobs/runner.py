@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import errno
 import logging
+import shutil
 import threading
 from collections.abc import Callable
+from concurrent.futures import CancelledError
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
+from distributed.client import FutureCancelledError
+from distributed.comm import CommClosedError
+from distributed.scheduler import NoValidWorkerError, NoWorkerError
 from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_workers.slices import Cancelled
 
 from ..compute import Compute
 from ..storage.files import Files
-from ..storage.jobs import Jobs
+from ..storage.jobs import LEASE_S, Jobs
+from ..storage.schema import ENDED
 from .failures import CRASHED, explain
-from .kinds import KINDS, Task
+from .kinds import KINDS, Kind, Task
 from .reporter import Reporter
 
 log = logging.getLogger("bentray.jobs")
@@ -26,31 +32,66 @@ log = logging.getLogger("bentray.jobs")
 IDLE_SECONDS = 1.0
 # How long a job may take to notice that the service leaves.
 STOP_SECONDS = 30.0
+# How often leases are renewed, and those of dead services looked for.
+LEASE_CHECK_SECONDS = LEASE_S / 6.0
+
+# What a client raises when its scheduler dies under it, or has no workers left.
+AWAY = (
+    CommClosedError,
+    FutureCancelledError,
+    CancelledError,
+    ConnectionError,
+    NoWorkerError,
+    NoValidWorkerError,
+)
+FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class Runner:
     """Runs up to ``at_once`` jobs at the same time.
 
-    A thread only drives its job: the work is done by the cluster.
+    A thread only drives its job: the work is done by the cluster. While the disk has less than
+    ``min_free_bytes`` free, jobs wait.
     """
 
-    def __init__(self, jobs: Jobs, files: Files, compute: Compute, at_once: int) -> None:
+    def __init__(
+        self, jobs: Jobs, files: Files, compute: Compute, at_once: int, min_free_bytes: int, *, alone: bool
+    ) -> None:
+        """Args:
+        alone: whether no other service uses the database; see ``Jobs.recover``.
+        """
         self._jobs = jobs
         self._files = files
         self._compute = compute
+        self._min_free_bytes = min_free_bytes
+        self._alone = alone
         self._wake = threading.Condition()
         self._leaving = threading.Event()
         self._threads = [
             threading.Thread(target=self._loop, name=f"job-{i}", daemon=True) for i in range(at_once)
         ]
+        self._threads.append(threading.Thread(target=self._keep_leases, name="leases", daemon=True))
 
     def start(self) -> None:
         """Take up what a dead process left, then begin."""
-        again = self._jobs.recover(CRASHED.model_dump(exclude_none=True))
-        if again:
-            log.warning("%d jobs of a service that died wait again", again)
+        self._recover()
+        self._files.keep_work(self._jobs.unfinished())
         for thread in self._threads:
             thread.start()
+
+    def _recover(self) -> None:
+        again = self._jobs.recover(CRASHED.model_dump(exclude_none=True), alone=self._alone)
+        if again:
+            log.warning("%d jobs of a service that died wait again", again)
+            self.notify()
+
+    def _keep_leases(self) -> None:
+        while not self._leaving.wait(LEASE_CHECK_SECONDS):
+            try:
+                self._jobs.renew()
+                self._recover()
+            except SQLAlchemyError:
+                log.exception("the leases could not be renewed")
 
     def notify(self) -> None:
         """Say that a job has been queued."""
@@ -76,7 +117,7 @@ class Runner:
     def _loop(self) -> None:
         while not self._leaving.is_set():
             try:
-                job = self._jobs.claim()
+                job = self._jobs.claim() if self._has_room() else None
                 if job is not None:
                     self._run(job)
                     continue
@@ -86,49 +127,73 @@ class Runner:
             with self._wake:
                 self._wake.wait(IDLE_SECONDS)
 
+    def _has_room(self) -> bool:
+        return shutil.disk_usage(self._files.root).free >= self._min_free_bytes
+
     def _run(self, job: dict[str, Any]) -> None:
-        reporter = Reporter(self._jobs, job["id"], self._leaving.is_set)
+        job_id = job["id"]
+        reporter = Reporter(self._jobs, job_id, self._leaving.is_set)
         kind = KINDS[job["kind"]]
         target = kind.target(self._files, job)
         try:
-            with TemporaryDirectory(dir=self._files.scratch) as work_dir:
-                volume = kind.run(
-                    Task(
-                        client=self._compute.client,
-                        source=kind.source(self._files, job),
-                        settings=job["settings"],
-                        target=target,
-                        work_dir=Path(work_dir),
-                        on_progress=reporter.report,
-                        stop=reporter.stop,
-                    )
+            result = kind.run(
+                Task(
+                    client=self._compute.client,
+                    source=kind.source(self._files, job),
+                    settings=job["settings"],
+                    target=target,
+                    work_dir=self._files.work(job_id),
+                    on_progress=reporter.report,
+                    on_saved=reporter.saved,
+                    stop=reporter.stop,
                 )
+            )
         except Cancelled:
-            self._settle(lambda: self._stopped(job["id"], reporter))
+            if not reporter.lost:
+                self._settle(lambda: self._stopped(job_id, reporter))
+        except AWAY as error:
+            log.warning("%s waits for its workers: %s", job_id, error)
+            self._settle(
+                lambda: self._jobs.release(job_id, "the workers were away; it goes on when they are back")
+            )
+            self._leaving.wait(IDLE_SECONDS)
         except Exception as error:
-            problem = explain(job["id"], error).model_dump(exclude_none=True)
-            self._settle(lambda: self._failed(job["id"], reporter, problem))
+            if isinstance(error, OSError) and error.errno in FULL and not self._has_room():
+                log.warning("%s waits for room on the disk", job_id)
+                self._settle(
+                    lambda: self._jobs.release(job_id, "the disk is full; it goes on once there is room")
+                )
+                return
+            problem = explain(job_id, error).model_dump(exclude_none=True)
+            self._settle(lambda: self._failed(job_id, reporter, problem))
         else:
-            self._settle(lambda: self._succeeded(job["id"], reporter, volume, target))
+            self._settle(lambda: self._succeeded(job_id, reporter, kind, result, target))
 
     def _stopped(self, job_id: str, reporter: Reporter) -> None:
         reporter.flush()
         if self._leaving.is_set():
-            self._jobs.release(job_id)
+            self._jobs.release(job_id, "the service was stopped")
         else:
             self._jobs.cancelled(job_id)
+        if self._jobs.state(job_id) in ENDED:
+            self._files.drop_work(job_id)
 
     def _failed(self, job_id: str, reporter: Reporter, problem: dict[str, Any]) -> None:
         reporter.flush()
         self._jobs.fail(job_id, problem)
+        self._files.drop_work(job_id)
 
     def _succeeded(
-        self, job_id: str, reporter: Reporter, volume: dict[str, Any] | None, target: Path
+        self, job_id: str, reporter: Reporter, kind: Kind, result: dict[str, Any] | None, target: Path
     ) -> None:
         reporter.flush()
-        if not self._jobs.succeed(job_id, volume):
-            target.unlink(missing_ok=True)
+        if not self._jobs.succeed(job_id, result, kind.table):
+            if self._jobs.told(job_id) is None:
+                # Another service runs it by now, and writes the same file.
+                return
+            kind.discard(target)
             self._jobs.cancelled(job_id)
+        self._files.drop_work(job_id)
 
     def _settle(self, write_the_end: Callable[[], None]) -> None:
         """Write the end of a job, as often as it takes: it would count as running for ever otherwise."""

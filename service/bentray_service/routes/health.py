@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import shutil
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request, Response
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from pydantic import BaseModel, Field
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -13,6 +14,7 @@ from ..refusals import NotReady
 from ..wiring import Service
 
 router = APIRouter(prefix="/health", tags=["health"])
+metrics_router = APIRouter(tags=["health"])
 
 
 class Alive(BaseModel):
@@ -57,3 +59,13 @@ def ready(service: Service) -> Ready:
     if faults:
         raise NotReady(faults)
     return Ready(workers=workers, free_bytes=free)
+
+
+@metrics_router.get(
+    "/metrics",
+    response_class=Response,
+    responses={200: {"content": {"text/plain": {}}, "description": "In the text format of Prometheus."}},
+)
+def metrics(request: Request) -> Response:
+    """Requests, jobs, workers and disk, for Prometheus."""
+    return Response(generate_latest(request.app.state.metrics.registry), media_type=CONTENT_TYPE_LATEST)

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 from functools import partial
 from typing import Annotated, Literal
+from urllib.parse import urlencode
 
-from fastapi import APIRouter, Body, Depends, Query, Response, status
+from fastapi import APIRouter, Body, Depends, Header, Query, Response, status
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from bentray_kernels.tomography.settings import Settings
+from bentray_workers.field_settings import FieldSettings, check_faces
 from bentray_workers.turntable import Turntable
 
 from ..asked_settings import known_only
 from ..errors import described
 from ..refusals import NoAnimation
+from ..storage.ids import field_of
 from ..wiring import Service
 from .bodies import SmallBody, only
 from .pictures import check_renderable
-from .records import JobList, JobRecord, job_record
+from .records import JobKind, JobList, JobRecord, State, job_record
 
 # Media type of each format of a turntable.
 ANIMATIONS = {"zip": "application/zip", "apng": "image/apng"}
@@ -50,35 +53,84 @@ class RefractionRequest(BaseModel):
     )
 
 
-JobRequest = Annotated[ReconstructionRequest | RefractionRequest, Body(discriminator="kind")]
+class GeometryFieldRequest(BaseModel):
+    """Make the geometry field of a mesh; the same mesh and settings have it at once the second time."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    kind: Literal["geometry-field"]
+    mesh: str = Field(description="Id of a mesh.")
+    settings: Annotated[FieldSettings, BeforeValidator(partial(known_only, of=FieldSettings))] = Field(
+        default_factory=FieldSettings, description="What is left out takes its default."
+    )
+
+
+JobRequest = Annotated[
+    ReconstructionRequest | RefractionRequest | GeometryFieldRequest, Body(discriminator="kind")
+]
 
 
 @router.post(
     "",
     status_code=status.HTTP_202_ACCEPTED,
     dependencies=[Depends(only("application/json"))],
-    responses=described(404, 413, 415, 422),
+    responses=described(404, 409, 413, 415, 422, 429),
 )
-def start_job(asked: JobRequest, response: Response, service: Service) -> JobRecord:
+def start_job(
+    asked: JobRequest,
+    response: Response,
+    service: Service,
+    idempotency_key: Annotated[
+        str | None,
+        Header(
+            min_length=1,
+            max_length=200,
+            description="A name for this request. Sent again with the same one, it makes no second job.",
+        ),
+    ] = None,
+) -> JobRecord:
     """Queue a job. It is stored before this answers, and survives a restart of the service."""
+    plan = None
     if isinstance(asked, ReconstructionRequest):
         dataset = service.datasets.get(asked.dataset)
-        row = service.jobs.add(asked.kind, asked.settings.to_dict(), dataset_id=dataset["id"])
+        read = {"dataset_id": dataset["id"]}
+        settings = asked.settings.to_dict()
+        plan = service.compute.plan(service.files.dataset(dataset["id"]), asked.settings)
+    elif isinstance(asked, GeometryFieldRequest):
+        mesh = service.meshes.get(asked.mesh)
+        check_faces(mesh["faces"])
+        settings = asked.settings.plain()
+        read = {"mesh_id": mesh["id"], "field_id": field_of(asked.settings.content(mesh["content"]))}
     else:
         volume = service.volumes.get(asked.volume)
         check_renderable(volume)
-        view = asked.settings.within(*volume["value_range"])
-        row = service.jobs.add(asked.kind, view.plain(), volume_id=volume["id"])
-    job = job_record(row)
+        read = {"volume_id": volume["id"]}
+        settings = asked.settings.within(*volume["value_range"]).plain()
+    most = service.settings.max_queued_jobs
+    job = job_record(
+        service.jobs.add(asked.kind, settings, **read, plan=plan, most_queued=most, key=idempotency_key)
+    )
     service.runner.notify()
     response.headers["Location"] = job.links["self"]
     return job
 
 
-@router.get("")
-def list_jobs(service: Service, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> JobList:
-    """Jobs, newest first."""
-    return JobList(jobs=[job_record(row) for row in service.jobs.newest(limit)])
+@router.get("", responses=described(404, 422))
+def list_jobs(
+    service: Service,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    state: Annotated[State | None, Query(description="Only these.")] = None,
+    kind: Annotated[JobKind | None, Query(description="Only these.")] = None,
+    before: Annotated[str | None, Query(description="Only jobs older than the one of this id.")] = None,
+) -> JobList:
+    """Jobs, newest first; `next` leads to the older ones."""
+    rows = service.jobs.newest(limit + 1, state, kind, before)
+    shown = [job_record(row) for row in rows[:limit]]
+    if len(rows) == len(shown):
+        return JobList(jobs=shown, next=None)
+    asked = {"limit": limit, "state": state, "kind": kind, "before": shown[-1].id}
+    given = urlencode({name: value for name, value in asked.items() if value is not None})
+    return JobList(jobs=shown, next=f"/v1/jobs?{given}")
 
 
 @router.get("/{job_id}", responses=described(404))

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from fastapi import Response
+from fastapi import Request, Response
 
 from bentray_workers.refraction_view import check_even
 from bentray_workers.scene_cache import check_size
@@ -33,20 +33,26 @@ def check_renderable(volume: Mapping[str, Any]) -> None:
 
 
 def picture(
-    volume: Mapping[str, Any], how: Mapping[str, Any], known: str | None, draw: Callable[[], bytes]
+    request: Request, volume: Mapping[str, Any], how: Mapping[str, Any], draw: Callable[[], bytes]
 ) -> Response:
     """A PNG with its tag, or 304 where the client has it.
 
     Args:
+        request: what is asked. HEAD is answered without drawing, so without Content-Length.
         volume: its row.
         how: all that the picture depends on beside it.
-        known: the header If-None-Match.
         draw: makes the picture; called where it is needed.
     """
+    known = request.headers.get("if-none-match")
     seed = repr((__version__, volume["id"], volume["created"], sorted(how.items())))
     tag = f'"{hashlib.sha256(seed.encode()).hexdigest()[:32]}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
     # A star stands for whichever the client has.
     if known is not None and (tag in known or known.strip() == "*"):
         return Response(status_code=304, headers=headers)
+    if request.method == "HEAD":
+        answer = Response(media_type="image/png", headers=headers)
+        # That of the empty body; the picture's is not known before it is drawn.
+        del answer.headers["content-length"]
+        return answer
     return Response(draw(), media_type="image/png", headers=headers)

@@ -14,8 +14,10 @@ from bentray_workers.refraction_view import check_even
 
 from ..errors import Problem
 from ..storage.ids import volume_of
+from .surface_records import field_links
 
 State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
+JobKind = Literal["reconstruction", "refraction", "geometry-field"]
 Row = dict[str, Any]
 
 # What the rows of reconstructed and of uploaded volumes have in common.
@@ -53,7 +55,7 @@ class DatasetList(BaseModel):
 
 
 class ProgressRecord(BaseModel):
-    """Emitter passes done and to do, over all slices and sweeps, or pictures; 0 of 0 before it is known."""
+    """Emitter passes done and to do, over all slices and sweeps, pictures, or tasks; 0 of 0 at first."""
 
     done: int
     total: int
@@ -70,6 +72,21 @@ class SweepRecord(BaseModel):
     given: bool = Field(True, description="Whether the misfit is that of the image which the stage gave.")
 
 
+class PlanRecord(BaseModel):
+    """How a reconstruction was to be cut into tasks when it was asked for."""
+
+    decomposition: str = Field(description="slices or emitters side by side, or a volume.")
+    lane: str = Field(description="Which workers take the tasks: recon, or opencl for those with a device.")
+    tasks: int = Field(description="About how many there will be.")
+    workers: int = Field(description="Workers that could hold each of them.")
+    call_bytes: dict[str, int] = Field(description="Memory of each kind of task.")
+    largest_bytes: int = Field(description="The most of these.")
+    field_bytes: int = Field(description="Of a travel time while it is made.")
+    rows_bytes: int = Field(description="Of the rays of all emitters.")
+    state_bytes: int = Field(description="Of what comes back from a task.")
+    why: str = Field(description="All of it in a sentence.")
+
+
 class JobRecord(BaseModel):
     """One job."""
 
@@ -78,11 +95,17 @@ class JobRecord(BaseModel):
     state: State
     dataset: str | None = Field(description="Id of the scan that a reconstruction reads.")
     settings: dict[str, Any]
+    plan: PlanRecord | None = Field(
+        description="Of a reconstruction; none of one from before plans were made."
+    )
+    advice: str | None = Field(description="What method auto chose and why, once it has.")
     progress: ProgressRecord
     history: list[SweepRecord]
     volume: str | None = Field(
         description="Of a reconstruction its result, once there is one; of a refraction what it shows."
     )
+    mesh: str | None = Field(description="Id of the mesh that a geometry field is made of.")
+    field: str | None = Field(description="Id of that geometry field, once it is made.")
     error: Problem | None = Field(description="Why it failed.")
     created: datetime
     started: datetime | None
@@ -95,6 +118,7 @@ class JobList(BaseModel):
     """Jobs, newest first."""
 
     jobs: list[JobRecord]
+    next: str | None = Field(description="Address of the older ones; null where there are none.")
 
 
 class VolumeRecord(BaseModel):
@@ -141,6 +165,9 @@ def job_record(row: Row) -> JobRecord:
         links["volume"] = f"/v1/volumes/{volume}"
         if done:
             links["animation"] = f"{here}/animation"
+    elif row["mesh_id"] is not None:
+        links["mesh"] = f"/v1/meshes/{row['mesh_id']}"
+        links |= field_links(row["field_id"]) if done else {}
     elif done:
         volume = volume_of(row["id"])
         links["volume"] = f"/v1/volumes/{volume}"
@@ -155,9 +182,13 @@ def job_record(row: Row) -> JobRecord:
         state=row["state"],
         dataset=row["dataset_id"],
         settings=row["settings"],
+        plan=row["plan"],
+        advice=row["advice"],
         progress=ProgressRecord(done=row["done"], total=row["total"]),
         history=row["history"],
         volume=volume,
+        mesh=row["mesh_id"],
+        field=row["field_id"] if done else None,
         error=row["error"],
         created=_time(row["created"]),
         started=_time(row["started"]) if row["started"] else None,

@@ -40,10 +40,10 @@ async def take_in(
     Args:
         request: whose body is read.
         service: the parts of the service.
-        what: "dataset" or "volume".
+        what: a key of ``ACCEPTED``.
         upload_id: its new id.
         store: writes the row, from the size and SHA-256 of the body and the summary of its content.
-        given: what the user says of a volume.
+        given: what the user says of it.
     """
     announced = request.headers.get("content-length")
     path = service.files.incoming(upload_id)

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Depends, Header, Query, Request, Response, status
+from fastapi import APIRouter, Depends, Query, Request, Response, status
 from fastapi.responses import FileResponse
 
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import described
-from ..storage.exports import values_as_npy
+from ..storage.exports import values_as_nifti, values_as_npy
 from ..storage.ids import new_id
 from ..wiring import Service
 from .bodies import only
@@ -22,6 +22,9 @@ from .records import VolumeList, VolumeRecord, volume_record
 from .uploads import body_of, take_in
 
 MEDIA_TYPES = ("application/octet-stream", "application/x-npy", "application/x-hdf5")
+
+# What makes a file of each format that is not the volume's own, and its extension.
+EXPORTS = {"npy": (values_as_npy, "npy"), "nifti": (values_as_nifti, "nii")}
 
 router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
 
@@ -85,6 +88,7 @@ def show_volume(volume_id: str, service: Service) -> VolumeRecord:
 @router.get("/{volume_id}/slice.png", response_class=Response, responses=PICTURE)
 def slice_png(
     volume_id: str,
+    request: Request,
     service: Service,
     index: Annotated[int | None, Query(ge=0, description="Axial index; the middle slice without it.")] = None,
     quantity: Annotated[
@@ -100,9 +104,11 @@ def slice_png(
     colormap: Annotated[
         str, Query(max_length=40, description="Name of a Matplotlib colour map.")
     ] = "viridis",
-    if_none_match: Annotated[str | None, Header(include_in_schema=False)] = None,
 ) -> Response:
-    """One axial slice as a PNG, drawn by a worker."""
+    """One axial slice as a PNG, drawn by a worker.
+
+    HEAD gives the tag at once, without drawing, so Content-Length is absent.
+    """
     volume = service.volumes.get(volume_id)
     slices = volume["shape"][2] if len(volume["shape"]) == 3 else 1
     if index is not None and index >= slices:
@@ -116,10 +122,10 @@ def slice_png(
         if quantity == "value":
             raise InvalidInput("quantity", "'value'", "speed, coverage, attenuation or recovery")
         how["quantity"] = quantity or "speed"
-        return picture(volume, how, if_none_match, lambda: service.compute.slice_png(path, **how))
+        return picture(request, volume, how, lambda: service.compute.slice_png(path, **how))
     if quantity not in (None, "value"):
         raise InvalidInput("quantity", repr(quantity), "value: this volume was uploaded")
-    return picture(volume, how, if_none_match, lambda: service.compute.volume_slice_png(path, **how))
+    return picture(request, volume, how, lambda: service.compute.volume_slice_png(path, **how))
 
 
 @router.get(
@@ -130,14 +136,18 @@ def slice_png(
             "content": {"application/x-hdf5": {}, "application/octet-stream": {}},
             "description": "The file.",
         },
-        **described(404),
+        **described(404, 422),
     },
 )
 def download(
     volume_id: str,
     service: Service,
     format: Annotated[  # noqa: A002 - the name of the query parameter
-        Literal["hdf5", "npy"], Query(description="hdf5: everything; npy: the values alone, speed in m/s.")
+        Literal["hdf5", "nifti", "npy"],
+        Query(
+            description="hdf5: everything; npy: the values alone, speed in m/s; nifti: these with spacing "
+            "and origin in mm, for even spacing."
+        ),
     ] = "hdf5",
 ) -> FileResponse:
     """The volume as a file."""
@@ -145,9 +155,10 @@ def download(
     source: Path = service.files.volume(volume["id"])
     if format == "hdf5":
         return FileResponse(source, media_type="application/x-hdf5", filename=f"{volume['id']}.h5")
+    export, extension = EXPORTS[format]
     uploaded = "job_id" not in volume
-    exported = values_as_npy(source, service.files.export(volume["id"], "npy"), uploaded=uploaded)
-    name = f"{volume['id']}-{'values' if uploaded else 'speed'}.npy"
+    exported = export(source, service.files.export(volume["id"], extension), uploaded=uploaded)
+    name = f"{volume['id']}-{'values' if uploaded else 'speed'}.{extension}"
     return FileResponse(exported, media_type="application/octet-stream", filename=name)
 
 

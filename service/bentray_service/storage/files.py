@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
+from collections.abc import Collection
 from pathlib import Path
 from typing import IO
 
@@ -18,8 +19,9 @@ class Files:
 
     ``incoming/`` holds uploads that no one has checked, ``datasets/`` the canonical files of scans,
     ``volumes/`` results and the canonical files of uploaded volumes, ``exports/`` volumes in other formats,
-    ``animations/`` turntables, ``scratch/`` what workers need while they work. An upload is a dataset or a
-    volume, as its id tells.
+    ``animations/`` turntables, ``meshes/`` the canonical files of meshes, ``fields/`` a folder for each
+    geometry field, ``work/`` one for each job that is not at its end, with its checkpoints, ``scratch/``
+    what workers need while they work. An upload is a dataset, a volume or a mesh, as its id tells.
     """
 
     def __init__(self, data_dir: Path) -> None:
@@ -29,6 +31,9 @@ class Files:
         self._volumes = self.root / "volumes"
         self._exports = self.root / "exports"
         self._animations = self.root / "animations"
+        self._meshes = self.root / "meshes"
+        self._fields = self.root / "fields"
+        self._work = self.root / "work"
         self.scratch = self.root / "scratch"
 
     def prepare(self) -> None:
@@ -38,8 +43,8 @@ class Files:
             InvalidInput: when the folder cannot be made or written.
         """
         try:
-            results = (self._volumes, self._exports, self._animations)
-            for folder in (self._incoming, self._datasets, *results, self.scratch):
+            results = (self._volumes, self._exports, self._animations, self._meshes, self._fields)
+            for folder in (self._incoming, self._datasets, *results, self._work, self.scratch):
                 folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InvalidInput(
@@ -50,7 +55,7 @@ class Files:
         """Remove what a dead process left half done; call it once the folder is locked."""
         for left in self._incoming.iterdir():
             left.unlink()
-        for folder in (self._volumes, self._exports, self._animations):
+        for folder in (self._volumes, self._exports, self._animations, self._meshes):
             for left in folder.glob("*.partial"):
                 left.unlink()
         for left in self.scratch.iterdir():
@@ -83,6 +88,30 @@ class Files:
         """The result of a turntable."""
         return self._animations / f"{checked('job', job_id)}.{extension}"
 
+    def mesh(self, mesh_id: str) -> Path:
+        """The canonical file of a mesh."""
+        return self._meshes / f"{checked('mesh', mesh_id)}.h5"
+
+    def field(self, field_id: str) -> Path:
+        """The folder of a geometry field; it is there as a whole or not at all."""
+        return self._fields / checked("field", field_id)
+
+    def work(self, job_id: str) -> Path:
+        """A folder for what a job makes on its way, which outlives the service; made if needed."""
+        folder = self._work / checked("job", job_id)
+        folder.mkdir(exist_ok=True)
+        return folder
+
+    def drop_work(self, job_id: str) -> None:
+        """Remove the folder of a job at its end."""
+        shutil.rmtree(self._work / checked("job", job_id), ignore_errors=True)
+
+    def keep_work(self, job_ids: Collection[str]) -> None:
+        """Remove the folders of all jobs but these."""
+        for folder in self._work.iterdir():
+            if folder.name not in job_ids:
+                shutil.rmtree(folder, ignore_errors=True)
+
     def discard_candidate(self, upload_id: str) -> None:
         """Remove a canonical file that was not adopted, also what a killed process left of it."""
         for left in self._incoming.glob(f"{self.candidate(upload_id).name}*"):
@@ -96,8 +125,8 @@ class Files:
         return target
 
     def _canonical(self, upload_id: str) -> Path:
-        is_volume = upload_id.startswith(f"{PREFIXES['volume']}-")
-        return self.volume(upload_id) if is_volume else self.dataset(upload_id)
+        place = {PREFIXES["volume"]: self.volume, PREFIXES["mesh"]: self.mesh}
+        return place.get(upload_id.partition("-")[0], self.dataset)(upload_id)
 
 
 def sync_folder(folder: Path) -> None:

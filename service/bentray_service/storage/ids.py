@@ -1,4 +1,4 @@
-"""Ids of datasets, jobs and volumes: made here, and checked here before one becomes part of a path."""
+"""Ids of all that is stored: made here, and checked here before one becomes part of a path."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import secrets
 
 from ..refusals import UnknownId
 
-PREFIXES = {"dataset": "ds", "job": "job", "volume": "vol"}
+PREFIXES = {"dataset": "ds", "job": "job", "volume": "vol", "mesh": "mesh", "field": "field"}
 _RANDOM = re.compile(r"[0-9a-f]{20}")
 
 
@@ -31,3 +31,8 @@ def checked(what: str, text: str) -> str:
 def volume_of(job_id: str) -> str:
     """The volume id of a job; fixed, so a job that is run again writes the same file."""
     return PREFIXES["volume"] + checked("job", job_id).removeprefix(PREFIXES["job"])
+
+
+def field_of(content: str) -> str:
+    """The geometry field id of a SHA-256 in hexadecimal: the same content has the same id."""
+    return f"{PREFIXES['field']}-{content[:20]}"

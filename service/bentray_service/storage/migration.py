@@ -13,6 +13,19 @@ from . import schema
 # SQLite rebuilds a table to change a column; what points at the old table must not follow it meanwhile.
 SQLITE_PRAGMAS = ("foreign_keys=OFF", "legacy_alter_table=ON")
 
+# As SQLite kept it.
+JOBS_OF_VERSION_2 = """
+CREATE TABLE jobs (
+    number INTEGER NOT NULL, id VARCHAR(32) NOT NULL, kind VARCHAR(32) NOT NULL, dataset_id VARCHAR(32),
+    volume_id VARCHAR(32), settings JSON NOT NULL, state VARCHAR(16) NOT NULL, attempts INTEGER NOT NULL,
+    done INTEGER NOT NULL, total INTEGER NOT NULL, history JSON NOT NULL, error JSON, created FLOAT NOT NULL,
+    started FLOAT, finished FLOAT,
+    PRIMARY KEY (number),
+    CONSTRAINT known_state CHECK (
+        state IN ('queued', 'running', 'cancelling', 'succeeded', 'failed', 'cancelled')),
+    UNIQUE (id), FOREIGN KEY(dataset_id) REFERENCES datasets (id))
+"""
+
 
 def migrate(connection: Connection, found: int) -> None:
     """Bring the tables of version ``found``, a key of ``STEPS`` or a later one, to ``schema.VERSION``.
@@ -35,7 +48,7 @@ def migrate(connection: Connection, found: int) -> None:
 
 def _to_2(connection: Connection) -> None:
     """Jobs may read a volume in place of a dataset; uploaded volumes have a table."""
-    # Version 2 is the present one. The next version writes down here what these two tables were in it.
+    # What version 3 left of this table as it was is still made from the present schema.
     schema.uploaded_volumes.create(connection)
     if connection.dialect.name != "sqlite":
         connection.execute(text("ALTER TABLE jobs ALTER COLUMN dataset_id DROP NOT NULL"))
@@ -47,9 +60,30 @@ def _to_2(connection: Connection) -> None:
     )
     connection.execute(text("DROP INDEX jobs_by_state"))
     connection.execute(text("ALTER TABLE jobs RENAME TO jobs_of_version_1"))
-    schema.jobs.create(connection)
+    connection.execute(text(JOBS_OF_VERSION_2))
+    connection.execute(text("CREATE INDEX jobs_by_state ON jobs (state, number)"))
     connection.execute(text(f"INSERT INTO jobs ({kept}) SELECT {kept} FROM jobs_of_version_1"))  # noqa: S608
     connection.execute(text("DROP TABLE jobs_of_version_1"))
 
 
-STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType({1: _to_2})
+def _to_3(connection: Connection) -> None:
+    """Jobs have a tenant and a lease, and may read a mesh; meshes and geometry fields have tables."""
+    for column in (
+        "tenant VARCHAR(64) NOT NULL DEFAULT 'local'",
+        "idempotency_key VARCHAR(200)",
+        "request_sha256 VARCHAR(64)",
+        "lease_owner VARCHAR(64)",
+        "lease_until FLOAT",
+        "plan JSON",
+        "advice VARCHAR(1000)",
+        "mesh_id VARCHAR(32)",
+        "field_id VARCHAR(32)",
+    ):
+        connection.execute(text(f"ALTER TABLE jobs ADD COLUMN {column}"))
+    connection.execute(text("CREATE INDEX jobs_by_tenant ON jobs (tenant, state)"))
+    connection.execute(text("CREATE UNIQUE INDEX jobs_by_key ON jobs (tenant, idempotency_key)"))
+    for table in (schema.meshes, schema.geometry_fields):
+        table.create(connection)
+
+
+STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType({1: _to_2, 2: _to_3})

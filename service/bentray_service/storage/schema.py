@@ -17,7 +17,7 @@ from sqlalchemy import (
     Table,
 )
 
-VERSION = 2
+VERSION = 3
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
@@ -60,9 +60,13 @@ jobs = Table(
     Column("number", Integer, primary_key=True, autoincrement=True),
     Column("id", String(32), nullable=False, unique=True),
     Column("kind", String(32), nullable=False),
-    # What the job reads: a reconstruction a dataset, a refraction a volume of either table.
+    # What the job reads: a reconstruction a dataset, a refraction a volume of either table, a geometry
+    # field a mesh.
     Column("dataset_id", String(32), ForeignKey("datasets.id")),
     Column("volume_id", String(32)),
+    Column("mesh_id", String(32)),
+    # The geometry field that it makes, or finds made.
+    Column("field_id", String(32)),
     Column("settings", JSON, nullable=False),
     Column("state", String(16), nullable=False),
     Column("attempts", Integer, nullable=False, default=0),
@@ -70,11 +74,24 @@ jobs = Table(
     Column("total", Integer, nullable=False, default=0),
     Column("history", JSON, nullable=False, default=list),
     Column("error", JSON(none_as_null=True)),
+    # How a reconstruction was to be cut into tasks, and what ``auto`` chose once it has.
+    Column("plan", JSON(none_as_null=True)),
+    Column("advice", String(1000)),
     Column("created", Float, nullable=False),
     Column("started", Float),
     Column("finished", Float),
+    # Whose it is: tenants take turns.
+    Column("tenant", String(64), nullable=False, server_default="local"),
+    # What the client calls the request, so that one sent twice makes one job; and a digest of what was asked.
+    Column("idempotency_key", String(200)),
+    Column("request_sha256", String(64)),
+    # Which service runs it, and until when that may be believed.
+    Column("lease_owner", String(64)),
+    Column("lease_until", Float),
     CheckConstraint("state IN ('" + "', '".join(STATES) + "')", name="known_state"),
     Index("jobs_by_state", "state", "number"),
+    Index("jobs_by_tenant", "tenant", "state"),
+    Index("jobs_by_key", "tenant", "idempotency_key", unique=True),
 )
 
 # Only ever appended to; the number of a row will be the id of a server-sent event.
@@ -118,4 +135,44 @@ uploaded_volumes = Table(
     Column("spacing_m", JSON, nullable=False),
     Column("origin_m", JSON, nullable=False),
     Column("value_range", JSON, nullable=False),
+)
+
+meshes = Table(
+    "meshes",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(32), nullable=False, unique=True),
+    Column("created", Float, nullable=False),
+    Column("bytes", BigInteger, nullable=False),
+    # Of what was uploaded, or of the file that was made of a volume.
+    Column("sha256", String(64), nullable=False),
+    Column("title", String(200), nullable=False),
+    Column("format", String(16), nullable=False),
+    # Of an iso-surface.
+    Column("volume_id", String(32)),
+    Column("iso", Float),
+    Column("vertices", Integer, nullable=False),
+    Column("faces", Integer, nullable=False),
+    Column("genus", Integer, nullable=False),
+    Column("holes", Integer, nullable=False),
+    Column("coloured", Boolean, nullable=False),
+    # How many vertices and faces were mended, by what was done to them.
+    Column("repairs", JSON, nullable=False),
+    # SHA-256 of vertices, faces and colours: what a geometry field depends on.
+    Column("content", String(64), nullable=False),
+)
+
+# A field is named by its content: the same mesh and settings have one field, however often it is asked for.
+geometry_fields = Table(
+    "geometry_fields",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(32), nullable=False, unique=True),
+    # The mesh and the job that it was first made for.
+    Column("mesh_id", String(32), nullable=False),
+    Column("job_id", String(32), ForeignKey("jobs.id"), nullable=False),
+    Column("created", Float, nullable=False),
+    Column("bytes", BigInteger, nullable=False),
+    Column("settings", JSON, nullable=False),
+    Column("figures", JSON, nullable=False),
 )

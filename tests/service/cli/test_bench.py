@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -65,6 +66,20 @@ def test_an_unknown_name_lists_the_known_ones(
     assert result.stderr == f"bentray: name: found {name!r}; accepted: one of empty, fake\n"
 
 
+@pytest.mark.parametrize("name", ["two-words", "two_words"])
+def test_words_may_be_joined_as_on_a_command_line(folder: Path, name: str) -> None:
+    (folder / "two_words.py").write_text(FAKE)
+    rows = load(name, folder)(True, lambda done, of, words: None)
+    assert [row.target for row in rows] == ["E1", "E2", "E3"]
+
+
+def test_a_benchmark_may_be_called_as_a_package_is(folder: Path) -> None:
+    (folder / "distributed_.py").write_text(FAKE)
+    rows = load("distributed", folder)(True, lambda done, of, words: None)
+    assert [row.target for row in rows] == ["E1", "E2", "E3"]
+    assert sys.modules["distributed"].__file__ != str(folder / "distributed_.py")
+
+
 def test_a_benchmark_without_rows_is_named(folder: Path) -> None:
     with pytest.raises(WorkFailed, match=r"benchmarks/empty.py defines no rows"):
         load("empty", folder)
@@ -88,7 +103,7 @@ def test_outside_a_checkout_the_reason_is_said(tmp_path: Path, monkeypatch: pyte
 
 @pytest.mark.parametrize("path", sorted(benchmark_folder().glob("[!_]*.py")), ids=lambda path: path.stem)
 def test_every_benchmark_of_the_checkout_fits_the_frame(path: Path) -> None:
-    assert callable(load(path.stem, path.parent))
+    assert callable(load(path.stem.rstrip("_"), path.parent))
 
 
 def test_the_reconstruction_benchmark_measures_what_it_promises() -> None:

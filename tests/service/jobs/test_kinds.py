@@ -1,6 +1,7 @@
-"""Jobs of kind refraction: three pictures of a ball, cancelled, refused, and taken up again after a death."""
+"""Kinds of jobs: turntables and geometry fields; cancelled, refused, and taken up again after a death."""
 
 import io
+import time
 import zipfile
 from contextlib import contextmanager
 
@@ -9,13 +10,17 @@ from fastapi.testclient import TestClient
 from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.geometry_field.defects import sound
 from bentray_kernels.phantoms import TWO_HOLES, sampled
+from bentray_kernels.phantoms.surfaces import torus
 from bentray_kernels.tomography import Progress
 from bentray_service.app import create_app
 from bentray_service.jobs import kinds
 from bentray_service.settings import ServiceSettings
 from bentray_service.storage.ids import new_id
+from bentray_workers import field_settings, geometry_field
 from bentray_workers.cluster import open_cluster
+from bentray_workers.mesh_file import StoredMesh, summary_of, write_mesh
 from bentray_workers.slices import Cancelled
 from bentray_workers.volume_file import Volume, write_volume
 
@@ -116,7 +121,7 @@ def test_cancel_between_pictures(serving, until):
 
 
 def test_a_stopped_job_runs_again_at_the_next_start(serving, until, monkeypatch):
-    def hold(client, path, turntable, target, work_dir, on_progress, stop):
+    def hold(client, path, turntable, target, work_dir, on_progress, on_saved, stop):
         on_progress(Progress(1, 3))
         while not stop():
             pass
@@ -162,7 +167,7 @@ def test_wrong_settings(start, settings, field):
     body = answer.json()
     assert (answer.status_code, body["field"].removesuffix(".0")) == (422, field), body
     assert body["accepted"]
-    assert http.get("/v1/jobs").json() == {"jobs": []}
+    assert http.get("/v1/jobs").json()["jobs"] == []
 
 
 def test_other_refusals(start):
@@ -183,3 +188,136 @@ def test_a_reconstruction_has_no_animation(start, work, uploaded, submitted, unt
     http = start()
     job = until(http, submitted(http, uploaded(http))["id"])
     assert http.get(f"/v1/jobs/{job['id']}/animation").json()["type"] == "/problems/no-animation"
+
+
+COARSE = {"samples": 6, "inner_samples": 4, "divisions": 4, "image_size": 33}
+
+
+def put_mesh(http, mesh=None):
+    """A mesh as an upload leaves it; its id."""
+    parts, mesh_id = http.app.state.parts, new_id("mesh")
+    stored = StoredMesh(torus(16, 10) if mesh is None else mesh)
+    write_mesh(parts.files.mesh(mesh_id), stored)
+    summary = summary_of(stored, sound(stored.mesh.vertices, stored.mesh.faces), "ply")
+    parts.meshes.add(mesh_id, size=1, sha256="0" * 64, summary={**summary, "title": "a ring"})
+    return mesh_id
+
+
+def ask_field(http, mesh, **settings):
+    asked = {"kind": "geometry-field", "mesh": mesh, "settings": {**COARSE, **settings}}
+    return http.post("/v1/jobs", json=asked)
+
+
+def test_a_torn_field_is_gone_on_from_at_the_next_start(serving, until, monkeypatch):
+    monkeypatch.setattr(geometry_field, "TASK_RAYS", 32 * 216)
+    plain, calls = geometry_field.build, []
+
+    def held(*given):
+        """As a service that leaves once three tasks have ended: the rest is still to do."""
+        *others, on_saved, stop = given
+        told = []
+        calls.append(told)
+
+        def saved():
+            told.append(1)
+            on_saved()
+
+        def leave():
+            while len(calls) == 1 and len(told) >= 3:
+                if stop():
+                    return True
+            return stop()
+
+        return plain(*others, saved, leave)
+
+    monkeypatch.setattr(geometry_field, "build", held)
+    with serving() as http:
+        job = ask_field(http, put_mesh(http)).json()
+        until(http, job["id"], "running")
+        files = http.app.state.parts.files
+        work = files.work(job["id"]) / "done"
+        deadline = time.monotonic() + 30.0
+        while len(list(work.glob("*.json"))) < 2:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+    with serving() as http:
+        done = until(http, job["id"])
+        assert done["state"] == "succeeded", done["error"]
+        total = http.get(done["links"]["field"]).json()
+        states = [event["state"] for event in http.app.state.parts.jobs.events(job["id"])]
+        assert states == ["queued", "running", "queued", "running", "succeeded"]
+        wait_until_empty(files.root / "work")
+        assert [one.name for one in (files.root / "fields").iterdir()] == [total["id"]]
+    # Layout, batches and the end: fewer in the second run than there are.
+    assert 1 <= len(calls[1]) < done["progress"]["total"] - 2
+
+
+def wait_until_empty(folder):
+    """What a job made on its way goes right after its end is stored."""
+    deadline = time.monotonic() + 10.0
+    while list(folder.iterdir()):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_a_cancelled_field_leaves_nothing(serving, until, monkeypatch):
+    def hold(*given):
+        while not given[-1]():
+            pass
+        raise Cancelled
+
+    monkeypatch.setattr(geometry_field, "build", hold)
+    with serving() as http:
+        job = ask_field(http, put_mesh(http)).json()
+        until(http, job["id"], "running")
+        assert http.post(job["links"]["cancel"]).status_code == 202
+        done = until(http, job["id"])
+        assert (done["state"], done["field"]) == ("cancelled", None)
+        assert "field" not in done["links"]
+        assert http.get("/v1/geometry-fields").json() == {"geometry_fields": []}
+        wait_until_empty(http.app.state.parts.files.root / "work")
+
+
+def test_a_field_that_is_cancelled_at_its_end_stays_for_others(tmp_path):
+    kept = tmp_path / "field"
+    kept.mkdir()
+    kinds.KINDS["geometry-field"].discard(kept)
+    assert kept.exists()
+    written = tmp_path / "volume.h5"
+    written.write_bytes(b"x")
+    kinds.KINDS["reconstruction"].discard(written)
+    assert not written.exists()
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        ({"samples": 3}, "settings.samples"),
+        ({"samples": 49}, "settings.samples"),
+        ({"image_size": "large"}, "settings.image_size"),
+        ({"image_threshold": -1}, "settings.image_threshold"),
+        ({"iso": 1}, "settings.iso"),
+    ],
+)
+def test_wrong_settings_of_a_field(start, settings, field):
+    http = start()
+    body = ask_field(http, put_mesh(http), **settings).json()
+    assert (body["status"], body["field"]) == (422, field), body
+    assert http.get("/v1/jobs").json()["jobs"] == []
+
+
+def test_other_refusals_of_a_field(start, monkeypatch):
+    http = start()
+    assert ask_field(http, "mesh-" + "0" * 20).status_code == 404
+    mesh = put_mesh(http)
+    both = {"kind": "geometry-field", "mesh": mesh, "volume": "vol-1"}
+    assert http.post("/v1/jobs", json=both).json()["field"] == "volume"
+    monkeypatch.setattr(field_settings, "MOST_FACES", 100)
+    body = ask_field(http, mesh).json()
+    assert (body["status"], body["field"]) == (422, "mesh")
+
+
+def test_what_a_task_refuses_fails_the_field_in_words(serving, until):
+    with serving() as http:
+        done = until(http, ask_field(http, put_mesh(http), image_threshold=1e-12).json()["id"])
+    assert (done["state"], done["error"]["field"]) == ("failed", "threshold")

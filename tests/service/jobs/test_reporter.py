@@ -12,6 +12,11 @@ class FakeJobs:
         self.asked = 0
         self.now = "running"
         self.away = False
+        self.further = 0
+
+    def got_further(self, job_id):
+        self.check()
+        self.further += 1
 
     def check(self):
         if self.away:
@@ -21,7 +26,7 @@ class FakeJobs:
         self.check()
         self.written.append((done, total, history))
 
-    def state(self, job_id):
+    def told(self, job_id):
         self.check()
         self.asked += 1
         return self.now
@@ -82,3 +87,23 @@ def test_stop_when_the_service_leaves():
     jobs = FakeJobs()
     assert Reporter(jobs, "job", lambda: True).stop()
     assert jobs.asked == 0
+
+
+def test_what_is_kept_is_told_once():
+    jobs = FakeJobs()
+    reporter = Reporter(jobs, "job", lambda: False)
+    jobs.away = True
+    reporter.saved()
+    jobs.away = False
+    for _ in range(5):
+        reporter.saved()
+    assert jobs.further == 1
+
+
+def test_a_job_that_another_service_runs_is_left():
+    jobs = FakeJobs()
+    reporter = Reporter(jobs, "job", lambda: False)
+    assert not reporter.lost
+    jobs.now = None
+    assert reporter.stop()
+    assert reporter.lost

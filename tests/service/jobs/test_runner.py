@@ -3,6 +3,9 @@
 import errno
 import time
 
+import pytest
+from distributed.client import FutureCancelledError
+from distributed.comm import CommClosedError
 from sqlalchemy.exc import OperationalError
 
 from bentray_kernels.errors import InvalidInput
@@ -88,3 +91,67 @@ def test_progress_is_seen_while_it_runs(start, uploaded, submitted, until, work)
         time.sleep(0.02)
     work.hold.set()
     assert until(http, job["id"])["progress"]["done"] == 24
+
+
+def test_a_full_disk_is_waited_for(start, uploaded, submitted, until, work, monkeypatch):
+    http = start(jobs_at_once=1)
+    dataset = uploaded(http)
+    runner = http.app.state.parts.runner
+    room = [True]
+    monkeypatch.setattr(runner, "_has_room", lambda: room[0])
+    work.hold.clear()
+    work.error = OSError(errno.ENOSPC, "full")
+    job = submitted(http, dataset)
+    until(http, job["id"], "running")
+    room[0] = False
+    work.hold.set()
+    until(http, job["id"], "queued")
+    time.sleep(0.1)
+    assert len(work.calls) == 1
+    work.error, room[0] = None, True
+    runner.notify()
+    assert until(http, job["id"])["state"] == "succeeded"
+    notes = [event["note"] for event in http.app.state.parts.jobs.events(job["id"])]
+    assert notes[2] == "the disk is full; it goes on once there is room"
+
+
+@pytest.mark.parametrize("error", [CommClosedError("gone"), FutureCancelledError("key", "lost")])
+def test_a_lost_scheduler_costs_no_job(start, uploaded, submitted, until, work, error):
+    http = start(jobs_at_once=1)
+    work.error = error
+    work.hold.clear()
+    job = submitted(http, uploaded(http))
+    until(http, job["id"], "running")
+    work.hold.set()
+    until(http, job["id"], "queued")
+    work.error = None
+    assert until(http, job["id"])["state"] == "succeeded"
+    notes = {event["note"] for event in http.app.state.parts.jobs.events(job["id"])}
+    assert "the workers were away; it goes on when they are back" in notes
+
+
+def test_what_is_left_of_jobs_goes_with_their_end(start, uploaded, submitted, until, work):
+    http = start()
+    folder = http.app.state.parts.files.root / "work"
+    work.hold.clear()
+    job = submitted(http, uploaded(http))
+    until(http, job["id"], "running")
+    assert [left.name for left in folder.iterdir()] == [job["id"]]
+    work.hold.set()
+    until(http, job["id"])
+    deadline = time.monotonic() + 10
+    while list(folder.iterdir()):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def test_a_full_queue_is_a_429(start, uploaded, submitted, until, work):
+    http = start(jobs_at_once=1, max_queued_jobs=1)
+    dataset = uploaded(http)
+    work.hold.clear()
+    until(http, submitted(http, dataset)["id"], "running")
+    submitted(http, dataset)
+    answer = http.post("/v1/jobs", json={"kind": "reconstruction", "dataset": dataset})
+    assert (answer.status_code, answer.json()["type"]) == (429, "/problems/queue-full")
+    assert int(answer.headers["Retry-After"]) > 0
+    work.hold.set()

@@ -1,10 +1,12 @@
 """/v1/jobs: what is taken, and every way of being refused."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 
 import pytest
 
 from bentray_kernels.eikonal import methods
+from bentray_kernels.tomography.result import Trial
 from bentray_kernels.tomography.settings import Settings
 
 
@@ -53,6 +55,48 @@ def test_settings_may_be_left_out(http, dataset, work, until):
     answer = http.post("/v1/jobs", json={"kind": "reconstruction", "dataset": dataset})
     until(http, answer.json()["id"])
     assert work.calls[0][1] == Settings()
+
+
+def test_the_plan_is_stored_and_told(http, dataset):
+    job = ask(http, dataset, {"nodes": 16}).json()
+    found = http.get(f"/v1/jobs/{job['id']}").json()["plan"]
+    assert found == job["plan"]
+    assert (found["decomposition"], found["lane"], found["workers"]) == ("slices", "recon", 1)
+    assert found["largest_bytes"] == max(found["call_bytes"].values()) > 0
+    assert "1 of 1 workers can hold it" in found["why"]
+
+
+def test_a_task_that_no_worker_can_hold_is_refused_before_it_is_stored(http, dataset, cluster):
+    cluster.memory_bytes = 500 * 2**20
+    body = problem(ask(http, dataset, {"nodes": 2048, "method": "gauss-newton"}))
+    assert (body["status"], body["field"]) == (422, "nodes")
+    assert "bytes" in body["found"]
+    assert "at most" in body["accepted"]
+    assert http.get("/v1/jobs").json()["jobs"] == []
+    assert ask(http, dataset, {"nodes": 16}).status_code == 202
+
+
+def test_a_device_that_no_worker_offers_is_refused(http, dataset):
+    body = problem(ask(http, dataset, {"eikonal": "fim-opencl"}))
+    assert (body["status"], body["field"]) == (422, "eikonal")
+
+
+def test_jobs_are_taken_while_no_worker_is_connected(http, dataset, cluster):
+    cluster.workers = 0
+    answer = ask(http, dataset, {"nodes": 16})
+    assert answer.status_code == 202
+    assert "no worker is connected yet" in answer.json()["plan"]["why"]
+
+
+def test_what_auto_chose_is_told_at_the_end(http, dataset, work, until):
+    work.trials = (
+        Trial({"rays": "straight", "method": "sart"}, 2e-8, 1e-8),
+        Trial({"rays": "curved", "method": "sart"}, 3e-8, 1e-8),
+    )
+    job = ask(http, dataset, {"nodes": 16, "method": "auto"}).json()
+    assert job["advice"] is None
+    told = until(http, job["id"])["advice"]
+    assert told.startswith("auto chose straight sart 20 ns")
 
 
 def test_newest_first(http, dataset):
@@ -110,7 +154,7 @@ def test_wrong_kind(http, dataset):
     assert (body["status"], body["field"], body["accepted"]) == (
         422,
         "kind",
-        "'reconstruction' or 'refraction'",
+        "'reconstruction' or 'refraction' or 'geometry-field'",
     )
 
 
@@ -139,3 +183,45 @@ def test_cancel_an_ended_job(http, dataset, until):
     job = until(http, ask(http, dataset, {"nodes": 16}).json()["id"])
     body = problem(http.post(f"/v1/jobs/{job['id']}/cancel"))
     assert (body["status"], body["found"]) == (409, "succeeded")
+
+
+def test_the_same_request_twice_makes_one_job(http, dataset, work):
+    work.hold.clear()
+    key = {"Idempotency-Key": "scan 7, first try"}
+    asked = {"kind": "reconstruction", "dataset": dataset, "settings": {"nodes": 16}}
+    first, again = (http.post("/v1/jobs", json=asked, headers=key) for _ in range(2))
+    assert (first.status_code, again.status_code) == (202, 202)
+    assert first.json()["id"] == again.json()["id"]
+    other = http.post("/v1/jobs", json={**asked, "settings": {"nodes": 17}}, headers=key)
+    assert (other.status_code, problem(other)["field"]) == (409, "Idempotency-Key")
+    assert http.post("/v1/jobs", json=asked).json()["id"] != first.json()["id"]
+    assert len(http.get("/v1/jobs").json()["jobs"]) == 2
+    assert http.post("/v1/jobs", json=asked, headers={"Idempotency-Key": 201 * "x"}).status_code == 422
+    work.hold.set()
+
+
+def test_many_at_once_with_one_key_make_one_job(http, dataset):
+    asked = {"kind": "reconstruction", "dataset": dataset, "settings": {"nodes": 16}}
+    with ThreadPoolExecutor(16) as pool:
+        send = lambda _: http.post("/v1/jobs", json=asked, headers={"Idempotency-Key": "k"}).json()["id"]  # noqa: E731
+        assert len(set(pool.map(send, range(50)))) == 1
+    assert len(http.get("/v1/jobs").json()["jobs"]) == 1
+
+
+def test_pages_lead_to_every_job_once(http, dataset, until):
+    made = [ask(http, dataset, {"nodes": 16}).json()["id"] for _ in range(7)]
+    for job in made:
+        until(http, job)
+    cancelled = http.get("/v1/jobs?state=cancelled").json()
+    assert cancelled == {"jobs": [], "next": None}
+    seen, address = [], "/v1/jobs?limit=3&state=succeeded&kind=reconstruction"
+    while address is not None:
+        page = http.get(address).json()
+        assert len(page["jobs"]) <= 3
+        seen += [job["id"] for job in page["jobs"]]
+        address = page["next"]
+    assert seen == made[::-1]
+    assert http.get("/v1/jobs?kind=refraction").json()["jobs"] == []
+    assert http.get(f"/v1/jobs?before=job-{20 * '0'}").status_code == 404
+    for wrong in ("state=lost", "kind=cake", "limit=0", "before=../x"):
+        assert http.get(f"/v1/jobs?{wrong}").status_code in (404, 422)

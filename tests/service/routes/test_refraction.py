@@ -13,12 +13,12 @@ from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography.result import Reconstruction
 from bentray_service import compute
 from bentray_service.app import create_app
-from bentray_service.asked_view import NAMES
 from bentray_service.settings import ServiceSettings
 from bentray_service.storage.ids import new_id
-from bentray_workers import refraction, scene_cache
+from bentray_workers import refraction, scene_cache, strips
 from bentray_workers.cluster import open_cluster
 from bentray_workers.lanes import RECONSTRUCTION
+from bentray_workers.refraction_view import RefractionView
 from bentray_workers.volume_file import Volume, write_volume
 
 SMALL = {"width": 32, "height": 24, "iso": 0.5}
@@ -77,7 +77,7 @@ def test_every_parameter_changes_the_picture_or_its_tag(http):
         "width": 31,
         "height": 31,
     }
-    assert set(other) == set(NAMES)
+    assert set(other) == set(RefractionView().plain())
     tags = {http.get(here, params=SMALL).headers["etag"]}
     for name, value in other.items():
         answer = http.get(here, params={**SMALL, name: value})
@@ -103,12 +103,19 @@ def test_any_picture_is_known_by_a_star(http, cluster):
     assert len(cluster.submitted) == cast
 
 
-def test_the_head_of_a_picture(http):
+def test_the_head_of_a_picture_is_told_without_drawing(http, cluster):
     here = put(http)
-    whole, head = http.get(here, params=SMALL), http.head(here, params=SMALL)
-    assert head.status_code == 200
-    for name in ("etag", "content-type", "content-length"):
+    whole = http.get(here, params=SMALL)
+    cast = len(cluster.submitted)
+    head = http.head(here, params=SMALL)
+    assert (head.status_code, head.content) == (200, b"")
+    for name in ("etag", "content-type", "cache-control"):
         assert head.headers[name] == whole.headers[name]
+    # The body would have that length, which nobody knows yet.
+    assert "content-length" not in head.headers
+    tag = {"If-None-Match": whole.headers["etag"]}
+    assert http.head(here, params=SMALL, headers=tag).status_code == 304
+    assert len(cluster.submitted) == cast
     assert http.head(here, params={"iso": 7}).status_code == 422
     refused = http.delete(here)
     assert (refused.status_code, refused.headers["allow"]) == (405, "GET, HEAD")
@@ -128,7 +135,7 @@ def test_several_surfaces(http):
 
 
 def test_a_large_picture_is_cast_in_strips(http, cluster, monkeypatch):
-    monkeypatch.setattr(refraction, "TASK_RAYS", 100)
+    monkeypatch.setattr(strips, "TASK_RAYS", 100)
     answer = http.get(put(http), params=SMALL)
     assert Image.open(io.BytesIO(answer.content)).size == (32, 24)
     assert len(cluster.submitted) == 8 + 1

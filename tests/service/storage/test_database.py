@@ -1,6 +1,7 @@
 """The database: durable settings, checked version, plain refusals."""
 
 import threading
+from contextlib import closing
 
 import pytest
 from sqlalchemy import insert, select, text, update
@@ -13,20 +14,11 @@ from bentray_service.storage import schema
 from bentray_service.storage.database import open_database
 
 
-@pytest.fixture
-def address(tmp_path):
-    return f"sqlite:///{tmp_path / 'db.sqlite'}"
-
-
-@pytest.fixture
-def database(address):
-    opened = open_database(address)
-    yield opened
-    opened.close()
-
-
-def test_pragmas(database):
-    with database.read() as connection:
+def test_pragmas(tmp_path):
+    with (
+        closing(open_database(f"sqlite:///{tmp_path / 'db.sqlite'}")) as database,
+        database.read() as connection,
+    ):
         found = {
             name: connection.execute(text(f"PRAGMA {name}")).scalar()
             for name in ("journal_mode", "synchronous")

@@ -18,12 +18,17 @@ def test_half_done_work_is_dropped(tmp_path):
     cut_off = files.volume(volume := "vol-" + 20 * "0").with_suffix(".h5.1f.partial")
     cut_off.write_bytes(b"half")
     files.volume(volume).write_bytes(b"whole")
+    torn = files.mesh(mesh := new_id("mesh")).with_suffix(".h5.1f.partial")
+    torn.write_bytes(b"half")
+    files.mesh(mesh).write_bytes(b"whole")
     (files.scratch / "job").mkdir()
     (files.scratch / "job" / "picked.h5").write_bytes(b"x")
     files.drop_leftovers()
     assert not left.exists()
     assert not cut_off.exists()
+    assert not torn.exists()
     assert files.volume(volume).exists()
+    assert files.mesh(mesh).exists()
     assert not list(files.scratch.iterdir())
     assert kept.exists()
 
@@ -38,17 +43,19 @@ def test_a_candidate_goes_with_what_a_killed_writer_left_of_it(tmp_path):
     assert list(tmp_path.glob("incoming/*")) == [other]
 
 
-def test_adopt_moves_the_checked_file(tmp_path):
+@pytest.mark.parametrize("what", ["dataset", "volume", "mesh"])
+def test_adopt_moves_the_checked_file(tmp_path, what):
     files = Files(tmp_path)
     files.prepare()
-    dataset = new_id("dataset")
-    files.candidate(dataset).write_bytes(b"x")
-    assert files.adopt(dataset) == files.dataset(dataset)
-    assert files.dataset(dataset).read_bytes() == b"x"
-    assert not files.candidate(dataset).exists()
+    upload = new_id(what)
+    place = getattr(files, what)(upload)
+    files.candidate(upload).write_bytes(b"x")
+    assert files.adopt(upload) == place
+    assert place.read_bytes() == b"x"
+    assert not files.candidate(upload).exists()
 
 
-@pytest.mark.parametrize("name", ["incoming", "candidate", "dataset"])
+@pytest.mark.parametrize("name", ["incoming", "candidate", "dataset", "mesh", "field"])
 def test_no_invented_string_becomes_a_path(tmp_path, name):
     with pytest.raises(UnknownId):
         getattr(Files(tmp_path), name)("../../etc/passwd")

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_service.refusals import UnknownId
-from bentray_service.storage.ids import PREFIXES, checked, new_id, volume_of
+from bentray_service.storage.ids import PREFIXES, checked, field_of, new_id, volume_of
 
 
 @pytest.mark.parametrize("what", PREFIXES)
@@ -40,3 +40,8 @@ def test_near_misses(text):
 def test_a_job_has_one_volume():
     job = new_id("job")
     assert volume_of(job) == volume_of(job) == checked("volume", volume_of(job))
+
+
+@given(st.binary(min_size=32, max_size=32).map(bytes.hex))
+def test_a_content_has_one_field(content):
+    assert field_of(content) == field_of(content) == checked("field", field_of(content))

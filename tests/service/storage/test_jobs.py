@@ -1,14 +1,14 @@
 """Jobs in the database: their order, their states, their events."""
 
 import threading
+import time
 
 import pytest
 
-from bentray_service.refusals import Finished, UnknownId
-from bentray_service.storage.database import open_database
+from bentray_service.refusals import Finished, KeyReused, QueueFull, UnknownId
 from bentray_service.storage.datasets import Datasets
 from bentray_service.storage.ids import new_id, volume_of
-from bentray_service.storage.jobs import Jobs
+from bentray_service.storage.jobs import LEASE_S, Jobs
 from bentray_service.storage.volumes import Volumes
 
 PROBLEM = {"type": "/problems/x", "title": "t", "status": 500, "detail": "why"}
@@ -26,13 +26,6 @@ SUMMARY = {
     "has_truth": False,
     "water_speed_mps": 1500.0,
 }
-
-
-@pytest.fixture
-def database(tmp_path):
-    opened = open_database(f"sqlite:///{tmp_path / 'db.sqlite'}")
-    yield opened
-    opened.close()
 
 
 @pytest.fixture
@@ -127,20 +120,83 @@ def test_release_is_no_attempt(jobs, dataset):
     job = jobs.add("reconstruction", {}, dataset)
     jobs.claim()
     jobs.progress(job["id"], 3, 9, [])
-    jobs.release(job["id"])
+    jobs.release(job["id"], "a reason")
     row = jobs.get(job["id"])
     assert (row["state"], row["attempts"], row["started"]) == ("queued", 0, None)
     assert jobs.claim()["done"] == 0
 
 
-def test_a_job_that_kills_the_service_is_given_up(jobs, dataset):
+def test_a_job_that_kills_the_service_is_given_up(database, jobs, dataset):
     job = jobs.add("reconstruction", {}, dataset)
     ends = []
     for _ in range(3):
-        jobs.claim()
-        jobs.recover(PROBLEM)
+        Jobs(database).claim()
+        jobs.recover(PROBLEM, alone=True)
         ends.append(jobs.state(job["id"]))
     assert ends == ["queued", "queued", "failed"]
+
+
+def test_a_job_that_gets_further_is_taken_up_again_and_again(database, jobs, dataset):
+    job = jobs.add("reconstruction", {}, dataset)
+    for _ in range(8):
+        dying = Jobs(database)
+        assert dying.claim()["id"] == job["id"]
+        dying.got_further(job["id"])
+        assert jobs.recover(PROBLEM, alone=True) == 1
+    assert jobs.get(job["id"])["attempts"] == 1
+    assert [event["state"] for event in jobs.events(job["id"])] == ["queued", *8 * ["running", "queued"]]
+
+
+def test_a_service_beside_others_takes_only_what_is_given_up(database, jobs, dataset, monkeypatch):
+    job = jobs.add("reconstruction", {}, dataset)
+    other = Jobs(database)
+    other.claim()
+    assert jobs.recover(PROBLEM, alone=False) == 0
+    later = time.time() + LEASE_S + 1.0
+    monkeypatch.setattr("bentray_service.storage.jobs.time.time", lambda: later)
+    other.renew()
+    assert jobs.recover(PROBLEM, alone=False) == 0
+    monkeypatch.setattr("bentray_service.storage.jobs.time.time", lambda: later + LEASE_S + 1.0)
+    assert other.recover(PROBLEM, alone=False) == 0, "its own job is at work"
+    assert jobs.recover(PROBLEM, alone=False) == 1
+    assert jobs.claim()["id"] == job["id"]
+    # The first one wakes up and has lost its job.
+    assert other.told(job["id"]) is None
+    other.progress(job["id"], 7, 9, [])
+    other.fail(job["id"], PROBLEM)
+    other.release(job["id"], "late")
+    assert not other.succeed(job["id"], volume(job["id"]))
+    row = jobs.get(job["id"])
+    assert (row["state"], row["done"], jobs.told(job["id"])) == ("running", 0, "running")
+    assert jobs.succeed(job["id"], volume(job["id"]))
+
+
+def test_tenants_take_turns(jobs, dataset):
+    for tenant, count in (("a", 5), ("b", 2), ("c", 1)):
+        for _ in range(count):
+            jobs.add("reconstruction", {}, dataset, tenant=tenant)
+    order = []
+    for _ in range(8):
+        job = jobs.claim()
+        order.append(job["tenant"])
+        jobs.fail(job["id"], PROBLEM)
+        # A clock too coarse to tell two starts apart would leave the order to the numbers.
+        time.sleep(0.002)
+    assert order == ["a", "b", "c", "a", "b", "a", "a", "a"]
+    for _ in range(3):
+        jobs.add("reconstruction", {}, dataset, tenant="a")
+    jobs.add("reconstruction", {}, dataset, tenant="b")
+    assert [jobs.claim()["tenant"] for _ in range(3)] == ["b", "a", "a"]
+
+
+def test_a_full_queue_refuses_of_this_tenant_alone(jobs, dataset):
+    for _ in range(2):
+        jobs.add("reconstruction", {}, dataset, tenant="a", most_queued=2)
+    with pytest.raises(QueueFull, match="2 that wait"):
+        jobs.add("reconstruction", {}, dataset, tenant="a", most_queued=2)
+    jobs.add("reconstruction", {}, dataset, tenant="b", most_queued=2)
+    jobs.claim()
+    jobs.add("reconstruction", {}, dataset, tenant="a", most_queued=2)
 
 
 @pytest.mark.parametrize("job_id", ["job-" + "0" * 20, "../../x", ""])
@@ -158,3 +214,22 @@ def test_a_job_on_a_volume_ends_without_one(jobs, database):
     assert jobs.state(job["id"]) == "succeeded"
     with pytest.raises(UnknownId):
         Volumes(database).get(volume_of(job["id"]))
+
+
+def test_a_key_names_one_job_of_its_tenant(database, jobs, dataset):
+    made = []
+
+    def add():
+        made.append(jobs.add("reconstruction", {"nodes": 16}, dataset, key="k")["id"])
+
+    threads = [threading.Thread(target=add) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert (len(made), len(set(made))) == (6, 1)
+    with pytest.raises(KeyReused):
+        jobs.add("reconstruction", {"nodes": 17}, dataset, key="k")
+    assert jobs.add("reconstruction", {"nodes": 17}, dataset, key="k", tenant="b")["id"] not in made
+    assert [len(jobs.newest(9, state=state)) for state in ("queued", "running")] == [2, 0]
+    assert jobs.load()[0] == {"queued": 2}

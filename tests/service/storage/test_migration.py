@@ -4,7 +4,7 @@ import json
 import sqlite3
 
 import pytest
-from sqlalchemy import inspect, text
+from sqlalchemy import create_engine, inspect, text
 from sqlalchemy.dialects import postgresql
 from sqlalchemy.exc import IntegrityError
 
@@ -48,10 +48,25 @@ INSERT INTO about VALUES (1, 0.0);
 DATASET, DONE, WAITING = new_id("dataset"), new_id("job"), new_id("job")
 
 
-@pytest.fixture
-def old(tmp_path):
-    """A database as version 1 left it, with a finished and a waiting job."""
+@pytest.fixture(params=[1, 2])
+def old(request, tmp_path):
+    """A database as an older version left it, with a finished and a waiting job."""
     path = tmp_path / "old.sqlite"
+    _of_version_1(path)
+    if request.param > 1:
+        # Only as far as this version.
+        engine = create_engine(f"sqlite:///{path}")
+        with engine.begin() as connection:
+            for pragma in migration.SQLITE_PRAGMAS:
+                connection.execute(text(f"PRAGMA {pragma}"))
+            for version in range(1, request.param):
+                migration.STEPS[version](connection)
+            connection.execute(text(f"UPDATE about SET version = {request.param}"))
+        engine.dispose()
+    return f"sqlite:///{path}"
+
+
+def _of_version_1(path):
     with sqlite3.connect(path) as connection:
         connection.executescript(VERSION_1)
         connection.execute(
@@ -68,7 +83,6 @@ def old(tmp_path):
         volume = (volume_of(DONE), DONE, "[8, 8]", "[1, 1]", "[0, 0]", "[1400, 1600]", "{}")
         connection.execute("INSERT INTO volumes VALUES (?, ?, 8.0, 9, 'x,y', ?, ?, ?, ?, 1500.0, ?)", volume)
     connection.close()
-    return f"sqlite:///{path}"
 
 
 def described(database):
@@ -90,6 +104,7 @@ def described(database):
         }
 
 
+@pytest.mark.parametrize("old", [1], indirect=True)
 def test_the_old_tables_were_those_of_version_1(old, tmp_path):
     """Guards the fixture: all but what version 2 changed is as in a new database."""
     new = open_database(f"sqlite:///{tmp_path / 'new.sqlite'}")
@@ -98,7 +113,7 @@ def test_the_old_tables_were_those_of_version_1(old, tmp_path):
     with sqlite3.connect(tmp_path / "old.sqlite") as connection:
         names = {row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     connection.close()
-    assert names == set(expected) - {"uploaded_volumes"}
+    assert names == set(expected) - {"uploaded_volumes", "meshes", "geometry_fields"}
 
 
 def test_afterwards_it_is_as_a_new_one(old, tmp_path):
@@ -138,10 +153,10 @@ def test_keys_hold_afterwards(old):
 
 def test_what_fails_half_way_leaves_the_old_database(old, monkeypatch):
     def broken(connection):
-        migration._to_2(connection)
+        migration._to_3(connection)
         raise RuntimeError("the power went")
 
-    monkeypatch.setattr(migration, "STEPS", {1: broken})
+    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 2: broken})
     with pytest.raises(RuntimeError, match="power"):
         open_database(old)
     monkeypatch.undo()
@@ -174,9 +189,42 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
     told = Recorder()
     monkeypatch.setattr(type(schema.uploaded_volumes), "create", lambda table, to: to.said.append(table.name))
     migration.migrate(told, 1)
-    assert told.said[:3] == [
+    assert told.said[:-1] == [
         "uploaded_volumes",
         "ALTER TABLE jobs ALTER COLUMN dataset_id DROP NOT NULL",
         "ALTER TABLE jobs ADD COLUMN volume_id VARCHAR(32)",
+        "ALTER TABLE jobs ADD COLUMN tenant VARCHAR(64) NOT NULL DEFAULT 'local'",
+        "ALTER TABLE jobs ADD COLUMN idempotency_key VARCHAR(200)",
+        "ALTER TABLE jobs ADD COLUMN request_sha256 VARCHAR(64)",
+        "ALTER TABLE jobs ADD COLUMN lease_owner VARCHAR(64)",
+        "ALTER TABLE jobs ADD COLUMN lease_until FLOAT",
+        "ALTER TABLE jobs ADD COLUMN plan JSON",
+        "ALTER TABLE jobs ADD COLUMN advice VARCHAR(1000)",
+        "ALTER TABLE jobs ADD COLUMN mesh_id VARCHAR(32)",
+        "ALTER TABLE jobs ADD COLUMN field_id VARCHAR(32)",
+        "CREATE INDEX jobs_by_tenant ON jobs (tenant, state)",
+        "CREATE UNIQUE INDEX jobs_by_key ON jobs (tenant, idempotency_key)",
+        "meshes",
+        "geometry_fields",
     ]
-    assert told.said[3].startswith("UPDATE about SET version")
+    assert told.said[-1].startswith("UPDATE about SET version")
+
+
+def test_a_real_postgres_keeps_its_jobs_and_is_as_a_new_one_afterwards(postgresql_server):
+    addresses = [postgresql_server.new_database() for _ in range(2)]
+    engine = create_engine(addresses[0])
+    with engine.begin() as connection:
+        connection.exec_driver_sql(VERSION_1.replace("number INTEGER NOT NULL", "number SERIAL NOT NULL"))
+        connection.exec_driver_sql(
+            "INSERT INTO datasets VALUES"
+            " (1, 'ds-x', 1, 9, 'f', '', '', '', 2, 8, 8, 8, 1, false, true, false, 1500);"
+            f"INSERT INTO jobs VALUES (1, '{WAITING}', 'reconstruction', 'ds-x', '{{}}', 'queued',"
+            " 0, 0, 0, '[]', NULL, 5, NULL, NULL)"
+        )
+    engine.dispose()
+    opened, new = map(open_database, addresses)
+    assert described(opened) == described(new)
+    assert Jobs(opened).claim()["id"] == WAITING
+    for database, address in zip((opened, new), addresses, strict=True):
+        database.close()
+        postgresql_server.drop(address)

@@ -1,17 +1,21 @@
 """The page / in a real browser: upload, start, watch, fail in words."""
 
 import io
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import httpx
 import numpy as np
 import pytest
+import trimesh
 from playwright.sync_api import expect, sync_playwright
 
 from bentray_kernels.phantoms import ONE_HOLE, sampled
+from bentray_kernels.phantoms.surfaces import torus
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.jobs import kinds
+from bentray_workers.render_tasks import ThreadTasks
 
 CHROMIUM = Path("/usr/bin/chromium")
 # The first picture waits for its compiled functions where none are kept from before.
@@ -50,7 +54,7 @@ def test_without_jobs_it_says_what_to_do(page, serve):
 
 def test_upload_start_watch(page, serve, scan, work):
     page.goto(serve())
-    page.set_input_files("#file", scan())
+    page.set_input_files("#scan-file", scan())
     page.get_by_text("scan.h5 is stored").wait_for()
     page.get_by_text("16 emitters").wait_for()
     page.get_by_label("Straight").check()
@@ -73,7 +77,7 @@ def test_upload_start_watch(page, serve, scan, work):
 
 def test_method_by_trial_asks_for_no_rays(page, serve, scan, work):
     page.goto(serve())
-    page.set_input_files("#file", scan())
+    page.set_input_files("#scan-file", scan())
     page.get_by_text("16 emitters").wait_for()
     page.get_by_label("By trial").check()
     expect(page.get_by_label("Straight")).to_be_disabled()
@@ -95,7 +99,7 @@ def test_method_by_trial_asks_for_no_rays(page, serve, scan, work):
 def test_the_residual_curve_shows_where_a_stage_begins(page, serve, scan, work):
     work.stages = 2
     page.goto(serve())
-    page.set_input_files("#file", scan())
+    page.set_input_files("#scan-file", scan())
     page.get_by_text("16 emitters").wait_for()
     page.get_by_label("Sweeps").fill("3")
     page.get_by_role("button", name="Start").click()
@@ -122,7 +126,7 @@ def test_a_volume_in_space_is_shown_as_glass(page, serve, scan, work, monkeypatc
         )
 
     page.goto(serve())
-    page.set_input_files("#file", scan())
+    page.set_input_files("#scan-file", scan())
     page.get_by_text("16 emitters").wait_for()
     page.get_by_role("button", name="Start").click()
     page.get_by_role("img", name="Speed of sound, Sixteen elements").wait_for()
@@ -166,9 +170,81 @@ def test_a_turntable_is_shown(page, serve, scan, work, monkeypatch):
     assert "iso=0.3&iso=0.6&" in image.get_attribute("src")
 
 
+def saved(tmp_path, values):
+    np.save(tmp_path / "ball.npy", values)
+    return tmp_path / "ball.npy"
+
+
+def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, monkeypatch):
+    monkeypatch.setattr(kinds, "turn", lambda *given: given[3].write_bytes(b"pictures"))
+    page.goto(serve())
+    turn = page.get_by_role("button", name="Turn it round")
+    expect(turn).to_be_disabled()
+    page.set_input_files("#volume-file", saved(tmp_path, sampled(ONE_HOLE, 12)))
+    page.get_by_text("ball.npy is stored").wait_for()
+    page.get_by_text(re.compile("^12 . 12 . 12 nodes")).wait_for()
+    image = page.get_by_role("img", name="ball.npy in glass")
+    expect(image).to_have_js_property("naturalWidth", 512, timeout=COMPILING_MS)
+    assert image.get_attribute("src").endswith("/refraction.png?azimuth_deg=30&elevation_deg=20")
+    page.get_by_label("Iso-value").fill("0.4")
+    page.get_by_label("Azimuth").fill("75")
+    page.get_by_label("Pictures of a turn").fill("7")
+    expect(image).to_have_attribute("src", re.compile("iso=0.4&azimuth_deg=75&"))
+    turn.click()
+    job = page.locator(".job")
+    job.get_by_text("7 pictures of 512").wait_for()
+    job.get_by_text("ball.npy").wait_for()
+    link = job.get_by_role("link", name="Pictures")
+    with page.expect_download() as download:
+        link.click()
+    assert download.value.suggested_filename.endswith(".apng")
+    assert download.value.path().read_bytes() == b"pictures"
+
+
+def test_what_cannot_be_shown_is_told_in_words(page, serve, tmp_path):
+    page.goto(serve())
+    page.set_input_files("#volume-file", saved(tmp_path, sampled(ONE_HOLE, 12)))
+    page.get_by_text("ball.npy is stored").wait_for()
+    page.get_by_label("Iso-value").fill("7")
+    page.get_by_label("Iso-value").press("Tab")
+    expect(page.locator("#look-error")).to_contain_text("iso: found 7; accepted: ", timeout=COMPILING_MS)
+    (tmp_path / "notes.txt").write_text("only text")
+    page.set_input_files("#volume-file", tmp_path / "notes.txt")
+    expect(page.locator("#volume-error")).to_contain_text("NRRD")
+
+
+def test_a_mesh_is_uploaded_and_its_field_looked_at(page, serve, tmp_path, monkeypatch):
+    monkeypatch.setattr(kinds, "ClusterTasks", lambda client, priority: ThreadTasks())
+    ring = torus(16, 10)
+    content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
+    (tmp_path / "ring.ply").write_bytes(content)
+    page.goto(serve())
+    make = page.get_by_role("button", name="Make its field")
+    expect(make).to_be_disabled()
+    page.set_input_files("#mesh-file", tmp_path / "ring.ply")
+    page.get_by_text("ring.ply is stored").wait_for()
+    page.get_by_text("320 faces · closed · 1 handle").wait_for()
+    expect(page.get_by_label("Samples along an edge")).to_have_value("24")
+    page.get_by_label("Samples along an edge").fill("6")
+    make.click()
+    job = page.locator(".job")
+    job.get_by_role("heading", name="Geometry field").wait_for()
+    job.get_by_text("6 samples along an edge").wait_for()
+    image = page.get_by_role("img", name="ring.ply, reflect")
+    expect(image).to_have_js_property("naturalWidth", 512, timeout=COMPILING_MS)
+    assert job.get_by_role("link", name="Normal map").get_attribute("href").endswith("/normal-map.png")
+    page.get_by_label("Scene").select_option("two-mirrors")
+    page.get_by_label("Made of").select_option("glass")
+    image = page.get_by_role("img", name="ring.ply, refract")
+    expect(image).to_have_attribute("src", re.compile("mode=refract&scene=two-mirrors&"))
+    (tmp_path / "notes.txt").write_text("only text")
+    page.set_input_files("#mesh-file", tmp_path / "notes.txt")
+    expect(page.locator("#mesh-error")).to_contain_text("PLY")
+
+
 def test_cancel(page, serve, scan, work):
     page.goto(serve())
-    page.set_input_files("#file", scan())
+    page.set_input_files("#scan-file", scan())
     page.get_by_text("16 emitters").wait_for()
     work.hold.clear()
     page.get_by_role("button", name="Start").click()
@@ -179,15 +255,15 @@ def test_cancel(page, serve, scan, work):
 def test_errors_in_words(page, serve, tmp_path):
     (tmp_path / "notes.h5").write_text("only text")
     page.goto(serve())
-    page.set_input_files("#file", tmp_path / "notes.h5")
-    alert = page.locator("#upload-error")
+    page.set_input_files("#scan-file", tmp_path / "notes.h5")
+    alert = page.locator("#scan-error")
     alert.wait_for()
     assert "HDF5" in alert.inner_text()
 
 
 def test_by_keyboard_alone(page, serve, scan, work):
     page.goto(serve())
-    page.set_input_files("#file", scan())
+    page.set_input_files("#scan-file", scan())
     page.get_by_text("16 emitters").wait_for()
     page.locator("#dataset").focus()
     for _ in range(20):

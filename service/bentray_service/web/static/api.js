@@ -25,11 +25,11 @@ export async function request(path, options = {}) {
 }
 
 // fetch() cannot tell how much of a body has been sent; XMLHttpRequest can.
-export function upload(file, onProgress) {
+export function upload(address, mediaType, file, onProgress) {
   return new Promise((resolve, reject) => {
     const sender = new XMLHttpRequest();
-    sender.open("POST", "/v1/datasets");
-    sender.setRequestHeader("Content-Type", "application/x-hdf5");
+    sender.open("POST", address);
+    sender.setRequestHeader("Content-Type", mediaType);
     sender.responseType = "json";
     sender.upload.onprogress = (event) => event.lengthComputable && onProgress(event.loaded / event.total);
     sender.onerror = () => reject(new Error("The upload broke off: the service did not take it or does not answer."));

@@ -1,11 +1,16 @@
-// The viewer: upload a scan, start a reconstruction, follow the jobs.
-import { request, upload } from "./api.js";
+// The viewer: upload a scan, start a reconstruction, follow the jobs; see glass.js for volumes, mesh.js for meshes.
+import { request } from "./api.js";
+import { loadVolumes, volumeTitle, watchGlass } from "./glass.js";
 import { showJobs } from "./jobs.js";
+import { loadMeshes, meshTitle, showFields, watchMeshes } from "./mesh.js";
+import { uploads } from "./uploads.js";
 
 const BUSY_MS = 700;
 const IDLE_MS = 4000;
 const at = (id) => document.getElementById(id);
 const datasets = new Map();
+// Volumes of jobs that the list of volumes has been read for.
+const asked = new Set();
 let timer = 0;
 
 function say(id, error) {
@@ -15,6 +20,11 @@ function say(id, error) {
 
 function titleOf(dataset) {
   return dataset.title || dataset.id;
+}
+
+function titleOfJob(job) {
+  if (job.mesh) return meshTitle(job.mesh);
+  return datasets.has(job.dataset) ? titleOf(datasets.get(job.dataset)) : volumeTitle(job.volume);
 }
 
 function showFacts() {
@@ -41,36 +51,18 @@ async function loadDatasets(chosen) {
   showFacts();
 }
 
-async function send(file) {
-  say("upload-error", null);
-  at("upload").hidden = at("upload-bar").hidden = false;
-  at("upload-name").textContent = `Sending ${file.name}`;
-  at("upload-bar").value = 0;
-  try {
-    const dataset = await upload(file, (share) => {
-      at("upload-bar").value = share;
-      if (share === 1) at("upload-name").textContent = `Checking ${file.name}`;
-    });
-    at("upload-name").textContent = `${file.name} is stored`;
-    at("upload-bar").hidden = true;
-    await loadDatasets(dataset.id);
-  } catch (error) {
-    at("upload").hidden = true;
-    say("upload-error", error);
-  } finally {
-    at("file").value = "";
-  }
-}
-
 async function refresh() {
   clearTimeout(timer);
   let wait = IDLE_MS;
   try {
     const { jobs } = await request("/v1/jobs");
     if (jobs.some((job) => job.dataset && !datasets.has(job.dataset))) await loadDatasets();
-    const titles = new Map([...datasets].map(([id, dataset]) => [id, titleOf(dataset)]));
+    const made = jobs.filter((job) => job.volume && !asked.has(job.volume)).map((job) => job.volume);
+    if (made.length) await loadVolumes();
+    for (const volume of made) asked.add(volume);
     at("empty").hidden = jobs.length > 0;
-    showJobs(at("jobs"), jobs, titles, cancel);
+    showJobs(at("jobs"), jobs, titleOfJob, cancel);
+    showFields(jobs);
     if (jobs.some((job) => ["queued", "running", "cancelling"].includes(job.state))) wait = BUSY_MS;
     say("jobs-error", null);
   } catch (error) {
@@ -108,11 +100,14 @@ async function start(event) {
   }
 }
 
-// What a reconstruction takes when nothing is said, as the service itself describes it.
+// What jobs take when nothing is said, as the service itself describes it.
 async function fillDefaults() {
   const { components } = await request("/openapi.json");
-  for (const input of document.querySelectorAll("#run input[type=number]")) {
-    input.value = components.schemas.Settings.properties[input.name].default;
+  for (const [id, schema] of [["run", "Settings"], ["look", "Turntable"], ["field", "FieldSettings"]]) {
+    for (const input of at(id).querySelectorAll("input[required]")) {
+      // The value that a form goes back to when it is reset.
+      if (input.type === "number") input.defaultValue = components.schemas[schema].properties[input.name].default;
+    }
   }
 }
 
@@ -129,24 +124,16 @@ async function health() {
   setTimeout(health, 15000);
 }
 
-const drop = at("drop");
-for (const name of ["dragenter", "dragover"]) {
-  drop.addEventListener(name, (event) => {
-    event.preventDefault();
-    drop.classList.add("over");
-  });
-}
-for (const name of ["dragleave", "drop"]) drop.addEventListener(name, () => drop.classList.remove("over"));
-drop.addEventListener("drop", (event) => {
-  event.preventDefault();
-  if (event.dataTransfer.files.length) send(event.dataTransfer.files[0]);
-});
-at("file").addEventListener("change", (event) => event.target.files.length && send(event.target.files[0]));
+uploads("scan", () => "/v1/datasets", "application/x-hdf5", (dataset) => loadDatasets(dataset.id));
+watchGlass(refresh);
+watchMeshes(refresh);
 at("dataset").addEventListener("change", showFacts);
 at("run").addEventListener("submit", start);
 at("run").addEventListener("change", showMethod);
 showMethod();
 fillDefaults().catch((error) => say("run-error", error));
 loadDatasets().catch((error) => say("jobs-error", error));
+loadVolumes().catch((error) => say("jobs-error", error));
+loadMeshes().catch((error) => say("jobs-error", error));
 refresh();
 health();

@@ -1,11 +1,10 @@
 // The list of jobs: one card a job, kept and updated in place so that the focus and the pictures stay.
 import { inWords, request } from "./api.js";
+import { glassOf, queryOf } from "./views.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const RAYS = { curved: "Bent rays", straight: "Straight rays", adjoint: "Without rays" };
 const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton", auto: "auto" };
-// Part of the speed of water that a speed must be off it to be shown as glass.
-const LEAST = 0.005;
 const cards = new Map();
 
 function make(tag, className, text) {
@@ -82,26 +81,7 @@ function drawn(address, words) {
   return frame;
 }
 
-// A volume in space is also shown as glass in water, which bends light as much as it bends sound.
-function glassOf({ water_speed_mps: water, value_range: [lowest, highest] }) {
-  const between = (speed) => Number(((water + speed) / 2).toPrecision(6));
-  const index = (speed) => Number((water / speed).toPrecision(4));
-  const slower = lowest < (1 - LEAST) * water;
-  const faster = highest > (1 + LEAST) * water;
-  if (!slower && !faster) return {};
-  return {
-    iso: [...(slower ? [between(lowest)] : []), ...(faster ? [between(highest)] : [])],
-    outside: slower ? index(lowest) : 1,
-    index: [...(slower ? [1] : []), ...(faster ? [index(highest)] : [])],
-    surroundings: slower ? 1 : 0,
-    elevation_deg: 35,
-  };
-}
-
-function queryOf(view) {
-  return new URLSearchParams(Object.entries(view).flatMap(([name, value]) => [value].flat().map((one) => [name, one])));
-}
-
+// A volume in space is also shown as glass.
 async function addGlass(column, job, title) {
   const volume = await request(job.links.volume);
   if (!volume.links.refraction) return;
@@ -117,7 +97,9 @@ function firstFrame(job) {
 
 function pictures(job, title) {
   const column = make("div", "pictures");
-  if (job.links.image) {
+  if (job.links.field) {
+    column.append(drawn(`${job.links.image}?${queryOf({ width: 320, height: 320, rays: 2 })}`, `As a mirror, ${title}`));
+  } else if (job.links.image) {
     column.append(drawn(job.links.image, `Speed of sound, ${title}`));
     addGlass(column, job, title).catch(() => {});
   } else if (job.links.animation) {
@@ -132,6 +114,9 @@ function pictures(job, title) {
 
 // What was asked for, in a heading and a line.
 function asked({ kind, settings }) {
+  if (kind === "geometry-field") {
+    return ["Geometry field", `${settings.samples} samples along an edge, image of ${settings.image_size} pixels`];
+  }
   if (kind === "refraction") {
     return ["Turntable", `${settings.frames} pictures of ${settings.width} × ${settings.height}, index ${settings.index.join(", ")}`];
   }
@@ -145,6 +130,8 @@ function facts(job, title, onCancel) {
   const heading = make("h3", "", what);
   heading.append(make("span", `state ${job.state}`, job.state));
   box.append(heading, make("p", "", title), make("p", "", settings));
+  if (job.plan) box.append(make("p", "", job.plan.why));
+  if (job.advice) box.append(make("p", "", job.advice));
   const { done, total } = job.progress;
   if (job.state === "running" || job.state === "cancelling") {
     const bar = make("progress");
@@ -168,6 +155,9 @@ function facts(job, title, onCancel) {
   if (values.length > 1) box.append(sparkline(course));
   if (job.error) box.append(make("p", "error", inWords(job.error)));
   const row = make("div", "links");
+  if (job.links.field) {
+    row.append(link("Geometry image", job.links.geometry_image), link("Normal map", job.links.normal_map), link("Figures", job.links.field));
+  }
   if (job.links.animation) row.append(link("Pictures", job.links.animation, true));
   if (job.links.data) {
     row.append(link("HDF5", `${job.links.data}?format=hdf5`, true), link("NumPy", `${job.links.data}?format=npy`, true));
@@ -182,7 +172,8 @@ function facts(job, title, onCancel) {
   return box;
 }
 
-export function showJobs(list, jobs, titles, onCancel) {
+// titleOf(job): of what it works on, where that is known.
+export function showJobs(list, jobs, titleOf, onCancel) {
   const present = new Set(jobs.map((job) => job.id));
   for (const [id, card] of cards) {
     if (!present.has(id)) {
@@ -191,7 +182,7 @@ export function showJobs(list, jobs, titles, onCancel) {
     }
   }
   jobs.forEach((job, place) => {
-    const title = titles.get(job.dataset) || job.dataset || job.volume;
+    const title = titleOf(job) || job.dataset || job.volume || job.mesh;
     const signature = JSON.stringify([job, title]);
     let card = cards.get(job.id);
     if (!card) {

@@ -1,0 +1,138 @@
+"""A folder of scans on a cluster: what `bentray submit --batch` does."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bentray_kernels.errors import InvalidInput
+
+from .batch_view import report, watching
+from .paths import output_folder
+from .results import write_results
+from .terminal import without_nan
+
+if TYPE_CHECKING:
+    from bentray_kernels.tomography import Settings
+    from bentray_workers.batch import Entry
+
+
+def submit_batch(
+    folder: Path,
+    scheduler: str,
+    settings: Settings,
+    output: Path | None,
+    at_once: int | None,
+    tls: Path | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Reconstruct every ``*.h5`` of a folder into OUTPUT/NAME/, and leave out what has its result.
+
+    Args:
+        folder: of the datasets; every worker must see it under the same path, and ``output`` too.
+        scheduler: of the cluster.
+        settings: of every reconstruction.
+        output: None: ``results`` in the folder.
+        at_once: datasets under way; None: one more than the cluster has workers.
+        tls: folder of the certificates.
+        as_json: print one JSON object at the end.
+
+    Raises:
+        InvalidInput: for the folder, the scheduler or the settings.
+        WorkFailed: when a dataset failed; the others have been done.
+    """
+    entries = entries_of(folder)
+    results = output_folder((output or folder / "results").resolve())
+
+    from bentray_workers import batch
+    from bentray_workers.cluster import open_cluster
+
+    for entry in entries:
+        found = finished(results / entry.name, entry.source, settings)
+        if found is not None:
+            entry.skip(found["seconds"], found["residual_rms_s"])
+    waiting = [entry for entry in entries if entry.state == "waiting"]
+    if waiting:
+        with open_cluster(scheduler, tls=tls) as cluster, watching(entries) as watch:
+            batch.run(
+                waiting,
+                lambda entry, stop: reconstruct_one(cluster.client, entry, results, settings, stop),
+                watch,
+                at_once or cluster.describe()["workers"] + 1,
+            )
+    report(folder, results, entries, as_json=as_json)
+
+
+def entries_of(folder: Path) -> list[Entry]:
+    """An entry for each dataset of a folder, by name.
+
+    Raises:
+        InvalidInput: where there are none.
+    """
+    from bentray_workers.batch import Entry
+
+    if not folder.is_dir():
+        raise InvalidInput("--batch", f"{folder} (no such folder)", "a folder of datasets, *.h5")
+    found = sorted(folder.resolve().glob("*.h5"))
+    if not found:
+        raise InvalidInput("--batch", f"{folder} (without any *.h5)", "a folder of datasets, *.h5")
+    return [Entry(path) for path in found]
+
+
+def reconstruct_one(
+    client: Any, entry: Entry, results: Path, settings: Settings, stop: Callable[[], bool]
+) -> None:
+    """Reconstruct one dataset into its folder of results; the picture is drawn by the cluster too."""
+    from bentray_workers.batch import report_of
+    from bentray_workers.dataset_file import read_dataset
+    from bentray_workers.lanes import RENDER
+    from bentray_workers.slices import Cancelled, reconstruct
+
+    folder, asked = output_folder(results / entry.name), _asked(entry.source, settings)
+
+    def draw() -> bytes:
+        drawn = client.submit(
+            report_of, folder / "reconstruction.h5", entry.source, resources=RENDER, pure=False
+        )
+        return bytes(drawn.result())
+
+    # Checkpoints are gone on from by whoever asks for the same again, and by nobody else.
+    mark = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:12]
+    work_dir = output_folder(folder / f"work-{mark}")
+    try:
+        result = reconstruct(client, entry.source, settings, entry.show, stop, work_dir)
+        dataset = read_dataset(entry.source, traces=False)
+        write_results(folder, result, dataset, entry.seconds, draw, file=str(entry.source), asked=asked)
+    except Cancelled:
+        raise
+    except Exception:
+        shutil.rmtree(work_dir, ignore_errors=True)
+        raise
+    shutil.rmtree(work_dir, ignore_errors=True)
+
+
+def _asked(source: Path, settings: Settings) -> dict[str, Any]:
+    """What a result is of: it is valid for the same file and the same settings only."""
+    there = source.stat()
+    asked = {"bytes": there.st_size, "mtime_ns": there.st_mtime_ns, "settings": settings.to_dict()}
+    found: dict[str, Any] = json.loads(json.dumps(without_nan(asked)))
+    return found
+
+
+def finished(folder: Path, source: Path, settings: Settings) -> dict[str, Any] | None:
+    """The figures of a whole and sound result of this file with these settings; None without one."""
+    from bentray_workers.reconstruction_file import read_reconstruction
+
+    try:
+        found: dict[str, Any] = json.loads((folder / "reconstruction.json").read_text())
+        if found["asked"] != _asked(source, settings) or not (folder / "reconstruction.png").is_file():
+            return None
+        read_reconstruction(folder / "reconstruction.h5")
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, InvalidInput):
+        return None
+    return found

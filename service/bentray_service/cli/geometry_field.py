@@ -1,0 +1,129 @@
+"""`bentray geometry-field`: from a mesh file to its geometry field and pictures, without a server."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .field_options import AskedField, with_field_options
+from .paths import input_file, output_folder
+from .terminal import AsJson, Step, print_json, print_lines, print_table, progress_bar
+
+if TYPE_CHECKING:
+    from bentray_kernels.tomography import Progress
+    from bentray_workers.field_view import FieldView
+    from bentray_workers.mesh_reading import ReadMesh
+
+ACCEPTED = "a triangle mesh: PLY, OBJ, OFF, STL, glTF or GLB"
+
+
+@with_field_options
+def geometry_field(
+    mesh: Annotated[Path, typer.Argument(help="Triangle mesh: PLY, OBJ, OFF, STL, glTF or GLB.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; made if absent.")],
+    asked: AskedField,
+    as_json: AsJson = False,
+) -> None:
+    """Make the geometry field of a mesh, and pictures of it, in OUTPUT.
+
+    Writes image.png, geometry-image.png, normal-map.png, geometry-field.json and the field itself. A field
+    that is there already is used again; one that was broken off is gone on from.
+
+    Example:  bentray geometry-field bunny.ply -o bunny --mode refract --up y
+    """
+    source, folder = input_file(mesh, ACCEPTED), output_folder(output)
+    settings, view = asked.settings(), asked.view()
+
+    from bentray_service.storage.ids import field_of
+    from bentray_workers.field_settings import check_faces
+    from bentray_workers.geometry_field import build
+    from bentray_workers.mesh_file import StoredMesh, summary_of, write_mesh
+    from bentray_workers.mesh_reading import read_mesh
+    from bentray_workers.render_tasks import ThreadTasks
+
+    read: ReadMesh = read_mesh(source.read_bytes())
+    check_faces(len(read.surface.mesh.faces))
+    stored = StoredMesh(read.surface.mesh, read.colours)
+    summary = summary_of(stored, read.surface, read.format)
+    name = field_of(settings.content(summary["content"]))
+    target, work = folder / name, folder / f"{name}-unfinished"
+    work.mkdir(exist_ok=True)
+    write_mesh(work / "mesh.h5", stored)
+    started = time.perf_counter()
+    with progress_bar("Making the field") as step:
+
+        def show(progress: Progress) -> None:
+            step(progress.done, progress.total, "" if progress.total else "laying the mesh out")
+
+        figures = build(
+            ThreadTasks(), work / "mesh.h5", settings, target, work, show, lambda: None, lambda: False
+        )
+    shutil.rmtree(work)
+    made = time.perf_counter()
+    with progress_bar("Drawing") as step:
+        outputs = _draw(target, view, folder, step)
+    seconds = {"make_seconds": made - started, "draw_seconds": time.perf_counter() - made}
+    found = {"mesh": str(source), **summary, **settings.plain(), "figures": figures, **seconds}
+    found |= {"view": view.plain(), "outputs": {"field": str(target), **outputs}}
+    _write(folder / "geometry-field.json", found)
+    _show(source, found, as_json=as_json)
+
+
+def _draw(field: Path, view: FieldView, folder: Path, step: Step) -> dict[str, str]:
+    """The three pictures; their paths by name."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    from bentray_workers.atomic import write_bytes
+    from bentray_workers.field_picture import map_png, strip_image
+    from bentray_workers.strips import joined_png
+
+    rows = max(1, 2**16 // (view.width * view.rays**2))
+    firsts = range(0, view.height, rows)
+    strips = []
+    with ThreadPoolExecutor() as pool:
+        drawn = pool.map(
+            lambda first: strip_image(field, view, first, min(first + rows, view.height)), firsts
+        )
+        for strip in drawn:
+            strips.append(strip)
+            step(len(strips), len(firsts))
+    draw: dict[str, Callable[[], bytes]] = {
+        "image": lambda: joined_png(strips),
+        "geometry-image": lambda: map_png(field, "positions"),
+        "normal-map": lambda: map_png(field, "normals"),
+    }
+    for name, png in draw.items():
+        write_bytes(folder / f"{name}.png", png())
+    return {name.replace("-", "_"): str(folder / f"{name}.png") for name in draw}
+
+
+def _write(path: Path, found: dict[str, Any]) -> None:
+    from bentray_workers.field_files import write_json
+
+    write_json(path, found)
+
+
+def _show(source: Path, found: dict[str, Any], *, as_json: bool) -> None:
+    if as_json:
+        print_json(found)
+        return
+    figures = found["figures"]
+    mended = ", ".join(f"{n} {what.replace('_', ' ')}" for what, n in found["repairs"].items() if n)
+    kind = "closed" if found["holes"] == 0 else f"{found['holes']} holes"
+    tables = (figures["outer_bytes"] + figures["inner_bytes"]) / 1e6
+    rows = [
+        ("mesh", f"{found['faces']} faces, {kind}, genus {found['genus']}"),
+        ("mended", mended or "nothing"),
+        ("geometry image", f"{figures['image_pixels']}², rms error {figures['image_rms']:.1e} of the cube"),
+        ("tables", f"{found['samples']} samples along an edge, {tables:.0f} MB"),
+        ("wrong hits and misses", f"{100.0 * figures['lookup_wrong']:.2f} % of random rays"),
+        ("error of the others", f"{figures['lookup_median']:.1e} of the cube, median"),
+        ("time", f"{found['make_seconds']:.1f} s to make, {found['draw_seconds']:.1f} s to draw"),
+    ]
+    print_table(f"Geometry field of {source.name}", ("figure", "value"), rows)
+    print_lines(found["outputs"].values())

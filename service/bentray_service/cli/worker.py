@@ -1,0 +1,111 @@
+"""`bentray worker`: let this machine work for a scheduler, here or elsewhere."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bentray_kernels.errors import InvalidInput
+
+from .paths import output_folder
+from .terminal import print_lines, remark
+
+Tls = Annotated[
+    Path | None,
+    typer.Option(
+        envvar="BENTRAY_TLS_DIR",
+        help="Folder with authority.pem, certificate.pem and key.pem, for a scheduler at tls://…",
+    ),
+]
+
+
+def worker(
+    scheduler: Annotated[
+        str,
+        typer.Option(
+            envvar="DASK_SCHEDULER_ADDRESS",
+            help="Address of the scheduler, as tcp://head:8786 or tls://head:8786.",
+        ),
+    ],
+    workers: Annotated[
+        int | None, typer.Option(min=1, show_default="one a core", help="Worker processes.")
+    ] = None,
+    memory_limit: Annotated[
+        str | None,
+        typer.Option(
+            envvar="BENTRAY_WORKER_MEMORY",
+            show_default="its share of this machine's",
+            help="Memory of each process, as 4GiB; one that takes more is ended and its tasks go elsewhere.",
+        ),
+    ] = None,
+    local_directory: Annotated[
+        Path | None, typer.Option(show_default="a temporary folder", help="Folder for scratch files.")
+    ] = None,
+    host: Annotated[
+        str | None,
+        typer.Option(
+            show_default="the one that leads to the scheduler",
+            help="Address of this machine that scheduler and workers reach it by.",
+        ),
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(show_default="its address", help="Name of the worker in the cluster.")
+    ] = None,
+    opencl: Annotated[
+        bool,
+        typer.Option("--opencl/--no-opencl", help="Try the OpenCL devices and offer the one that passes."),
+    ] = True,
+    tls: Tls = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print {scheduler, workers, lanes, pid} as one JSON object.")
+    ] = False,
+) -> None:
+    """Work for the scheduler until Ctrl-C or SIGTERM; running tasks are handed to other workers then.
+
+    Each process runs one reconstruction and one rendering task at a time. It must see the data folder of the
+    service under the same path. Kernels are compiled before the first task comes. When the scheduler goes,
+    the workers wait for it to come back. Whoever reaches the scheduler or a worker can run code there: keep
+    both on a network of your own, or use TLS.
+
+    Example:  bentray worker --scheduler tcp://head:8786 --workers 4 --memory-limit 4GiB
+    """
+    from dask.utils import parse_bytes
+
+    from bentray_workers.joining import Joining, join
+    from bentray_workers.lanes import OFFERED, OPENCL
+    from bentray_workers.tls import security_of
+
+    if memory_limit is not None:
+        try:
+            parse_bytes(memory_limit)
+        except ValueError as error:
+            raise InvalidInput(
+                "memory_limit", repr(memory_limit), "a size, as 4GiB; 0 for no limit"
+            ) from error
+    count = workers if workers is not None else len(os.sched_getaffinity(0))
+    asked = Joining(
+        scheduler=scheduler,
+        workers=count,
+        lanes={**OFFERED, **(OPENCL if opencl and _has_device() else {})},
+        memory_limit=memory_limit,
+        local_directory=None if local_directory is None else output_folder(local_directory),
+        host=host,
+        name=name,
+        security=security_of(tls),
+    )
+    if as_json:
+        about = {"scheduler": scheduler, "workers": count, "lanes": dict(asked.lanes), "pid": os.getpid()}
+        print_lines([json.dumps(about)])
+    join(asked, remark)
+
+
+def _has_device() -> bool:
+    from bentray_kernels.opencl import choose
+
+    device = choose().device
+    remark("No OpenCL device passed its trial." if device is None else f"OpenCL device: {device.label}.")
+    return device is not None

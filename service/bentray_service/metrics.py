@@ -1,0 +1,134 @@
+"""What Prometheus is told: how requests go, what the queue holds, and what is left of workers and disk.
+
+Names begin with ``bentray_`` and end with their unit in the plural (``_seconds``, ``_bytes``), counters after
+it with ``_total``. No metric has a label whose values a client can choose.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram
+from prometheus_client.core import GaugeMetricFamily
+from prometheus_client.registry import Collector
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from .storage.schema import STATES
+
+if TYPE_CHECKING:
+    from .wiring import Parts
+
+# From a status poll to a picture that a worker draws.
+BUCKETS_S = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0)
+
+UNMATCHED = "unmatched"
+
+
+class Metrics:
+    """The metrics of one application.
+
+    Attributes:
+        registry: all of them.
+    """
+
+    def __init__(self) -> None:
+        self.registry = CollectorRegistry()
+        labels = ("method", "route")
+        self._requests = Counter(
+            "bentray_http_requests_total", "Requests answered.", (*labels, "status"), registry=self.registry
+        )
+        self._seconds = Histogram(
+            "bentray_http_request_duration_seconds",
+            "From the first byte of a request to the last of its answer.",
+            labels,
+            buckets=BUCKETS_S,
+            registry=self.registry,
+        )
+        self._received = Counter(
+            "bentray_http_received_bytes_total", "Bytes of bodies received.", labels, registry=self.registry
+        )
+        self._in_flight = Gauge(
+            "bentray_http_requests_in_flight", "Requests that are being answered.", registry=self.registry
+        )
+
+    def watch(self, parts: Parts) -> None:
+        """Tell of an open service, too; read when it is asked for."""
+        self.registry.register(_Parts(parts))
+
+    def middleware(self, app: ASGIApp) -> ASGIApp:
+        """ASGI middleware that counts and times requests."""
+
+        async def counted(scope: Scope, receive: Receive, send: Send) -> None:
+            if scope["type"] != "http":
+                await app(scope, receive, send)
+                return
+            status, received, begun = 500, 0, time.perf_counter()
+
+            async def receive_counted() -> Message:
+                nonlocal received
+                message = await receive()
+                received += len(message.get("body", b""))
+                return message
+
+            async def send_seen(message: Message) -> None:
+                nonlocal status
+                if message["type"] == "http.response.start":
+                    status = message["status"]
+                await send(message)
+
+            self._in_flight.inc()
+            try:
+                await app(scope, receive_counted, send_seen)
+            finally:
+                self._in_flight.dec()
+                method, route = _method(scope), _route(scope)
+                self._requests.labels(method, route, str(status)).inc()
+                self._seconds.labels(method, route).observe(time.perf_counter() - begun)
+                self._received.labels(method, route).inc(received)
+
+        return counted
+
+
+def _method(scope: Scope) -> str:
+    known = {"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"}
+    return scope["method"] if scope["method"] in known else "other"
+
+
+def _route(scope: Scope) -> str:
+    """The path as the route writes it, as ``/v1/jobs/{job_id}``."""
+    return str(getattr(scope.get("route"), "path", UNMATCHED))
+
+
+class _Parts(Collector):
+    """Reads the parts of a service when Prometheus asks; what cannot be read is left out."""
+
+    def __init__(self, parts: Parts) -> None:
+        self._parts = parts
+
+    def describe(self) -> list[GaugeMetricFamily]:
+        return []
+
+    def collect(self) -> Iterator[GaugeMetricFamily]:
+        parts = self._parts
+        waiting = GaugeMetricFamily("bentray_jobs", "Jobs by state.", labels=["state"])
+        try:
+            counts, oldest = parts.jobs.load()
+        except SQLAlchemyError:
+            pass
+        else:
+            for state in STATES:
+                waiting.add_metric([state], counts.get(state, 0))
+            yield waiting
+            age = 0.0 if oldest is None else max(0.0, time.time() - oldest)
+            yield _gauge("bentray_jobs_oldest_queued_seconds", "Age of the job that waits longest.", age)
+        yield _gauge("bentray_workers", "Dask workers connected.", parts.compute.workers())
+        free = shutil.disk_usage(parts.files.root).free
+        yield _gauge("bentray_disk_free_bytes", "Free space in the data folder.", free)
+
+
+def _gauge(name: str, words: str, value: float) -> GaugeMetricFamily:
+    return GaugeMetricFamily(name, words, value=value)

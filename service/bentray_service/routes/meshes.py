@@ -1,0 +1,102 @@
+"""/v1/meshes: upload, list and look at triangle meshes; iso-surfaces of volumes as meshes."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Query, Request, Response, status
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.isosurface_mesh import MOST_STEP, check_nodes
+
+from ..errors import described
+from ..storage.ids import new_id
+from ..wiring import Service
+from .bodies import only
+from .pictures import check_renderable
+from .surface_records import MeshList, MeshRecord, mesh_record
+from .uploads import body_of, take_in
+
+MEDIA_TYPES = (
+    "application/octet-stream",
+    "model/gltf-binary",
+    "model/gltf+json",
+    "model/obj",
+    "model/stl",
+)
+
+router = APIRouter(prefix="/v1", tags=["meshes"])
+
+
+@router.post(
+    "/meshes",
+    status_code=status.HTTP_201_CREATED,
+    dependencies=[Depends(only(*MEDIA_TYPES))],
+    openapi_extra=body_of("mesh", MEDIA_TYPES),
+    responses=described(413, 415, 422, 507),
+)
+async def upload_mesh(
+    request: Request,
+    response: Response,
+    service: Service,
+    title: Annotated[str, Query(max_length=200, description="What it is.")] = "",
+) -> MeshRecord:
+    """Upload a mesh. A process of its own reads it and makes one sound surface of it, or says why not."""
+    mesh_id = new_id("mesh")
+
+    def store(size: int, sha256: str, summary: dict[str, Any]) -> dict[str, Any]:
+        return service.meshes.add(mesh_id, size=size, sha256=sha256, summary=summary)
+
+    record = mesh_record(await take_in(request, service, "mesh", mesh_id, store, {"title": title}))
+    response.headers["Location"] = record.links["self"]
+    return record
+
+
+@router.get("/meshes")
+def list_meshes(service: Service, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> MeshList:
+    """Meshes, newest first."""
+    return MeshList(meshes=[mesh_record(row) for row in service.meshes.newest(limit)])
+
+
+@router.get("/meshes/{mesh_id}", responses=described(404))
+def show_mesh(mesh_id: str, service: Service) -> MeshRecord:
+    """One mesh: its size, its handles and holes, and what was repaired."""
+    return mesh_record(service.meshes.get(mesh_id))
+
+
+@router.post(
+    "/volumes/{volume_id}/mesh",
+    status_code=status.HTTP_201_CREATED,
+    responses=described(404, 422, 503),
+)
+def mesh_of_volume(
+    volume_id: str,
+    response: Response,
+    service: Service,
+    iso: Annotated[
+        float | None, Query(description="In the unit of the volume; without it the middle of its range.")
+    ] = None,
+    step: Annotated[int, Query(ge=1, le=MOST_STEP, description="Take every so many nodes: fewer faces.")] = 1,
+) -> MeshRecord:
+    """Make a mesh of a volume's iso-surface: the largest piece of it, closed at the faces of the volume."""
+    volume = service.volumes.get(volume_id)
+    check_renderable(volume)
+    check_nodes(volume["shape"], step)
+    low, high = volume["value_range"]
+    # NaN is between nothing.
+    if iso is not None and not (math.isfinite(iso) and low <= iso < high):
+        raise InvalidInput("iso", iso, f"{low:g} to less than {high:g}, the range of the volume")
+    mesh_id = new_id("mesh")
+    try:
+        made = service.files.candidate(mesh_id)
+        summary = service.compute.mesh_volume(service.files.volume(volume["id"]), iso, step, made)
+        content = service.files.adopt(mesh_id).read_bytes()
+    finally:
+        service.files.discard_candidate(mesh_id)
+    summary |= {"title": volume["title"], "volume_id": volume["id"]}
+    digest = hashlib.sha256(content).hexdigest()
+    record = mesh_record(service.meshes.add(mesh_id, size=len(content), sha256=digest, summary=summary))
+    response.headers["Location"] = record.links["self"]
+    return record

@@ -1,0 +1,154 @@
+"""What the REST interface answers of meshes and geometry fields."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Any
+
+from pydantic import BaseModel, Field
+
+Row = dict[str, Any]
+
+
+class Repairs(BaseModel):
+    """What was done to make one sound surface of a mesh."""
+
+    merged_vertices: int = Field(description="Vertices that lay in the place of another one.")
+    unused_vertices: int = Field(description="Vertices of no face.")
+    turned_faces: int = Field(description="Faces that ran against the others.")
+    parted_vertices: int = Field(description="Vertices added where parts of the surface only touched.")
+    dropped_pieces: int = Field(description="Of an iso-surface, all pieces but the largest.")
+
+
+class MeshRecord(BaseModel):
+    """One triangle mesh: an upload, or the iso-surface of a volume."""
+
+    id: str
+    title: str
+    format: str = Field(description="Of the file that was uploaded; isosurface of a volume's.")
+    volume: str | None = Field(description="The volume whose iso-surface it is.")
+    iso: float | None = Field(description="Its iso-value.")
+    vertices: int
+    faces: int
+    genus: int = Field(description="Handles: 0 of a ball, 1 of a ring.")
+    closed: bool
+    holes: int = Field(description="Boundaries; 0 where it is closed.")
+    coloured: bool = Field(description="Whether its vertices have colours.")
+    repairs: Repairs
+    bytes: int = Field(description="Size of what was uploaded, or of the file that was made.")
+    sha256: str = Field(description="SHA-256 of that.")
+    created: datetime
+    links: dict[str, str]
+
+
+class MeshList(BaseModel):
+    """Meshes, newest first."""
+
+    meshes: list[MeshRecord]
+
+
+class FieldSizes(BaseModel):
+    """How much there is of each."""
+
+    faces: int
+    vertices: int
+    points: int = Field(description="Of the surface, from which rays leave it in the inner field.")
+    image_pixels: int = Field(description="Along a side of the geometry image.")
+    outer_bytes: int = Field(description="Of the table of rays from outside.")
+    inner_bytes: int = Field(description="Of the table of rays that leave the surface.")
+
+
+class FieldErrors(BaseModel):
+    """How far things are from what they stand for; distances in edges of the unit cube."""
+
+    image_rms: float = Field(description="Rms distance of the geometry image from the surface, either way.")
+    image_greatest: float = Field(description="Its greatest distance.")
+    conformal: bool = Field(description="Whether the layout of the geometry image keeps angles.")
+    median_quasi_conformal: float = Field(
+        description="1 where a face keeps its angles; of half the faces less."
+    )
+    area_stretch: float = Field(description="How unevenly the layout scales areas; 1 is evenly.")
+    lookup_wrong: float = Field(description="Share of rays whose hit or miss accurate lookups tell wrong.")
+    lookup_median: float = Field(
+        description="Distance of accurate lookups from the exact place, half of them."
+    )
+    lookup_99: float = Field(description="The same, 99 of 100.")
+
+
+class FieldSeconds(BaseModel):
+    """Seconds of tasks, added up over those that ran side by side."""
+
+    parameterisation: float
+    image: float
+    error: float = Field(description="Of measuring the image, where no threshold had it measured before.")
+    outer: float
+    inner: float
+    border: float = Field(description="Of marking, in entries without a face, what is met beside them.")
+
+
+class FieldRecord(BaseModel):
+    """One geometry field; the same mesh and settings have the same one."""
+
+    id: str
+    mesh: str = Field(description="The mesh that it was first made of.")
+    job: str = Field(description="The job that made it.")
+    settings: dict[str, Any]
+    sizes: FieldSizes
+    errors: FieldErrors
+    seconds: FieldSeconds
+    bytes: int = Field(description="Of all of its files.")
+    created: datetime
+    links: dict[str, str]
+
+
+class FieldList(BaseModel):
+    """Geometry fields, newest first."""
+
+    geometry_fields: list[FieldRecord]
+
+
+def mesh_record(row: Row) -> MeshRecord:
+    links = {"self": f"/v1/meshes/{row['id']}"}
+    if row["volume_id"] is not None:
+        links["volume"] = f"/v1/volumes/{row['volume_id']}"
+    same = ("id", "title", "format", "iso", "vertices", "faces", "genus", "holes", "coloured", "repairs")
+    return MeshRecord(
+        volume=row["volume_id"],
+        closed=row["holes"] == 0,
+        created=datetime.fromtimestamp(row["created"], UTC),
+        links=links,
+        **{name: row[name] for name in (*same, "bytes", "sha256")},
+    )
+
+
+def field_links(field_id: str) -> dict[str, str]:
+    """Where a field is found, and its pictures."""
+    here = f"/v1/geometry-fields/{field_id}"
+    return {
+        "field": here,
+        "image": f"{here}/image.png",
+        "geometry_image": f"{here}/geometry-image.png",
+        "normal_map": f"{here}/normal-map.png",
+    }
+
+
+def field_record(row: Row) -> FieldRecord:
+    links = field_links(row["id"])
+    figures = row["figures"]
+    return FieldRecord(
+        id=row["id"],
+        mesh=row["mesh_id"],
+        job=row["job_id"],
+        settings=row["settings"],
+        sizes=FieldSizes(**{name: figures[name] for name in FieldSizes.model_fields}),
+        errors=FieldErrors(**{name: figures[name] for name in FieldErrors.model_fields}),
+        seconds=FieldSeconds(**{name: figures[f"{name}_seconds"] for name in FieldSeconds.model_fields}),
+        bytes=row["bytes"],
+        created=datetime.fromtimestamp(row["created"], UTC),
+        links={
+            "self": links.pop("field"),
+            "mesh": f"/v1/meshes/{row['mesh_id']}",
+            "job": f"/v1/jobs/{row['job_id']}",
+            **links,
+        },
+    )

@@ -1,0 +1,45 @@
+// A place where files are dropped: sends one, says how far it is, and why it was refused.
+import { upload } from "./api.js";
+
+const at = (id) => document.getElementById(id);
+
+// The elements are prefix-drop, prefix-file, prefix-upload, prefix-name, prefix-bar and prefix-error.
+export function uploads(prefix, addressOf, mediaType, onStored) {
+  const part = (name) => at(`${prefix}-${name}`);
+
+  async function send(file) {
+    part("error").hidden = true;
+    part("upload").hidden = part("bar").hidden = false;
+    part("name").textContent = `Sending ${file.name}`;
+    part("bar").value = 0;
+    try {
+      const stored = await upload(addressOf(file), mediaType, file, (share) => {
+        part("bar").value = share;
+        if (share === 1) part("name").textContent = `Checking ${file.name}`;
+      });
+      part("name").textContent = `${file.name} is stored`;
+      part("bar").hidden = true;
+      await onStored(stored);
+    } catch (error) {
+      part("upload").hidden = true;
+      part("error").textContent = error.message;
+      part("error").hidden = false;
+    } finally {
+      part("file").value = "";
+    }
+  }
+
+  const drop = part("drop");
+  for (const name of ["dragenter", "dragover"]) {
+    drop.addEventListener(name, (event) => {
+      event.preventDefault();
+      drop.classList.add("over");
+    });
+  }
+  for (const name of ["dragleave", "drop"]) drop.addEventListener(name, () => drop.classList.remove("over"));
+  drop.addEventListener("drop", (event) => {
+    event.preventDefault();
+    if (event.dataTransfer.files.length) send(event.dataTransfer.files[0]);
+  });
+  part("file").addEventListener("change", (event) => event.target.files.length && send(event.target.files[0]));
+}

@@ -1,0 +1,164 @@
+"""docker-compose.yml: valid, published as little as said, locked down, pinned; and the scripts beside it."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+import yaml
+
+from bentray_service.cli import app
+from bentray_service.settings import ServiceSettings
+from bentray_workers.dask_settings import SETTINGS
+
+from . import compose
+
+DEPLOY = compose.ROOT / "deploy"
+OURS = ("scheduler", "worker", "service")
+
+
+@pytest.fixture(scope="module")
+def file() -> dict[str, Any]:
+    return compose.read()
+
+
+def client() -> list[str] | None:
+    """The command of a compose client, if there is one."""
+    for words in (["docker", "compose"], ["docker-compose"]):
+        if shutil.which(words[0]) is None:
+            continue
+        if subprocess.run([*words, "version"], capture_output=True, check=False).returncode == 0:
+            return words
+    return None
+
+
+def test_a_compose_client_takes_it(tmp_path: Path) -> None:
+    words = client()
+    if words is None:
+        pytest.skip("no compose client here: apt-get install docker-compose")
+    for name in ("docker-compose.yml", "deploy"):
+        source = compose.ROOT / name
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / name)
+    done = subprocess.run([*words, "config", "-q"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_only_the_service_is_published_and_on_loopback(file: dict[str, Any]) -> None:
+    published = {name: part["ports"] for name, part in file["services"].items() if "ports" in part}
+    assert published == {"service": ["127.0.0.1:8000:8000"]}
+    internal = {name for name, network in file["networks"].items() if network.get("internal")}
+    for name in ("scheduler", "worker", "database"):
+        assert set(file["services"][name]["networks"]) <= internal
+        assert "network_mode" not in file["services"][name]
+    assert not set(file["services"]["worker"]["networks"]) & set(file["services"]["database"]["networks"])
+
+
+def test_every_part_is_locked_down_and_limited(file: dict[str, Any]) -> None:
+    for name, part in file["services"].items():
+        assert part["read_only"] is True, name
+        assert part["cap_drop"] == ["ALL"], name
+        assert part["security_opt"] == ["no-new-privileges:true"], name
+        assert any(folder.startswith("/tmp:") for folder in part["tmpfs"]), name
+        assert part["mem_limit"], name
+        assert part["cpus"], name
+        assert part["healthcheck"]["test"][0] == "CMD", name
+        assert part["restart"] == "unless-stopped", name
+        assert "privileged" not in part, name
+    assert file["services"]["service"]["healthcheck"]["test"] == [
+        "CMD",
+        "python",
+        "-m",
+        "bentray_service.healthcheck",
+    ]
+
+
+def test_images_are_pinned_and_ours_runs_as_an_ordinary_user(file: dict[str, Any]) -> None:
+    text = (DEPLOY / "Dockerfile").read_text()
+    images = [part["image"] for part in file["services"].values()] + re.findall(r"^FROM (\S+)", text, re.M)
+    assert all(re.search(r":\d+\.\d+[.\w-]*$", image) for image in images), images
+    assert re.search(r"^FROM python:3\.11\.\d+-slim", text, re.M)
+    assert re.findall(r"^USER (\S+)", text, re.M)[-1] == "bentray"
+    assert file["services"]["database"]["user"] != "root"
+    for copied in re.findall(r"^COPY (?:--\S+ )?(.+) \S+$", text, re.M):
+        for name in copied.split():
+            assert (compose.ROOT / name).exists()
+            assert f"!{name}" in (DEPLOY / "Dockerfile.dockerignore").read_text().split()
+
+
+def test_numba_can_write_its_cache(file: dict[str, Any]) -> None:
+    cache = re.search(r"NUMBA_CACHE_DIR=(\S+)", (DEPLOY / "Dockerfile").read_text())
+    assert cache is not None
+    for name in OURS:
+        assert any(folder.startswith(f"{cache[1]}:uid=1000") for folder in file["services"][name]["tmpfs"])
+
+
+def test_no_password_is_in_the_file_and_git_ignores_where_it_is(file: dict[str, Any]) -> None:
+    text = compose.FILE.read_text()
+    assert not re.search(r"postgresql\+psycopg://\w+:", text)
+    assert "POSTGRES_PASSWORD:" not in text
+    secret = file["secrets"]["database-password"]["file"].removeprefix("./")
+    ignored = subprocess.run(["git", "check-ignore", "-q", secret], cwd=compose.ROOT, check=False)
+    if (compose.ROOT / ".git").exists():
+        assert ignored.returncode == 0
+
+
+def test_every_variable_and_setting_is_known(file: dict[str, Any]) -> None:
+    told = (DEPLOY / "README.md").read_text()
+    assert [name for name in sorted(compose.variables()) if f"`{name}`" not in told] == []
+    fields = {f"BENTRAY_{name.upper()}" for name in ServiceSettings.model_fields} | {"DASK_SCHEDULER_ADDRESS"}
+    assert set(file["services"]["service"]["environment"]) <= fields
+
+
+def test_the_scheduler_runs_under_our_settings_of_dask(file: dict[str, Any]) -> None:
+    pod = yaml.safe_load((DEPLOY / "kubernetes" / "cluster.yaml").read_text())["spec"]["scheduler"]["spec"]
+    variables = {one["name"]: one["value"] for one in pod["containers"][0]["env"]}
+    asked = {name: value for name, value in SETTINGS.items() if name.startswith("distributed.scheduler.")}
+    assert asked
+    for name, value in asked.items():
+        variable = "DASK_" + name.upper().replace(".", "__").replace("-", "_")
+        assert file["services"]["scheduler"]["environment"][variable] == str(value)
+        if not name.endswith("routes"):  # the operator asks for idle workers by one
+            assert variables[variable] == str(value)
+
+
+@pytest.mark.parametrize("part", ["worker", "service"])
+def test_commands_of_ours_parse(file: dict[str, Any], part: str) -> None:
+    program, command, *words = file["services"][part]["command"]
+    assert program == "bentray"
+    typer.main.get_command(app).commands[command].make_context(command, words)  # type: ignore[attr-defined]
+
+
+def test_the_password_is_made_once_and_closed_to_others(tmp_path: Path) -> None:
+    folder = tmp_path / "secrets"
+    for _ in range(2):
+        subprocess.run([str(DEPLOY / "secrets.sh"), str(folder)], check=True, capture_output=True)
+    found = (folder / "database-password").read_text()
+    assert re.fullmatch("[0-9a-f]{64}", found)
+    assert folder.stat().st_mode & 0o777 == 0o700
+    subprocess.run([str(DEPLOY / "secrets.sh"), str(tmp_path / "more")], check=True)
+    assert (tmp_path / "more" / "database-password").read_text() != found
+
+
+def test_the_compiled_kernels_are_laid_where_numba_looks_once(tmp_path: Path) -> None:
+    compiled, cache = tmp_path / "compiled", tmp_path / "cache"
+    (compiled / "folder").mkdir(parents=True)
+    (compiled / "folder" / "kernel.nbc").write_text("compiled with the image")
+    cache.mkdir()
+    environment = {**os.environ, "BENTRAY_COMPILED": str(compiled), "NUMBA_CACHE_DIR": str(cache)}
+    for content in ("compiled with the image", "compiled since"):
+        done = subprocess.run(
+            [str(DEPLOY / "entrypoint.sh"), "echo", "the command, as it is"],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout == "the command, as it is\n"
+        assert (cache / "folder" / "kernel.nbc").read_text() == content
+        (cache / "folder" / "kernel.nbc").write_text("compiled since")

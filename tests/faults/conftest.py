@@ -1,0 +1,45 @@
+"""What the tests of faults share: a scan, and a machine of parts that can be killed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_workers.dataset_file import write_dataset
+
+from .machine import Machine
+
+ELEMENTS = 32
+
+
+@pytest.fixture(scope="session")
+def scan() -> Dataset:
+    """A phantom in water, with noise-free times."""
+    ring, emitters = Ring(ELEMENTS, 0.08), np.arange(ELEMENTS)
+    delta = TravelTimeScan(table6(1500.0), ring, TABLE6_SIDE_M, nodes=64).delta_tof(emitters)
+    return Dataset(ring.positions(), emitters, emitters, 1500.0, delta_tof_s=delta)
+
+
+@pytest.fixture(scope="session")
+def scan_file(scan: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same as a file."""
+    path = tmp_path_factory.mktemp("scan") / "scan.h5"
+    write_dataset(path, scan)
+    return path
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Iterator[Machine]:
+    """A scheduler, two workers and a service."""
+    made = Machine(tmp_path)
+    try:
+        made.wait_ready()
+        yield made
+    finally:
+        made.close()

@@ -1,0 +1,30 @@
+"""A scan that ends every process that looks at it, but for the one that made it."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+from typing import NamedTuple
+
+from bentray_kernels.tomography import Problem, Settings
+from bentray_workers.scan import FileScan
+
+
+class PoisonedScan(NamedTuple):
+    """As ``bentray_workers.scan.FileScan``."""
+
+    path: Path
+    settings: Settings
+    maker: int
+
+    def stages(self) -> tuple[Settings, ...]:
+        """See ``Scan``."""
+        return (self.settings,)
+
+    def problem(self, index: int, stage: int = -1) -> Problem:
+        """See ``Scan``."""
+        if os.getpid() != self.maker:
+            # As the kernel ends it for lack of memory.
+            os.kill(os.getpid(), signal.SIGKILL)
+        return FileScan(self.path, 0, self.settings, "all").problem(index, stage)

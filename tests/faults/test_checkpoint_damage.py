@@ -1,0 +1,31 @@
+"""A checkpoint that the disk has damaged is not believed; the one before it is."""
+
+import numpy as np
+import pytest
+
+from bentray_kernels.tomography import Settings, reconstruct
+from bentray_workers.reconstruction_file import read_reconstruction
+
+from .machine import wait_until
+
+pytestmark = pytest.mark.slow
+
+PLAN = {"nodes": 64, "attenuation": False, "method": "sart", "sweeps": 200}
+
+
+def test_the_newest_checkpoint_is_flipped_while_the_service_is_dead(machine, scan, scan_file):
+    job = machine.submit(machine.upload(scan_file), **PLAN)
+    folder = machine.data / "work" / job / "checkpoints"
+    wait_until(lambda: len(list(folder.glob("*.npz"))) == 2)
+    machine.kill("service")
+    older, newest = sorted(folder.glob("*.npz"))
+    content = bytearray(newest.read_bytes())
+    content[len(content) // 2] ^= 0x40
+    newest.write_bytes(bytes(content))
+    machine.start("service")
+    assert machine.ended(job)["state"] == "succeeded"
+    assert f"{newest.name} is passed over" in (machine.data.parent / "service.log").read_text()
+    found = read_reconstruction(machine.data / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
+    assert np.array_equal(found.speed, reconstruct(scan, Settings(**PLAN)).speed)
+    assert older.parent == folder
+    wait_until(lambda: not folder.exists())

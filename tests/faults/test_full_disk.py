@@ -1,0 +1,59 @@
+"""A disk that is full in the middle of a job: the job waits, and goes on once there is room."""
+
+import contextlib
+import os
+import sqlite3
+import subprocess
+
+import numpy as np
+import pytest
+
+from bentray_kernels.tomography import Settings, reconstruct
+from bentray_workers.reconstruction_file import read_reconstruction
+
+from .machine import Machine, wait_until
+
+pytestmark = pytest.mark.slow
+
+PLAN = {"nodes": 64, "attenuation": False, "method": "sart", "sweeps": 300}
+MIB = 2**20
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 16 MiB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=16m", "tmpfs", str(folder)]
+    if os.getuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode != 0:
+        pytest.skip("this machine does not let the test mount a small file system")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def test_a_job_waits_for_room(tmp_path, small_disk, scan, scan_file):
+    machine = Machine(tmp_path, 1, BENTRAY_DATA_DIR=str(small_disk), BENTRAY_MIN_FREE_BYTES=str(2 * MIB))
+    try:
+        machine.wait_ready()
+        dataset = machine.upload(scan_file)
+        job = machine.submit(dataset, **PLAN)
+        wait_until(lambda: list(small_disk.glob(f"work/{job}/checkpoints/*.npz")))
+        filler = small_disk / "filler"
+        with contextlib.suppress(OSError), filler.open("wb", buffering=0) as file:
+            while file.write(b"\0" * 4096):
+                pass
+        # SQLite may have no room to say so before there is some.
+        wait_until(lambda: not machine.http.get("/health/ready").is_success)
+        wait_until(lambda: "waits for room" in (tmp_path / "service.log").read_text())
+        filler.unlink()
+        assert machine.ended(job)["state"] == "succeeded"
+        found = read_reconstruction(small_disk / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
+        assert np.array_equal(found.speed, reconstruct(scan, Settings(**PLAN)).speed)
+        with sqlite3.connect(small_disk / "bentray.sqlite") as database:
+            notes = [note for (note,) in database.execute("SELECT note FROM events ORDER BY number")]
+        assert "the disk is full; it goes on once there is room" in notes
+        wait_until(lambda: machine.http.get("/health/ready").is_success)
+    finally:
+        machine.close()

@@ -1,0 +1,94 @@
+"""Parts are killed at random: no job is lost or doubled, little is done again, and the bits are the same."""
+
+import random
+import sqlite3
+import time
+
+import numpy as np
+import pytest
+
+from bentray_kernels.tomography import Settings, reconstruct
+from bentray_workers.reconstruction_file import read_reconstruction
+
+from .conftest import ELEMENTS
+from .machine import wait_until
+
+pytestmark = pytest.mark.slow
+
+PLAN = {"nodes": 64, "attenuation": False}
+PLANS = [
+    {**PLAN, "method": "sart", "sweeps": 100},
+    {**PLAN, "method": "gauss-newton", "sweeps": 30, "penalty_strength": 0.003, "coarser_grids": 1},
+    {**PLAN, "method": "sart", "sweeps": 60, "resolution_check": True},
+    {**PLAN, "method": "auto", "sweeps": 24},
+]
+
+KILLS = 20
+# Of every kind at least one; the rest as it comes.
+TARGETS = ["service", "service", "service", "a worker", "a worker", "workers", "scheduler"]
+
+
+def test_whatever_is_killed_nothing_is_lost(machine, scan, scan_file):
+    chance = random.Random(7)
+    dataset = machine.upload(scan_file)
+    targets = [*dict.fromkeys(TARGETS), *chance.choices(TARGETS, k=KILLS - len(set(TARGETS)))]
+    chance.shuffle(targets)
+    jobs = {}
+    for target in targets:
+        keep_busy(machine, dataset, jobs)
+        time.sleep(chance.uniform(0.2, 2.0))
+        before = {job: progress_of(machine, job) for job in jobs}
+        if target == "a worker":
+            machine.kill_a_worker(chance.randrange(2))
+        else:
+            machine.restart(target)
+        if target == "service":
+            machine.wait_ready()
+            # What is running has gone on from where it was, but for one pass and the newest report.
+            for job, (state, done) in before.items():
+                if state == "running":
+                    # The trials of auto are chains side by side, as many as are in flight on two workers.
+                    lost = 5 if jobs[job]["method"] == "auto" else 2
+                    assert begun_at(machine, job) >= done - lost * ELEMENTS, (job, before)
+    for job, plan in jobs.items():
+        assert machine.ended(job)["state"] == "succeeded"
+        found = read_reconstruction(machine.data / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
+        expected = reconstruct(scan, Settings(**plan))
+        assert np.array_equal(found.speed, expected.speed)
+        assert found.history == expected.history
+    volumes = machine.http.get("/v1/volumes").json()["volumes"]
+    assert len(volumes) == len(list((machine.data / "volumes").iterdir())) == len(jobs)
+    wait_until(lambda: not list((machine.data / "work").iterdir()))
+    attempts = sum(attempts_of(machine, job) for job in jobs)
+    # Two jobs run at once, and nearly every kill but a worker's, which Dask makes good, tore one.
+    assert attempts > len(jobs) + targets.count("service")
+
+
+def keep_busy(machine, dataset, jobs):
+    """Queue more jobs, each with a seed of its own, until at least three are not at their end."""
+    while sum(machine.job(job)["state"] in ("queued", "running") for job in jobs) < 3:
+        plan = {**PLANS[len(jobs) % len(PLANS)], "seed": len(jobs)}
+        jobs[machine.submit(dataset, **plan)] = plan
+
+
+def progress_of(machine, job):
+    record = machine.job(job)
+    return record["state"], record["progress"]["done"]
+
+
+def begun_at(machine, job):
+    """Where a job that was taken up again began."""
+    while True:
+        record = machine.job(job)
+        if record["progress"]["total"] or record["state"] not in ("queued", "running"):
+            return record["progress"]["done"]
+        time.sleep(0.02)
+
+
+def attempts_of(machine, job):
+    """How often a job was begun; every attempt but the last has gone back to the queue."""
+    with sqlite3.connect(machine.data / "bentray.sqlite") as database:
+        rows = database.execute("SELECT state FROM events WHERE job_id = ? ORDER BY number", [job])
+        states = [state for (state,) in rows]
+    assert states == [*(len(states) // 2) * ["queued", "running"], "succeeded"]
+    return len(states) // 2

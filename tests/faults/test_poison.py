@@ -1,0 +1,67 @@
+"""A task that kills its workers fails its own job and no other."""
+
+import os
+import threading
+from pathlib import Path
+
+import dask
+import numpy as np
+import pytest
+from distributed import Client, KilledWorker, LocalCluster
+from distributed.scheduler import NoValidWorkerError, NoWorkerError
+
+from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.tomography.chains import Chain
+from bentray_workers import slices
+from bentray_workers.attempts import Attempts
+from bentray_workers.checkpoints import Checkpoints
+from bentray_workers.dask_settings import NO_DASHBOARD, SETTINGS
+from bentray_workers.lanes import OFFERED, THREADS
+
+pytestmark = pytest.mark.slow
+
+PLAN = Settings(nodes=48, attenuation=False, method="gauss-newton", sweeps=20, penalty_strength=0.003)
+
+
+def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):
+    # The workers find the module on the path that they take over from this process.
+    monkeypatch.syspath_prepend(Path(__file__).parent)
+    from poison import PoisonedScan
+
+    ends = {}
+    # Without the preload, so that workers are back at once.
+    how = {"threads_per_worker": THREADS, "resources": OFFERED, "local_directory": str(tmp_path / "scratch")}
+    with (
+        dask.config.set(SETTINGS),
+        LocalCluster(n_workers=2, dashboard_address=NO_DASHBOARD, **how) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+
+        def innocent():
+            ends["innocent"] = slices.reconstruct(client, scan_file, PLAN, work_dir=tmp_path / "work")
+
+        def poisoned():
+            chain = Chain(PoisonedScan(scan_file, PLAN, os.getpid()), 0)
+            kept = Checkpoints(tmp_path / "checkpoints")
+            attempts = Attempts(client, tmp_path)
+            try:
+                slices._drive(client, attempts, {"0": chain}, 0, 0, kept, None, None)
+            except KilledWorker as error:
+                ends["poisoned"] = error
+
+        def again_and_again(part):
+            # As the service does it: on a slow machine no worker may be back in time.
+            while True:
+                try:
+                    return part()
+                except (NoValidWorkerError, NoWorkerError):
+                    continue
+
+        threads = [threading.Thread(target=again_and_again, args=[part]) for part in (innocent, poisoned)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(400.0)
+        assert isinstance(ends["poisoned"], KilledWorker)
+        assert np.array_equal(ends["innocent"].speed, reconstruct(scan, PLAN).speed)
+        assert client.submit(os.getpid, pure=False).result(timeout=120.0) > 0

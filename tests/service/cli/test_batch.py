@@ -1,0 +1,154 @@
+"""`bentray submit --batch`: results as of `reconstruct`, finished ones left out, failures by themselves."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import Result
+
+from bentray_workers.cluster import Cluster, open_cluster
+from bentray_workers.reconstruction_file import read_reconstruction
+
+QUICK = ("--nodes", 24, "--sweeps", 1, "--rays", "straight")
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    """Workers in this process, by their scheduler's address."""
+    folder = tmp_path_factory.mktemp("dask")
+    with open_cluster(workers=1, local_directory=folder, processes=False) as found:
+        yield found
+
+
+@pytest.fixture(autouse=True)
+def quick_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pictures have tests of their own, and take longer than all the rest here."""
+    for module in ("bentray_workers.batch", "bentray_workers.images"):
+        monkeypatch.setattr(
+            f"{module}.report_png", lambda result, truth, roi: b"\x89PNG of " + bytes(truth.axes, "ascii")
+        )
+
+
+@pytest.fixture
+def scans(scan_file: Path, tmp_path: Path) -> Path:
+    """Two scans, and a file that is none."""
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    for name in ("one", "two"):
+        shutil.copy(scan_file, folder / f"{name}.h5")
+    (folder / "broken.h5").write_bytes(b"certainly not HDF5")
+    (folder / "notes.txt").write_text("not a scan")
+    return folder
+
+
+@pytest.fixture
+def submit(
+    bentray: Callable[..., Result], cluster: Cluster, scans: Path
+) -> Callable[..., tuple[Result, Any]]:
+    """Give the batch and read what it prints."""
+
+    def run(*words: object) -> tuple[Result, Any]:
+        address = cluster.client.scheduler.address
+        result = bentray("submit", "--batch", scans, "--scheduler", address, "--json", *QUICK, *words)
+        return result, json.loads(result.stdout)
+
+    return run
+
+
+def states(said: Any) -> dict[str, str]:
+    return {one["name"]: one["state"] for one in said["datasets"]}
+
+
+def test_each_gets_the_files_of_reconstruct_and_a_broken_one_fails_alone(
+    submit: Callable[..., tuple[Result, Any]], bentray: Callable[..., Result], scans: Path, tmp_path: Path
+) -> None:
+    result, said = submit("--out", tmp_path / "out")
+    assert result.exit_code == 1
+    assert result.stderr.splitlines()[-1] == "bentray: 1 of 3 datasets failed: the reasons are above"
+    assert states(said) == {"broken": "failed", "one": "succeeded", "two": "succeeded"}
+    assert (said["succeeded"], said["skipped"], said["failed"]) == (2, 0, 1)
+    broken = said["datasets"][0]
+    assert "HDF5" in broken["reason"]
+    assert broken["output"] is None
+
+    bentray("reconstruct", scans / "one.h5", "-o", tmp_path / "here", *QUICK, "--workers", 1)
+    names = sorted(path.name for path in (tmp_path / "here").iterdir())
+    assert sorted(path.name for path in (tmp_path / "out" / "one").iterdir()) == names
+    assert (tmp_path / "out" / "one" / "reconstruction.png").read_bytes() == b"\x89PNG of x,y"
+    ours, theirs = (
+        read_reconstruction(tmp_path / where / "reconstruction.h5") for where in ("here", "out/one")
+    )
+    np.testing.assert_array_equal(ours.speed, theirs.speed)
+    figures = json.loads((tmp_path / "out" / "one" / "reconstruction.json").read_text())
+    assert figures["residual_rms_s"] == said["datasets"][1]["residual_rms_s"]
+
+
+def test_what_is_done_is_left_out_and_nothing_else(
+    submit: Callable[..., tuple[Result, Any]], scans: Path, scan_file: Path
+) -> None:
+    submit()
+    results = scans / "results"
+    stamps = {path: path.stat().st_mtime_ns for path in results.glob("*/reconstruction.h5")}
+    shutil.copy(scan_file, scans / "broken.h5")
+    result, said = submit()
+    assert result.exit_code == 0
+    assert states(said) == {"broken": "succeeded", "one": "skipped", "two": "skipped"}
+    assert {path: path.stat().st_mtime_ns for path in stamps} == stamps
+    assert said["datasets"][1]["seconds"] > 0.0
+
+    damaged = results / "one" / "reconstruction.h5"
+    damaged.write_bytes(damaged.read_bytes()[:1000])
+    os.utime(scans / "two.h5", ns=(1, 1))
+    assert states(submit()[1]) == {"broken": "skipped", "one": "succeeded", "two": "succeeded"}
+    assert set(states(submit("--smoothing", 2)[1]).values()) == {"succeeded"}
+
+
+def test_without_json_it_ends_with_a_table_and_the_reasons(
+    bentray: Callable[..., Result], cluster: Cluster, scans: Path
+) -> None:
+    address = cluster.client.scheduler.address
+    result = bentray("submit", "--batch", scans, "--scheduler", address, "--at-once", 1, *QUICK)
+    assert result.exit_code == 1
+    assert result.stdout.splitlines()[0].rstrip() == "Batch of scans"
+    assert "broken: file: found" in result.stdout
+    assert result.stdout.splitlines()[-1] == str(scans / "results")
+    told = [line.split(" after ")[0] for line in result.stderr.splitlines()]
+    assert [line for line in told if " " in line][:3] == ["broken failed", "one succeeded", "two succeeded"]
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (
+            ("--batch", "nowhere", "--scheduler", "tcp://h:1"),
+            "bentray: --batch: found nowhere (no such folder)",
+        ),
+        (("--batch", "."), "bentray: scheduler: found none"),
+        (("x.h5", "--batch", "."), "bentray: file: found x.h5 with --batch"),
+        ((), "bentray: file: found nothing"),
+        (("x.h5", "--scheduler", "tcp://h:1"), "bentray: scheduler: found tcp://h:1 without --batch"),
+        (
+            ("--batch", ".", "--scheduler", "tcp://h:1", "--no-wait"),
+            "bentray: scheduler: found tcp://h:1 with",
+        ),
+    ],
+)
+def test_words_that_make_no_sense_are_refused(
+    bentray: Callable[..., Result], words: tuple[str, ...], line: str
+) -> None:
+    result = bentray("submit", *words)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(line)
+
+
+def test_a_folder_without_scans_is_refused(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    result = bentray("submit", "--batch", tmp_path, "--scheduler", "tcp://127.0.0.1:1")
+    assert result.exit_code == 2
+    assert "without any *.h5" in result.stderr

@@ -1,0 +1,101 @@
+"""`bentray geometry-field`: a mesh in, a field and three pictures out, used again and gone on from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trimesh
+from PIL import Image
+from typer.testing import Result
+
+from bentray_kernels.phantoms.surfaces import torus
+from bentray_workers import geometry_field
+
+SMALL = ("--samples", 6, "--inner-samples", 4, "--divisions", 4, "--image-size", 33)
+PICTURE = ("--width", 32, "--height", 24)
+
+
+@pytest.fixture
+def mesh(tmp_path: Path) -> Path:
+    ring = torus(16, 10)
+    path = tmp_path / "ring.ply"
+    path.write_bytes(trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply"))
+    return path
+
+
+def test_a_field_and_its_pictures(bentray: Callable[..., Result], mesh: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    result = bentray("geometry-field", mesh, "-o", out, *SMALL, *PICTURE, "--mode", "refract")
+    assert result.exit_code == 0, result.stderr
+    assert "320 faces, closed, genus 1" in result.stdout
+    for name, size in (("image", (32, 24)), ("geometry-image", (33, 33)), ("normal-map", (33, 33))):
+        assert Image.open(out / f"{name}.png").size == size
+        assert str(out / f"{name}.png") in result.stdout.splitlines()
+    found = json.loads((out / "geometry-field.json").read_text())
+    assert (found["faces"], found["samples"], found["view"]["mode"]) == (320, 6, "refract")
+    field = Path(found["outputs"]["field"])
+    assert sorted(path.name for path in out.iterdir()) == sorted(
+        [field.name, "image.png", "geometry-image.png", "normal-map.png", "geometry-field.json"]
+    )
+
+
+def test_a_field_is_made_once(
+    bentray: Callable[..., Result], mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+
+    def figures(*words: object) -> dict[str, Any]:
+        result = bentray("geometry-field", mesh, "-o", out, *SMALL, *PICTURE, "--json", *words)
+        assert result.exit_code == 0, result.stderr
+        return dict(json.loads(result.stdout))
+
+    first = figures()
+    before = (out / "image.png").read_bytes()
+    monkeypatch.setattr(geometry_field, "lay_out", None)
+    second = figures("--scene", "two-mirrors")
+    assert (out / "image.png").read_bytes() != before
+    assert second["figures"] == first["figures"]
+    assert second["outputs"] == first["outputs"]
+
+
+def test_one_that_was_broken_off_is_gone_on_from(
+    bentray: Callable[..., Result], mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*given: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(geometry_field, "finish", broken)
+    assert bentray("geometry-field", mesh, "-o", tmp_path / "out", *SMALL, *PICTURE).exit_code == 130
+    monkeypatch.undo()
+    monkeypatch.setattr(geometry_field, "lay_out", None)
+    result = bentray("geometry-field", mesh, "-o", tmp_path / "out", *SMALL, *PICTURE)
+    assert result.exit_code == 0, result.stderr
+    assert not list((tmp_path / "out").glob("*-unfinished"))
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("--samples", 99), "samples"),
+        (("--scene", "moon"), "scene"),
+        (("--image-threshold", 1e-12), "threshold"),
+    ],
+)
+def test_bad_input_is_one_line(
+    bentray: Callable[..., Result], mesh: Path, tmp_path: Path, words: tuple[object, ...], named: str
+) -> None:
+    result = bentray("geometry-field", mesh, "-o", tmp_path / "out", *SMALL, *PICTURE, *words)
+    assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
+    assert named in result.stderr
+
+
+def test_no_mesh_is_one_line(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    (tmp_path / "notes.ply").write_text("only text")
+    for path in (tmp_path / "notes.ply", tmp_path / "absent.ply"):
+        result = bentray("geometry-field", path, "-o", tmp_path / "out")
+        assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
+        assert "PLY, OBJ" in result.stderr

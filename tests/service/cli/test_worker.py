@@ -1,0 +1,164 @@
+"""`bentray worker`: joins a scheduler, does real work, comes back, and leaves when it is told to."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+from typer.testing import Result
+
+from bentray_kernels.tomography import Settings
+from bentray_service.healthcheck import check_worker
+from bentray_workers.cluster import Cluster, open_cluster
+from bentray_workers.slices import reconstruct
+
+from ...listening import beyond_loopback, listening, pages
+
+PATIENCE_S = 240.0
+Process = subprocess.Popen[str]
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
+def start_scheduler(port: int) -> Process:
+    command = ["dask", "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+    environment = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__HTTP__ROUTES": "[]"}
+    return subprocess.Popen(
+        [sys.executable, "-m", *command], env=environment, text=True, stderr=subprocess.DEVNULL
+    )
+
+
+def wait_until(so: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE_S
+    while not so():
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+
+
+def wait_for_workers(cluster: Cluster, count: int) -> None:
+    wait_until(lambda: cluster.describe()["workers"] == count)
+
+
+class Machine:
+    """A scheduler and a worker of this machine, each a process."""
+
+    def __init__(self, folder: Path) -> None:
+        self.port = free_port()
+        self.log = folder / "worker.log"
+        self.scheduler = start_scheduler(self.port)
+        self.address = f"tcp://127.0.0.1:{self.port}"
+        self._join(folder)
+
+    def _join(self, folder: Path) -> None:
+        with open_cluster(self.address, connect_timeout_s=60.0):
+            words = ["--scheduler", self.address, "--workers", "1", "--no-opencl", "--name", "away", "--json"]
+            command = [sys.executable, "-m", "bentray_service.cli", "worker", *words]
+            command += ["--memory-limit", "2GiB", "--local-directory", str(folder / "scratch")]
+            with self.log.open("w") as log:
+                self.worker: Process = subprocess.Popen(
+                    command, text=True, stdout=subprocess.PIPE, stderr=log
+                )
+
+    def close(self) -> None:
+        for process in (self.worker, self.scheduler):
+            process.kill()
+            process.wait()
+        assert self.worker.stdout is not None
+        self.worker.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
+    found = Machine(tmp_path_factory.mktemp("machine"))
+    yield found
+    found.close()
+
+
+@pytest.mark.slow
+def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path) -> None:
+    settings = Settings(nodes=32, sweeps=1)
+    with open_cluster(machine.address) as cluster:
+        wait_for_workers(cluster, 1)
+        (facts,) = cluster.client.scheduler_info(n_workers=-1)["workers"].values()
+        assert (facts["name"], facts["nthreads"], facts["memory_limit"]) == ("away", 2, 2 * 1024**3)
+        assert facts["resources"] == {"recon": 1, "render": 1}
+        there = reconstruct(cluster.client, scan_file, settings)
+    np.testing.assert_array_equal(there.speed, reconstruct(None, scan_file, settings).speed)
+
+    assert check_worker(machine.address) is None
+    sockets = listening(machine.worker.pid)
+    assert (beyond_loopback(sockets), pages(sockets)) == (set(), [])
+
+    machine.scheduler.kill()
+    machine.scheduler.wait()
+    machine.scheduler = start_scheduler(machine.port)
+    with open_cluster(machine.address, connect_timeout_s=60.0) as cluster:
+        wait_for_workers(cluster, 1)
+        assert cluster.client.submit(sum, [1, 2]).result(timeout=60) == 3
+
+    wait_until(lambda: machine.log.read_text().count(f"1 workers joined {machine.address}") == 2)
+    family = psutil.Process(machine.worker.pid).children(recursive=True)
+    assert family
+    machine.worker.send_signal(signal.SIGTERM)
+    assert machine.worker.wait(30) == 0
+    psutil.wait_procs(family, timeout=10)
+    assert [process for process in family if process.is_running()] == []
+    assert machine.worker.stdout is not None
+    assert json.loads(machine.worker.stdout.readline()) == {
+        "scheduler": machine.address,
+        "workers": 1,
+        "lanes": {"recon": 1, "render": 1},
+        "pid": machine.worker.pid,
+    }
+    said = machine.log.read_text()
+    assert f"{machine.address} is gone; trying again." in said
+    assert "never retrieved" not in said
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (("--memory-limit", "plenty"), "bentray: memory_limit: found 'plenty'; accepted: a size, as 4GiB"),
+        (("--tls", "nowhere"), "bentray: tls: found nowhere (without authority.pem)"),
+        ((), "bentray: scheduler_address: found nonsense"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(
+    bentray: Callable[..., Result], words: tuple[str, ...], line: str
+) -> None:
+    result = bentray("worker", "--scheduler", "nonsense", "--no-opencl", *words)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(line)
+    assert result.stderr.count("\n") == 1
+
+
+def test_the_lane_of_opencl_is_offered_where_a_device_passed(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from bentray_kernels import opencl
+    from bentray_workers import joining
+
+    asked: list[joining.Joining] = []
+    monkeypatch.setattr(joining, "join", lambda joined, say: asked.append(joined))
+    device = opencl.Device(0, "PoCL", "cpu", "cpu", "", "", True)
+    for found in (device, None):
+        monkeypatch.setattr(opencl, "choose", lambda found=found: opencl.Choice(found, ()))
+        assert bentray("worker", "--scheduler", "tcp://head:8786", "--workers", 3).exit_code == 0
+    assert [dict(one.lanes) for one in asked] == [
+        {"recon": 1, "render": 1, "opencl": 1},
+        {"recon": 1, "render": 1},
+    ]
+    assert asked[0].workers == 3

@@ -1,0 +1,186 @@
+"""/v1/geometry-fields: from an upload to pictures on a real cluster, and every refusal."""
+
+import io
+from contextlib import contextmanager
+from dataclasses import fields
+
+import pytest
+import trimesh
+from fastapi.testclient import TestClient
+from PIL import Image
+from sqlalchemy import insert
+
+from bentray_kernels.phantoms.surfaces import torus
+from bentray_service.app import create_app
+from bentray_service.settings import ServiceSettings
+from bentray_service.storage.ids import field_of, new_id
+from bentray_service.storage.schema import geometry_fields
+from bentray_workers.cluster import open_cluster
+from bentray_workers.field_settings import FieldSettings
+from bentray_workers.field_view import FieldView
+from bentray_workers.geometry_field import build, bytes_of
+from bentray_workers.mesh_file import StoredMesh, write_mesh
+from bentray_workers.render_tasks import ThreadTasks
+
+SMALL = {"width": 32, "height": 24}
+COARSE = {"samples": 6, "inner_samples": 4, "divisions": 4, "image_size": 33}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A field and its figures, to be put into services."""
+    folder = tmp_path_factory.mktemp("made")
+    write_mesh(folder / "mesh.h5", StoredMesh(torus(16, 10)))
+    (folder / "work").mkdir()
+    given = FieldSettings(**COARSE), folder / "field", folder / "work"
+    figures = build(ThreadTasks(), folder / "mesh.h5", *given, lambda told: None, lambda: None, lambda: False)
+    return folder / "field", figures
+
+
+@pytest.fixture
+def http(start):
+    return start()
+
+
+@pytest.fixture
+def here(http, made):
+    """The address of a field in a service, as a job leaves it."""
+    parts, field, mesh = http.app.state.parts, field_of("a" * 64), new_id("mesh")
+    source, figures = made
+    target = parts.files.field(field)
+    target.mkdir()
+    for file in source.iterdir():
+        (target / file.name).write_bytes(file.read_bytes())
+    job = parts.jobs.add("reconstruction", {})["id"]
+    row = {"mesh_id": mesh, "bytes": bytes_of(target), "settings": COARSE, "figures": figures}
+    with parts.database.write() as connection:
+        connection.execute(insert(geometry_fields).values(id=field, job_id=job, created=1.0, **row))
+    return f"/v1/geometry-fields/{field}"
+
+
+@contextmanager
+def serving(folder):
+    with open_cluster(workers=1, processes=False) as cluster:
+        app = create_app(ServiceSettings(data_dir=folder), cluster)
+        with TestClient(app, raise_server_exceptions=False) as http:
+            yield http
+
+
+def test_from_an_upload_to_a_picture(tmp_path, until):
+    ring = torus(16, 10)
+    content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
+    with serving(tmp_path) as http:
+        sent = http.post("/v1/meshes", content=content, headers={"Content-Type": "application/octet-stream"})
+        mesh = sent.json()["id"]
+        asked = {"kind": "geometry-field", "mesh": mesh, "settings": COARSE}
+        job = http.post("/v1/jobs", json=asked).json()
+        assert (job["mesh"], job["field"], job["volume"], job["dataset"]) == (mesh, None, None, None)
+        assert job["links"]["mesh"] == f"/v1/meshes/{mesh}"
+        done = until(http, job["id"])
+        assert done["state"] == "succeeded", done["error"]
+        assert done["progress"]["done"] == done["progress"]["total"] == 4
+        field = http.get(done["links"]["field"]).json()
+        assert (field["id"], field["mesh"], field["job"]) == (done["field"], mesh, job["id"])
+        assert field["sizes"]["faces"] == 320
+        assert field["sizes"]["outer_bytes"] > 216 * 216 * 8
+        assert field["errors"]["lookup_median"] < 1e-6
+        assert field["seconds"]["outer"] > 0.0
+        assert field["settings"] == {**COARSE, "image_threshold": 0.0}
+        assert http.get(field["links"]["self"]).json() == field
+        assert http.get("/v1/geometry-fields").json() == {"geometry_fields": [field]}
+        for name in ("image", "geometry_image", "normal_map"):
+            assert field["links"][name] == done["links"][name]
+            answer = http.get(field["links"][name], params=SMALL if name == "image" else {})
+            assert Image.open(io.BytesIO(answer.content)).size == ((32, 24) if name == "image" else (33, 33))
+        # The same again, under another id of the same mesh: the same field, at once.
+        twin = http.post("/v1/meshes", content=content, headers={"Content-Type": "application/octet-stream"})
+        again = http.post("/v1/jobs", json={**asked, "mesh": twin.json()["id"]}).json()
+        done = until(http, again["id"])
+        assert (done["state"], done["field"]) == ("succeeded", field["id"])
+        assert done["progress"] == {"done": 1, "total": 1}
+        assert http.get("/v1/geometry-fields").json() == {"geometry_fields": [field]}
+        assert not list((tmp_path / "work").iterdir())
+
+
+OTHER = {
+    "scene": "two-mirrors",
+    "mode": "refract",
+    "lookup": "nearest",
+    "eye": "linear",
+    "index": 1.2,
+    "share": 0.5,
+    "camera": "orthographic",
+    "azimuth_deg": 5,
+    "elevation_deg": 5,
+    "zoom": 2,
+    "up": "y",
+    "width": 31,
+    "height": 31,
+    "rays": 2,
+    "depth": 2,
+}
+
+
+def test_every_parameter_changes_the_tag(http, here):
+    assert set(OTHER) == {field.name for field in fields(FieldView)}
+    tags = {http.head(f"{here}/image.png", params=SMALL).headers["etag"]}
+    for name, value in OTHER.items():
+        answer = http.head(f"{here}/image.png", params={**SMALL, name: value})
+        assert answer.status_code == 200, answer.text
+        tags.add(answer.headers["etag"])
+    assert len(tags) == len(OTHER) + 1
+
+
+@pytest.mark.parametrize("name", ["image.png", "geometry-image.png", "normal-map.png"])
+def test_a_known_picture_is_not_drawn_again(http, here, cluster, name):
+    query = SMALL if name == "image.png" else {}
+    first = http.get(f"{here}/{name}", params=query)
+    assert first.headers["content-type"] == "image/png"
+    assert first.headers["cache-control"] == "private, no-cache"
+    assert cluster.submitted[-1] == {"pure": False, "resources": {"render": 1}, "priority": 10} | (
+        {} if name == "image.png" else {"what": cluster.submitted[-1]["what"]}
+    )
+    drawn = len(cluster.submitted)
+    tag = {"If-None-Match": first.headers["etag"]}
+    assert http.get(f"{here}/{name}", params=query, headers=tag).status_code == 304
+    head = http.head(f"{here}/{name}", params=query)
+    assert (head.status_code, head.content, head.headers["etag"]) == (200, b"", first.headers["etag"])
+    assert "content-length" not in head.headers
+    assert len(cluster.submitted) == drawn
+
+
+def test_a_large_picture_is_drawn_in_strips(http, here, cluster):
+    answer = http.get(f"{here}/image.png", params={"width": 1024, "height": 600, "depth": 0})
+    assert Image.open(io.BytesIO(answer.content)).size == (1024, 600)
+    assert len(cluster.submitted) == 2 + 1
+
+
+@pytest.mark.parametrize(
+    ("query", "field", "accepted"),
+    [
+        ("scene=moon", "scene", "mirror-ball"),
+        ("mode=paint", "mode", "refract"),
+        ("lookup=guess", "lookup", "accurate"),
+        ("camera=fisheye", "camera", "perspective"),
+        ("azimuth_deg=nan", "azimuth_deg", "36000"),
+        ("elevation_deg=90", "elevation_deg", "89"),
+        ("index=0", "index", "10"),
+        ("share=2", "share", "1"),
+        ("width=5000", "width", "4096"),
+        ("width=4096&height=4096&rays=2", "width, height, rays", "16777216"),
+        ("depth=99", "depth", "64"),
+        ("iso=1", "iso", "scene, mode"),
+    ],
+)
+def test_refused_views(http, here, cluster, query, field, accepted):
+    answer = http.get(f"{here}/image.png?{query}")
+    assert (answer.status_code, answer.json()["field"]) == (422, field), answer.text
+    assert accepted in answer.json()["accepted"]
+    assert not cluster.submitted
+
+
+def test_unknown_fields(http):
+    for path in ("", "/image.png", "/geometry-image.png", "/normal-map.png"):
+        answer = http.get(f"/v1/geometry-fields/{field_of('b' * 64)}{path}")
+        assert (answer.status_code, answer.json()["field"]) == (404, "field")
+    assert http.get("/v1/geometry-fields").json() == {"geometry_fields": []}

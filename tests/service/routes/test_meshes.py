@@ -1,0 +1,194 @@
+"""/v1/meshes: every format in, every defect refused by name; iso-surfaces of volumes."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+from bentray_kernels.geometry_field.mesh import TriangleMesh
+from bentray_kernels.phantoms import ONE_HOLE, sampled
+from bentray_kernels.phantoms.surfaces import bumpy_ball, torus
+from bentray_service.storage.ids import new_id
+from bentray_workers import isosurface_mesh
+from bentray_workers.mesh_file import load_mesh
+from bentray_workers.volume_file import Volume, write_volume
+
+STREAM = {"Content-Type": "application/octet-stream"}
+RING = torus(12, 8)
+
+
+@pytest.fixture
+def http(start):
+    return start()
+
+
+def off(mesh):
+    """As an OFF file, which can hold any nonsense."""
+    lines = ["OFF", f"{len(mesh.vertices)} {len(mesh.faces)} 0"]
+    lines += [" ".join(map(str, vertex)) for vertex in mesh.vertices.tolist()]
+    lines += [" ".join(map(str, (3, *face))) for face in mesh.faces.tolist()]
+    return "\n".join(lines).encode()
+
+
+def send(http, content, **asked):
+    return http.post("/v1/meshes", content=content, headers=STREAM, params=asked)
+
+
+def mesh_with(vertices=None, faces=None):
+    return TriangleMesh(
+        RING.vertices if vertices is None else vertices, RING.faces if faces is None else faces
+    )
+
+
+@pytest.mark.parametrize("kind", ["ply", "obj", "off", "stl", "glb"])
+def test_every_format(http, kind):
+    content = trimesh.Trimesh(RING.vertices, RING.faces, process=False).export(file_type=kind)
+    content = content.encode() if isinstance(content, str) else content
+    answer = send(http, content, title="a ring")
+    made = answer.json()
+    assert answer.status_code == 201, made
+    assert answer.headers["location"] == made["links"]["self"]
+    assert (made["format"], made["title"], made["faces"], made["vertices"]) == (kind, "a ring", 192, 96)
+    assert (made["genus"], made["closed"], made["holes"], made["coloured"]) == (1, True, 0, False)
+    assert (made["volume"], made["iso"], made["bytes"]) == (None, None, len(content))
+    assert http.get(made["links"]["self"]).json() == made
+    assert [one["id"] for one in http.get("/v1/meshes").json()["meshes"]] == [made["id"]]
+    stored = load_mesh(http.app.state.parts.files.mesh(made["id"])).mesh
+    assert stored.faces.shape == (192, 3)
+
+
+def test_what_is_mended_is_told(http):
+    doubled = RING.vertices[RING.faces].reshape(-1, 3)
+    faces = np.arange(3 * 192).reshape(-1, 3)
+    faces[7] = faces[7, ::-1]
+    made = send(http, off(mesh_with(doubled, faces))).json()
+    assert (made["repairs"]["merged_vertices"], made["repairs"]["turned_faces"]) == (480, 1)
+    left = RING.corners.mean(axis=1)[:, 0] < 0.3
+    half_a_ring = send(http, off(mesh_with(faces=RING.faces[left]))).json()
+    assert (half_a_ring["closed"], half_a_ring["holes"], half_a_ring["genus"]) == (False, 2, 0)
+
+
+BROKEN = {
+    "no faces": (mesh_with(faces=RING.faces[:0]), "faces", "none"),
+    "NaN": (mesh_with(np.where(RING.vertices > 1.3, np.nan, RING.vertices)), "vertices", "not finite"),
+    "three faces on an edge": (
+        mesh_with(
+            np.vstack((RING.vertices, [[0, 0, 9]])), np.vstack((RING.faces, [[*RING.faces[0, :2], 96]]))
+        ),
+        "faces",
+        "three faces or more",
+    ),
+    "two pieces": (
+        mesh_with(np.vstack((RING.vertices, RING.vertices + 5.0)), np.vstack((RING.faces, RING.faces + 96))),
+        "faces",
+        "2 pieces",
+    ),
+    "a face without area": (
+        mesh_with(faces=np.vstack((RING.faces, [[0, 0, 1]]))),
+        "faces",
+        "without area",
+    ),
+    "rows that are not there": (mesh_with(faces=RING.faces + 90), "file", ""),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_mesh_is_refused_by_name(http, name):
+    mesh, field, found = BROKEN[name]
+    answer = send(http, off(mesh))
+    body = answer.json()
+    assert (answer.status_code, body["type"]) == (422, "/problems/invalid-input"), body
+    assert body["field"] in (field, "faces"), body
+    assert found in body["found"], body
+    assert body["accepted"]
+    assert http.get("/v1/meshes").json() == {"meshes": []}
+    assert not list((http.app.state.parts.files.root / "incoming").iterdir())
+
+
+def test_a_surface_with_one_side_is_refused(http):
+    turn = np.arange(12)
+    angle = 2 * np.pi * turn / 12
+    half = 0.3 * np.array([-1.0, 1.0])[:, None]
+    radius = 1.0 + half * np.cos(angle / 2)
+    edge = np.stack((radius * np.cos(angle), radius * np.sin(angle), half * np.sin(angle / 2)), axis=-1)
+    faces = []
+    for k in range(12):
+        low, high = (k + 1) % 12, (k + 1) % 12 + 12
+        if k == 11:
+            low, high = high, low
+        faces += [(k, low, k + 12), (low, high, k + 12)]
+    body = send(http, off(TriangleMesh(edge.reshape(-1, 3), np.array(faces)))).json()
+    assert (body["status"], body["field"], body["accepted"]) == (422, "faces", "one with two sides")
+
+
+@pytest.mark.parametrize("content", [b"", b"only text", b"ply\nformat ascii 1.0\nnonsense", b"glTF\x02"])
+def test_what_is_no_mesh(http, content):
+    answer = send(http, content)
+    assert answer.status_code == 422
+    assert answer.json()["accepted"]
+
+
+def test_other_refusals(http):
+    assert http.post("/v1/meshes", content=b"x", headers={"Content-Type": "text/plain"}).status_code == 415
+    answer = http.get("/v1/meshes/" + new_id("mesh"))
+    assert (answer.status_code, answer.json()["field"]) == (404, "mesh")
+    outside = {"buffers": [{"uri": "secret.bin", "byteLength": 4}], "asset": {"version": "2.0"}}
+    body = send(http, json.dumps(outside).encode()).json()
+    assert (body["status"], body["field"]) == (422, "buffers/uri")
+
+
+def volume(http, values=None, spacing=(1e-3,) * 3):
+    """A volume as an upload leaves it; its address."""
+    parts, volume_id = http.app.state.parts, new_id("volume")
+    stored = Volume.of(sampled(ONE_HOLE, 20) if values is None else values, spacing)
+    write_volume(parts.files.volume(volume_id), stored)
+    summary = {
+        "title": "a ball",
+        "shape": list(stored.values.shape),
+        "spacing_m": list(spacing),
+        "origin_m": [0.0] * 3,
+        "value_range": list(stored.range()),
+    }
+    parts.volumes.add(volume_id, size=1, sha256="0" * 64, summary=summary)
+    return f"/v1/volumes/{volume_id}"
+
+
+def test_the_surface_of_a_volume(http, cluster):
+    here = volume(http)
+    answer = http.post(f"{here}/mesh", params={"iso": 0.4})
+    made = answer.json()
+    assert answer.status_code == 201, made
+    assert cluster.submitted[-1]["resources"] == {"render": 1}
+    assert (made["format"], made["title"], made["iso"], made["closed"]) == ("isosurface", "a ball", 0.4, True)
+    assert made["links"]["volume"] == here
+    assert made["volume"] == here.rpartition("/")[2]
+    assert made["faces"] > 500
+    coarse = http.post(f"{here}/mesh", params={"iso": 0.4, "step": 2}).json()
+    assert coarse["faces"] < 0.5 * made["faces"]
+    assert {one["id"] for one in http.get("/v1/meshes").json()["meshes"]} == {made["id"], coarse["id"]}
+    assert not list((http.app.state.parts.files.root / "incoming").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("query", "field"), [("iso=7", "iso"), ("iso=nan", "iso"), ("step=0", "step"), ("step=99", "step")]
+)
+def test_refused_surfaces(http, query, field):
+    answer = http.post(f"{volume(http)}/mesh?{query}")
+    assert (answer.status_code, answer.json()["field"]) == (422, field)
+
+
+def test_a_surface_that_is_too_large(http, monkeypatch):
+    monkeypatch.setattr(isosurface_mesh, "MOST_CROSSINGS", 50)
+    answer = http.post(f"{volume(http)}/mesh")
+    assert (answer.status_code, answer.json()["field"]) == (422, "iso")
+    assert "a larger step" in answer.json()["accepted"]
+    assert not list((http.app.state.parts.files.root / "incoming").iterdir())
+
+
+def test_a_coloured_mesh(http):
+    ball = bumpy_ball(200)
+    shown = trimesh.Trimesh(ball.vertices, ball.faces, vertex_colors=[[200, 30, 30]] * len(ball.vertices))
+    made = send(http, io.BytesIO(shown.export(file_type="ply")).getvalue()).json()
+    assert made["coloured"]

@@ -1,0 +1,107 @@
+"""Metrics: named by one rule, counted by the route's own words, and true."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+
+NAME = re.compile(r"bentray_[a-z]+(_[a-z]+)*")
+
+
+@pytest.fixture
+def http(start, work):
+    return start()
+
+
+def read(http):
+    answer = http.get("/metrics")
+    assert answer.headers["content-type"].startswith("text/plain")
+    return {family.name: family for family in text_string_to_metric_families(answer.text)}
+
+
+def value(http, name, **labels):
+    found = [s.value for f in read(http).values() for s in f.samples if s.name == name and s.labels == labels]
+    assert len(found) <= 1
+    return found[0] if found else 0.0
+
+
+def test_names_tell_their_unit(http):
+    families = read(http)
+    assert len(families) >= 7
+    for name, family in families.items():
+        assert NAME.fullmatch(name)
+        assert family.documentation.endswith(".")
+        assert not re.search(r"_(ms|mb|kb|millis|time|size)$", name)
+        if family.type == "histogram":
+            assert name.endswith("_seconds")
+
+
+def test_requests_are_counted_by_route_and_not_by_what_was_asked(http):
+    for k in range(5):
+        http.get(f"/v1/jobs/job-{k:020d}")
+        http.get(f"/nothing/{k}")
+        http.request(f"BREW{k}", "/v1/jobs")
+    job = {"method": "GET", "route": "/v1/jobs/{job_id}"}
+    assert value(http, "bentray_http_requests_total", **job, status="404") == 5
+    assert value(http, "bentray_http_request_duration_seconds_count", **job) == 5
+    assert value(http, "bentray_http_requests_total", method="GET", route="unmatched", status="404") == 5
+    methods = {s.labels["method"] for s in read(http)["bentray_http_requests"].samples}
+    assert methods <= {"GET", "other"}
+
+
+def test_bytes_of_uploads(http, uploaded):
+    before = value(http, "bentray_http_received_bytes_total", method="POST", route="/v1/datasets")
+    uploaded(http)
+    after = value(http, "bentray_http_received_bytes_total", method="POST", route="/v1/datasets")
+    assert before == 0.0
+    assert after > 1000.0
+
+
+def test_the_queue(http, uploaded, submitted, until, work, cluster):
+    dataset = uploaded(http)
+    work.hold.clear()
+    jobs = [submitted(http, dataset)["id"] for _ in range(3)]
+    for job in jobs[:2]:
+        until(http, job, "running")
+    assert value(http, "bentray_jobs", state="running") == 2
+    assert value(http, "bentray_jobs", state="queued") == 1
+    assert value(http, "bentray_jobs_oldest_queued_seconds") > 0.0
+    work.hold.set()
+    for job in jobs:
+        until(http, job)
+    assert value(http, "bentray_jobs", state="succeeded") == 3
+    assert value(http, "bentray_jobs_oldest_queued_seconds") == 0.0
+    assert value(http, "bentray_workers") == 1
+    cluster.workers = 0
+    assert value(http, "bentray_workers") == 0
+    assert value(http, "bentray_disk_free_bytes") > 0
+
+
+def test_a_database_that_is_away_leaves_the_rest(http, monkeypatch):
+    from sqlalchemy.exc import OperationalError
+
+    def away():
+        raise OperationalError("select", {}, Exception("gone"))
+
+    monkeypatch.setattr(http.app.state.parts.jobs, "load", away)
+    families = read(http)
+    assert "bentray_jobs" not in families
+    assert "bentray_workers" in families
+
+
+def test_each_application_has_its_own(start, work):
+    one, other = start(), start("other")
+    one.get("/health/live")
+    labels = {"method": "GET", "route": "/health/live", "status": "200"}
+    assert value(one, "bentray_http_requests_total", **labels) == 1
+    assert value(other, "bentray_http_requests_total", **labels) == 0
+
+
+def test_the_dashboard_asks_for_what_there_is(http):
+    dashboard = json.loads((Path(__file__).parents[2] / "deploy/grafana/dashboard.json").read_text())
+    asked = " ".join(one["expr"] for panel in dashboard["panels"] for one in panel["targets"])
+    http.get("/health/live")
+    there = {sample.name for family in read(http).values() for sample in family.samples}
+    assert {found.group() for found in NAME.finditer(asked)} <= there
