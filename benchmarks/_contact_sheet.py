@@ -22,8 +22,8 @@ class Panel:
     image: np.ndarray
 
 
-def sheet(rows: Sequence[tuple[str, Sequence[Panel]]]) -> bytes:
-    """PNG of rows of panels, each row under its title, in 64 colours."""
+def sheet(rows: Sequence[tuple[str, Sequence[Panel]]], colours: int = 64) -> bytes:
+    """PNG of rows of panels, each row under its title, in so many colours."""
     # Pillow's own font has no Greek.
     face = findfont("DejaVu Sans")
     font, bold = ImageFont.truetype(face, 10), ImageFont.truetype(face, 12)
@@ -44,5 +44,5 @@ def sheet(rows: Sequence[tuple[str, Sequence[Panel]]]) -> bytes:
             pen.multiline_text((left, top + PANEL + 1), panel.name, INK, font, spacing=1)
         top += PANEL + 2 * LINE + GAP
     buffer = io.BytesIO()
-    page.quantize(64, dither=Image.Dither.NONE).save(buffer, "png", optimize=True)
+    page.quantize(colours, dither=Image.Dither.NONE).save(buffer, "png", optimize=True)
     return buffer.getvalue()
