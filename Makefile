@@ -25,8 +25,8 @@ demo: install ## simulate a scan, send it to a service, compare straight and ben
 serve: install ## start the service; HOST=127.0.0.1 PORT=8000
 	@$(BIN)/bentray serve --host $(HOST) --port $(PORT)
 
-test: install-dev ## run the tests; ARGS="tests/kernels -x" narrows them
-	@$(BIN)/python -m pytest $(ARGS)
+test: install-dev ## run the tests, up to four files at once; ARGS="tests/kernels -x" narrows them
+	@$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(ARGS)
 
 lint: install-dev ## check style, types and the import rules
 	$(BIN)/ruff check .
@@ -40,8 +40,8 @@ bench: install ## run benchmarks/NAME.py; NAME=reconstruction ARGS=--quick
 
 lock: ## compile the lock files anew (needs uv on the PATH)
 	@command -v uv >/dev/null || { echo "make lock needs uv: pip install uv" >&2; exit 1; }
-	$(call compile,requirements.lock,--extra build)
-	$(call compile,requirements-dev.lock,--extra build --extra test --extra lint -c requirements.lock)
+	$(call compile,requirements.lock,--extra build --extra postgres)
+	$(call compile,requirements-dev.lock,--extra build --extra postgres --extra test --extra lint -c requirements.lock)
 
 clean: ## remove what was built or written here, .venv too
 	rm -rf .venv build dist demo-output .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,10 +1,15 @@
-"""What tests of several packages share: the figures that were drawn, with the words in them."""
+"""What tests of several packages share: figures that were drawn, and a PostgreSQL server."""
 
 from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator
 
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+
+from . import postgresql
 
 
 class Drawn(list[Figure]):
@@ -27,3 +32,13 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> Drawn:
 
     monkeypatch.setattr(Figure, "savefig", keep)
     return figures
+
+
+@pytest.fixture(scope="session")
+def postgresql_server() -> Iterator[postgresql.Server]:
+    """One server for all tests; each makes databases of its own. Skips where PostgreSQL is not installed."""
+    if postgresql.programs() is None:
+        pytest.skip(postgresql.SKIPPED)
+    server = postgresql.Server("bentray", secrets.token_hex(8), "postgres")
+    yield server
+    server.close()

@@ -23,7 +23,7 @@ from bentray_service.settings import ServiceSettings
 from bentray_workers.dataset_file import read_dataset
 
 ROOT = Path(__file__).resolve().parents[1]
-TEXTS = ("README.md", "CONTRIBUTING.md", "deploy/README.md")
+TEXTS = ("README.md", "CONTRIBUTING.md", "deploy/README.md", "deploy/SCALING.md")
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 
 
@@ -41,7 +41,7 @@ def lines_of(program: str) -> list[list[str]]:
     """The words after ``program`` on every line that runs it."""
     found = []
     for _, words in shell_lines():
-        command = [word for word in words if not re.fullmatch(r"[A-Z_]+=[a-z]+://.*", word)]
+        command = [word for word in words if not re.fullmatch(r"[A-Z_]+=.*", word)]
         if command[0].removeprefix(".venv/bin/") == program:
             found.append(command[1:])
     return found
@@ -55,7 +55,14 @@ def test_the_readme_opens_with_the_two_commands() -> None:
 
 def test_nothing_else_is_asked_for_than_what_is_tested_here() -> None:
     programs = {words[0].removeprefix(".venv/bin/").split("=")[0] for _, words in shell_lines()}
-    assert programs <= {"git", "cd", "make", "bentray", "curl", "dask", "docker", "DASK_SCHEDULER_ADDRESS"}
+    ours = {
+        "bentray",
+        "deploy/secrets.sh",
+        "deploy/certificates.sh",
+        "DASK_SCHEDULER_ADDRESS",
+        "BENTRAY_TLS_DIR",
+    }
+    assert programs <= ours | {"git", "cd", "make", "curl", "dask", "docker", "ssh"}
 
 
 @pytest.mark.parametrize("words", lines_of("bentray"), ids=" ".join)
@@ -81,9 +88,9 @@ def test_every_address_of_curl_is_served(tmp_path: Path) -> None:
         for path, methods_of_path in create_app(ServiceSettings(data_dir=tmp_path)).openapi()["paths"].items()
         for method in methods_of_path
     }
-    assert len(lines_of("curl")) == 8
+    assert len(lines_of("curl")) == 12
     for words in lines_of("curl"):
-        method = "POST" if {"-d", "--data-binary"} & set(words) else "GET"
+        method = "POST" if {"-d", "--data-binary", "POST"} & set(words) else "GET"
         url = next(word for word in words if word.startswith("http://"))
         assert any(m == method and p.fullmatch(urlsplit(url).path) for m, p in served), url
         for body in (words[n + 1] for n, word in enumerate(words) if word == "-d"):

@@ -13,7 +13,10 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = {"bentray_kernels": "kernels", "bentray_workers": "workers", "bentray_service": "service"}
-LOCKS = {"requirements.lock": ("build",), "requirements-dev.lock": ("build", "test", "lint")}
+LOCKS = {
+    "requirements.lock": ("build", "postgres"),
+    "requirements-dev.lock": ("build", "postgres", "test", "lint"),
+}
 
 # Folders of one machine, and hosts of package indexes; spelt so that this file does not contain them.
 MACHINE_PATH = re.compile(r"(?<![\w./-])/(?:work|root|opt|Users|home/(?!bentray\b)\w+)/[\w.]")
