@@ -78,11 +78,11 @@ def _operation(operation: tuple[str, str, Node]) -> str:
         f"<p>{escape(what.get('description', ''))}</p>",
     ]
     if parameters := what.get("parameters"):
-        known = [(p["name"], p["in"], _type(p["schema"]), p.get("description", "")) for p in parameters]
+        known = [(p["name"], p["in"], type_words(p["schema"]), p.get("description", "")) for p in parameters]
         parts.append(_table(("Parameter", "In", "Type", "Meaning"), known))
     if body := what.get("requestBody"):
         parts.append("<h3>Body</h3>")
-        bodies = [(media, _type(content["schema"])) for media, content in body["content"].items()]
+        bodies = [(media, type_words(content["schema"])) for media, content in body["content"].items()]
         parts.append(_table(("Media type", "Content"), bodies))
     answers = [
         (code, _answer(answer), "" if answer["description"] == UNSAID else answer["description"])
@@ -95,25 +95,25 @@ def _operation(operation: tuple[str, str, Node]) -> str:
 
 def _answer(answer: Node) -> str:
     return "; ".join(
-        _type(content.get("schema", {})) if media.endswith("json") else media
+        type_words(content.get("schema", {})) if media.endswith("json") else media
         for media, content in answer.get("content", {}).items()
     )
 
 
-def _type(schema: Node) -> str:
+def type_words(schema: Node) -> str:
     """A JSON schema in a few words."""
     if "$ref" in schema:
         return str(schema["$ref"]).rpartition("/")[2]
     if "anyOf" in schema:
-        return " or ".join(_type(one) for one in schema["anyOf"])
+        return " or ".join(type_words(one) for one in schema["anyOf"])
     if "const" in schema:
         return f'"{schema["const"]}"'
     if "enum" in schema:
         return " or ".join(f'"{value}"' for value in schema["enum"])
     if "prefixItems" in schema:
-        return "[" + ", ".join(_type(one) for one in schema["prefixItems"]) + "]"
+        return "[" + ", ".join(type_words(one) for one in schema["prefixItems"]) + "]"
     if schema.get("type") == "array":
-        return f"list of {_type(schema.get('items', {}))}"
+        return f"list of {type_words(schema.get('items', {}))}"
     limits = [
         f"{words} {schema[key]}" for key, words in (("minimum", "≥"), ("maximum", "≤")) if key in schema
     ]
@@ -127,7 +127,7 @@ def _schema(name: str, schema: Node) -> str:
     for field, what in schema.get("properties", {}).items():
         default = f", default {what['default']}" if what.get("default") is not None else ""
         need = " (required)" if field in required else ""
-        rows.append((field, _type(what) + default + need, what.get("description", "")))
+        rows.append((field, type_words(what) + default + need, what.get("description", "")))
     about = "".join(f"<p>{escape(text)}</p>" for text in schema.get("description", "").split("\n\n")[:1])
     table = _table(("Field", "Type", "Meaning"), rows)
     return f'<section class="panel" id="{escape(name)}"><h3>{escape(name)}</h3>{about}{table}</section>'
