@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.dataset_file import read_dataset, write_dataset
+from bentray_workers.dataset_file import copy_dataset, read_dataset, write_dataset
 
 from .datasets import datasets, small
 
@@ -176,11 +176,13 @@ def test_each_wrong_field_is_named_with_what_was_found_and_what_is_accepted(tmp_
     write_dataset(path, small())
     with h5py.File(path, "a") as file:
         change(file)
-    with pytest.raises(InvalidInput) as refused:
-        read_dataset(path)
-    assert refused.value.field == field
-    assert refused.value.value
-    assert refused.value.accepted
+    for read in (read_dataset, lambda path: copy_dataset(path, tmp_path / "copy.h5")):
+        with pytest.raises(InvalidInput) as refused:
+            read(path)
+        assert refused.value.field == field
+        assert refused.value.value
+        assert refused.value.accepted
+    assert not (tmp_path / "copy.h5").exists()
 
 
 def test_a_file_without_travel_times_and_traces_is_refused(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from .dataset_format import FORMAT, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
 from .hdf5_reading import Limits, Reader, opened
 
 NUMERIC = "iuf"
+TRACES = "int16 or float32 traces over (ntx, nrx, nt)"
 
 
 def read_dataset(path: Path, *, traces: bool = True, limits: Limits | None = None) -> Dataset:
@@ -37,45 +39,48 @@ def read_dataset(path: Path, *, traces: bool = True, limits: Limits | None = Non
             for the file as a whole), what was found and what is accepted.
     """
     with opened(Path(path), limits or Limits()) as reader:
-        _check_format(reader)
-        speed, temperature = _water(reader)
-        position = _floats(reader, "geometry/element_position_m", "(elements, 2 or 3) numbers in m")
-        if position is None:
-            raise InvalidInput("geometry/element_position_m", "nothing", "(elements, 2 or 3) numbers in m")
-        dimension = reader.number("", "dimension", "2 or 3")
-        if dimension is not None and position.ndim == 2 and dimension != position.shape[1]:
-            raise InvalidInput(
-                "@dimension", f"{dimension:g}", f"{position.shape[1]}, as element_position_m has"
-            )
-        fields: dict[str, Any] = {
-            name: _floats(reader, place, "numbers over (ntx, nrx)") for place, name in PAIR_ARRAYS.items()
-        }
-        fields |= {name: reader.number(group, attribute, unit) for group, attribute, unit, name in NUMBERS}
-        fields |= {name: reader.text("", name) or "" for name in TEXTS}
-        if not _has_traces(reader) and fields["tof_s"] is None and fields["delta_tof_s"] is None:
-            raise InvalidInput(
-                "traveltime",
-                "neither travel times nor traces",
-                "traveltime/delta_tof_s, traveltime/tof_s or waveform/object",
-            )
-        return Dataset(
-            element_position_m=position,
-            tx=_indices(reader, "acquisition/tx"),
-            rx=_indices(reader, "acquisition/rx"),
-            water_speed_mps=speed,
-            water_temperature_c=temperature,
-            element_normal=_floats(reader, "geometry/element_normal", "numbers, one row an element"),
-            array_type=reader.text("geometry", "array_type") or "ring",
-            t0_s=reader.number("acquisition", "t0_s", "s") or 0.0,
-            wavelet=_floats(reader, "acquisition/wavelet", "(nt,) numbers"),
-            valid=_flags(reader, "mask/valid", "booleans over (ntx, nrx)"),
-            roi=_flags(reader, "mask/roi", "an image of booleans"),
-            slice_z_m=_floats(reader, "slice/z_m", "(nz,) numbers in m"),
-            picker=reader.text("traveltime", "picker") or "",
-            waveform=_waveform(reader) if traces and _has_traces(reader) else None,
-            truth=_truth(reader),
-            **fields,
+        return dataset_of(reader, _waveform if traces else None)
+
+
+def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) -> Dataset:
+    """What an open file holds; ``waveform`` reads its traces, if there are any. See ``read_dataset``."""
+    _check_format(reader)
+    speed, temperature = _water(reader)
+    position = _floats(reader, "geometry/element_position_m", "(elements, 2 or 3) numbers in m")
+    if position is None:
+        raise InvalidInput("geometry/element_position_m", "nothing", "(elements, 2 or 3) numbers in m")
+    dimension = reader.number("", "dimension", "2 or 3")
+    if dimension is not None and position.ndim == 2 and dimension != position.shape[1]:
+        raise InvalidInput("@dimension", f"{dimension:g}", f"{position.shape[1]}, as element_position_m has")
+    fields: dict[str, Any] = {
+        name: _floats(reader, place, "numbers over (ntx, nrx)") for place, name in PAIR_ARRAYS.items()
+    }
+    fields |= {name: reader.number(group, attribute, unit) for group, attribute, unit, name in NUMBERS}
+    fields |= {name: reader.text("", name) or "" for name in TEXTS}
+    if not traces_in(reader) and fields["tof_s"] is None and fields["delta_tof_s"] is None:
+        raise InvalidInput(
+            "traveltime",
+            "neither travel times nor traces",
+            "traveltime/delta_tof_s, traveltime/tof_s or waveform/object",
         )
+    return Dataset(
+        element_position_m=position,
+        tx=_indices(reader, "acquisition/tx"),
+        rx=_indices(reader, "acquisition/rx"),
+        water_speed_mps=speed,
+        water_temperature_c=temperature,
+        element_normal=_floats(reader, "geometry/element_normal", "numbers, one row an element"),
+        array_type=reader.text("geometry", "array_type") or "ring",
+        t0_s=reader.number("acquisition", "t0_s", "s") or 0.0,
+        wavelet=_floats(reader, "acquisition/wavelet", "(nt,) numbers"),
+        valid=_flags(reader, "mask/valid", "booleans over (ntx, nrx)"),
+        roi=_flags(reader, "mask/roi", "an image of booleans"),
+        slice_z_m=_floats(reader, "slice/z_m", "(nz,) numbers in m"),
+        picker=reader.text("traveltime", "picker") or "",
+        waveform=waveform(reader) if waveform is not None and traces_in(reader) else None,
+        truth=_truth(reader),
+        **fields,
+    )
 
 
 def _check_format(reader: Reader) -> None:
@@ -106,17 +111,47 @@ def _water(reader: Reader) -> tuple[float, float | None]:
     return speed, temperature
 
 
-def _has_traces(reader: Reader) -> bool:
+def traces_in(reader: Reader) -> bool:
+    """Whether there are traces; what they are is checked."""
     return reader.checked("waveform/object", "iuf", "traces over (ntx, nrx, nt)") is not None
 
 
-def _waveform(reader: Reader) -> Waveform:
+def stand_ins(reader: Reader) -> Waveform:
+    """The traces of a file as arrays of their shape and type that take no memory; they are all 0."""
+
+    def stand_in(path: str) -> NDArray[Any] | None:
+        found = reader.checked(path, NUMERIC, TRACES)
+        if found is None:
+            return None
+        zero = trace_type(path, np.zeros((), dtype=found.dtype))
+        return np.broadcast_to(zero, found.shape)
+
+    return _waveform(reader, stand_in)
+
+
+def trace_type(path: str, array: NDArray[Any]) -> NDArray[Any]:
+    """Traces as int16 or float32, whichever holds them.
+
+    Raises:
+        InvalidInput: naming ``path``, for integers that are wider.
+    """
+    if array.dtype.kind == "f":
+        with np.errstate(over="ignore"):
+            return np.ascontiguousarray(array, dtype=np.float32).reshape(array.shape)
+    if not np.can_cast(array.dtype, np.int16):
+        raise InvalidInput(path, f"{array.dtype}", TRACES)
+    return np.ascontiguousarray(array, dtype=np.int16).reshape(array.shape)
+
+
+def _waveform(reader: Reader, traces: Callable[[str], NDArray[Any] | None] | None = None) -> Waveform:
+    """The traces with their scales; ``traces`` reads one array of them in its own way."""
     scale = reader.number("waveform", "scale", "the unit of the traces a count")
-    received = _traces(reader, "waveform/object")
+    read = traces or (lambda path: _traces(reader, path))
+    received = read("waveform/object")
     assert received is not None
     return Waveform(
         received,
-        _traces(reader, "waveform/water"),
+        read("waveform/water"),
         1.0 if scale is None else scale,
         _floats(reader, "waveform/object_scale", "numbers over (ntx, nrx)"),
         _floats(reader, "waveform/water_scale", "numbers over (ntx, nrx)"),
@@ -124,16 +159,8 @@ def _waveform(reader: Reader) -> Waveform:
 
 
 def _traces(reader: Reader, path: str) -> NDArray[Any] | None:
-    accepted = "int16 or float32 traces over (ntx, nrx, nt)"
-    array = reader.array(path, NUMERIC, accepted)
-    if array is None:
-        return None
-    if array.dtype.kind == "f":
-        with np.errstate(over="ignore"):
-            return np.ascontiguousarray(array, dtype=np.float32)
-    if not np.can_cast(array.dtype, np.int16):
-        raise InvalidInput(path, f"{array.dtype}", accepted)
-    return np.ascontiguousarray(array, dtype=np.int16)
+    array = reader.array(path, NUMERIC, TRACES)
+    return None if array is None else trace_type(path, array)
 
 
 def _truth(reader: Reader) -> Truth | None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Dataset, Truth, Waveform
 from bentray_kernels.errors import InvalidInput
@@ -19,8 +21,19 @@ from .hdf5_writing import creating
 PACK_FROM_BYTES = 4096
 
 
-def write_dataset(path: Path, dataset: Dataset) -> None:
+# Part of an array, and where it belongs.
+Piece = tuple[tuple[slice, ...], NDArray[Any]]
+# The traces of a name, piece by piece; also told the shape of the chunks that they are stored in.
+Pieces = Callable[[str, tuple[int, ...]], Iterable[Piece]]
+
+
+def write_dataset(path: Path, dataset: Dataset, pieces: Pieces | None = None) -> None:
     """Write a dataset in the upload format; ``path`` is replaced whole or not touched.
+
+    Args:
+        path: of the file.
+        dataset: what to write.
+        pieces: gives the values of the traces in place of ``dataset.waveform``, which tells shape and type.
 
     Raises:
         InvalidInput: for a dataset without travel times and traces.
@@ -29,19 +42,23 @@ def write_dataset(path: Path, dataset: Dataset) -> None:
     if not dataset.picked and dataset.waveform is None:
         raise InvalidInput("traveltime", "neither travel times nor traces", "at least one of the two")
     with creating(Path(path)) as file:
-        _write(file, dataset)
+        _write(file, dataset, pieces)
 
 
-def write_array(group: h5py.Group, name: str, array: Any, chunks: tuple[int, ...] | bool = True) -> None:
+def write_array(group: h5py.Group, name: str, array: Any) -> None:
     """An array, packed with gzip unless it is small."""
     array = np.asarray(array)
-    packed = array.nbytes >= PACK_FROM_BYTES
+    group.create_dataset(name, data=array, track_times=False, **_packing(array, True))
+
+
+def _packing(array: NDArray[Any], chunks: tuple[int, ...] | bool) -> dict[str, Any]:
+    if array.size * array.dtype.itemsize < PACK_FROM_BYTES:
+        return {}
     # Level 1: on traces higher levels take several times as long for a few per cent.
-    how = {"chunks": chunks, "compression": "gzip", "compression_opts": 1, "shuffle": True} if packed else {}
-    group.create_dataset(name, data=array, track_times=False, **how)
+    return {"chunks": chunks, "compression": "gzip", "compression_opts": 1, "shuffle": True}
 
 
-def _write(file: h5py.File, dataset: Dataset) -> None:
+def _write(file: h5py.File, dataset: Dataset, pieces: Pieces | None) -> None:
     file.attrs["format"] = FORMAT
     file.attrs["format_version"] = VERSION
     file.attrs["dimension"] = dataset.element_position_m.shape[1]
@@ -74,7 +91,7 @@ def _write(file: h5py.File, dataset: Dataset) -> None:
     if dataset.slice_z_m is not None:
         write_array(file.create_group("slice"), "z_m", dataset.slice_z_m)
     if dataset.waveform is not None:
-        _write_waveform(file.create_group("waveform"), dataset.waveform)
+        _write_waveform(file.create_group("waveform"), dataset.waveform, pieces)
     if dataset.truth is not None:
         _write_truth(file.create_group("truth"), dataset.truth)
     for group, attribute, _, name in NUMBERS:
@@ -82,7 +99,7 @@ def _write(file: h5py.File, dataset: Dataset) -> None:
             file.require_group(group).attrs[attribute] = getattr(dataset, name)
 
 
-def _write_waveform(group: h5py.Group, waveform: Waveform) -> None:
+def _write_waveform(group: h5py.Group, waveform: Waveform, pieces: Pieces | None) -> None:
     group.attrs["scale"] = waveform.scale
     # An emission a chunk, which is what the picker reads at a time.
     chunks = tuple(
@@ -90,7 +107,11 @@ def _write_waveform(group: h5py.Group, waveform: Waveform) -> None:
     )
     for name, array in (("object", waveform.object), ("water", waveform.water)):
         if array is not None:
-            write_array(group, name, array, chunks)
+            how = _packing(array, chunks)
+            made = group.create_dataset(name, array.shape, array.dtype, track_times=False, **how)
+            whole = ((slice(None),) * array.ndim, array)
+            for where, values in pieces(name, chunks) if pieces is not None else (whole,):
+                made[where] = values
     for name, scale in (("object_scale", waveform.object_scale), ("water_scale", waveform.water_scale)):
         if scale is not None:
             write_array(group, name, scale)
