@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Sweep
 from bentray_workers.reconstruction_file import read_reconstruction, write_reconstruction
 
 from .reconstructions import made
@@ -27,6 +28,20 @@ def test_what_is_written_comes_back_bit_by_bit(tmp_path, slices, with_attenuatio
     # NaN, which says that slices are not evenly spaced, equals itself here.
     np.testing.assert_array_equal(found.spacing_m, result.spacing_m)
     assert_same(replace(found, spacing_m=()), replace(result, spacing_m=()))
+
+
+def test_bands_of_a_refinement_come_back(tmp_path):
+    waves = (
+        Sweep(0, 1, 3e-8, 36, 1, given=False, band_hz=(1e5, 2e5), misfit=0.3, held_out_misfit=0.4),
+        Sweep(0, 2, 2e-8, 36, 1, band_hz=(1e5, 2e5), misfit=0.1),
+    )
+    whole = replace(made(), history=(*made().history, *waves))
+    write_reconstruction(tmp_path / "r.h5", whole)
+    assert read_reconstruction(tmp_path / "r.h5").history == whole.history
+    with h5py.File(tmp_path / "r.h5", "r+") as file:
+        del file["history/misfit"]
+    with pytest.raises(InvalidInput, match="history/misfit"):
+        read_reconstruction(tmp_path / "r.h5")
 
 
 def test_a_result_without_history_comes_back(tmp_path):

@@ -8,13 +8,13 @@ import time
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from bentray_kernels.sources import digest
-from bentray_kernels.tomography.chains import ChainState
+from bentray_kernels.tomography.chains import Standing
 from bentray_kernels.tomography.snapshot import packed, unpacked
+from bentray_kernels.wave.snapshot import TYPES
 
 from .atomic import replacing
 from .npy_headers import PARSING
@@ -53,10 +53,10 @@ class Checkpoints:
         self._folder = folder
         self._on_saved = on_saved
         self._clock = clock
-        self._kept: dict[str, tuple[ChainState, float]] = {}
+        self._kept: dict[str, tuple[Standing, float]] = {}
         folder.mkdir(parents=True, exist_ok=True)
 
-    def keep(self, name: str, standing: ChainState) -> None:
+    def keep(self, name: str, standing: Standing) -> None:
         """Save where a chain stands, unless it has hardly moved since it was saved last.
 
         Raises:
@@ -66,13 +66,13 @@ class Checkpoints:
             before, saved = self._kept[name]
             # Rows that are being gathered move no state; a long pass of SART does.
             moved = before.state is not standing.state and self._clock() - saved >= INTERVAL_S
-            if _passed(before) == _passed(standing) and not moved:
+            if before.passed == standing.passed and not moved:
                 return
         self._save(name, standing)
         self._kept[name] = standing, self._clock()
         self._on_saved()
 
-    def last(self, name: str) -> ChainState | None:
+    def last(self, name: str) -> Standing | None:
         """Where the chain stood when it was saved last; None where it never was."""
         for path in reversed(list(self._files(name))):
             try:
@@ -81,7 +81,7 @@ class Checkpoints:
                 log.warning("%s is passed over: %s", path.name, error)
         return None
 
-    def _save(self, name: str, standing: ChainState) -> None:
+    def _save(self, name: str, standing: Standing) -> None:
         files = list(self._files(name))
         number = 1 + (int(files[-1].stem.rpartition("-")[2]) if files else 0)
         tree, arrays = packed(standing)
@@ -98,18 +98,12 @@ class Checkpoints:
 
 
 def _kernels() -> str:
-    return digest("bentray_kernels.tomography")
+    return digest("bentray_kernels.tomography") + digest("bentray_kernels.wave")
 
 
-def _passed(standing: ChainState) -> tuple[Any, ...]:
-    """What differs as soon as a pass, a stage or what follows them is finished."""
-    found = tuple(value is not None for value in standing.found)
-    return standing.number, standing.state.sweep, standing.state.done, found
-
-
-def _read(path: Path) -> ChainState:
+def _read(path: Path) -> Standing:
     with PARSING, np.load(path, allow_pickle=False) as found:
         content = json.loads(bytes(found["json"]))
         if content["kernels"] != _kernels():
             raise ValueError("it is of another version of the kernels")
-        return unpacked(content["state"], [found[str(k)] for k in range(len(found.files) - 1)])
+        return unpacked(content["state"], [found[str(k)] for k in range(len(found.files) - 1)], TYPES)

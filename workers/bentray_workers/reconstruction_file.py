@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, fields
+import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,9 @@ HISTORY = {
     "stage": np.int64,
     "given": np.bool_,
 }
+
+# Columns of refinements by waveforms; NaN where there is none. Files of before them have none of these.
+WAVES = ("band_low_hz", "band_high_hz", "misfit", "held_out_misfit")
 IMAGES = {
     "speed": "speed_mps",
     "coverage": "coverage_m",
@@ -63,6 +67,11 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
         for column, dtype in HISTORY.items():
             rows: NDArray[Any] = np.array([getattr(sweep, column) for sweep in reconstruction.history], dtype)
             write_array(history, column, rows)
+        if any(sweep.band_hz is not None for sweep in reconstruction.history):
+            for column, values in zip(
+                WAVES, zip(*map(_waves, reconstruction.history), strict=True), strict=True
+            ):
+                write_array(history, column, np.array(values, dtype=np.float64))
         if reconstruction.residuals is not None:
             residuals = file.create_group("residuals")
             write_array(residuals, "count", reconstruction.residuals)
@@ -129,9 +138,35 @@ def _history(reader: Reader) -> tuple[Sweep, ...]:
                 f"history/{column}", "nothing" if found is None else f"shape {found.shape}", "a column"
             )
         columns[column] = found.tolist()
-    if len({len(column) for column in columns.values()}) != 1:
+    rows = [dict(zip(columns, row, strict=False)) for row in zip(*columns.values(), strict=False)]
+    waves = [[None if math.isnan(value) else value for value in column] for column in _wave_columns(reader)]
+    if len({len(column) for column in (*columns.values(), *waves)}) != 1:
         raise InvalidInput("history", "columns of different lengths", "columns of one length")
-    return tuple(Sweep(*row) for row in zip(*(columns[f.name] for f in fields(Sweep)), strict=True))
+    if not waves:
+        return tuple(Sweep(**row) for row in rows)
+    return tuple(
+        Sweep(**row, band_hz=(low, high) if low and high else None, misfit=misfit, held_out_misfit=held)
+        for row, low, high, misfit, held in zip(rows, *waves, strict=True)
+    )
+
+
+def _waves(sweep: Sweep) -> tuple[float, ...]:
+    """What is in ``WAVES`` of one sweep."""
+    found = (*(sweep.band_hz or (None, None)), sweep.misfit, sweep.held_out_misfit)
+    return tuple(math.nan if value is None else value for value in found)
+
+
+def _wave_columns(reader: Reader) -> list[list[float]]:
+    """None in a file without them."""
+    if not reader.has(f"history/{WAVES[0]}"):
+        return []
+    found = [reader.array(f"history/{column}", "f", "a column of numbers") for column in WAVES]
+    for column, values in zip(WAVES, found, strict=True):
+        if values is None or values.ndim != 1:
+            raise InvalidInput(
+                f"history/{column}", "nothing" if values is None else f"shape {values.shape}", "a column"
+            )
+    return [values.tolist() for values in found if values is not None]
 
 
 def _residuals(reader: Reader) -> NDArray[np.int64] | None:

@@ -10,7 +10,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from ..arrays import Floats, Ints
 from . import attenuation, gauss_newton, resolution, sart
@@ -51,6 +51,52 @@ class Call(NamedTuple):
     keep: bool = False
 
 
+@runtime_checkable
+class Standing(Protocol):
+    """Where a chain stands; all that is needed to go on, to the bit."""
+
+    @property
+    def state(self) -> Any:
+        """Where what is under way stands; another object as soon as it moves."""
+
+    @property
+    def passed(self) -> tuple[Any, ...]:
+        """What differs as soon as a pass, a stage or what follows them is finished."""
+
+
+class Calls(Protocol):
+    """What is to be done, call by call: a ``Chain``, or what goes on from the image of one.
+
+    Attributes:
+        done, total: emitter passes that are made, or that an early end made needless; of how many at most.
+        history: of all stages so far.
+        standing: where it stands, to be kept.
+    """
+
+    @property
+    def done(self) -> int: ...
+    @property
+    def total(self) -> int: ...
+    @property
+    def history(self) -> tuple[Sweep, ...]: ...
+    @property
+    def standing(self) -> Standing: ...
+
+    def restore(self, standing: Any) -> None:
+        """Go on from where a chain of the same scan and index stood; to be called before ``first``."""
+
+    def first(self) -> list[Call]:
+        """Calls to begin with, or to go on with after ``restore``."""
+
+    def after(self, call: Call, given: Any) -> list[Call]:
+        """Calls that may follow one that has finished.
+
+        Args:
+            call: the one that has finished.
+            given: what it gave, or its handle where ``call.keep``.
+        """
+
+
 @dataclass(frozen=True)
 class ChainState:
     """Where a chain stands; all that is needed to go on, to the bit.
@@ -68,6 +114,16 @@ class ChainState:
     history: tuple[Sweep, ...]
     state: sart.State | gauss_newton.Iterate
     found: tuple[Floats | float | None, ...]
+
+    @property
+    def passed(self) -> tuple[Any, ...]:
+        """What differs as soon as a pass, a stage or what follows them is finished."""
+        return (
+            self.number,
+            self.state.sweep,
+            self.state.done,
+            tuple(value is not None for value in self.found),
+        )
 
 
 class Chain:

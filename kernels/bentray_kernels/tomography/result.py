@@ -35,6 +35,10 @@ class Sweep:
         stage: from 0: coarser grids and straight rays that come first are stages of their own.
         given: whether the misfit is that of the image which the stage gave: with SART, as near as a pass
             comes to it; with Gauss–Newton of the best image, once it is known which.
+        band_hz: of an image that was refined by waveforms, (lower, upper) corner of the band. Its residual is
+            then the shift of a wave in the middle of the band that has the same misfit.
+        misfit: of its waveforms, 0 where they agree and 1 where they have nothing in common.
+        held_out_misfit: the same of emitters that only judge.
     """
 
     slice: int
@@ -43,6 +47,9 @@ class Sweep:
     emitters: int
     stage: int = 0
     given: bool = True
+    band_hz: tuple[float, float] | None = None
+    misfit: float | None = None
+    held_out_misfit: float | None = None
 
 
 @dataclass(frozen=True)

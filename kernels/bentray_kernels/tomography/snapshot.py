@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import gauss_newton, sart
-from .chains import ChainState
+from .chains import ChainState, Standing
 from .result import Sweep
 
+# Records that states are made of, by name. What goes on from a finished image, as ``wave``, adds its own.
 TYPES: Mapping[str, type] = MappingProxyType(
     {
         kind.__name__: kind
@@ -24,20 +25,24 @@ TYPES: Mapping[str, type] = MappingProxyType(
 Arrays = list[NDArray[Any]]
 
 
-def packed(state: ChainState) -> tuple[Any, Arrays]:
+def packed(state: Standing) -> tuple[Any, Arrays]:
     """What ``json.dumps`` takes, and the arrays that it refers to by number."""
     arrays: Arrays = []
     return _pack(state, arrays), arrays
 
 
-def unpacked(tree: Any, arrays: Sequence[NDArray[Any]]) -> ChainState:
+def unpacked(tree: Any, arrays: Sequence[NDArray[Any]], types: Mapping[str, type] = TYPES) -> Standing:
     """The state again.
+
+    Args:
+        tree, arrays: as ``packed`` gave them.
+        types: of the records that may be in it, by name.
 
     Raises:
         KeyError, TypeError, IndexError: for what ``packed`` never gave.
     """
-    state = _unpack(tree, arrays)
-    if not isinstance(state, ChainState):
+    state = _unpack(tree, arrays, types)
+    if not isinstance(state, Standing):
         raise TypeError(f"the state of a chain, not {type(state).__name__}")
     return state
 
@@ -56,11 +61,12 @@ def _pack(value: Any, arrays: Arrays) -> Any:
     raise TypeError(f"a state has no {type(value).__name__}")
 
 
-def _unpack(tree: Any, arrays: Sequence[NDArray[Any]]) -> Any:
+def _unpack(tree: Any, arrays: Sequence[NDArray[Any]], types: Mapping[str, type]) -> Any:
     if isinstance(tree, list):
-        return tuple(_unpack(part, arrays) for part in tree)
+        return tuple(_unpack(part, arrays, types) for part in tree)
     if isinstance(tree, dict):
         if "array" in tree:
             return arrays[tree["array"]]
-        return TYPES[tree["of"]](**{name: _unpack(part, arrays) for name, part in tree["fields"].items()})
+        inner = {name: _unpack(part, arrays, types) for name, part in tree["fields"].items()}
+        return types[tree["of"]](**inner)
     return tree

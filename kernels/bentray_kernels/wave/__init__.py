@@ -1,7 +1,7 @@
 """Acoustic waves in a plane: a finite-difference simulator, its adjoint, waveform refinement of an image."""
 
 from .adjoint import Slope, slope, stored_bytes
-from .chain import Image, Standing, WaveChain, WaveScan
+from .chain import BandEnd, Image, WaveChain, WaveScan, WaveStanding
 from .continuation import Refined, refine
 from .medium import Medium
 from .preparation import prepare
@@ -11,15 +11,16 @@ from .simulation import simulate
 
 __all__ = [
     "Band",
+    "BandEnd",
     "Image",
     "Medium",
     "Refined",
     "Slope",
-    "Standing",
     "WaveChain",
     "WaveProblem",
     "WaveScan",
     "WaveSettings",
+    "WaveStanding",
     "bands",
     "prepare",
     "refine",

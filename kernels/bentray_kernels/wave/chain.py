@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.ndimage import map_coordinates
 
 from ..arrays import Floats
 from ..tomography.chains import Call
+from ..tomography.result import Sweep
 from . import refine
+from .passes import sweeps
 from .problem import WaveProblem
-from .refine import Iterate, Look
+from .refine import Look, WaveIterate, WavePass
 from .settings import WaveSettings
 
 
-class Image(NamedTuple):
+@dataclass(frozen=True)
+class Image:
     """A speed image.
 
     Attributes:
@@ -41,31 +44,80 @@ class WaveScan(Protocol):
 
 
 @dataclass(frozen=True)
-class Standing:
-    """Where a chain stands between two images; all that is needed to go on, to the bit.
+class BandEnd:
+    """What a band left.
+
+    Attributes:
+        image: the image.
+        skipped: whether held-out emitters ended the band.
+        history: a record for each image that was looked at.
+    """
+
+    image: Image
+    skipped: bool
+    history: tuple[WavePass, ...]
+
+
+@dataclass(frozen=True)
+class Entered:
+    """The band under way, as a chain knows it, which never makes a problem itself.
+
+    Attributes:
+        state: where it stands.
+        origin: of its grid, m.
+        emitters: how many there are to look at in each iteration.
+    """
+
+    state: WaveIterate
+    origin: tuple[float, float]
+    emitters: int
+
+
+@dataclass(frozen=True)
+class WaveStanding:
+    """Where a chain stands; all that is needed to go on, to the bit.
 
     Attributes:
         ends: of the bands before.
-        state: of the band under way.
+        band: the band under way; None between two.
     """
 
-    ends: tuple[Iterate, ...]
-    state: Iterate
+    ends: tuple[BandEnd, ...]
+    band: Entered | None
+
+    @property
+    def state(self) -> WaveIterate | None:
+        """Where the band under way stands."""
+        return None if self.band is None else self.band.state
+
+    @property
+    def passed(self) -> tuple[int, ...]:
+        """What differs as soon as an image or a band is done with."""
+        return len(self.ends), len(self.state.history) if self.state is not None else -1
 
 
 class WaveChain:
     """The calls of all bands: looks of single emitters in any order, then one step, again and again.
 
+    Args:
+        scan: see ``WaveScan``.
+        start: the image to begin with.
+        index: of the slice, for the history.
+        earlier: what led to the start; it comes first in the history.
+
     Attributes:
         ends: where bands ended.
-        state: of the band under way; None before it is entered.
+        total: emitter passes that it takes at most, but for shortened steps, which count as none.
     """
 
-    def __init__(self, scan: WaveScan, start: Image) -> None:
+    def __init__(self, scan: WaveScan, start: Image, index: int = 0, earlier: tuple[Sweep, ...] = ()) -> None:
         self._scan, self._start = scan, start
-        self.ends: tuple[Iterate, ...] = ()
-        self.state: Iterate | None = None
-        self._looks: dict[int, Look] = {}
+        self._index, self._earlier = index, earlier
+        self._sizes = [band.looks(scan.settings().held_out) for band in scan.settings().bands]
+        self.ends: tuple[BandEnd, ...] = ()
+        self._band: Entered | None = None
+        self._looks: dict[int, Any] = {}
+        self.total = sum(self._sizes)
 
     @property
     def number(self) -> int:
@@ -75,87 +127,129 @@ class WaveChain:
     @property
     def over(self) -> bool:
         """Whether nothing is left to do: all bands are gone through, or held-out emitters ended it."""
-        bands = len(self._scan.settings().bands)
-        return self.number == bands or bool(self.ends and self.ends[-1].skipped)
+        return self.number == len(self._sizes) or bool(self.ends and self.ends[-1].skipped)
+
+    @property
+    def done(self) -> int:
+        """Emitter passes that are made, or that an early end made needless."""
+        if self.over:
+            return self.total
+        passed = sum(self._sizes[: self.number])
+        if self._band is None:
+            return passed
+        band = self._scan.settings().bands[self.number]
+        each = band.emitters + self._scan.settings().held_out
+        seen = each * len(self._band.state.history) + len(self._looks)
+        return passed + min(seen, self._sizes[self.number])
+
+    @property
+    def history(self) -> tuple[Sweep, ...]:
+        """What led to the start, then of each band a stage."""
+        stage = 1 + max((sweep.stage for sweep in self._earlier), default=-1)
+        passes = [end.history for end in self.ends]
+        if self._band is not None:
+            passes.append(self._band.state.history)
+        found = list(self._earlier)
+        for number, of_band in enumerate(passes):
+            skipped = number < self.number and self.ends[number].skipped
+            over = number < self.number
+            found += sweeps(
+                self._scan.settings(),
+                number,
+                of_band,
+                self._index,
+                stage + number,
+                over=over,
+                skipped=skipped,
+            )
+        return tuple(found)
 
     @property
     def image(self) -> Image:
         """The image that the last finished band left."""
-        if not self.ends:
-            return self._start
-        problem = self._scan.problem(self.number - 1)
-        return Image(self.ends[-1].speed, problem.band.spacing_m, problem.origin)
+        return self.ends[-1].image if self.ends else self._start
 
     @property
-    def standing(self) -> Standing | None:
-        """Where it stands, to be kept, without looks that wait for others; None between bands."""
-        return None if self.state is None else Standing(self.ends, self.state)
+    def standing(self) -> WaveStanding:
+        """Where it stands, to be kept, without looks that wait for others."""
+        return WaveStanding(self.ends, self._band)
 
-    def restore(self, standing: Standing) -> None:
+    def restore(self, standing: WaveStanding) -> None:
         """Go on from where a chain of the same scan stood; to be called before ``first``."""
-        self.ends, self.state = standing.ends, standing.state
+        self.ends, self._band = standing.ends, standing.band
 
     def first(self) -> list[Call]:
         """Calls to begin with, or to go on with after ``restore``."""
         if self.over:
             return []
-        if self.state is None:
+        if self._band is None:
             return [Call(enter, (self._scan, self.number, self.image))]
-        if self.state.done:
-            return self._next()
-        count = len(refine.emitters(self._scan.problem(self.number)))
-        return [Call(look, (self._scan, self.number, self.state.speed, place)) for place in range(count)]
+        speed = self._band.state.speed
+        return [
+            Call(look_at_waves, (self._scan, self.number, speed, place), keep=True)
+            for place in range(self._band.emitters)
+        ]
 
     def after(self, call: Call, given: Any) -> list[Call]:
         """Calls that may follow one that has finished.
 
         Args:
             call: the one that has finished.
-            given: what it gave.
+            given: what it gave, or its handle where ``call.keep``.
         """
-        if call.function is look:
+        if call.function is enter:
+            self._band = given
+            return self.first()
+        assert self._band is not None
+        if call.function is look_at_waves:
             self._looks[call.arguments[-1]] = given
-            if len(self._looks) < len(refine.emitters(self._scan.problem(self.number))):
+            if len(self._looks) < self._band.emitters:
                 return []
             # In the order of the emitters, never in that of their coming.
             looks = [found for _, found in sorted(self._looks.items())]
-            self._looks = {}
-            return [Call(step, (self._scan, self.number, self.state, looks))]
-        self.state = given
+            return [Call(step_by_waves, (self._scan, self.number, self._band.state, looks))]
+        self._looks = {}
+        self._band = replace(self._band, state=given)
+        if given.done:
+            spacing = self._scan.settings().bands[self.number].spacing_m
+            image = Image(given.speed, spacing, self._band.origin)
+            # The band is over, so that pairs of changes are not kept any longer.
+            self.ends = (*self.ends, BandEnd(image, given.skipped, given.history))
+            self._band = None
         return self.first()
 
-    def _next(self) -> list[Call]:
-        assert self.state is not None
-        self.ends = (*self.ends, self.state)
-        self.state = None
-        return self.first()
+
+def enter(scan: WaveScan, number: int, image: Image) -> Entered:
+    """Call: what a band begins with."""
+    problem = scan.problem(number)
+    state = refine.begin(on_grid(image, problem))
+    return Entered(state, problem.origin, len(refine.emitters(problem)))
 
 
-def enter(scan: WaveScan, number: int, image: Image) -> Iterate:
-    """Call: the state that a band begins with."""
-    return refine.begin(on_grid(image, scan.problem(number)))
-
-
-def look(scan: WaveScan, number: int, speed: Floats, place: int) -> Look:
+def look_at_waves(scan: WaveScan, number: int, speed: Floats, place: int) -> Look:
     """Call: one emitter's look at an image, by its place among the band's emitters."""
     problem = scan.problem(number)
     return refine.look(problem, scan.settings(), speed, refine.emitters(problem)[place : place + 1])
 
 
-def step(scan: WaveScan, number: int, state: Iterate, looks: list[Look]) -> Iterate:
+def step_by_waves(scan: WaveScan, number: int, state: WaveIterate, looks: list[Look]) -> WaveIterate:
     """Call: the next image."""
     return refine.step(scan.problem(number), scan.settings(), state, looks)
 
 
 def on_grid(image: Image, problem: WaveProblem) -> Floats:
     """An image on the grid of a problem, (nx, ny), m/s; water where nothing may change."""
+    speed = resampled(image, problem.band.spacing_m, problem.origin, problem.region.shape)
+    return np.where(problem.region, speed, problem.water.speed)
+
+
+def resampled(image: Image, spacing: float, origin: tuple[float, float], shape: tuple[int, ...]) -> Floats:
+    """An image on another grid, (nx, ny), m/s; beyond its own its outermost nodes go on."""
     lines = [
-        (problem.origin[axis] + problem.band.spacing_m * np.arange(nodes) - image.origin[axis])
-        / image.spacing
-        for axis, nodes in enumerate(problem.region.shape)
+        (origin[axis] + spacing * np.arange(nodes) - image.origin[axis]) / image.spacing
+        for axis, nodes in enumerate(shape)
     ]
     places = np.meshgrid(*lines, indexing="ij")
     # Cubic, for linear interpolation takes sharpness off at every change of grid; it may overshoot.
     speed = map_coordinates(image.speed, places, order=3, mode="nearest")
-    speed = np.clip(speed, image.speed.min(), image.speed.max())
-    return np.where(problem.region, speed, problem.water.speed)
+    return np.asarray(np.clip(speed, image.speed.min(), image.speed.max()))

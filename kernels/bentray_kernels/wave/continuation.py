@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 from ..acquisition import Dataset
 from ..errors import InvalidInput
 from ..tomography.chains import Call
-from .chain import Image, WaveChain, step
+from .chain import BandEnd, Image, WaveChain, step_by_waves
 from .preparation import prepare
 from .problem import WaveProblem
-from .refine import Iterate
+from .refine import WaveIterate
 from .settings import WaveSettings
 from .sounding import Mapping
 
 # Called with the problem of the band under way and where it stands.
-Progress = Callable[[WaveProblem, Iterate], None]
+Progress = Callable[[WaveProblem, WaveIterate], None]
 
 
 class Refined(NamedTuple):
@@ -30,7 +30,7 @@ class Refined(NamedTuple):
     """
 
     image: Image
-    bands: tuple[Iterate, ...]
+    bands: tuple[BandEnd, ...]
     skipped: bool
 
 
@@ -81,7 +81,7 @@ def refine(
         given = [_made(calls[0])] if len(calls) == 1 else list(run(_made, calls))
         number, done = chain.number, calls
         calls = [after for call, value in zip(done, given, strict=True) for after in chain.after(call, value)]
-        if progress is not None and done[0].function is step:
+        if progress is not None and done[0].function is step_by_waves:
             progress(scan.problem(number), given[0])
     return Refined(chain.image, chain.ends, chain.ends[-1].skipped)
 

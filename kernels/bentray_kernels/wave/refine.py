@@ -62,7 +62,7 @@ class WavePass:
 
 
 @dataclass(frozen=True)
-class Iterate:
+class WaveIterate:
     """Where a refinement stands in a band; all that is needed to go on, to the bit.
 
     Attributes:
@@ -98,10 +98,10 @@ class Iterate:
     history: tuple[WavePass, ...] = ()
 
 
-def begin(speed: Floats) -> Iterate:
+def begin(speed: Floats) -> WaveIterate:
     """An image to begin with, (nx, ny), m/s, on the grid of the problem."""
     nothing, none = np.zeros_like(speed), np.zeros((0, *speed.shape))
-    return Iterate(speed, speed, nothing, float("inf"), nothing, nothing, none, none, speed, float("inf"))
+    return WaveIterate(speed, speed, nothing, float("inf"), nothing, nothing, none, none, speed, float("inf"))
 
 
 def emitters(problem: WaveProblem) -> Ints:
@@ -132,7 +132,9 @@ def look(problem: WaveProblem, settings: WaveSettings, speed: Floats, some: Ints
     return Look(misfit, held, gradient, illumination)
 
 
-def step(problem: WaveProblem, settings: WaveSettings, state: Iterate, looks: Sequence[Look]) -> Iterate:
+def step(
+    problem: WaveProblem, settings: WaveSettings, state: WaveIterate, looks: Sequence[Look]
+) -> WaveIterate:
     """The next image from the looks of all emitters, in their order."""
     misfit = sum(part.misfit for part in looks) / problem.used.size
     held = sum(part.held for part in looks) / problem.held.size if problem.held.size else float("nan")
@@ -174,7 +176,7 @@ def step(problem: WaveProblem, settings: WaveSettings, state: Iterate, looks: Se
     return replace(state, way=way, speed=_moved(settings, state.base, way))
 
 
-def _way(problem: WaveProblem, settings: WaveSettings, state: Iterate) -> Floats:
+def _way(problem: WaveProblem, settings: WaveSettings, state: WaveIterate) -> Floats:
     """What to add to the base, (nx, ny), m/s."""
     light = state.illumination
     dim = 1.0 / np.sqrt(light + DARK * light[problem.region].mean())
@@ -192,7 +194,7 @@ def _way(problem: WaveProblem, settings: WaveSettings, state: Iterate) -> Floats
     return way * min(1.0, settings.largest_step_mps / size)
 
 
-def _shortened(settings: WaveSettings, state: Iterate, misfit: float) -> Iterate:
+def _shortened(settings: WaveSettings, state: WaveIterate, misfit: float) -> WaveIterate:
     """A shorter step along the same way, to the lowest point of the parabola through what is known."""
     if state.shortenings == MOST_SHORTENINGS:
         return replace(state, speed=state.base, done=True)

@@ -39,6 +39,10 @@ class Band:
         if not 0.0 <= self.smoothing_m < float("inf"):
             raise InvalidInput("smoothing_m", self.smoothing_m, "a finite length >= 0 m")
 
+    def looks(self, held_out: int) -> int:
+        """Looks of single emitters at images, the first one included; shortened steps take more."""
+        return (self.iterations + 1) * (self.emitters + held_out)
+
 
 def bands(centre_hz: float, water_mps: float = 1500.0) -> tuple[Band, ...]:
     """The continuation for a pulse: half its centre frequency, three quarters, one and an eighth, 1.5 times.

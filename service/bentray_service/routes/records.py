@@ -70,6 +70,11 @@ class SweepRecord(BaseModel):
     emitters: int = Field(description="Emitters that had data.")
     stage: int = Field(0, description="From 0: coarser grids and straight rays that come first.")
     given: bool = Field(True, description="Whether the misfit is that of the image which the stage gave.")
+    band_hz: tuple[float, float] | None = Field(
+        None, description="Of an image refined by waveforms; its residual is the shift that its misfit means."
+    )
+    misfit: float | None = Field(None, description="Of these waveforms: 0 where they agree.")
+    held_out_misfit: float | None = Field(None, description="The same of emitters that only judge.")
 
 
 class PlanRecord(BaseModel):

@@ -1,6 +1,7 @@
 """The whole refinement: it finds a blob, through noise, in any number of threads."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -37,6 +38,6 @@ def test_progress_is_told_of_every_image():
 
 
 def test_a_start_out_of_bounds_is_refused():
-    start = water()._replace(speed=np.full((60, 60), 3000.0))
+    start = replace(water(), speed=np.full((60, 60), 3000.0))
     with pytest.raises(InvalidInput, match="start"):
         refine(scan(), SETTINGS, start)

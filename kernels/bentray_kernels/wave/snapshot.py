@@ -1,0 +1,17 @@
+"""What a checkpoint may hold of a refinement, beside what it may hold of the rays before it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from ..tomography import snapshot
+from .chain import BandEnd, Entered, Image, WaveStanding
+from .refine import WaveIterate, WavePass
+
+TYPES: Mapping[str, type] = MappingProxyType(
+    {
+        **snapshot.TYPES,
+        **{kind.__name__: kind for kind in (WaveStanding, BandEnd, Entered, Image, WaveIterate, WavePass)},
+    }
+)
