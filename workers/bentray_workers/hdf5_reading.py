@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,47 +14,14 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
+from .hdf5_checks import OTHER_TYPES, TYPES, Limits, check_storage
 
-FILTERS = {
-    h5py.h5z.FILTER_DEFLATE: "gzip",
-    h5py.h5z.FILTER_SHUFFLE: "shuffle",
-    h5py.h5z.FILTER_FLETCHER32: "fletcher32",
-    h5py.h5z.FILTER_LZF: "lzf",
-}
-TYPES = {h5py.h5t.INTEGER: "integers", h5py.h5t.FLOAT: "floating-point numbers", h5py.h5t.ENUM: "booleans"}
-OTHER_TYPES = {
-    h5py.h5t.STRING: "text",
-    h5py.h5t.COMPOUND: "records",
-    h5py.h5t.REFERENCE: "references",
-    h5py.h5t.VLEN: "lists of varying length",
-    h5py.h5t.OPAQUE: "opaque bytes",
-    h5py.h5t.ARRAY: "arrays as elements",
-    h5py.h5t.BITFIELD: "bit fields",
-    h5py.h5t.TIME: "times",
-}
+__all__ = ["SIGNATURE", "Limits", "Reader", "opened", "printable", "refusing"]
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 # What HDF5 and h5py raise on damaged files.
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError)
-
-
-@dataclass(frozen=True)
-class Limits:
-    """How much a file may make its reader do.
-
-    Attributes:
-        total_bytes: of all arrays read from one file, unpacked.
-        chunk_bytes: of one chunk, unpacked: HDF5 holds it in memory as a whole.
-        packing: unpacked over stored bytes; gzip cannot do better than 1032.
-        small_bytes: an array below this may be packed as well as it likes.
-        text: characters of an attribute.
-    """
-
-    total_bytes: int = 32 * 2**30
-    chunk_bytes: int = 512 * 2**20
-    packing: float = 1100.0
-    small_bytes: int = 16 * 2**20
-    text: int = 100_000
 
 
 @contextmanager
@@ -125,7 +91,7 @@ class Reader:
         if not isinstance(found, h5py.Dataset):
             raise InvalidInput(path, "a group", accepted)
         with refusing(path, accepted):
-            self._check_storage(path, found, accepted)
+            check_storage(path, found, accepted, self._limits, self._read_bytes)
             if found.dtype.kind not in kinds:
                 raise InvalidInput(
                     path, f"{TYPES[found.id.get_type().get_class()]} ({found.dtype})", accepted
@@ -207,37 +173,6 @@ class Reader:
                 if isinstance(here, h5py.Datatype):
                     raise InvalidInput(walked, "a named type", "a group or an array")
         return here
-
-    def _check_storage(self, path: str, found: h5py.Dataset, accepted: str) -> None:
-        kind = found.id.get_type().get_class()
-        if kind not in TYPES:
-            raise InvalidInput(path, OTHER_TYPES.get(kind, "an unknown type"), accepted)
-        if found.shape is None:
-            raise InvalidInput(path, "an array without a shape", accepted)
-        how = found.id.get_create_plist()
-        if how.get_layout() not in (h5py.h5d.COMPACT, h5py.h5d.CONTIGUOUS, h5py.h5d.CHUNKED):
-            raise InvalidInput(path, "a virtual dataset", "data in this file")
-        if how.get_layout() != h5py.h5d.CHUNKED and how.get_external_count():
-            raise InvalidInput(path, "data in another file", "data in this file")
-        for k in range(how.get_nfilters()):
-            code = how.get_filter(k)[0]
-            if code not in FILTERS:
-                raise InvalidInput(path, f"filter {code}", "the filters " + ", ".join(FILTERS.values()))
-        limits = self._limits
-        size = math.prod(found.shape) * found.dtype.itemsize
-        if size + self._read_bytes > limits.total_bytes:
-            raise InvalidInput(
-                path, f"{size} bytes unpacked", f"at most {limits.total_bytes} bytes in a file"
-            )
-        if found.chunks is not None:
-            chunk = math.prod(found.chunks) * found.dtype.itemsize
-            if chunk > limits.chunk_bytes:
-                raise InvalidInput(path, f"chunks of {chunk} bytes", f"at most {limits.chunk_bytes} bytes")
-        stored = found.id.get_storage_size()
-        if size > limits.small_bytes and size > limits.packing * stored:
-            raise InvalidInput(
-                path, f"{size} bytes, of which {stored} are stored", "data that are in the file"
-            )
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import json
 import math
 import resource
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,27 +64,13 @@ def convert(what: str, source: Path, target: Path, given: dict[str, Any]) -> dic
     """Read ``source``, write the canonical ``target``, and say what it holds or what is wrong with it."""
     try:
         from bentray_kernels.errors import InvalidInput
-        from bentray_workers.dataset_file import read_dataset, write_dataset
-        from bentray_workers.mesh_file import StoredMesh, summary_of, write_mesh
-        from bentray_workers.volume_file import write_volume
-        from bentray_workers.volume_reading import Given, import_volume
-    except MemoryError:
+
+        import_module(READERS[what])
+    except (ImportError, MemoryError):
+        # Where memory ends, NumPy says that it cannot be imported.
         return _error("file", "no memory left to start the reader", "a larger BENTRAY_INGEST_MEMORY_BYTES")
     try:
-        if what == "dataset":
-            dataset = read_dataset(source)
-            write_dataset(target, dataset)
-            return {"ok": summary(dataset)}
-        if what == "mesh":
-            from bentray_workers.mesh_reading import read_mesh
-
-            found = read_mesh(source.read_bytes())
-            stored = StoredMesh(found.surface.mesh, found.colours)
-            write_mesh(target, stored)
-            return {"ok": summary_of(stored, found.surface, found.format) | {"title": text(given["title"])}}
-        volume = import_volume(source, Given(**given))
-        write_volume(target, volume)
-        return {"ok": volume_summary(volume)}
+        return {"ok": CONVERTED[what](source, target, given)}
     except InvalidInput as error:
         return _error(error.field, error.value, error.accepted)
     except MemoryError:
@@ -93,6 +80,42 @@ def convert(what: str, source: Path, target: Path, given: dict[str, Any]) -> dic
             return {"full": True}
         # A reader must never take the service down: whatever breaks it is a fault of the file.
         return _error("file", f"{type(error).__name__}: {error}", ACCEPTED[what])
+
+
+def _dataset(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
+    from bentray_workers.dataset_file import read_dataset, write_dataset
+
+    dataset = read_dataset(source)
+    write_dataset(target, dataset)
+    return summary(dataset)
+
+
+def _volume(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
+    from bentray_workers.volume_file import write_volume
+    from bentray_workers.volume_reading import Given, import_volume
+
+    volume = import_volume(source, Given(**given))
+    write_volume(target, volume)
+    return volume_summary(volume)
+
+
+def _mesh(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
+    from bentray_workers.mesh_file import StoredMesh, summary_of, write_mesh
+    from bentray_workers.mesh_reading import read_mesh
+
+    found = read_mesh(source.read_bytes())
+    stored = StoredMesh(found.surface.mesh, found.colours)
+    write_mesh(target, stored)
+    return summary_of(stored, found.surface, found.format) | {"title": text(given["title"])}
+
+
+CONVERTED = {"dataset": _dataset, "volume": _volume, "mesh": _mesh}
+# Each needs its own reader alone: what starts for every upload should start fast.
+READERS = {
+    "dataset": "bentray_workers.dataset_file",
+    "volume": "bentray_workers.volume_reading",
+    "mesh": "bentray_workers.mesh_reading",
+}
 
 
 def summary(dataset: Dataset) -> dict[str, Any]:

@@ -1,0 +1,99 @@
+"""What an array in a stranger's HDF5 file may be: type, place of its data, filters and size."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import h5py
+
+from bentray_kernels.errors import InvalidInput
+
+FILTERS = {
+    h5py.h5z.FILTER_DEFLATE: "gzip",
+    h5py.h5z.FILTER_SHUFFLE: "shuffle",
+    h5py.h5z.FILTER_FLETCHER32: "fletcher32",
+    h5py.h5z.FILTER_LZF: "lzf",
+}
+TYPES = {h5py.h5t.INTEGER: "integers", h5py.h5t.FLOAT: "floating-point numbers", h5py.h5t.ENUM: "booleans"}
+OTHER_TYPES = {
+    h5py.h5t.STRING: "text",
+    h5py.h5t.COMPOUND: "records",
+    h5py.h5t.REFERENCE: "references",
+    h5py.h5t.VLEN: "lists of varying length",
+    h5py.h5t.OPAQUE: "opaque bytes",
+    h5py.h5t.ARRAY: "arrays as elements",
+    h5py.h5t.BITFIELD: "bit fields",
+    h5py.h5t.TIME: "times",
+}
+
+# What cannot be packed may grow by so much, and by a few bytes a chunk.
+GROWN = 1.01
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much a file may make its reader do.
+
+    Attributes:
+        total_bytes: of all arrays read from one file, unpacked.
+        chunk_bytes: of one chunk, unpacked: HDF5 holds it in memory as a whole.
+        packing: unpacked over stored bytes; gzip cannot do better than 1032.
+        small_bytes: an array below this may be packed as well as it likes.
+        text: characters of an attribute.
+    """
+
+    total_bytes: int = 32 * 2**30
+    chunk_bytes: int = 512 * 2**20
+    packing: float = 1100.0
+    small_bytes: int = 16 * 2**20
+    text: int = 100_000
+
+
+def check_storage(path: str, found: h5py.Dataset, accepted: str, limits: Limits, read_bytes: int) -> None:
+    """Refuse an array that is not plain numbers in this file, of a size that can be read.
+
+    Args:
+        path: of the array.
+        found: it, opened but not read.
+        accepted: what it should be, in words.
+        limits: what it may ask for.
+        read_bytes: of the arrays of the file that have been read.
+
+    Raises:
+        InvalidInput: naming ``path``.
+    """
+    kind = found.id.get_type().get_class()
+    if kind not in TYPES:
+        raise InvalidInput(path, OTHER_TYPES.get(kind, "an unknown type"), accepted)
+    if kind == h5py.h5t.ENUM and found.dtype.kind != "b":
+        raise InvalidInput(path, "names of numbers", accepted)
+    if found.shape is None:
+        raise InvalidInput(path, "an array without a shape", accepted)
+    how = found.id.get_create_plist()
+    if how.get_layout() not in (h5py.h5d.COMPACT, h5py.h5d.CONTIGUOUS, h5py.h5d.CHUNKED):
+        raise InvalidInput(path, "a virtual dataset", "data in this file")
+    if how.get_layout() != h5py.h5d.CHUNKED and how.get_external_count():
+        raise InvalidInput(path, "data in another file", "data in this file")
+    for k in range(how.get_nfilters()):
+        code = how.get_filter(k)[0]
+        if code not in FILTERS:
+            raise InvalidInput(path, f"filter {code}", "the filters " + ", ".join(FILTERS.values()))
+    _check_sizes(path, found, limits, read_bytes)
+
+
+def _check_sizes(path: str, found: h5py.Dataset, limits: Limits, read_bytes: int) -> None:
+    size = math.prod(found.shape) * found.dtype.itemsize
+    if size + read_bytes > limits.total_bytes:
+        raise InvalidInput(path, f"{size} bytes unpacked", f"at most {limits.total_bytes} bytes in a file")
+    stored = found.id.get_storage_size()
+    if found.chunks is not None:
+        chunk = math.prod(found.chunks) * found.dtype.itemsize
+        if chunk > limits.chunk_bytes:
+            raise InvalidInput(path, f"chunks of {chunk} bytes", f"at most {limits.chunk_bytes} bytes")
+        # Packing makes nothing much larger: chunks that hold more unpack far beyond their size.
+        chunks = math.prod(-(-n // c) for n, c in zip(found.shape, found.chunks, strict=True))
+        if stored > chunks * (GROWN * chunk + 64):
+            raise InvalidInput(path, f"{stored} bytes in {chunks} chunks of {chunk}", "no more than these")
+    if size > limits.small_bytes and size > limits.packing * stored:
+        raise InvalidInput(path, f"{size} bytes, of which {stored} are stored", "data that are in the file")
