@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 LONGEST_TEXT = 200
 OPEN_FILES = 64
+# How much larger the canonical file of a large upload may be: it is packed quickly, not well.
+PACKING = 2
 
 # What may be ingested, and how the user is told of it.
 ACCEPTED = {
@@ -40,17 +42,17 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, required=True)
     parser.add_argument("--given", type=json.loads, required=True, help="what the user says of the file")
     asked = parser.parse_args()
-    limit(asked.memory, asked.seconds)
+    limit(asked.memory, asked.seconds, PACKING * asked.source.stat().st_size)
     answer = convert(asked.what, asked.source, asked.target, asked.given)
     sys.stdout.write(json.dumps(answer) + "\n")
 
 
-def limit(memory_bytes: int, seconds: float) -> None:
-    """Bound this process before it imports a reader or opens anything."""
+def limit(memory_bytes: int, seconds: float, file_bytes: int = 0) -> None:
+    """Bound this process, before it imports a reader or opens anything; files may have ``file_bytes``, if more."""
     cpu = math.ceil(seconds)
     for what, amount in (
         (resource.RLIMIT_AS, memory_bytes),
-        (resource.RLIMIT_FSIZE, memory_bytes),
+        (resource.RLIMIT_FSIZE, max(memory_bytes, file_bytes)),
         (resource.RLIMIT_CPU, cpu),
         (resource.RLIMIT_NOFILE, OPEN_FILES),
         (resource.RLIMIT_CORE, 0),
@@ -83,11 +85,9 @@ def convert(what: str, source: Path, target: Path, given: dict[str, Any]) -> dic
 
 
 def _dataset(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
-    from bentray_workers.dataset_file import read_dataset, write_dataset
+    from bentray_workers.dataset_file import copy_dataset
 
-    dataset = read_dataset(source)
-    write_dataset(target, dataset)
-    return summary(dataset)
+    return summary(copy_dataset(source, target))
 
 
 def _volume(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:

@@ -21,6 +21,9 @@ from .child import ACCEPTED
 
 log = logging.getLogger("bentray.ingest")
 
+# Slow for reading and packing traces: a busy machine must be able to.
+BYTES_PER_S = 8 * 2**20
+
 # One thread each: every further one reserves address space, which is limited. No filter plug-in is loaded.
 ENVIRONMENT = {
     "PATH": os.defpath,
@@ -48,7 +51,8 @@ def ingest(
     Args:
         what: a key of ``ACCEPTED``.
         source, target: paths of this machine.
-        memory_bytes, seconds: what the process may use of address space, of processor and of wall time.
+        memory_bytes: what the process may use of address space.
+        seconds: of processor and of wall time, and one more for each ``BYTES_PER_S`` of the source.
         scratch: the folder it runs in.
         given: what the user says of it: of a volume as ``volume_reading.Given``, of a mesh its title.
         started: told the id of the process.
@@ -60,6 +64,7 @@ def ingest(
         InvalidInput: when the file is refused, and also when reading it crashed, hung or ate the memory.
         StorageFull: when there is no space for the canonical file.
     """
+    seconds += source.stat().st_size // BYTES_PER_S
     command = [sys.executable, "-I", "-m", "bentray_service.ingest.child", what, str(source), str(target)]
     command += ["--memory", str(memory_bytes), "--seconds", str(seconds), "--given", json.dumps(dict(given))]
     process = subprocess.Popen(  # noqa: S603 - our own program and paths

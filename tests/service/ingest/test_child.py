@@ -46,19 +46,19 @@ def test_a_bad_file_is_named(scan, tmp_path):
 
 @pytest.mark.parametrize("error", [RuntimeError("odd"), MemoryError()])
 def test_a_reader_that_breaks_is_the_fault_of_the_file(scan, tmp_path, monkeypatch, error):
-    def broken(path):
+    def broken(source, target):
         raise error
 
-    monkeypatch.setattr("bentray_workers.dataset_file.read_dataset", broken)
+    monkeypatch.setattr("bentray_workers.dataset_file.copy_dataset", broken)
     answer = child.convert("dataset", scan(), tmp_path / "out.h5", {})
     assert answer["error"]["field"] == "file"
 
 
 def test_a_full_disk_is_no_fault_of_the_file(scan, tmp_path, monkeypatch):
-    def full(path, dataset):
-        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+    def full(source, target):
+        raise OSError(errno.ENOSPC, "No space left on device", str(target))
 
-    monkeypatch.setattr("bentray_workers.dataset_file.write_dataset", full)
+    monkeypatch.setattr("bentray_workers.dataset_file.copy_dataset", full)
     assert child.convert("dataset", scan(), tmp_path / "out.h5", {}) == {"full": True}
 
 

@@ -64,6 +64,29 @@ def test_a_reader_that_hangs_is_ended_with_its_children(program, scan, tmp_path)
     assert not status.exists() or status.read_text().split()[2] == "Z"
 
 
+def test_a_large_file_has_more_time(program, tmp_path):
+    program(
+        "import sys, json; print(json.dumps({'ok': {'seconds': sys.argv[sys.argv.index('--seconds') + 1]}}))"
+    )
+    with (tmp_path / "large").open("wb") as file:
+        file.truncate(100 * 2**20)
+    assert run(tmp_path / "large", tmp_path, seconds=30.0) == {"seconds": "42.0"}
+
+
+def test_a_canonical_file_may_be_larger_than_the_memory(program, scan, tmp_path):
+    program(
+        "import sys, json, resource\n"
+        "from pathlib import Path\n"
+        "from bentray_service.ingest import child\n"
+        "child.convert = lambda *given: {'ok': {'most': resource.getrlimit(resource.RLIMIT_FSIZE)[0]}}\n"
+        "child.main()\n"
+    )
+    with (tmp_path / "large").open("wb") as file:
+        file.truncate(3 * 2**30)
+    assert run(tmp_path / "large", tmp_path) == {"most": 6 * 2**30}
+    assert run(scan(), tmp_path) == {"most": LIMITS["memory_bytes"]}
+
+
 def test_a_reader_that_crashes(program, scan, tmp_path):
     program("import os; os.abort()")
     with pytest.raises(InvalidInput, match="SIGABRT"):
