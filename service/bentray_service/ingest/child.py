@@ -48,7 +48,7 @@ def main() -> None:
 
 
 def limit(memory_bytes: int, seconds: float, file_bytes: int = 0) -> None:
-    """Bound this process, before it imports a reader or opens anything; files may have ``file_bytes``, if more."""
+    """Bound this process, before it imports or opens anything; files may have ``file_bytes``, if more."""
     cpu = math.ceil(seconds)
     for what, amount in (
         (resource.RLIMIT_AS, memory_bytes),
