@@ -71,6 +71,14 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.WrongMediaType: Kind(415, "wrong-media-type", "The media type is not accepted"),
     refusals.EmptyBody: Kind(422, "empty-body", "The request has no body"),
     refusals.TooLarge: Kind(413, "too-large", "The body is too large"),
+    refusals.TooSlow: Kind(408, "too-slow", "The body came too slowly"),
+    refusals.WrongProtocol: Kind(412, "wrong-protocol", "The upload protocol is another"),
+    refusals.WrongOffset: Kind(409, "wrong-offset", "The upload stands elsewhere"),
+    refusals.Locked: Kind(423, "locked", "Another request is at work on it"),
+    # The number is that of tus, which HTTP does not know.
+    refusals.WrongChecksum: Kind(460, "wrong-checksum", "What came is not what was sent"),
+    refusals.UnknownChecksum: Kind(400, "unknown-checksum", "The checksum is of an unknown kind"),
+    refusals.InUse: Kind(409, "in-use", "A job needs it"),
     refusals.Finished: Kind(409, "job-finished", "The job has ended already"),
     refusals.KeyReused: Kind(409, "key-reused", "The key belongs to another request"),
     refusals.QueueFull: Kind(429, "queue-full", "Too many jobs wait"),
@@ -156,8 +164,13 @@ def _respond(problem: Problem, headers: Mapping[str, str] | None = None) -> Resp
 
 def _refused(request: Request, error: Exception) -> Response:
     assert isinstance(error, InvalidInput)
-    later = {"Retry-After": RETRY_AFTER} if isinstance(error, refusals.Busy | refusals.QueueFull) else None
-    return _respond(from_exception(error, request.url.path), later)
+    headers = {}
+    if isinstance(error, refusals.Busy | refusals.QueueFull):
+        headers["Retry-After"] = RETRY_AFTER
+    if isinstance(error, refusals.TooSlow):
+        # The rest of the body is not waited for.
+        headers["Connection"] = "close"
+    return _respond(from_exception(error, request.url.path), headers)
 
 
 def _not_ready(request: Request, error: Exception) -> Response:

@@ -36,6 +36,34 @@ class TooLarge(InvalidInput):
     """The body is larger than the service takes."""
 
 
+class TooSlow(InvalidInput):
+    """The body hardly comes."""
+
+
+class WrongProtocol(InvalidInput):
+    """The request does not speak the version of the upload protocol that the service does."""
+
+
+class WrongOffset(InvalidInput):
+    """What was sent does not begin where the upload stands."""
+
+
+class Locked(InvalidInput):
+    """Another request is at work on it."""
+
+
+class WrongChecksum(InvalidInput):
+    """What came is not what was sent."""
+
+
+class UnknownChecksum(InvalidInput):
+    """The checksum is of a kind that the service does not know."""
+
+
+class InUse(InvalidInput):
+    """A job that is not at its end needs it."""
+
+
 class Finished(InvalidInput):
     """The job has ended, so nothing can be asked of it any more."""
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import hashlib
 import os
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
+from io import FileIO
 from pathlib import Path
-from typing import IO
 
 from starlette.concurrency import run_in_threadpool
 
 from ..refusals import EmptyBody, StorageFull, TooLarge
 
 BATCH_BYTES = 4 * 1024 * 1024
+# What a power cut may cost of a body, and how much of it waits for the disk at most.
+SYNC_BYTES = 64 * 1024 * 1024
 
 
 @dataclass(frozen=True)
@@ -42,39 +45,105 @@ async def receive(
     """
     if announced == 0:
         raise EmptyBody("body", "0 bytes", expected)
+    accepted = f"at most {limit} bytes (BENTRAY_MAX_UPLOAD_BYTES)"
     if announced is not None and announced > limit:
-        raise _too_large(f"{announced} bytes", limit)
-    digest, size, batch = hashlib.sha256(), 0, bytearray()
-    file = await run_in_threadpool(path.open, "xb")
+        raise TooLarge("body", f"{announced} bytes", accepted)
+    digest = hashlib.sha256()
+    file = await run_in_threadpool(path.open, "xb", 0)
     try:
-        async for chunk in stream:
-            size += len(chunk)
-            if size > limit:
-                raise _too_large(f"more than {limit} bytes", limit)
-            batch += chunk
-            if len(batch) >= BATCH_BYTES:
-                await run_in_threadpool(_write, file, bytes(batch), digest)
-                batch.clear()
-        if not size:
-            raise EmptyBody("body", "0 bytes", expected)
-        await run_in_threadpool(_write, file, bytes(batch), digest)
-        await run_in_threadpool(os.fsync, file.fileno())
+        size = await pour(stream, file, limit, accepted, digest)
+    finally:
+        await run_in_threadpool(file.close)
+    if not size:
+        raise EmptyBody("body", "0 bytes", expected)
+    return Received(size, digest.hexdigest())
+
+
+async def pour(
+    stream: AsyncIterator[bytes], file: FileIO, limit: int, accepted: str, digest: hashlib._Hash | None
+) -> int:
+    """Write what comes to the end of an open file, one batch while the next one comes, and sync it.
+
+    Whatever ends it, all that came before is in the file.
+
+    Args:
+        stream: the chunks.
+        file: where they go, unbuffered: what a full disk refused must not come later.
+        limit: at most so many bytes; those that go beyond are not written.
+        accepted: the limit in words.
+        digest: fed with all that is written.
+
+    Returns:
+        how many bytes came.
+
+    Raises:
+        TooLarge, StorageFull: as their names say.
+    """
+    size, batch, behind = 0, bytearray(), _Behind(file, digest)
+    try:
+        try:
+            async for chunk in stream:
+                if size + len(chunk) > limit:
+                    raise TooLarge("body", f"more than {limit} bytes", accepted)
+                size += len(chunk)
+                batch += chunk
+                if len(batch) >= BATCH_BYTES:
+                    await behind.write(bytes(batch))
+                    batch.clear()
+        finally:
+            # After a write that failed, what follows would stand in the wrong place.
+            if not behind.failed:
+                await behind.write(bytes(batch))
+                await behind.end()
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             raise StorageFull(
                 "body", f"no space after {size} bytes", "a smaller file, or a larger disk"
             ) from error
         raise
-    finally:
-        await run_in_threadpool(file.close)
-    return Received(size, digest.hexdigest())
+    return size
 
 
-def _write(file: IO[bytes], batch: bytes, digest: hashlib._Hash) -> None:
-    digest.update(batch)
-    file.write(batch)
-    file.flush()
+class _Behind:
+    """Writes a batch in a thread while the next one comes.
 
+    Attributes:
+        failed: whether a write has; nothing more may be written then.
+    """
 
-def _too_large(found: str, limit: int) -> TooLarge:
-    return TooLarge("body", found, f"at most {limit} bytes (BENTRAY_MAX_UPLOAD_BYTES)")
+    def __init__(self, file: FileIO, digest: hashlib._Hash | None) -> None:
+        self._file = file
+        self._digest = digest
+        self._running: asyncio.Task[None] | None = None
+        self._unsynced = 0
+        self.failed = False
+
+    async def write(self, batch: bytes) -> None:
+        """Begin to write, once the batch before is written."""
+        await self._settle()
+        self._running = asyncio.create_task(run_in_threadpool(self._write, batch))
+
+    async def end(self) -> None:
+        """See all of it on the disk."""
+        await self._settle()
+        await run_in_threadpool(os.fdatasync, self._file.fileno())
+
+    async def _settle(self) -> None:
+        if self._running is not None:
+            running, self._running = self._running, None
+            try:
+                await running
+            except BaseException:
+                self.failed = True
+                raise
+
+    def _write(self, batch: bytes) -> None:
+        if self._digest is not None:
+            self._digest.update(batch)
+        left = memoryview(batch)
+        while left:
+            left = left[self._file.write(left) :]
+        self._unsynced += len(batch)
+        if self._unsynced >= SYNC_BYTES:
+            os.fdatasync(self._file.fileno())
+            self._unsynced = 0

@@ -1,0 +1,50 @@
+"""Bodies that hardly come are broken off: a slow or vanished client must not hold a file open for ever."""
+
+from __future__ import annotations
+
+import asyncio
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from ..refusals import TooSlow
+
+# So many bytes must come in the time allowed, or the rest of the body.
+LEAST_BYTES = 64 * 1024
+
+
+class Pace:
+    """ASGI middleware: of every body, ``LEAST_BYTES`` or the end must come in each ``seconds``.
+
+    Otherwise whoever reads the body gets :class:`TooSlow`.
+    """
+
+    def __init__(self, app: ASGIApp, seconds: float) -> None:
+        self.app = app
+        self._seconds = seconds
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        clock = asyncio.get_running_loop().time
+        due, came, ended = clock() + self._seconds, 0, False
+
+        async def receive_in_time() -> Message:
+            nonlocal due, came, ended
+            if ended:
+                # What is waited for now is that the client leaves.
+                return await receive()
+            try:
+                async with asyncio.timeout_at(due):
+                    message = await receive()
+            except TimeoutError:
+                found = f"{came} bytes in {self._seconds:g} s"
+                accepted = f"at least {LEAST_BYTES} bytes in {self._seconds:g} s (BENTRAY_UPLOAD_PATIENCE_S)"
+                raise TooSlow("body", found, accepted) from None
+            came += len(message.get("body", b""))
+            ended = not message.get("more_body", False)
+            if came >= LEAST_BYTES:
+                due, came = clock() + self._seconds, 0
+            return message
+
+        await self.app(scope, receive_in_time, send)

@@ -1,0 +1,87 @@
+"""Appending a piece: what came stays, with a checksum all of it or nothing, and one writer at a time."""
+
+import asyncio
+import base64
+import hashlib
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.ingest.append import Checksum, Hold, append
+from bentray_service.refusals import Locked, TooLarge, UnknownChecksum, WrongChecksum
+
+BEGIN = b"begin "
+
+
+def checksum(algorithm, body):
+    digest = base64.b64encode(hashlib.new(algorithm, body).digest()).decode()
+    return Checksum.of(f"{algorithm} {digest}")
+
+
+async def stream(chunks, error):
+    for chunk in chunks:
+        yield chunk
+    if error is not None:
+        raise error
+
+
+def run(path, *chunks, error=None, length=100, expected=None):
+    if not path.exists():
+        path.write_bytes(BEGIN)
+    return asyncio.run(append(stream(chunks, error), path, len(BEGIN), length, expected))
+
+
+@pytest.mark.parametrize("algorithm", [None, "sha256", "sha1", "md5"])
+def test_a_piece_is_appended(tmp_path, algorithm):
+    expected = None if algorithm is None else checksum(algorithm, b"middleend")
+    assert run(tmp_path / "u", b"middle", b"end", expected=expected) == 15
+    assert (tmp_path / "u").read_bytes() == b"begin middleend"
+
+
+def test_a_wrong_checksum_takes_the_piece_back(tmp_path):
+    with pytest.raises(WrongChecksum, match="sha256"):
+        run(tmp_path / "u", b"middle", expected=checksum("sha256", b"muddle"))
+    assert (tmp_path / "u").read_bytes() == BEGIN
+
+
+def test_what_came_before_the_client_went_stays_unless_it_cannot_be_checked(tmp_path):
+    for name, expected, left in (
+        ("plain", None, b"begin middle"),
+        ("checked", checksum("md5", b"middleend"), BEGIN),
+    ):
+        with pytest.raises(ConnectionError):
+            run(tmp_path / name, b"middle", error=ConnectionError(), expected=expected)
+        assert (tmp_path / name).read_bytes() == left
+
+
+def test_more_than_the_length_is_refused(tmp_path):
+    with pytest.raises(TooLarge, match="Upload-Length of 10"):
+        run(tmp_path / "u", b"123", b"45", length=10)
+    assert (tmp_path / "u").read_bytes() == b"begin 123"
+
+
+@pytest.mark.parametrize(
+    ("header", "error"),
+    [
+        ("crc32 AAAA", UnknownChecksum),
+        ("", UnknownChecksum),
+        ("sha1", InvalidInput),
+        ("sha1 AAAA", InvalidInput),
+        ("sha1 ÄÖÜ", InvalidInput),
+        ("md5 " + "A" * 1000, InvalidInput),
+    ],
+)
+def test_what_is_no_checksum_is_refused(header, error):
+    with pytest.raises(error) as refused:
+        Checksum.of(header)
+    assert refused.value.field == "Upload-Checksum"
+
+
+def test_one_writer_at_a_time_also_after_a_failure():
+    hold = Hold()
+    with pytest.raises(ZeroDivisionError), hold("a"), hold("b"):
+        with pytest.raises(Locked, match="one at a time"), hold("a"):
+            raise AssertionError
+        _ = 1 / 0
+    with hold("a"), hold("b"):
+        pass
