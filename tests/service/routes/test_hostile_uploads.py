@@ -1,0 +1,67 @@
+"""Hostile files over HTTP: a problem each, the same process afterwards, and nothing left of them."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import psutil
+import pytest
+
+from bentray_workers.dataset_file import write_dataset
+
+from ...workers.datasets import small
+from ..ingest import hostile_datasets, hostile_meshes, hostile_volumes
+from ..ingest.damage import damaged
+
+STREAM = {"Content-Type": "application/octet-stream"}
+# Resident memory that the service may gain while it refuses some dozens of files.
+MOST_GROWN = 100 * 2**20
+
+SCANS = (
+    "external storage",
+    "virtual",
+    "external link",
+    "records",
+    "terabytes",
+    "16 GiB of zeros",
+    "zstandard",
+)
+VOLUMES = ("pickled objects", "a file beside it", "absurd sizes", "absurd dims", "a bomb")
+MESHES = ("a buffer in a file", "billions of binary vertices", "a deep scene", "a long chunk")
+
+
+@pytest.fixture
+def hostile(tmp_path):
+    """(path of the route, content) of each."""
+    write_dataset(tmp_path / "sound.h5", small())
+    sound = (tmp_path / "sound.h5").read_bytes()
+    scans = hostile_datasets.files(sound, tmp_path, SCANS)
+    found = [("/v1/datasets", path.read_bytes()) for path in scans.values()]
+    found += [("/v1/datasets", content) for _, content in damaged(sound, flips=0, cuts=4, losses=3, seed=2)]
+    found += [("/v1/volumes", hostile_volumes.REFUSED[name][0]) for name in VOLUMES]
+    return found + [("/v1/meshes", hostile_meshes.REFUSED[name][0]) for name in MESHES]
+
+
+@pytest.mark.slow
+def test_nothing_is_left_of_a_hostile_file(start, hostile):
+    http = start(ingest_seconds=60.0)
+    here = psutil.Process(os.getpid())
+    before, children = here.memory_info().rss, set(here.children())
+    with ThreadPoolExecutor(2) as pool:
+        answers = list(pool.map(lambda one: http.post(one[0], content=one[1], headers=STREAM), hostile))
+    assert len(answers) >= 20
+    for answer in answers:
+        body = answer.json()
+        assert answer.status_code in (413, 415, 422), body
+        assert answer.headers["content-type"] == "application/problem+json"
+        assert body["field"]
+        assert body["found"]
+        assert body["accepted"]
+    assert http.get("/health/live").status_code == 200
+    assert here.memory_info().rss - before < MOST_GROWN
+    assert set(here.children()) <= children
+    root = http.app.state.parts.files.root
+    for folder in ("incoming", "datasets", "volumes", "meshes", "scratch"):
+        assert not list((root / folder).iterdir()), folder
+    assert http.get("/v1/datasets").json() == {"datasets": []}
+    assert http.get("/v1/volumes").json() == {"volumes": []}
+    assert http.get("/v1/meshes").json() == {"meshes": []}
