@@ -1,4 +1,4 @@
-"""First motion in one trace at a time: AIC and threshold onsets, and their match with the water pulse.
+"""First motion in one trace at a time: noise, the first strong swing, AIC and threshold onsets.
 
 Traces are (nt,) in any unit; places and lengths are in samples and may be fractions. Nothing here
 depends on the unit of a trace, so per-trace scales are not needed.
@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import kernel
+from .between_samples import vertex
 
 Trace = NDArray[Any]
-
-AIC, THRESHOLD = 0, 1
 
 # Fewest samples before the arrival that tell the noise.
 LEAD = 16
@@ -126,69 +125,3 @@ def threshold(x: Trace, begin: int, end: int, noise: float) -> float:
             low = abs(x[i - 1])
             return float(i - 1 + (height - low) / (abs(x[i]) - low))
     return np.nan
-
-
-@kernel
-def onset(x: Trace, begin: int, end: int, period: float, noise: float, picker: int) -> tuple[float, int]:
-    """Onset of the first arrival in ``x[begin:end]`` and the place of its largest swing; NaN, −1 if none."""
-    strong = first_strong(x, begin, end, period, noise)
-    if strong < 0:
-        return np.nan, -1
-    if picker == AIC:
-        # A little past the swing, or its part of the window is too short for a variance.
-        return aic(x, begin, min(strong + 1 + math.ceil(0.25 * period), end)), strong
-    return threshold(x, begin, strong + 1, noise), strong
-
-
-@kernel
-def match(
-    water: Trace, object_: Trace, begin: int, end: int, shift: float, reach: float
-) -> tuple[float, float]:
-    """Delay, near ``shift``, at which ``water[begin:end]`` best resembles the object trace, and how well.
-
-    The likeness is the normalised correlation Σwo/√(Σw²Σo²) of equally long pieces, so a weaker pulse
-    counts as much; a cosine through the best three gives the fraction of a sample. NaN when the best lies at
-    the rim of ``shift ± reach`` or outside the trace.
-    """
-    first = math.floor(shift - reach) - 1
-    count = math.ceil(shift + reach) + 1 - first + 1
-    likeness = np.full(count, -2.0)
-    power = 0.0
-    for i in range(begin, end):
-        power += water[i] * water[i]
-    for k in range(count):
-        lag = first + k
-        if begin + lag >= 0 and end + lag <= object_.size:
-            both = 0.0
-            other = 0.0
-            for i in range(begin, end):
-                both += water[i] * object_[i + lag]
-                other += object_[i + lag] * object_[i + lag]
-            if other > 0.0 and power > 0.0:
-                likeness[k] = both / math.sqrt(power * other)
-    best = int(np.argmax(likeness))
-    if best == 0 or best == count - 1 or likeness[best - 1] < -1.5 or likeness[best + 1] < -1.5:
-        return np.nan, 0.0
-    part, height = crest(likeness[best - 1], likeness[best], likeness[best + 1])
-    return first + best + part, min(height, 1.0)
-
-
-@kernel(inline="always")
-def vertex(left: float, middle: float, right: float) -> float:
-    """Place of the extremum of the parabola through (−1, left), (0, middle), (1, right)."""
-    bend = left - 2.0 * middle + right
-    return 0.5 * (left - right) / bend if bend != 0.0 and math.isfinite(bend) else 0.0
-
-
-@kernel(inline="always")
-def crest(left: float, middle: float, right: float) -> tuple[float, float]:
-    """Place and height of the crest of the cosine through (−1, left), (0, middle), (1, right).
-
-    The likeness of a pulse with itself is a cosine near its crest; at few samples a period a parabola
-    would miss the height, and a true copy would look unlike by its sampling alone.
-    """
-    turn = math.acos(min(max((left + right) / (2.0 * middle), -1.0), 1.0))
-    if turn < 1e-9:
-        return 0.0, middle
-    phase = math.atan2(right - left, 2.0 * middle * math.sin(turn))
-    return phase / turn, middle / math.cos(phase)

@@ -9,22 +9,26 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InvalidInput
+from . import rules
 from .consistency import consistent
-from .dataset import Dataset, Floats, Waveform
+from .dataset import Dataset, Floats
 from .differential import emission
-from .onset import AIC, THRESHOLD
+from .pickers import PICKERS, Picker, picker_named
+from .pulse import Inverse
 
-PICKERS = {"aic": AIC, "threshold": THRESHOLD}
+__all__ = ["PICKERS", "pick"]
 
 # Standard deviation of rounding to whole numbers.
 ROUNDING = 1.0 / math.sqrt(12.0)
 
-# A delay is not known better than this part of a sample, whatever the noise.
-FINEST = 0.02
-
 
 def pick(
-    dataset: Dataset, picker: str = "aic", progress: Callable[[int, int], None] | None = None
+    dataset: Dataset,
+    picker: str = "aic",
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    predicted_s: Floats | None = None,
+    reach_s: float | None = None,
 ) -> Dataset:
     """Read the travel times of a scan from its traces.
 
@@ -33,16 +37,19 @@ def pick(
     water's speed, the object onset where speeds from 1300 to 1700 m/s put it. The delay between the two
     is then refined: the first one and a half periods of the water pulse are correlated with the object
     trace, to a fraction of a sample. Pairs are left out (NaN) that are nearer than two wavelengths, have
-    no pulse above five times the noise, do not resemble the water pulse, or contradict their neighbours
+    no pulse above four times the noise, do not resemble the water pulse, or contradict their neighbours
     or their own reverse by more than half a period.
 
-    The standard deviation is sqrt(1 − ρ²) / (2π f ρ), with ρ the likeness and f the centre frequency:
-    what differs from the water pulse is counted as noise at that frequency.
+    The standard deviation counts the measured noise as averaged over the pulse, and all else that object and
+    water pulse differ in as pulling one way, at the centre frequency; see ``match.spread``.
 
     Args:
         dataset: with traces of object and water, a sampling rate and a centre frequency.
-        picker: ``aic`` or ``threshold``: what finds the onset.
+        picker: what finds the onset, see ``pickers.PICKERS``.
         progress: called with (emissions done, emissions in all).
+        predicted_s: (…, ntx, nrx), s: object minus water as a model has it; the object's window is then
+            about it and not where plausible speeds put it. NaN where the model says nothing.
+        reach_s: how far from the prediction a pick may lie, s; None: a period.
 
     Returns:
         The dataset with ``delta_tof_s``, ``sigma_s`` and ``picker`` set, and without its traces and any
@@ -51,8 +58,39 @@ def pick(
     Raises:
         InvalidInput: for an unknown picker, or a dataset that lacks one of the above.
     """
-    if picker not in PICKERS:
-        raise InvalidInput("picker", repr(picker), "one of " + ", ".join(PICKERS))
+    chosen = picker_named(picker)
+    require_traces(dataset)
+    assert dataset.center_frequency_hz is not None
+    ntx, nz = len(dataset.tx), dataset.slices
+    delta = np.empty((nz, ntx, len(dataset.rx)))
+    sigma = np.empty_like(delta)
+    predicted = _predictions(dataset, predicted_s)
+    reach = 1.0 / dataset.center_frequency_hz if reach_s is None else reach_s
+    if not 0.0 < reach < math.inf:
+        raise InvalidInput("reach_s", reach_s, "a finite time > 0 s")
+    for k in range(nz):
+        one = dataset.slice(k)
+        inverse = Inverse.of(one) if chosen.filtered else None
+        for e in range(ntx):
+            _pick_emission(one, e, chosen, inverse, predicted[k, e], reach, delta[k, e], sigma[k, e])
+            if progress is not None:
+                progress(k * ntx + e + 1, nz * ntx)
+        if one.valid is not None:
+            delta[k][~one.valid] = np.nan
+        delta[k][dataset.tx[:, None] == dataset.rx[None, :]] = np.nan
+        delta[k] = consistent(one, delta[k], 0.5 / dataset.center_frequency_hz)
+    sigma = np.where(np.isfinite(delta), sigma, np.nan)
+    if dataset.slice_z_m is None:
+        delta, sigma = delta[0], sigma[0]
+    return replace(dataset, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=picker, waveform=None)
+
+
+def require_traces(dataset: Dataset) -> None:
+    """What picking needs is there.
+
+    Raises:
+        InvalidInput: naming what is not.
+    """
     if dataset.waveform is None:
         raise InvalidInput("waveform/object", "no traces", "traces to pick from")
     if dataset.waveform.water is None:
@@ -61,52 +99,50 @@ def pick(
         raise InvalidInput(
             "acquisition@center_frequency_hz", "nothing", "the centre frequency of the pulse, Hz"
         )
-    ntx, nz = len(dataset.tx), dataset.slices
-    delta = np.empty((nz, ntx, len(dataset.rx)))
-    likeness = np.empty_like(delta)
-    for k in range(nz):
-        one = dataset.slice(k)
-        assert one.waveform is not None
-        for e in range(ntx):
-            _pick_emission(one, one.waveform, e, PICKERS[picker], delta[k, e], likeness[k, e])
-            if progress is not None:
-                progress(k * ntx + e + 1, nz * ntx)
-        if one.valid is not None:
-            delta[k][~one.valid] = np.nan
-        delta[k][dataset.tx[:, None] == dataset.rx[None, :]] = np.nan
-        delta[k] = consistent(one, delta[k], 0.5 / dataset.center_frequency_hz)
-    sigma = _sigma(delta, likeness, dataset)
-    if dataset.slice_z_m is None:
-        delta, sigma = delta[0], sigma[0]
-    return replace(dataset, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=picker, waveform=None)
+
+
+def _predictions(dataset: Dataset, predicted_s: Floats | None) -> Floats:
+    """(nz, ntx, nrx), s; NaN without a model."""
+    shape = (dataset.slices, len(dataset.tx), len(dataset.rx))
+    if predicted_s is None:
+        return np.full(shape, np.nan)
+    rules.shape("predicted_s", predicted_s, shape if dataset.slice_z_m is not None else shape[1:])
+    return np.asarray(predicted_s, dtype=np.float64).reshape(shape)
 
 
 def _pick_emission(
-    dataset: Dataset, traces: Waveform, e: int, picker: int, delta: Floats, likeness: Floats
+    dataset: Dataset,
+    e: int,
+    picker: Picker,
+    inverse: Inverse | None,
+    predicted: Floats,
+    reach: float,
+    delta: Floats,
+    sigma: Floats,
 ) -> None:
+    traces = dataset.waveform
+    assert traces is not None
     assert traces.water is not None
     assert dataset.sampling_rate_hz is not None
     assert dataset.center_frequency_hz is not None
-    emitter = dataset.element_position_m[dataset.tx[e]]
+    rounding = ROUNDING if traces.object.dtype.kind == "i" else 0.0
+    object_, water = (np.ascontiguousarray(t[e]) for t in (traces.object, traces.water))
+    if inverse is not None:
+        object_, water, rounding = inverse(object_), inverse(water), inverse.gain * rounding
     emission(
-        np.ascontiguousarray(traces.object[e]),
-        np.ascontiguousarray(traces.water[e]),
-        np.linalg.norm(dataset.element_position_m[dataset.rx] - emitter, axis=1),
+        object_,
+        water,
+        np.linalg.norm(
+            dataset.element_position_m[dataset.rx] - dataset.element_position_m[dataset.tx[e]], axis=1
+        ),
         float(dataset.water_speed_mps),
         float(dataset.sampling_rate_hz),
         float(dataset.t0_s),
         float(dataset.center_frequency_hz),
-        ROUNDING if traces.object.dtype.kind == "i" else 0.0,
-        picker,
+        rounding,
+        picker.code,
+        predicted,
+        reach,
         delta,
-        likeness,
+        sigma,
     )
-
-
-def _sigma(delta: Floats, likeness: Floats, dataset: Dataset) -> Floats:
-    """Standard deviation of the picks, s; NaN where there is none."""
-    assert dataset.center_frequency_hz is not None
-    assert dataset.sampling_rate_hz is not None
-    same = np.where(np.isfinite(delta), np.minimum(likeness, 1.0), np.nan)
-    spread = np.sqrt(1.0 - same**2) / (2.0 * np.pi * dataset.center_frequency_hz * same)
-    return np.hypot(spread, FINEST / dataset.sampling_rate_hz)

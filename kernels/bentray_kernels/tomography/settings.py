@@ -6,6 +6,7 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal
 
+from ..acquisition import PICKERS
 from ..acquisition.dataset import PLAUSIBLE_SPEED_MPS
 from ..eikonal import methods
 from ..errors import InvalidInput
@@ -19,7 +20,6 @@ DEVIATION = "deviation"
 DECOMPOSITIONS = ("slices", "volume")
 PENALTIES = ("total-variation", "laplacian", "tikhonov")
 SPEED_UPDATES = ("fixed", "data-driven")
-PICKERS = ("aic", "threshold")
 LEAST_NODES = 16
 
 
@@ -108,7 +108,7 @@ class Settings:
     huber_spreads: float = 3.0
     roi: bool = False
     reciprocity: bool = True
-    picker: Literal["aic", "threshold"] = "aic"
+    picker: Literal["aic", "threshold", "energy-ratio", "sta-lta", "correlation", "matched"] = "aic"
     attenuation: bool = True
     focusing: bool = False
     resolution_check: bool = False
@@ -118,7 +118,7 @@ class Settings:
         _one_of("rays", self.rays, RAYS)
         _one_of("eikonal", self.eikonal, (DEVIATION, *methods()))
         _one_of("speed_update", self.speed_update, SPEED_UPDATES)
-        _one_of("picker", self.picker, PICKERS)
+        _one_of("picker", self.picker, tuple(PICKERS))
         _one_of("decomposition", self.decomposition, DECOMPOSITIONS)
         _one_of("penalty", self.penalty, PENALTIES)
         _speeds("speed_bounds_mps", self.speed_bounds_mps)

@@ -68,7 +68,12 @@ OPTIONS = {
     "penalty_strength": Option(
         "--penalty-strength", float, "0.3", "Of gauss-newton's penalty, over the misfit; 0 is none."
     ),
-    "picker": Option("--picker", str, "aic", "How times are read from raw traces: aic or threshold."),
+    "picker": Option(
+        "--picker",
+        str,
+        "aic",
+        "How times are read from raw traces: aic, threshold, energy-ratio, sta-lta, correlation or matched.",
+    ),
 }
 SET = typer.Option(
     "--set", metavar="NAME=VALUE", help="Any setting by its name, as coarser_grids=2; may be repeated."

@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.acquisition.differential import LEAST_LIKENESS
-from bentray_kernels.acquisition.onset import AIC, THRESHOLD, aic, match, onset, prepare, threshold
+from bentray_kernels.acquisition.match import match
+from bentray_kernels.acquisition.onset import aic, prepare, threshold
+from bentray_kernels.acquisition.pickers import AIC, ENERGY_RATIO, STA_LTA, THRESHOLD, onset
 
 from .traces import ricker
 
@@ -34,7 +36,7 @@ def test_the_match_refuses_what_lies_beyond_its_reach():
     assert likeness < LEAST_LIKENESS
 
 
-@pytest.mark.parametrize("picker", [AIC, THRESHOLD])
+@pytest.mark.parametrize("picker", [AIC, THRESHOLD, ENERGY_RATIO, STA_LTA])
 @given(shift=st.floats(0.0, 40.0))
 @settings(max_examples=30, deadline=None)
 def test_an_onset_moves_with_the_pulse(picker, shift):
@@ -44,14 +46,14 @@ def test_an_onset_moves_with_the_pulse(picker, shift):
     assert strong == pytest.approx(90.0 + shift, abs=1.0)
 
 
-@pytest.mark.parametrize("picker", [AIC, THRESHOLD])
+@pytest.mark.parametrize("picker", [AIC, THRESHOLD, ENERGY_RATIO, STA_LTA])
 def test_a_later_stronger_pulse_does_not_hide_the_first(picker):
     alone, _ = onset(trace(60.0), 20, 180, PERIOD, 0.0, picker)
     both, _ = onset(trace(60.0) + 1.6 * trace(120.0), 20, 180, PERIOD, 0.0, picker)
     assert both == pytest.approx(alone, abs=1.5)
 
 
-@pytest.mark.parametrize("picker", [AIC, THRESHOLD])
+@pytest.mark.parametrize("picker", [AIC, THRESHOLD, ENERGY_RATIO, STA_LTA])
 def test_silence_has_no_onset(picker):
     found, strong = onset(np.zeros(100), 10, 90, PERIOD, 0.0, picker)
     assert np.isnan(found)
