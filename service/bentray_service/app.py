@@ -36,6 +36,7 @@ from .storage.files import Files, lock
 from .storage.geometry_fields import GeometryFields
 from .storage.jobs import Jobs
 from .storage.meshes import Meshes
+from .storage.queue import Queue
 from .storage.volumes import Volumes
 from .web.headers import SecurityHeaders
 from .wiring import Parts
@@ -93,6 +94,7 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
     files = Files(settings.data_dir)
     files.prepare()
     stack.enter_context(lock(files.root))
+    files.give_to_local()
     files.drop_leftovers()
     database = open_database(settings.database)
     stack.callback(database.close)
@@ -107,9 +109,9 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
                 tls=settings.tls_dir,
             )
         )
-    store, compute = Jobs(database), Compute(cluster)
+    queue, compute = Queue(database), Compute(cluster)
     runner = Runner(
-        store,
+        queue,
         files,
         compute,
         settings.jobs_at_once,
@@ -124,7 +126,8 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
         database=database,
         files=files,
         datasets=Datasets(database),
-        jobs=store,
+        jobs=Jobs(database),
+        queue=queue,
         volumes=Volumes(database),
         meshes=Meshes(database),
         geometry_fields=GeometryFields(database),

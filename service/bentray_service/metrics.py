@@ -116,7 +116,7 @@ class _Parts(Collector):
         parts = self._parts
         waiting = GaugeMetricFamily("bentray_jobs", "Jobs by state.", labels=["state"])
         try:
-            counts, oldest = parts.jobs.load()
+            counts, oldest = parts.queue.load()
         except SQLAlchemyError:
             pass
         else:

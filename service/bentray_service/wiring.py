@@ -16,6 +16,8 @@ from .storage.files import Files
 from .storage.geometry_fields import GeometryFields
 from .storage.jobs import Jobs
 from .storage.meshes import Meshes
+from .storage.queue import Queue
+from .storage.tenants import LOCAL, Tenant
 from .storage.volumes import Volumes
 
 
@@ -28,6 +30,7 @@ class Parts:
     files: Files
     datasets: Datasets
     jobs: Jobs
+    queue: Queue
     volumes: Volumes
     meshes: Meshes
     geometry_fields: GeometryFields
@@ -39,4 +42,10 @@ def _parts(request: Request) -> Parts:
     return cast(Parts, request.app.state.parts)
 
 
+def _tenant() -> Tenant:
+    return LOCAL
+
+
 Service = Annotated[Parts, Depends(_parts)]
+# Whose request it is; every query takes it.
+CallerTenant = Annotated[Tenant, Depends(_tenant)]

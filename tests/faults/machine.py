@@ -46,6 +46,7 @@ class Machine:
         environment: of the service, beside where its parts are.
 
     Attributes:
+        data: the data folder; files: of its tenant in there.
         host: the address of the scheduler.
     """
 
@@ -53,6 +54,7 @@ class Machine:
 
     def __init__(self, folder: Path, workers: int = 2, **environment: str) -> None:
         self.data = folder / "data"
+        self.files = self.data / "tenants" / "local"
         self._folder = folder
         self._workers = workers
         self._scheduler_port, self._service_port = free_port(), free_port()

@@ -15,7 +15,7 @@ PLAN = {"nodes": 64, "attenuation": False, "method": "sart", "sweeps": 200}
 
 def test_the_newest_checkpoint_is_flipped_while_the_service_is_dead(machine, scan, scan_file):
     job = machine.submit(machine.upload(scan_file), **PLAN)
-    folder = machine.data / "work" / job / "checkpoints"
+    folder = machine.files / "work" / job / "checkpoints"
     wait_until(lambda: len(list(folder.glob("*.npz"))) == 2)
     machine.kill("service")
     older, newest = sorted(folder.glob("*.npz"))
@@ -25,7 +25,7 @@ def test_the_newest_checkpoint_is_flipped_while_the_service_is_dead(machine, sca
     machine.start("service")
     assert machine.ended(job)["state"] == "succeeded"
     assert f"{newest.name} is passed over" in (machine.data.parent / "service.log").read_text()
-    found = read_reconstruction(machine.data / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
+    found = read_reconstruction(machine.files / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
     assert np.array_equal(found.speed, reconstruct(scan, Settings(**PLAN)).speed)
     assert older.parent == folder
     wait_until(lambda: not folder.exists())

@@ -73,7 +73,7 @@ def test_a_cable_that_is_cut_for_a_while(tmp_path, away, scan, scan_file):
         assert machine.job(job)["state"] in ("running", "queued")
         ip("link", "set", cable, "up")
         assert machine.ended(job)["state"] == "succeeded"
-        found = read_reconstruction(machine.data / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
+        found = read_reconstruction(machine.files / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
         assert np.array_equal(found.speed, reconstruct(scan, Settings(**PLAN)).speed)
     finally:
         machine.close()

@@ -39,7 +39,7 @@ def test_a_job_waits_for_room(tmp_path, small_disk, scan, scan_file):
         machine.wait_ready()
         dataset = machine.upload(scan_file)
         job = machine.submit(dataset, **PLAN)
-        wait_until(lambda: list(small_disk.glob(f"work/{job}/checkpoints/*.npz")))
+        wait_until(lambda: list(small_disk.glob(f"tenants/local/work/{job}/checkpoints/*.npz")))
         filler = small_disk / "filler"
         with contextlib.suppress(OSError), filler.open("wb", buffering=0) as file:
             while file.write(b"\0" * 4096):
@@ -49,7 +49,9 @@ def test_a_job_waits_for_room(tmp_path, small_disk, scan, scan_file):
         wait_until(lambda: "waits for room" in (tmp_path / "service.log").read_text())
         filler.unlink()
         assert machine.ended(job)["state"] == "succeeded"
-        found = read_reconstruction(small_disk / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
+        found = read_reconstruction(
+            small_disk / "tenants/local/volumes" / f"vol-{job.removeprefix('job-')}.h5"
+        )
         assert np.array_equal(found.speed, reconstruct(scan, Settings(**PLAN)).speed)
         with sqlite3.connect(small_disk / "bentray.sqlite") as database:
             notes = [note for (note,) in database.execute("SELECT note FROM events ORDER BY number")]

@@ -52,13 +52,13 @@ def test_whatever_is_killed_nothing_is_lost(machine, scan, scan_file):
                     assert begun_at(machine, job) >= done - lost * ELEMENTS, (job, before)
     for job, plan in jobs.items():
         assert machine.ended(job)["state"] == "succeeded"
-        found = read_reconstruction(machine.data / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
+        found = read_reconstruction(machine.files / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
         expected = reconstruct(scan, Settings(**plan))
         assert np.array_equal(found.speed, expected.speed)
         assert found.history == expected.history
     volumes = machine.http.get("/v1/volumes").json()["volumes"]
-    assert len(volumes) == len(list((machine.data / "volumes").iterdir())) == len(jobs)
-    wait_until(lambda: not list((machine.data / "work").iterdir()))
+    assert len(volumes) == len(list((machine.files / "volumes").iterdir())) == len(jobs)
+    wait_until(lambda: not list((machine.files / "work").iterdir()))
     attempts = sum(attempts_of(machine, job) for job in jobs)
     # Two jobs run at once, and nearly every kill but a worker's, which Dask makes good, tore one.
     assert attempts > len(jobs) + targets.count("service")

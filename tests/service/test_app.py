@@ -20,6 +20,7 @@ from bentray_service.app import create_app
 from bentray_service.settings import ServiceSettings
 from bentray_service.storage import schema
 from bentray_service.storage.ids import new_id
+from bentray_service.storage.tenants import LOCAL
 from bentray_workers.cluster import open_cluster
 
 
@@ -72,7 +73,7 @@ def test_clean_stop_puts_a_running_job_back(tmp_path, cluster, uploaded, submitt
     app = create_app(settings, cluster)
     with TestClient(app) as http:
         assert until(http, job["id"])["state"] == "succeeded"
-        states = [event["state"] for event in app.state.parts.jobs.events(job["id"])]
+        states = [event["state"] for event in app.state.parts.jobs.events(LOCAL, job["id"])]
     assert states == ["queued", "running", "queued", "running", "succeeded"]
     assert len(work.calls) == 2
 
@@ -107,7 +108,7 @@ def test_jobs_of_a_dead_process(tmp_path, cluster, uploaded, submitted, until, w
 
 
 def test_two_services_cannot_share_a_folder(start):
-    files = start("one").app.state.parts.files
+    files = start("one").app.state.parts.files.of(LOCAL)
     arriving = files.incoming(new_id("dataset"))
     arriving.write_bytes(b"half an upload")
     with pytest.raises(InvalidInput, match="another service is using"):

@@ -85,7 +85,7 @@ def test_a_database_that_is_away_leaves_the_rest(http, monkeypatch):
     def away():
         raise OperationalError("select", {}, Exception("gone"))
 
-    monkeypatch.setattr(http.app.state.parts.jobs, "load", away)
+    monkeypatch.setattr(http.app.state.parts.queue, "load", away)
     families = read(http)
     assert "bentray_jobs" not in families
     assert "bentray_workers" in families

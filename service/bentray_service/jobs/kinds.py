@@ -21,8 +21,8 @@ from bentray_workers.render_tasks import ClusterTasks
 from bentray_workers.turntable import PRIORITY, Turntable, turn
 
 from ..storage import schema
-from ..storage.files import Files
 from ..storage.ids import volume_of
+from ..storage.tenant_files import TenantFiles
 
 Row = dict[str, Any]
 
@@ -63,10 +63,10 @@ class Kind(Protocol):
     @property
     def table(self) -> str: ...
 
-    def source(self, files: Files, job: Row) -> Path:
+    def source(self, files: TenantFiles, job: Row) -> Path:
         """The file that the job reads."""
 
-    def target(self, files: Files, job: Row) -> Path:
+    def target(self, files: TenantFiles, job: Row) -> Path:
         """The file that it writes; fixed, so that a job which is run again writes the same one."""
 
     def run(self, task: Task) -> Row | None:
@@ -82,10 +82,10 @@ class ReconstructionKind:
     table = schema.volumes.name
     settings: TypeAdapter[Settings] = TypeAdapter(Settings)
 
-    def source(self, files: Files, job: Row) -> Path:
+    def source(self, files: TenantFiles, job: Row) -> Path:
         return files.dataset(job["dataset_id"])
 
-    def target(self, files: Files, job: Row) -> Path:
+    def target(self, files: TenantFiles, job: Row) -> Path:
         return files.volume(volume_of(job["id"]))
 
     def run(self, task: Task) -> Row | None:
@@ -106,10 +106,10 @@ class RefractionKind:
     table = schema.volumes.name
     settings: TypeAdapter[Turntable] = TypeAdapter(Turntable)
 
-    def source(self, files: Files, job: Row) -> Path:
+    def source(self, files: TenantFiles, job: Row) -> Path:
         return files.volume(job["volume_id"])
 
-    def target(self, files: Files, job: Row) -> Path:
+    def target(self, files: TenantFiles, job: Row) -> Path:
         return files.animation(job["id"], job["settings"]["format"])
 
     def run(self, task: Task) -> Row | None:
@@ -136,10 +136,10 @@ class GeometryFieldKind:
     table = schema.geometry_fields.name
     settings: TypeAdapter[FieldSettings] = TypeAdapter(FieldSettings)
 
-    def source(self, files: Files, job: Row) -> Path:
+    def source(self, files: TenantFiles, job: Row) -> Path:
         return files.mesh(job["mesh_id"])
 
-    def target(self, files: Files, job: Row) -> Path:
+    def target(self, files: TenantFiles, job: Row) -> Path:
         return files.field(job["field_id"])
 
     def run(self, task: Task) -> Row | None:

@@ -12,7 +12,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.tomography.result import Progress
 
-from ..storage.jobs import Jobs
+from ..storage.queue import Queue
 from .kinds import finite
 
 log = logging.getLogger("bentray.jobs")
@@ -29,12 +29,12 @@ class Reporter:
 
     def __init__(
         self,
-        jobs: Jobs,
+        queue: Queue,
         job_id: str,
         leaving: Callable[[], bool],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._jobs = jobs
+        self._queue = queue
         self._job_id = job_id
         self._leaving = leaving
         self._clock = clock
@@ -63,14 +63,14 @@ class Reporter:
         history: list[dict[str, Any]] = [
             {**asdict(sweep), "residual_rms_s": finite(sweep.residual_rms_s)} for sweep in kept.history
         ]
-        self._jobs.progress(self._job_id, kept.done, kept.total, history)
+        self._queue.progress(self._job_id, kept.done, kept.total, history)
         self._pending = None
 
     def saved(self) -> None:
         """Say once that the job has kept something to go on from."""
         if not self._further:
             try:
-                self._jobs.got_further(self._job_id)
+                self._queue.got_further(self._job_id)
                 self._further = True
             except SQLAlchemyError:
                 log.warning("that %s got further could not be stored", self._job_id, exc_info=True)
@@ -82,7 +82,7 @@ class Reporter:
         if self._clock() - self._asked >= INTERVAL_SECONDS:
             self._asked = self._clock()
             try:
-                told = self._jobs.told(self._job_id)
+                told = self._queue.told(self._job_id)
                 self.lost = told is None
                 self._stopped = told != "running"
             except SQLAlchemyError:

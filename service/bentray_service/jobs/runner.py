@@ -20,8 +20,10 @@ from bentray_workers.slices import Cancelled
 
 from ..compute import Compute
 from ..storage.files import Files
-from ..storage.jobs import LEASE_S, Jobs
+from ..storage.queue import LEASE_S, Queue
 from ..storage.schema import ENDED
+from ..storage.tenant_files import TenantFiles
+from ..storage.tenants import Tenant
 from .failures import CRASHED, explain
 from .kinds import KINDS, Kind, Task
 from .reporter import Reporter
@@ -55,12 +57,12 @@ class Runner:
     """
 
     def __init__(
-        self, jobs: Jobs, files: Files, compute: Compute, at_once: int, min_free_bytes: int, *, alone: bool
+        self, queue: Queue, files: Files, compute: Compute, at_once: int, min_free_bytes: int, *, alone: bool
     ) -> None:
         """Args:
         alone: whether no other service uses the database; see ``Jobs.recover``.
         """
-        self._jobs = jobs
+        self._queue = queue
         self._files = files
         self._compute = compute
         self._min_free_bytes = min_free_bytes
@@ -75,12 +77,12 @@ class Runner:
     def start(self) -> None:
         """Take up what a dead process left, then begin."""
         self._recover()
-        self._files.keep_work(self._jobs.unfinished())
+        self._files.keep_work(self._queue.unfinished())
         for thread in self._threads:
             thread.start()
 
     def _recover(self) -> None:
-        again = self._jobs.recover(CRASHED.model_dump(exclude_none=True), alone=self._alone)
+        again = self._queue.recover(CRASHED.model_dump(exclude_none=True), alone=self._alone)
         if again:
             log.warning("%d jobs of a service that died wait again", again)
             self.notify()
@@ -88,7 +90,7 @@ class Runner:
     def _keep_leases(self) -> None:
         while not self._leaving.wait(LEASE_CHECK_SECONDS):
             try:
-                self._jobs.renew()
+                self._queue.renew()
                 self._recover()
             except SQLAlchemyError:
                 log.exception("the leases could not be renewed")
@@ -117,7 +119,7 @@ class Runner:
     def _loop(self) -> None:
         while not self._leaving.is_set():
             try:
-                job = self._jobs.claim() if self._has_room() else None
+                job = self._queue.claim() if self._has_room() else None
                 if job is not None:
                     self._run(job)
                     continue
@@ -131,18 +133,18 @@ class Runner:
         return shutil.disk_usage(self._files.root).free >= self._min_free_bytes
 
     def _run(self, job: dict[str, Any]) -> None:
-        job_id = job["id"]
-        reporter = Reporter(self._jobs, job_id, self._leaving.is_set)
+        job_id, files = job["id"], self._files.of(Tenant(job["tenant"]))
+        reporter = Reporter(self._queue, job_id, self._leaving.is_set)
         kind = KINDS[job["kind"]]
-        target = kind.target(self._files, job)
+        target = kind.target(files, job)
         try:
             result = kind.run(
                 Task(
                     client=self._compute.client,
-                    source=kind.source(self._files, job),
+                    source=kind.source(files, job),
                     settings=job["settings"],
                     target=target,
-                    work_dir=self._files.work(job_id),
+                    work_dir=files.work(job_id),
                     on_progress=reporter.report,
                     on_saved=reporter.saved,
                     stop=reporter.stop,
@@ -150,50 +152,56 @@ class Runner:
             )
         except Cancelled:
             if not reporter.lost:
-                self._settle(lambda: self._stopped(job_id, reporter))
+                self._settle(lambda: self._stopped(job_id, files, reporter))
         except AWAY as error:
             log.warning("%s waits for its workers: %s", job_id, error)
             self._settle(
-                lambda: self._jobs.release(job_id, "the workers were away; it goes on when they are back")
+                lambda: self._queue.release(job_id, "the workers were away; it goes on when they are back")
             )
             self._leaving.wait(IDLE_SECONDS)
         except Exception as error:
             if isinstance(error, OSError) and error.errno in FULL and not self._has_room():
                 log.warning("%s waits for room on the disk", job_id)
                 self._settle(
-                    lambda: self._jobs.release(job_id, "the disk is full; it goes on once there is room")
+                    lambda: self._queue.release(job_id, "the disk is full; it goes on once there is room")
                 )
                 return
             problem = explain(job_id, error).model_dump(exclude_none=True)
-            self._settle(lambda: self._failed(job_id, reporter, problem))
+            self._settle(lambda: self._failed(job_id, files, reporter, problem))
         else:
-            self._settle(lambda: self._succeeded(job_id, reporter, kind, result, target))
+            self._settle(lambda: self._succeeded(job_id, files, reporter, kind, result, target))
 
-    def _stopped(self, job_id: str, reporter: Reporter) -> None:
+    def _stopped(self, job_id: str, files: TenantFiles, reporter: Reporter) -> None:
         reporter.flush()
         if self._leaving.is_set():
-            self._jobs.release(job_id, "the service was stopped")
+            self._queue.release(job_id, "the service was stopped")
         else:
-            self._jobs.cancelled(job_id)
-        if self._jobs.state(job_id) in ENDED:
-            self._files.drop_work(job_id)
+            self._queue.cancelled(job_id)
+        if self._queue.state(job_id) in ENDED:
+            files.drop_work(job_id)
 
-    def _failed(self, job_id: str, reporter: Reporter, problem: dict[str, Any]) -> None:
+    def _failed(self, job_id: str, files: TenantFiles, reporter: Reporter, problem: dict[str, Any]) -> None:
         reporter.flush()
-        self._jobs.fail(job_id, problem)
-        self._files.drop_work(job_id)
+        self._queue.fail(job_id, problem)
+        files.drop_work(job_id)
 
     def _succeeded(
-        self, job_id: str, reporter: Reporter, kind: Kind, result: dict[str, Any] | None, target: Path
+        self,
+        job_id: str,
+        files: TenantFiles,
+        reporter: Reporter,
+        kind: Kind,
+        result: dict[str, Any] | None,
+        target: Path,
     ) -> None:
         reporter.flush()
-        if not self._jobs.succeed(job_id, result, kind.table):
-            if self._jobs.told(job_id) is None:
+        if not self._queue.succeed(job_id, result, kind.table):
+            if self._queue.told(job_id) is None:
                 # Another service runs it by now, and writes the same file.
                 return
             kind.discard(target)
-            self._jobs.cancelled(job_id)
-        self._files.drop_work(job_id)
+            self._queue.cancelled(job_id)
+        files.drop_work(job_id)
 
     def _settle(self, write_the_end: Callable[[], None]) -> None:
         """Write the end of a job, as often as it takes: it would count as running for ever otherwise."""

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response, status
 
 from ..errors import described
 from ..storage.ids import new_id
-from ..wiring import Service
+from ..wiring import CallerTenant, Service
 from .bodies import only
 from .records import DatasetList, DatasetRecord, dataset_record
 from .uploads import body_of, take_in
@@ -25,25 +25,29 @@ router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
     openapi_extra=body_of("dataset", MEDIA_TYPES),
     responses=described(413, 415, 422, 507),
 )
-async def upload_dataset(request: Request, response: Response, service: Service) -> DatasetRecord:
+async def upload_dataset(
+    request: Request, response: Response, service: Service, tenant: CallerTenant
+) -> DatasetRecord:
     """Upload a scan. A process of its own reads it and stores it in canonical form, or says why not."""
     dataset_id = new_id("dataset")
 
     def store(size: int, sha256: str, summary: dict[str, Any]) -> dict[str, Any]:
-        return service.datasets.add(dataset_id, size=size, sha256=sha256, summary=summary)
+        return service.datasets.add(tenant, dataset_id, size=size, sha256=sha256, summary=summary)
 
-    record = dataset_record(await take_in(request, service, "dataset", dataset_id, store, {}))
+    record = dataset_record(await take_in(request, service, tenant, "dataset", dataset_id, store, {}))
     response.headers["Location"] = record.links["self"]
     return record
 
 
 @router.get("")
-def list_datasets(service: Service, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> DatasetList:
+def list_datasets(
+    service: Service, tenant: CallerTenant, limit: Annotated[int, Query(ge=1, le=1000)] = 100
+) -> DatasetList:
     """Datasets, newest first."""
-    return DatasetList(datasets=[dataset_record(row) for row in service.datasets.newest(limit)])
+    return DatasetList(datasets=[dataset_record(row) for row in service.datasets.newest(tenant, limit)])
 
 
 @router.get("/{dataset_id}", responses=described(404))
-def show_dataset(dataset_id: str, service: Service) -> DatasetRecord:
+def show_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> DatasetRecord:
     """One dataset."""
-    return dataset_record(service.datasets.get(dataset_id))
+    return dataset_record(service.datasets.get(tenant, dataset_id))

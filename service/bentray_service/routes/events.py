@@ -16,7 +16,8 @@ from starlette.concurrency import run_in_threadpool
 from ..errors import described
 from ..storage.jobs import Jobs
 from ..storage.schema import ENDED
-from ..wiring import Service
+from ..storage.tenants import Tenant
+from ..wiring import CallerTenant, Service
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
@@ -37,6 +38,7 @@ def job_events(
     job_id: str,
     request: Request,
     service: Service,
+    tenant: CallerTenant,
     last_event_id: Annotated[
         int, Header(ge=0, le=2**63 - 1, description="Only later events; a browser sends it by itself.")
     ] = 0,
@@ -46,20 +48,22 @@ def job_events(
     Events `state` are the changes of its state, each with an id that only grows; between them events
     `progress`, without an id, tell how far it is.
     """
-    service.jobs.get(job_id)
+    service.jobs.get(tenant, job_id)
     leaving = request.app.state.leaving
-    stream = _stream(service.jobs, job_id, last_event_id, leaving.is_set)
+    stream = _stream(service.jobs, tenant, job_id, last_event_id, leaving.is_set)
     return StreamingResponse(stream, media_type=MEDIA_TYPE, headers={"Cache-Control": "no-store"})
 
 
-async def _stream(jobs: Jobs, job_id: str, last: int, leaving: Callable[[], bool]) -> AsyncIterator[str]:
+async def _stream(
+    jobs: Jobs, tenant: Tenant, job_id: str, last: int, leaving: Callable[[], bool]
+) -> AsyncIterator[str]:
     told: dict[str, Any] = {}
     spoken = time.monotonic()
     while not leaving():
         # The job first: an event that comes in between is told next time, never left out at the end.
-        job = await run_in_threadpool(jobs.get, job_id)
+        job = await run_in_threadpool(jobs.get, tenant, job_id)
         said = []
-        for event in await run_in_threadpool(jobs.events, job_id, after=last):
+        for event in await run_in_threadpool(jobs.events, tenant, job_id, after=last):
             last = event["number"]
             at = datetime.fromtimestamp(event["time"], UTC).isoformat()
             said.append(_event("state", {"state": event["state"], "note": event["note"], "time": at}, last))

@@ -8,7 +8,8 @@ from fastapi import APIRouter, Query, Request, Response
 
 from ..asked_view import AskedFieldView
 from ..errors import described
-from ..wiring import Service
+from ..storage.tenants import Tenant
+from ..wiring import CallerTenant, Parts, Service
 from .pictures import PICTURE, picture
 from .surface_records import FieldList, FieldRecord, field_record
 
@@ -16,45 +17,49 @@ router = APIRouter(prefix="/v1/geometry-fields", tags=["geometry-fields"])
 
 
 @router.get("")
-def list_fields(service: Service, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> FieldList:
+def list_fields(
+    service: Service, tenant: CallerTenant, limit: Annotated[int, Query(ge=1, le=1000)] = 100
+) -> FieldList:
     """Geometry fields, newest first."""
-    rows = service.geometry_fields.newest(limit)
+    rows = service.geometry_fields.newest(tenant, limit)
     return FieldList(geometry_fields=[field_record(row) for row in rows])
 
 
 @router.get("/{field_id}", responses=described(404))
-def show_field(field_id: str, service: Service) -> FieldRecord:
+def show_field(field_id: str, service: Service, tenant: CallerTenant) -> FieldRecord:
     """One geometry field: its sizes, its errors and how long it took."""
-    return field_record(service.geometry_fields.get(field_id))
+    return field_record(service.geometry_fields.get(tenant, field_id))
 
 
 @router.head("/{field_id}/image.png", include_in_schema=False)
 @router.get("/{field_id}/image.png", response_class=Response, responses=PICTURE)
-def image_png(field_id: str, request: Request, service: Service, view: AskedFieldView) -> Response:
+def image_png(
+    field_id: str, request: Request, service: Service, tenant: CallerTenant, view: AskedFieldView
+) -> Response:
     """A scene with the mesh as mirror, glass or clay, its rays answered by the field, traced by a worker.
 
     HEAD gives the tag at once, without drawing, so Content-Length is absent.
     """
-    field = service.geometry_fields.get(field_id)
-    folder = service.files.field(field["id"])
+    field = service.geometry_fields.get(tenant, field_id)
+    folder = service.files.of(tenant).field(field["id"])
     return picture(request, field, view.plain(), lambda: service.compute.field_png(folder, view))
 
 
 @router.head("/{field_id}/geometry-image.png", include_in_schema=False)
 @router.get("/{field_id}/geometry-image.png", response_class=Response, responses=PICTURE)
-def geometry_image_png(field_id: str, request: Request, service: Service) -> Response:
+def geometry_image_png(field_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
     """The geometry image: places of the surface as colours, over its layout on the unit square."""
-    return _map(field_id, request, service, "positions")
+    return _map(field_id, request, service, tenant, "positions")
 
 
 @router.head("/{field_id}/normal-map.png", include_in_schema=False)
 @router.get("/{field_id}/normal-map.png", response_class=Response, responses=PICTURE)
-def normal_map_png(field_id: str, request: Request, service: Service) -> Response:
+def normal_map_png(field_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
     """The normal map: the same with the directions of the normals."""
-    return _map(field_id, request, service, "normals")
+    return _map(field_id, request, service, tenant, "normals")
 
 
-def _map(field_id: str, request: Request, service: Service, what: str) -> Response:
-    field = service.geometry_fields.get(field_id)
-    folder = service.files.field(field["id"])
+def _map(field_id: str, request: Request, service: Parts, tenant: Tenant, what: str) -> Response:
+    field = service.geometry_fields.get(tenant, field_id)
+    folder = service.files.of(tenant).field(field["id"])
     return picture(request, field, {"map": what}, lambda: service.compute.field_map_png(folder, what))

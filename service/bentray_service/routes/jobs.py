@@ -18,7 +18,7 @@ from ..asked_settings import known_only
 from ..errors import described
 from ..refusals import NoAnimation
 from ..storage.ids import field_of
-from ..wiring import Service
+from ..wiring import CallerTenant, Service
 from .bodies import SmallBody, only
 from .pictures import check_renderable
 from .records import JobKind, JobList, JobRecord, State, job_record
@@ -80,6 +80,7 @@ def start_job(
     asked: JobRequest,
     response: Response,
     service: Service,
+    tenant: CallerTenant,
     idempotency_key: Annotated[
         str | None,
         Header(
@@ -92,23 +93,26 @@ def start_job(
     """Queue a job. It is stored before this answers, and survives a restart of the service."""
     plan = None
     if isinstance(asked, ReconstructionRequest):
-        dataset = service.datasets.get(asked.dataset)
+        dataset = service.datasets.get(tenant, asked.dataset)
         read = {"dataset_id": dataset["id"]}
         settings = asked.settings.to_dict()
-        plan = service.compute.plan(service.files.dataset(dataset["id"]), asked.settings)
+        path = service.files.of(tenant).dataset(dataset["id"])
+        plan = service.compute.plan(path, asked.settings)
     elif isinstance(asked, GeometryFieldRequest):
-        mesh = service.meshes.get(asked.mesh)
+        mesh = service.meshes.get(tenant, asked.mesh)
         check_faces(mesh["faces"])
         settings = asked.settings.plain()
         read = {"mesh_id": mesh["id"], "field_id": field_of(asked.settings.content(mesh["content"]))}
     else:
-        volume = service.volumes.get(asked.volume)
+        volume = service.volumes.get(tenant, asked.volume)
         check_renderable(volume)
         read = {"volume_id": volume["id"]}
         settings = asked.settings.within(*volume["value_range"]).plain()
     most = service.settings.max_queued_jobs
     job = job_record(
-        service.jobs.add(asked.kind, settings, **read, plan=plan, most_queued=most, key=idempotency_key)
+        service.jobs.add(
+            tenant, asked.kind, settings, **read, plan=plan, most_queued=most, key=idempotency_key
+        )
     )
     service.runner.notify()
     response.headers["Location"] = job.links["self"]
@@ -118,13 +122,14 @@ def start_job(
 @router.get("", responses=described(404, 422))
 def list_jobs(
     service: Service,
+    tenant: CallerTenant,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
     state: Annotated[State | None, Query(description="Only these.")] = None,
     kind: Annotated[JobKind | None, Query(description="Only these.")] = None,
     before: Annotated[str | None, Query(description="Only jobs older than the one of this id.")] = None,
 ) -> JobList:
     """Jobs, newest first; `next` leads to the older ones."""
-    rows = service.jobs.newest(limit + 1, state, kind, before)
+    rows = service.jobs.newest(tenant, limit + 1, state, kind, before)
     shown = [job_record(row) for row in rows[:limit]]
     if len(rows) == len(shown):
         return JobList(jobs=shown, next=None)
@@ -134,9 +139,9 @@ def list_jobs(
 
 
 @router.get("/{job_id}", responses=described(404))
-def show_job(job_id: str, service: Service) -> JobRecord:
+def show_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
     """One job: its state, its progress and the residual of every sweep so far."""
-    return job_record(service.jobs.get(job_id))
+    return job_record(service.jobs.get(tenant, job_id))
 
 
 @router.post(
@@ -144,9 +149,9 @@ def show_job(job_id: str, service: Service) -> JobRecord:
     status_code=status.HTTP_202_ACCEPTED,
     responses=described(404, 409),
 )
-def cancel_job(job_id: str, service: Service) -> JobRecord:
+def cancel_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
     """Ask a job to stop. A queued one ends at once, a running one within a second or so."""
-    return job_record(service.jobs.request_cancel(job_id))
+    return job_record(service.jobs.request_cancel(tenant, job_id))
 
 
 @router.get(
@@ -157,11 +162,11 @@ def cancel_job(job_id: str, service: Service) -> JobRecord:
         **described(404),
     },
 )
-def animation(job_id: str, service: Service) -> FileResponse:
+def animation(job_id: str, service: Service, tenant: CallerTenant) -> FileResponse:
     """The pictures of a job of kind refraction, once it has succeeded."""
-    job = service.jobs.get(job_id)
+    job = service.jobs.get(tenant, job_id)
     if job["kind"] != "refraction" or job["state"] != "succeeded":
         raise NoAnimation(job["id"], job["kind"], job["state"])
     extension = job["settings"]["format"]
-    path = service.files.animation(job["id"], extension)
+    path = service.files.of(tenant).animation(job["id"], extension)
     return FileResponse(path, media_type=ANIMATIONS[extension], filename=path.name)

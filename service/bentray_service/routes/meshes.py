@@ -13,7 +13,7 @@ from bentray_workers.isosurface_mesh import MOST_STEP, check_nodes
 
 from ..errors import described
 from ..storage.ids import new_id
-from ..wiring import Service
+from ..wiring import CallerTenant, Service
 from .bodies import only
 from .pictures import check_renderable
 from .surface_records import MeshList, MeshRecord, mesh_record
@@ -41,29 +41,32 @@ async def upload_mesh(
     request: Request,
     response: Response,
     service: Service,
+    tenant: CallerTenant,
     title: Annotated[str, Query(max_length=200, description="What it is.")] = "",
 ) -> MeshRecord:
     """Upload a mesh. A process of its own reads it and makes one sound surface of it, or says why not."""
     mesh_id = new_id("mesh")
 
     def store(size: int, sha256: str, summary: dict[str, Any]) -> dict[str, Any]:
-        return service.meshes.add(mesh_id, size=size, sha256=sha256, summary=summary)
+        return service.meshes.add(tenant, mesh_id, size=size, sha256=sha256, summary=summary)
 
-    record = mesh_record(await take_in(request, service, "mesh", mesh_id, store, {"title": title}))
+    record = mesh_record(await take_in(request, service, tenant, "mesh", mesh_id, store, {"title": title}))
     response.headers["Location"] = record.links["self"]
     return record
 
 
 @router.get("/meshes")
-def list_meshes(service: Service, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> MeshList:
+def list_meshes(
+    service: Service, tenant: CallerTenant, limit: Annotated[int, Query(ge=1, le=1000)] = 100
+) -> MeshList:
     """Meshes, newest first."""
-    return MeshList(meshes=[mesh_record(row) for row in service.meshes.newest(limit)])
+    return MeshList(meshes=[mesh_record(row) for row in service.meshes.newest(tenant, limit)])
 
 
 @router.get("/meshes/{mesh_id}", responses=described(404))
-def show_mesh(mesh_id: str, service: Service) -> MeshRecord:
+def show_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> MeshRecord:
     """One mesh: its size, its handles and holes, and what was repaired."""
-    return mesh_record(service.meshes.get(mesh_id))
+    return mesh_record(service.meshes.get(tenant, mesh_id))
 
 
 @router.post(
@@ -75,28 +78,30 @@ def mesh_of_volume(
     volume_id: str,
     response: Response,
     service: Service,
+    tenant: CallerTenant,
     iso: Annotated[
         float | None, Query(description="In the unit of the volume; without it the middle of its range.")
     ] = None,
     step: Annotated[int, Query(ge=1, le=MOST_STEP, description="Take every so many nodes: fewer faces.")] = 1,
 ) -> MeshRecord:
     """Make a mesh of a volume's iso-surface: the largest piece of it, closed at the faces of the volume."""
-    volume = service.volumes.get(volume_id)
+    volume = service.volumes.get(tenant, volume_id)
     check_renderable(volume)
     check_nodes(volume["shape"], step)
     low, high = volume["value_range"]
     # NaN is between nothing.
     if iso is not None and not (math.isfinite(iso) and low <= iso < high):
         raise InvalidInput("iso", iso, f"{low:g} to less than {high:g}, the range of the volume")
-    mesh_id = new_id("mesh")
+    mesh_id, files = new_id("mesh"), service.files.of(tenant)
     try:
-        made = service.files.candidate(mesh_id)
-        summary = service.compute.mesh_volume(service.files.volume(volume["id"]), iso, step, made)
-        content = service.files.adopt(mesh_id).read_bytes()
+        made = files.candidate(mesh_id)
+        summary = service.compute.mesh_volume(files.volume(volume["id"]), iso, step, made)
+        content = files.adopt(mesh_id).read_bytes()
     finally:
-        service.files.discard_candidate(mesh_id)
+        files.discard_candidate(mesh_id)
     summary |= {"title": volume["title"], "volume_id": volume["id"]}
     digest = hashlib.sha256(content).hexdigest()
-    record = mesh_record(service.meshes.add(mesh_id, size=len(content), sha256=digest, summary=summary))
+    row = service.meshes.add(tenant, mesh_id, size=len(content), sha256=digest, summary=summary)
+    record = mesh_record(row)
     response.headers["Location"] = record.links["self"]
     return record

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 
 from ..asked_view import AskedView
-from ..wiring import Service
+from ..wiring import CallerTenant, Service
 from .pictures import PICTURE, check_renderable, picture
 
 router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
@@ -17,6 +17,7 @@ def refraction_png(
     volume_id: str,
     request: Request,
     service: Service,
+    tenant: CallerTenant,
     view: AskedView,
 ) -> Response:
     """A volume as glass before a backdrop, or its surface, cast by a worker.
@@ -24,8 +25,8 @@ def refraction_png(
     Works for volumes in space with even spacing, reconstructed or uploaded. HEAD gives the tag at once,
     without drawing, so Content-Length is absent.
     """
-    volume = service.volumes.get(volume_id)
+    volume = service.volumes.get(tenant, volume_id)
     check_renderable(volume)
     view = view.within(*volume["value_range"])
-    path = service.files.volume(volume["id"])
+    path = service.files.of(tenant).volume(volume["id"])
     return picture(request, volume, view.plain(), lambda: service.compute.refraction_png(path, view))

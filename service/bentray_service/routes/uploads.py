@@ -12,6 +12,7 @@ from starlette.concurrency import run_in_threadpool
 from ..ingest.child import ACCEPTED
 from ..ingest.receive import Received, receive
 from ..ingest.sandbox import ingest
+from ..storage.tenants import Tenant
 from ..wiring import Parts
 
 # Each ingest process may take the whole of its memory limit.
@@ -30,6 +31,7 @@ def body_of(what: str, media_types: tuple[str, ...]) -> dict[str, Any]:
 async def take_in(
     request: Request,
     service: Parts,
+    tenant: Tenant,
     what: str,
     upload_id: str,
     store: Callable[[int, str, Row], Row],
@@ -40,28 +42,30 @@ async def take_in(
     Args:
         request: whose body is read.
         service: the parts of the service.
+        tenant: whose upload it is.
         what: a key of ``ACCEPTED``.
         upload_id: its new id.
         store: writes the row, from the size and SHA-256 of the body and the summary of its content.
         given: what the user says of it.
     """
     announced = request.headers.get("content-length")
-    path = service.files.incoming(upload_id)
+    files = service.files.of(tenant)
+    path = files.incoming(upload_id)
 
     def check_and_store(received: Received) -> Row:
         try:
             summary = ingest(
                 what,
                 path,
-                service.files.candidate(upload_id),
+                files.candidate(upload_id),
                 memory_bytes=service.settings.ingest_memory_bytes,
                 seconds=service.settings.ingest_seconds,
                 scratch=service.files.scratch,
                 given=given,
             )
-            service.files.adopt(upload_id)
+            files.adopt(upload_id)
         finally:
-            service.files.discard_candidate(upload_id)
+            files.discard_candidate(upload_id)
         return store(received.size, received.sha256, summary)
 
     try:

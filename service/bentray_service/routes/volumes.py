@@ -15,7 +15,7 @@ from bentray_kernels.errors import InvalidInput
 from ..errors import described
 from ..storage.exports import values_as_nifti, values_as_npy
 from ..storage.ids import new_id
-from ..wiring import Service
+from ..wiring import CallerTenant, Service
 from .bodies import only
 from .pictures import PICTURE, picture
 from .records import VolumeList, VolumeRecord, volume_record
@@ -40,6 +40,7 @@ async def upload_volume(
     request: Request,
     response: Response,
     service: Service,
+    tenant: CallerTenant,
     title: Annotated[str, Query(max_length=200, description="In place of the file's own.")] = "",
     spacing_m: Annotated[
         str | None,
@@ -65,23 +66,25 @@ async def upload_volume(
     volume_id = new_id("volume")
 
     def store(size: int, sha256: str, summary: dict[str, Any]) -> dict[str, Any]:
-        return service.volumes.add(volume_id, size=size, sha256=sha256, summary=summary)
+        return service.volumes.add(tenant, volume_id, size=size, sha256=sha256, summary=summary)
 
-    record = volume_record(await take_in(request, service, "volume", volume_id, store, given))
+    record = volume_record(await take_in(request, service, tenant, "volume", volume_id, store, given))
     response.headers["Location"] = record.links["self"]
     return record
 
 
 @router.get("")
-def list_volumes(service: Service, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> VolumeList:
+def list_volumes(
+    service: Service, tenant: CallerTenant, limit: Annotated[int, Query(ge=1, le=1000)] = 100
+) -> VolumeList:
     """Volumes, reconstructed and uploaded, newest first."""
-    return VolumeList(volumes=[volume_record(row) for row in service.volumes.newest(limit)])
+    return VolumeList(volumes=[volume_record(row) for row in service.volumes.newest(tenant, limit)])
 
 
 @router.get("/{volume_id}", responses=described(404))
-def show_volume(volume_id: str, service: Service) -> VolumeRecord:
+def show_volume(volume_id: str, service: Service, tenant: CallerTenant) -> VolumeRecord:
     """Shape, axes, spacing, origin and range of one volume."""
-    return volume_record(service.volumes.get(volume_id))
+    return volume_record(service.volumes.get(tenant, volume_id))
 
 
 @router.head("/{volume_id}/slice.png", include_in_schema=False)
@@ -90,6 +93,7 @@ def slice_png(
     volume_id: str,
     request: Request,
     service: Service,
+    tenant: CallerTenant,
     index: Annotated[int | None, Query(ge=0, description="Axial index; the middle slice without it.")] = None,
     quantity: Annotated[
         Literal["speed", "coverage", "attenuation", "recovery", "value"] | None,
@@ -109,7 +113,7 @@ def slice_png(
 
     HEAD gives the tag at once, without drawing, so Content-Length is absent.
     """
-    volume = service.volumes.get(volume_id)
+    volume = service.volumes.get(tenant, volume_id)
     slices = volume["shape"][2] if len(volume["shape"]) == 3 else 1
     if index is not None and index >= slices:
         raise InvalidInput("index", index, f"0 to {slices - 1}")
@@ -117,7 +121,7 @@ def slice_png(
         if value is not None and not math.isfinite(value):
             raise InvalidInput(name, value, "a finite number")
     how: dict[str, Any] = {"index": index, "low": low, "high": high, "colormap": colormap}
-    path = service.files.volume(volume["id"])
+    path = service.files.of(tenant).volume(volume["id"])
     if "job_id" in volume:
         if quantity == "value":
             raise InvalidInput("quantity", "'value'", "speed, coverage, attenuation or recovery")
@@ -142,6 +146,7 @@ def slice_png(
 def download(
     volume_id: str,
     service: Service,
+    tenant: CallerTenant,
     format: Annotated[  # noqa: A002 - the name of the query parameter
         Literal["hdf5", "nifti", "npy"],
         Query(
@@ -151,13 +156,13 @@ def download(
     ] = "hdf5",
 ) -> FileResponse:
     """The volume as a file."""
-    volume = service.volumes.get(volume_id)
-    source: Path = service.files.volume(volume["id"])
+    volume = service.volumes.get(tenant, volume_id)
+    source: Path = service.files.of(tenant).volume(volume["id"])
     if format == "hdf5":
         return FileResponse(source, media_type="application/x-hdf5", filename=f"{volume['id']}.h5")
     export, extension = EXPORTS[format]
     uploaded = "job_id" not in volume
-    exported = export(source, service.files.export(volume["id"], extension), uploaded=uploaded)
+    exported = export(source, service.files.of(tenant).export(volume["id"], extension), uploaded=uploaded)
     name = f"{volume['id']}-{'values' if uploaded else 'speed'}.{extension}"
     return FileResponse(exported, media_type="application/octet-stream", filename=name)
 

@@ -11,6 +11,7 @@ from ..refusals import UnknownId
 from .database import Database
 from .ids import checked
 from .schema import datasets
+from .tenants import Tenant
 
 Row = dict[str, Any]
 
@@ -21,33 +22,33 @@ class Datasets:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def add(self, dataset_id: str, *, size: int, sha256: str, summary: Row) -> Row:
+    def add(self, tenant: Tenant, dataset_id: str, *, size: int, sha256: str, summary: Row) -> Row:
         """Store a dataset; ``summary`` holds the columns that the ingest process filled."""
         with self._database.write() as connection:
             connection.execute(
                 insert(datasets).values(
-                    id=dataset_id, created=time.time(), bytes=size, sha256=sha256, **summary
+                    tenant=tenant, id=dataset_id, created=time.time(), bytes=size, sha256=sha256, **summary
                 )
             )
-        return self.get(dataset_id)
+        return self.get(tenant, dataset_id)
 
-    def get(self, dataset_id: str) -> Row:
-        """One dataset.
+    def get(self, tenant: Tenant, dataset_id: str) -> Row:
+        """One dataset of this tenant.
 
         Raises:
-            UnknownId: when there is none.
+            UnknownId: when it has no such one.
         """
+        name = checked("dataset", dataset_id)
+        mine = select(datasets).where(datasets.c.tenant == tenant, datasets.c.id == name)
         with self._database.read() as connection:
-            found = connection.execute(
-                select(datasets).where(datasets.c.id == checked("dataset", dataset_id))
-            )
-            row = found.mappings().one_or_none()
+            row = connection.execute(mine).mappings().one_or_none()
         if row is None:
             raise UnknownId("dataset", dataset_id)
         return dict(row)
 
-    def newest(self, limit: int) -> list[Row]:
-        """Up to ``limit`` datasets, newest first."""
+    def newest(self, tenant: Tenant, limit: int) -> list[Row]:
+        """Up to ``limit`` datasets of this tenant, newest first."""
+        mine = select(datasets).where(datasets.c.tenant == tenant)
         with self._database.read() as connection:
-            found = connection.execute(select(datasets).order_by(datasets.c.number.desc()).limit(limit))
+            found = connection.execute(mine.order_by(datasets.c.number.desc()).limit(limit))
             return [dict(row) for row in found.mappings()]

@@ -10,6 +10,7 @@ from ..refusals import UnknownId
 from .database import Database
 from .ids import checked
 from .schema import geometry_fields
+from .tenants import Tenant
 
 Row = dict[str, Any]
 
@@ -20,22 +21,24 @@ class GeometryFields:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def get(self, field_id: str) -> Row:
-        """One field.
+    def get(self, tenant: Tenant, field_id: str) -> Row:
+        """One field of this tenant.
 
         Raises:
-            UnknownId: when there is none.
+            UnknownId: when it has no such one.
         """
         name = checked("field", field_id)
+        table = geometry_fields.c
+        mine = select(geometry_fields).where(table.tenant == tenant, table.id == name)
         with self._database.read() as connection:
-            found = connection.execute(select(geometry_fields).where(geometry_fields.c.id == name))
-            row = found.mappings().one_or_none()
+            row = connection.execute(mine).mappings().one_or_none()
         if row is None:
             raise UnknownId("field", field_id)
         return dict(row)
 
-    def newest(self, limit: int) -> list[Row]:
-        """Up to ``limit`` fields, newest first."""
-        query = select(geometry_fields).order_by(geometry_fields.c.number.desc()).limit(limit)
+    def newest(self, tenant: Tenant, limit: int) -> list[Row]:
+        """Up to ``limit`` fields of this tenant, newest first."""
+        mine = select(geometry_fields).where(geometry_fields.c.tenant == tenant)
+        query = mine.order_by(geometry_fields.c.number.desc()).limit(limit)
         with self._database.read() as connection:
             return [dict(row) for row in connection.execute(query).mappings()]

@@ -11,6 +11,7 @@ from ..refusals import UnknownId
 from .database import Database
 from .ids import checked
 from .schema import meshes
+from .tenants import Tenant
 
 Row = dict[str, Any]
 
@@ -21,29 +22,32 @@ class Meshes:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def add(self, mesh_id: str, *, size: int, sha256: str, summary: Row) -> Row:
+    def add(self, tenant: Tenant, mesh_id: str, *, size: int, sha256: str, summary: Row) -> Row:
         """Store a mesh; ``summary`` holds the columns that tell what is in its file."""
         with self._database.write() as connection:
             connection.execute(
-                insert(meshes).values(id=mesh_id, created=time.time(), bytes=size, sha256=sha256, **summary)
+                insert(meshes).values(
+                    tenant=tenant, id=mesh_id, created=time.time(), bytes=size, sha256=sha256, **summary
+                )
             )
-        return self.get(mesh_id)
+        return self.get(tenant, mesh_id)
 
-    def get(self, mesh_id: str) -> Row:
-        """One mesh.
+    def get(self, tenant: Tenant, mesh_id: str) -> Row:
+        """One mesh of this tenant.
 
         Raises:
-            UnknownId: when there is none.
+            UnknownId: when it has no such one.
         """
+        mine = select(meshes).where(meshes.c.tenant == tenant, meshes.c.id == checked("mesh", mesh_id))
         with self._database.read() as connection:
-            found = connection.execute(select(meshes).where(meshes.c.id == checked("mesh", mesh_id)))
-            row = found.mappings().one_or_none()
+            row = connection.execute(mine).mappings().one_or_none()
         if row is None:
             raise UnknownId("mesh", mesh_id)
         return dict(row)
 
-    def newest(self, limit: int) -> list[Row]:
-        """Up to ``limit`` meshes, newest first."""
+    def newest(self, tenant: Tenant, limit: int) -> list[Row]:
+        """Up to ``limit`` meshes of this tenant, newest first."""
+        mine = select(meshes).where(meshes.c.tenant == tenant)
         with self._database.read() as connection:
-            found = connection.execute(select(meshes).order_by(meshes.c.number.desc()).limit(limit))
+            found = connection.execute(mine.order_by(meshes.c.number.desc()).limit(limit))
             return [dict(row) for row in found.mappings()]

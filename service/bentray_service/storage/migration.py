@@ -6,7 +6,19 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from sqlalchemy import Connection, text, update
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Column,
+    Connection,
+    Float,
+    Integer,
+    MetaData,
+    String,
+    Table,
+    text,
+    update,
+)
 
 from . import schema
 
@@ -25,6 +37,21 @@ CREATE TABLE jobs (
         state IN ('queued', 'running', 'cancelling', 'succeeded', 'failed', 'cancelled')),
     UNIQUE (id), FOREIGN KEY(dataset_id) REFERENCES datasets (id))
 """
+
+UPLOADED_VOLUMES_OF_VERSION_2 = Table(
+    "uploaded_volumes",
+    MetaData(),
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(32), nullable=False, unique=True),
+    Column("created", Float, nullable=False),
+    Column("bytes", BigInteger, nullable=False),
+    Column("sha256", String(64), nullable=False),
+    Column("title", String(200), nullable=False),
+    Column("shape", JSON, nullable=False),
+    Column("spacing_m", JSON, nullable=False),
+    Column("origin_m", JSON, nullable=False),
+    Column("value_range", JSON, nullable=False),
+)
 
 
 def migrate(connection: Connection, found: int) -> None:
@@ -48,8 +75,7 @@ def migrate(connection: Connection, found: int) -> None:
 
 def _to_2(connection: Connection) -> None:
     """Jobs may read a volume in place of a dataset; uploaded volumes have a table."""
-    # What version 3 left of this table as it was is still made from the present schema.
-    schema.uploaded_volumes.create(connection)
+    UPLOADED_VOLUMES_OF_VERSION_2.create(connection)
     if connection.dialect.name != "sqlite":
         connection.execute(text("ALTER TABLE jobs ALTER COLUMN dataset_id DROP NOT NULL"))
         connection.execute(text("ALTER TABLE jobs ADD COLUMN volume_id VARCHAR(32)"))
@@ -67,9 +93,11 @@ def _to_2(connection: Connection) -> None:
 
 
 def _to_3(connection: Connection) -> None:
-    """Jobs have a tenant and a lease, and may read a mesh; meshes and geometry fields have tables."""
+    """Every row has a tenant, jobs a lease; meshes, geometry fields and keys have tables."""
+    for table in ("datasets", "uploaded_volumes", "volumes", "jobs"):
+        tenant = "tenant VARCHAR(64) NOT NULL DEFAULT 'local'"
+        connection.execute(text(f"ALTER TABLE {table} ADD COLUMN {tenant}"))
     for column in (
-        "tenant VARCHAR(64) NOT NULL DEFAULT 'local'",
         "idempotency_key VARCHAR(200)",
         "request_sha256 VARCHAR(64)",
         "lease_owner VARCHAR(64)",
@@ -82,8 +110,15 @@ def _to_3(connection: Connection) -> None:
         connection.execute(text(f"ALTER TABLE jobs ADD COLUMN {column}"))
     connection.execute(text("CREATE INDEX jobs_by_tenant ON jobs (tenant, state)"))
     connection.execute(text("CREATE UNIQUE INDEX jobs_by_key ON jobs (tenant, idempotency_key)"))
-    for table in (schema.meshes, schema.geometry_fields):
-        table.create(connection)
+    for name, table, order in (
+        ("datasets_by_tenant", "datasets", "number"),
+        ("uploaded_volumes_by_tenant", "uploaded_volumes", "created"),
+        ("volumes_by_tenant", "volumes", "created"),
+        ("jobs_by_age", "jobs", "number"),
+    ):
+        connection.execute(text(f"CREATE INDEX {name} ON {table} (tenant, {order})"))
+    for new in (schema.meshes, schema.geometry_fields, schema.keys):
+        new.create(connection)
 
 
 STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType({1: _to_2, 2: _to_3})

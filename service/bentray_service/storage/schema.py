@@ -15,6 +15,7 @@ from sqlalchemy import (
     MetaData,
     String,
     Table,
+    UniqueConstraint,
 )
 
 VERSION = 3
@@ -23,6 +24,12 @@ STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
 
 metadata = MetaData()
+
+
+def _tenant() -> Column[str]:
+    """Whose the row is; every query for a caller asks for it."""
+    return Column("tenant", String(64), nullable=False, server_default="local")
+
 
 # Times are seconds since 1970 UTC: SQLite has no type for them that keeps the zone.
 about = Table(
@@ -52,6 +59,8 @@ datasets = Table(
     Column("has_travel_times", Boolean, nullable=False),
     Column("has_truth", Boolean, nullable=False),
     Column("water_speed_mps", Float, nullable=False),
+    _tenant(),
+    Index("datasets_by_tenant", "tenant", "number"),
 )
 
 jobs = Table(
@@ -80,8 +89,8 @@ jobs = Table(
     Column("created", Float, nullable=False),
     Column("started", Float),
     Column("finished", Float),
-    # Whose it is: tenants take turns.
-    Column("tenant", String(64), nullable=False, server_default="local"),
+    # Tenants take turns.
+    _tenant(),
     # What the client calls the request, so that one sent twice makes one job; and a digest of what was asked.
     Column("idempotency_key", String(200)),
     Column("request_sha256", String(64)),
@@ -92,9 +101,10 @@ jobs = Table(
     Index("jobs_by_state", "state", "number"),
     Index("jobs_by_tenant", "tenant", "state"),
     Index("jobs_by_key", "tenant", "idempotency_key", unique=True),
+    Index("jobs_by_age", "tenant", "number"),
 )
 
-# Only ever appended to; the number of a row will be the id of a server-sent event.
+# Only ever appended to; the number of a row is the id of a server-sent event. Their tenant is their job's.
 events = Table(
     "events",
     metadata,
@@ -120,6 +130,8 @@ volumes = Table(
     Column("speed_range_mps", JSON, nullable=False),
     Column("water_speed_mps", Float, nullable=False),
     Column("provenance", JSON, nullable=False),
+    _tenant(),
+    Index("volumes_by_tenant", "tenant", "created"),
 )
 
 uploaded_volumes = Table(
@@ -135,6 +147,8 @@ uploaded_volumes = Table(
     Column("spacing_m", JSON, nullable=False),
     Column("origin_m", JSON, nullable=False),
     Column("value_range", JSON, nullable=False),
+    _tenant(),
+    Index("uploaded_volumes_by_tenant", "tenant", "created"),
 )
 
 meshes = Table(
@@ -160,14 +174,17 @@ meshes = Table(
     Column("repairs", JSON, nullable=False),
     # SHA-256 of vertices, faces and colours: what a geometry field depends on.
     Column("content", String(64), nullable=False),
+    _tenant(),
+    Index("meshes_by_tenant", "tenant", "number"),
 )
 
-# A field is named by its content: the same mesh and settings have one field, however often it is asked for.
+# A field is named by its content: the same mesh and settings have one field, however often a tenant asks for
+# it. Another tenant has one of its own, and cannot learn that there is another.
 geometry_fields = Table(
     "geometry_fields",
     metadata,
     Column("number", Integer, primary_key=True, autoincrement=True),
-    Column("id", String(32), nullable=False, unique=True),
+    Column("id", String(32), nullable=False),
     # The mesh and the job that it was first made for.
     Column("mesh_id", String(32), nullable=False),
     Column("job_id", String(32), ForeignKey("jobs.id"), nullable=False),
@@ -175,4 +192,23 @@ geometry_fields = Table(
     Column("bytes", BigInteger, nullable=False),
     Column("settings", JSON, nullable=False),
     Column("figures", JSON, nullable=False),
+    _tenant(),
+    UniqueConstraint("tenant", "id"),
+    Index("geometry_fields_by_tenant", "tenant", "number"),
+)
+
+# What lets a caller in. The secret itself is nowhere: only its digest is.
+keys = Table(
+    "keys",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(32), nullable=False, unique=True),
+    _tenant(),
+    Column("name", String(100), nullable=False),
+    Column("sha256", String(64), nullable=False),
+    Column("scopes", JSON, nullable=False),
+    Column("created", Float, nullable=False),
+    Column("expires", Float),
+    Column("revoked", Float),
+    Column("used", Float),
 )

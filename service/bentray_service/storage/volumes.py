@@ -11,6 +11,7 @@ from ..refusals import UnknownId
 from .database import Database
 from .ids import checked
 from .schema import datasets, jobs, uploaded_volumes, volumes
+from .tenants import Tenant
 
 Row = dict[str, Any]
 
@@ -26,36 +27,36 @@ class Volumes:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def add(self, volume_id: str, *, size: int, sha256: str, summary: Row) -> Row:
+    def add(self, tenant: Tenant, volume_id: str, *, size: int, sha256: str, summary: Row) -> Row:
         """Store an uploaded volume; ``summary`` holds the columns that the ingest process filled."""
         with self._database.write() as connection:
             connection.execute(
                 insert(uploaded_volumes).values(
-                    id=volume_id, created=time.time(), bytes=size, sha256=sha256, **summary
+                    tenant=tenant, id=volume_id, created=time.time(), bytes=size, sha256=sha256, **summary
                 )
             )
-        return self.get(volume_id)
+        return self.get(tenant, volume_id)
 
-    def get(self, volume_id: str) -> Row:
-        """One volume of either table.
+    def get(self, tenant: Tenant, volume_id: str) -> Row:
+        """One volume of this tenant, of either table.
 
         Raises:
-            UnknownId: when there is none.
+            UnknownId: when it has no such one.
         """
         name = checked("volume", volume_id)
         found = self._rows(
-            _reconstructed().where(volumes.c.id == name),
-            select(uploaded_volumes).where(uploaded_volumes.c.id == name),
+            _reconstructed(tenant).where(volumes.c.id == name),
+            _uploaded(tenant).where(uploaded_volumes.c.id == name),
         )
         if not found:
             raise UnknownId("volume", volume_id)
         return found[0]
 
-    def newest(self, limit: int) -> list[Row]:
-        """Up to ``limit`` volumes of both tables, newest first."""
+    def newest(self, tenant: Tenant, limit: int) -> list[Row]:
+        """Up to ``limit`` volumes of this tenant, of both tables, newest first."""
         found = self._rows(
-            _reconstructed().order_by(volumes.c.created.desc()).limit(limit),
-            select(uploaded_volumes).order_by(uploaded_volumes.c.created.desc()).limit(limit),
+            _reconstructed(tenant).order_by(volumes.c.created.desc()).limit(limit),
+            _uploaded(tenant).order_by(uploaded_volumes.c.created.desc()).limit(limit),
         )
         return sorted(found, key=lambda row: row["created"], reverse=True)[:limit]
 
@@ -69,9 +70,14 @@ class Volumes:
         ]
 
 
-def _reconstructed() -> Select[Any]:
+def _reconstructed(tenant: Tenant) -> Select[Any]:
     return (
         select(volumes, jobs.c.dataset_id, datasets.c.title)
         .join(jobs, jobs.c.id == volumes.c.job_id)
         .join(datasets, datasets.c.id == jobs.c.dataset_id)
+        .where(volumes.c.tenant == tenant)
     )
+
+
+def _uploaded(tenant: Tenant) -> Select[Any]:
+    return select(uploaded_volumes).where(uploaded_volumes.c.tenant == tenant)

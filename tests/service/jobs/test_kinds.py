@@ -18,6 +18,7 @@ from bentray_service.app import create_app
 from bentray_service.jobs import kinds
 from bentray_service.settings import ServiceSettings
 from bentray_service.storage.ids import new_id
+from bentray_service.storage.tenants import LOCAL
 from bentray_workers import field_settings, geometry_field
 from bentray_workers.cluster import open_cluster
 from bentray_workers.mesh_file import StoredMesh, summary_of, write_mesh
@@ -50,7 +51,7 @@ def put(http, spacing=(1e-3,) * 3):
     """A volume as an upload leaves it; its id."""
     parts = http.app.state.parts
     volume, volume_id = Volume.of(sampled(TWO_HOLES, 12), spacing), new_id("volume")
-    write_volume(parts.files.volume(volume_id), volume)
+    write_volume(parts.files.of(LOCAL).volume(volume_id), volume)
     summary = {
         "title": "a ball",
         "shape": list(volume.values.shape),
@@ -58,7 +59,7 @@ def put(http, spacing=(1e-3,) * 3):
         "origin_m": [0.0] * 3,
         "value_range": list(volume.range()),
     }
-    parts.volumes.add(volume_id, size=1, sha256="0" * 64, summary=summary)
+    parts.volumes.add(LOCAL, volume_id, size=1, sha256="0" * 64, summary=summary)
     return volume_id
 
 
@@ -115,7 +116,7 @@ def test_cancel_between_pictures(serving, until):
         done = until(http, job["id"])
         assert (done["state"], done["progress"]["total"]) == ("cancelled", 720)
         assert done["progress"]["done"] < 720
-        assert not list((http.app.state.parts.files.root / "animations").iterdir())
+        assert not list((http.app.state.parts.files.of(LOCAL).root / "animations").iterdir())
         answer = http.get(f"/v1/jobs/{job['id']}/animation")
         assert (answer.status_code, answer.json()["type"]) == (404, "/problems/no-animation")
 
@@ -134,7 +135,7 @@ def test_a_stopped_job_runs_again_at_the_next_start(serving, until, monkeypatch)
     monkeypatch.undo()
     with serving() as http:
         assert until(http, job["id"])["state"] == "succeeded"
-        states = [event["state"] for event in http.app.state.parts.jobs.events(job["id"])]
+        states = [event["state"] for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
     assert states == ["queued", "running", "queued", "running", "succeeded"]
 
 
@@ -197,9 +198,9 @@ def put_mesh(http, mesh=None):
     """A mesh as an upload leaves it; its id."""
     parts, mesh_id = http.app.state.parts, new_id("mesh")
     stored = StoredMesh(torus(16, 10) if mesh is None else mesh)
-    write_mesh(parts.files.mesh(mesh_id), stored)
+    write_mesh(parts.files.of(LOCAL).mesh(mesh_id), stored)
     summary = summary_of(stored, sound(stored.mesh.vertices, stored.mesh.faces), "ply")
-    parts.meshes.add(mesh_id, size=1, sha256="0" * 64, summary={**summary, "title": "a ring"})
+    parts.meshes.add(LOCAL, mesh_id, size=1, sha256="0" * 64, summary={**summary, "title": "a ring"})
     return mesh_id
 
 
@@ -234,7 +235,7 @@ def test_a_torn_field_is_gone_on_from_at_the_next_start(serving, until, monkeypa
     with serving() as http:
         job = ask_field(http, put_mesh(http)).json()
         until(http, job["id"], "running")
-        files = http.app.state.parts.files
+        files = http.app.state.parts.files.of(LOCAL)
         work = files.work(job["id"]) / "done"
         deadline = time.monotonic() + 30.0
         while len(list(work.glob("*.json"))) < 2:
@@ -244,7 +245,7 @@ def test_a_torn_field_is_gone_on_from_at_the_next_start(serving, until, monkeypa
         done = until(http, job["id"])
         assert done["state"] == "succeeded", done["error"]
         total = http.get(done["links"]["field"]).json()
-        states = [event["state"] for event in http.app.state.parts.jobs.events(job["id"])]
+        states = [event["state"] for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
         assert states == ["queued", "running", "queued", "running", "succeeded"]
         wait_until_empty(files.root / "work")
         assert [one.name for one in (files.root / "fields").iterdir()] == [total["id"]]
@@ -275,7 +276,7 @@ def test_a_cancelled_field_leaves_nothing(serving, until, monkeypatch):
         assert (done["state"], done["field"]) == ("cancelled", None)
         assert "field" not in done["links"]
         assert http.get("/v1/geometry-fields").json() == {"geometry_fields": []}
-        wait_until_empty(http.app.state.parts.files.root / "work")
+        wait_until_empty(http.app.state.parts.files.of(LOCAL).root / "work")
 
 
 def test_a_field_that_is_cancelled_at_its_end_stays_for_others(tmp_path):

@@ -9,7 +9,8 @@ from distributed.comm import CommClosedError
 from sqlalchemy.exc import OperationalError
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.storage.jobs import Jobs
+from bentray_service.storage.queue import Queue
+from bentray_service.storage.tenants import LOCAL
 
 
 def test_at_most_so_many_at_a_time(start, uploaded, submitted, until, work):
@@ -43,7 +44,7 @@ def test_cancel_a_running_job(start, uploaded, submitted, until, work):
     assert answer.json()["state"] in ("cancelling", "cancelled")
     done = until(http, job["id"])
     assert (done["state"], done["volume"]) == ("cancelled", None)
-    assert not list((http.app.state.parts.files.root / "volumes").iterdir())
+    assert not list((http.app.state.parts.files.of(LOCAL).root / "volumes").iterdir())
 
 
 def test_a_refused_job_says_why(start, uploaded, submitted, until, work):
@@ -66,16 +67,16 @@ def test_the_next_job_runs_after_a_failure(start, uploaded, submitted, until, wo
 
 def test_the_end_is_stored_once_the_database_is_back(start, uploaded, submitted, until, work, monkeypatch):
     http = start()
-    jobs, store = http.app.state.parts.jobs, Jobs.succeed
+    queue, store = http.app.state.parts.queue, Queue.succeed
     tries = []
 
     def away_at_first(*given):
         tries.append(given)
         if len(tries) == 1:
             raise OperationalError("update", {}, Exception("database is locked"))
-        return store(jobs, *given)
+        return store(queue, *given)
 
-    monkeypatch.setattr(jobs, "succeed", away_at_first)
+    monkeypatch.setattr(queue, "succeed", away_at_first)
     assert until(http, submitted(http, uploaded(http))["id"])["state"] == "succeeded"
     assert len(tries) == 2
 
@@ -111,7 +112,7 @@ def test_a_full_disk_is_waited_for(start, uploaded, submitted, until, work, monk
     work.error, room[0] = None, True
     runner.notify()
     assert until(http, job["id"])["state"] == "succeeded"
-    notes = [event["note"] for event in http.app.state.parts.jobs.events(job["id"])]
+    notes = [event["note"] for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
     assert notes[2] == "the disk is full; it goes on once there is room"
 
 
@@ -126,13 +127,13 @@ def test_a_lost_scheduler_costs_no_job(start, uploaded, submitted, until, work, 
     until(http, job["id"], "queued")
     work.error = None
     assert until(http, job["id"])["state"] == "succeeded"
-    notes = {event["note"] for event in http.app.state.parts.jobs.events(job["id"])}
+    notes = {event["note"] for event in http.app.state.parts.jobs.events(LOCAL, job["id"])}
     assert "the workers were away; it goes on when they are back" in notes
 
 
 def test_what_is_left_of_jobs_goes_with_their_end(start, uploaded, submitted, until, work):
     http = start()
-    folder = http.app.state.parts.files.root / "work"
+    folder = http.app.state.parts.files.of(LOCAL).root / "work"
     work.hold.clear()
     job = submitted(http, uploaded(http))
     until(http, job["id"], "running")

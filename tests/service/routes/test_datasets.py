@@ -6,6 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
+from bentray_service.storage.tenants import LOCAL
+
 HDF5 = {"Content-Type": "application/x-hdf5"}
 
 
@@ -37,7 +39,7 @@ def test_upload_answers_with_the_record(start, scan):
 def test_only_the_canonical_file_is_kept(start, scan):
     http = start()
     dataset = upload(http, scan().read_bytes()).json()
-    root = http.app.state.parts.files.root
+    root = http.app.state.parts.files.of(LOCAL).root
     assert [path.name for path in (root / "datasets").iterdir()] == [f"{dataset['id']}.h5"]
     assert not list((root / "incoming").iterdir())
     assert h5py.is_hdf5(root / "datasets" / f"{dataset['id']}.h5")
@@ -95,7 +97,7 @@ def test_bad_contents_are_named(start, scan, spoil, field):
     assert body["found"]
     assert body["accepted"]
     assert http.get("/v1/datasets").json() == {"datasets": []}
-    root = http.app.state.parts.files.root
+    root = http.app.state.parts.files.of(LOCAL).root
     assert not list((root / "incoming").iterdir())
     assert not list((root / "datasets").iterdir())
 
@@ -137,7 +139,7 @@ def test_too_large(start, content):
     body = problem(upload(http, content))
     assert (body["status"], body["type"]) == (413, "/problems/too-large")
     assert "50000" in body["accepted"]
-    assert not list((http.app.state.parts.files.root / "incoming").iterdir())
+    assert not list((http.app.state.parts.files.of(LOCAL).root / "incoming").iterdir())
 
 
 def test_a_file_larger_than_a_batch_arrives_whole(start, scan):

@@ -15,6 +15,7 @@ from bentray_service.app import create_app
 from bentray_service.settings import ServiceSettings
 from bentray_service.storage.ids import field_of, new_id
 from bentray_service.storage.schema import geometry_fields
+from bentray_service.storage.tenants import LOCAL
 from bentray_workers.cluster import open_cluster
 from bentray_workers.field_settings import FieldSettings
 from bentray_workers.field_view import FieldView
@@ -47,11 +48,11 @@ def here(http, made):
     """The address of a field in a service, as a job leaves it."""
     parts, field, mesh = http.app.state.parts, field_of("a" * 64), new_id("mesh")
     source, figures = made
-    target = parts.files.field(field)
+    target = parts.files.of(LOCAL).field(field)
     target.mkdir()
     for file in source.iterdir():
         (target / file.name).write_bytes(file.read_bytes())
-    job = parts.jobs.add("reconstruction", {})["id"]
+    job = parts.jobs.add(LOCAL, "reconstruction", {})["id"]
     row = {"mesh_id": mesh, "bytes": bytes_of(target), "settings": COARSE, "figures": figures}
     with parts.database.write() as connection:
         connection.execute(insert(geometry_fields).values(id=field, job_id=job, created=1.0, **row))
@@ -99,7 +100,7 @@ def test_from_an_upload_to_a_picture(tmp_path, until):
         assert (done["state"], done["field"]) == ("succeeded", field["id"])
         assert done["progress"] == {"done": 1, "total": 1}
         assert http.get("/v1/geometry-fields").json() == {"geometry_fields": [field]}
-        assert not list((tmp_path / "work").iterdir())
+        assert not list((tmp_path / "tenants/local/work").iterdir())
 
 
 OTHER = {

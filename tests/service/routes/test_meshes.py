@@ -11,6 +11,7 @@ from bentray_kernels.geometry_field.mesh import TriangleMesh
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.phantoms.surfaces import bumpy_ball, torus
 from bentray_service.storage.ids import new_id
+from bentray_service.storage.tenants import LOCAL
 from bentray_workers import isosurface_mesh
 from bentray_workers.mesh_file import load_mesh
 from bentray_workers.volume_file import Volume, write_volume
@@ -55,7 +56,7 @@ def test_every_format(http, kind):
     assert (made["volume"], made["iso"], made["bytes"]) == (None, None, len(content))
     assert http.get(made["links"]["self"]).json() == made
     assert [one["id"] for one in http.get("/v1/meshes").json()["meshes"]] == [made["id"]]
-    stored = load_mesh(http.app.state.parts.files.mesh(made["id"])).mesh
+    stored = load_mesh(http.app.state.parts.files.of(LOCAL).mesh(made["id"])).mesh
     assert stored.faces.shape == (192, 3)
 
 
@@ -104,7 +105,7 @@ def test_a_broken_mesh_is_refused_by_name(http, name):
     assert found in body["found"], body
     assert body["accepted"]
     assert http.get("/v1/meshes").json() == {"meshes": []}
-    assert not list((http.app.state.parts.files.root / "incoming").iterdir())
+    assert not list((http.app.state.parts.files.of(LOCAL).root / "incoming").iterdir())
 
 
 def test_a_surface_with_one_side_is_refused(http):
@@ -143,7 +144,7 @@ def volume(http, values=None, spacing=(1e-3,) * 3):
     """A volume as an upload leaves it; its address."""
     parts, volume_id = http.app.state.parts, new_id("volume")
     stored = Volume.of(sampled(ONE_HOLE, 20) if values is None else values, spacing)
-    write_volume(parts.files.volume(volume_id), stored)
+    write_volume(parts.files.of(LOCAL).volume(volume_id), stored)
     summary = {
         "title": "a ball",
         "shape": list(stored.values.shape),
@@ -151,7 +152,7 @@ def volume(http, values=None, spacing=(1e-3,) * 3):
         "origin_m": [0.0] * 3,
         "value_range": list(stored.range()),
     }
-    parts.volumes.add(volume_id, size=1, sha256="0" * 64, summary=summary)
+    parts.volumes.add(LOCAL, volume_id, size=1, sha256="0" * 64, summary=summary)
     return f"/v1/volumes/{volume_id}"
 
 
@@ -168,7 +169,7 @@ def test_the_surface_of_a_volume(http, cluster):
     coarse = http.post(f"{here}/mesh", params={"iso": 0.4, "step": 2}).json()
     assert coarse["faces"] < 0.5 * made["faces"]
     assert {one["id"] for one in http.get("/v1/meshes").json()["meshes"]} == {made["id"], coarse["id"]}
-    assert not list((http.app.state.parts.files.root / "incoming").iterdir())
+    assert not list((http.app.state.parts.files.of(LOCAL).root / "incoming").iterdir())
 
 
 @pytest.mark.parametrize(
@@ -184,7 +185,7 @@ def test_a_surface_that_is_too_large(http, monkeypatch):
     answer = http.post(f"{volume(http)}/mesh")
     assert (answer.status_code, answer.json()["field"]) == (422, "iso")
     assert "a larger step" in answer.json()["accepted"]
-    assert not list((http.app.state.parts.files.root / "incoming").iterdir())
+    assert not list((http.app.state.parts.files.of(LOCAL).root / "incoming").iterdir())
 
 
 def test_a_coloured_mesh(http):

@@ -15,6 +15,7 @@ from bentray_service import compute
 from bentray_service.app import create_app
 from bentray_service.settings import ServiceSettings
 from bentray_service.storage.ids import new_id
+from bentray_service.storage.tenants import LOCAL
 from bentray_workers import refraction, scene_cache, strips
 from bentray_workers.cluster import open_cluster
 from bentray_workers.lanes import RECONSTRUCTION
@@ -29,7 +30,7 @@ def put(http, values=None, spacing=(1e-3,) * 3):
     parts = http.app.state.parts
     volume = Volume.of(sampled(ONE_HOLE, 12) if values is None else values, spacing)
     volume_id = new_id("volume")
-    write_volume(parts.files.volume(volume_id), volume)
+    write_volume(parts.files.of(LOCAL).volume(volume_id), volume)
     summary = {
         "title": "a ball",
         "shape": list(volume.values.shape),
@@ -37,7 +38,7 @@ def put(http, values=None, spacing=(1e-3,) * 3):
         "origin_m": [0.0] * 3,
         "value_range": list(volume.range()),
     }
-    parts.volumes.add(volume_id, size=1, sha256="0" * 64, summary=summary)
+    parts.volumes.add(LOCAL, volume_id, size=1, sha256="0" * 64, summary=summary)
     return http.get(f"/v1/volumes/{volume_id}").json()["links"]["refraction"]
 
 

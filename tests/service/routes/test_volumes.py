@@ -9,6 +9,8 @@ import nibabel
 import numpy as np
 import pytest
 
+from bentray_service.storage.tenants import LOCAL
+
 
 @pytest.fixture
 def http(start, work):
@@ -157,7 +159,7 @@ def test_an_uploaded_volume_is_stored(start):
     assert (body["job"], body["dataset"], body["provenance"]) == (None, None, {})
     assert (body["bytes"], body["sha256"]) == (len(npy(RAMP)), hashlib.sha256(npy(RAMP)).hexdigest())
     assert http.get(answer.headers["location"]).json() == body
-    root = http.app.state.parts.files.root
+    root = http.app.state.parts.files.of(LOCAL).root
     assert [path.name for path in (root / "volumes").iterdir()] == [f"{body['id']}.h5"]
     assert not list((root / "incoming").iterdir())
 
@@ -229,7 +231,7 @@ def test_a_refused_volume_leaves_nothing(start, content, query, field):
     assert body["found"]
     assert body["accepted"]
     assert http.get("/v1/volumes").json() == {"volumes": []}
-    root = http.app.state.parts.files.root
+    root = http.app.state.parts.files.of(LOCAL).root
     assert not list((root / "incoming").iterdir())
     assert not list((root / "volumes").iterdir())
 

@@ -1,4 +1,4 @@
-"""Every kind of database that the service can use, each of them empty."""
+"""Every kind of database that the service can use, and what jobs need to be in one."""
 
 from __future__ import annotations
 
@@ -8,6 +8,26 @@ from pathlib import Path
 import pytest
 
 from bentray_service.storage.database import Database, open_database
+from bentray_service.storage.datasets import Datasets
+from bentray_service.storage.ids import new_id
+from bentray_service.storage.jobs import Jobs
+from bentray_service.storage.queue import Queue
+from bentray_service.storage.tenants import LOCAL
+
+SUMMARY = {
+    "title": "",
+    "source": "",
+    "license": "",
+    "dimension": 2,
+    "elements": 3,
+    "ntx": 3,
+    "nrx": 3,
+    "slices": 1,
+    "has_traces": False,
+    "has_travel_times": True,
+    "has_truth": False,
+    "water_speed_mps": 1500.0,
+}
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])
@@ -28,3 +48,20 @@ def database(address: str) -> Iterator[Database]:
     opened = open_database(address)
     yield opened
     opened.close()
+
+
+@pytest.fixture
+def jobs(database: Database) -> Jobs:
+    return Jobs(database)
+
+
+@pytest.fixture
+def queue(database: Database) -> Queue:
+    return Queue(database)
+
+
+@pytest.fixture
+def dataset(database: Database) -> str:
+    """The id of a dataset of the local tenant."""
+    row = Datasets(database).add(LOCAL, new_id("dataset"), size=1, sha256="0" * 64, summary=SUMMARY)
+    return str(row["id"])

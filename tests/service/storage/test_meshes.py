@@ -6,6 +6,7 @@ from bentray_service.refusals import UnknownId
 from bentray_service.storage.database import open_database
 from bentray_service.storage.ids import new_id
 from bentray_service.storage.meshes import Meshes
+from bentray_service.storage.tenants import LOCAL
 
 SUMMARY = {
     "title": "a ball",
@@ -29,17 +30,17 @@ def meshes(tmp_path):
 
 def test_a_row_is_kept_as_given(meshes):
     mesh = new_id("mesh")
-    row = meshes.add(mesh, size=9, sha256="f" * 64, summary=SUMMARY)
+    row = meshes.add(LOCAL, mesh, size=9, sha256="f" * 64, summary=SUMMARY)
     assert SUMMARY.items() <= row.items()
     assert (row["id"], row["bytes"], row["volume_id"], row["iso"]) == (mesh, 9, None, None)
-    assert meshes.get(mesh) == row
+    assert meshes.get(LOCAL, mesh) == row
 
 
 def test_newest_first(meshes):
-    made = [meshes.add(new_id("mesh"), size=1, sha256="f", summary=SUMMARY)["id"] for _ in range(3)]
-    assert [row["id"] for row in meshes.newest(2)] == made[:0:-1]
+    made = [meshes.add(LOCAL, new_id("mesh"), size=1, sha256="f", summary=SUMMARY)["id"] for _ in range(3)]
+    assert [row["id"] for row in meshes.newest(LOCAL, 2)] == made[:0:-1]
 
 
 def test_what_is_not_there(meshes):
     with pytest.raises(UnknownId, match="GET /v1/meshes"):
-        meshes.get(new_id("mesh"))
+        meshes.get(LOCAL, new_id("mesh"))

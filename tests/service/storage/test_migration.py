@@ -12,6 +12,8 @@ from bentray_service.storage import migration, schema
 from bentray_service.storage.database import open_database
 from bentray_service.storage.ids import new_id, volume_of
 from bentray_service.storage.jobs import Jobs
+from bentray_service.storage.queue import Queue
+from bentray_service.storage.tenants import LOCAL
 from bentray_service.storage.volumes import Volumes
 
 # The tables of version 1, word for word as SQLite kept them.
@@ -113,7 +115,7 @@ def test_the_old_tables_were_those_of_version_1(old, tmp_path):
     with sqlite3.connect(tmp_path / "old.sqlite") as connection:
         names = {row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     connection.close()
-    assert names == set(expected) - {"uploaded_volumes", "meshes", "geometry_fields"}
+    assert names == set(expected) - {"uploaded_volumes", "meshes", "geometry_fields", "keys"}
 
 
 def test_afterwards_it_is_as_a_new_one(old, tmp_path):
@@ -126,21 +128,21 @@ def test_afterwards_it_is_as_a_new_one(old, tmp_path):
 def test_every_row_is_kept(old):
     for _ in range(2):
         database = open_database(old)
-        jobs, volume = Jobs(database), Volumes(database).get(volume_of(DONE))
-        assert [row["id"] for row in jobs.newest(9)] == [WAITING, DONE]
-        job = jobs.get(DONE)
+        jobs, volume = Jobs(database), Volumes(database).get(LOCAL, volume_of(DONE))
+        assert [row["id"] for row in jobs.newest(LOCAL, 9)] == [WAITING, DONE]
+        job = jobs.get(LOCAL, DONE)
         assert (job["number"], job["dataset_id"], job["volume_id"]) == (3, DATASET, None)
         assert (job["settings"], job["done"], job["finished"]) == ({"nodes": 3}, 2, 7.0)
-        assert [event["note"] for event in jobs.events(WAITING)] == ["a note"]
+        assert [event["note"] for event in jobs.events(LOCAL, WAITING)] == ["a note"]
         assert (volume["dataset_id"], volume["shape"]) == (DATASET, [8, 8])
         database.close()
 
 
 def test_a_job_that_waited_is_run(old):
     database = open_database(old)
-    jobs = Jobs(database)
-    assert jobs.claim()["id"] == WAITING
-    assert jobs.state(WAITING) == "running"
+    queue = Queue(database)
+    assert queue.claim()["id"] == WAITING
+    assert queue.state(WAITING) == "running"
     database.close()
 
 
@@ -161,7 +163,7 @@ def test_what_fails_half_way_leaves_the_old_database(old, monkeypatch):
         open_database(old)
     monkeypatch.undo()
     database = open_database(old)
-    assert Jobs(database).get(DONE)["settings"] == {"nodes": 3}
+    assert Jobs(database).get(LOCAL, DONE)["settings"] == {"nodes": 3}
     database.close()
 
 
@@ -193,7 +195,10 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
         "uploaded_volumes",
         "ALTER TABLE jobs ALTER COLUMN dataset_id DROP NOT NULL",
         "ALTER TABLE jobs ADD COLUMN volume_id VARCHAR(32)",
-        "ALTER TABLE jobs ADD COLUMN tenant VARCHAR(64) NOT NULL DEFAULT 'local'",
+        *(
+            f"ALTER TABLE {table} ADD COLUMN tenant VARCHAR(64) NOT NULL DEFAULT 'local'"
+            for table in ("datasets", "uploaded_volumes", "volumes", "jobs")
+        ),
         "ALTER TABLE jobs ADD COLUMN idempotency_key VARCHAR(200)",
         "ALTER TABLE jobs ADD COLUMN request_sha256 VARCHAR(64)",
         "ALTER TABLE jobs ADD COLUMN lease_owner VARCHAR(64)",
@@ -204,8 +209,13 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
         "ALTER TABLE jobs ADD COLUMN field_id VARCHAR(32)",
         "CREATE INDEX jobs_by_tenant ON jobs (tenant, state)",
         "CREATE UNIQUE INDEX jobs_by_key ON jobs (tenant, idempotency_key)",
+        "CREATE INDEX datasets_by_tenant ON datasets (tenant, number)",
+        "CREATE INDEX uploaded_volumes_by_tenant ON uploaded_volumes (tenant, created)",
+        "CREATE INDEX volumes_by_tenant ON volumes (tenant, created)",
+        "CREATE INDEX jobs_by_age ON jobs (tenant, number)",
         "meshes",
         "geometry_fields",
+        "keys",
     ]
     assert told.said[-1].startswith("UPDATE about SET version")
 
@@ -224,7 +234,7 @@ def test_a_real_postgres_keeps_its_jobs_and_is_as_a_new_one_afterwards(postgresq
     engine.dispose()
     opened, new = map(open_database, addresses)
     assert described(opened) == described(new)
-    assert Jobs(opened).claim()["id"] == WAITING
+    assert Queue(opened).claim()["id"] == WAITING
     for database, address in zip((opened, new), addresses, strict=True):
         database.close()
         postgresql_server.drop(address)

@@ -1,0 +1,37 @@
+"""How a job changes its state: one update and one appended event, in the transaction of the caller."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from sqlalchemy import ColumnElement, Connection, insert, update
+
+from . import schema
+from .schema import jobs
+
+RUNNING = ("running", "cancelling")
+
+
+def change(
+    connection: Connection,
+    job_id: str,
+    before: tuple[str, ...],
+    after: str,
+    note: str = "",
+    only: ColumnElement[bool] | None = None,
+    **values: Any,
+) -> bool:
+    """Change the state if it is one of ``before`` and ``only`` holds; whether it was changed."""
+    where = [jobs.c.id == job_id, jobs.c.state.in_(before)]
+    if only is not None:
+        where.append(only)
+    changed = connection.execute(update(jobs).where(*where).values(state=after, **values))
+    if changed.rowcount:
+        tell(connection, job_id, after, note)
+    return bool(changed.rowcount)
+
+
+def tell(connection: Connection, job_id: str, state: str, note: str = "") -> None:
+    """Append an event."""
+    connection.execute(insert(schema.events).values(job_id=job_id, time=time.time(), state=state, note=note))

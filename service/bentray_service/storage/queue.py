@@ -1,0 +1,202 @@
+"""The queue of all tenants' jobs as the service that runs them sees it; no caller's request comes here."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import socket
+import time
+from typing import Any
+
+from sqlalchemy import ColumnElement, Connection, and_, func, insert, select, update
+
+from . import schema
+from .database import Database
+from .job_states import RUNNING, change
+from .schema import ENDED, jobs, volumes
+
+Row = dict[str, Any]
+MAX_ATTEMPTS = 3
+
+# How long a service that says nothing is believed to be at work on its jobs, s.
+LEASE_S = 30.0
+
+
+class Queue:
+    """Jobs from ``queued`` through ``running`` (and ``cancelling``) to their end.
+
+    Who claims a job has a lease of it, renewed as long as the service lives. A service that lost its lease,
+    because it stood still for too long, changes nothing of the job any more.
+    """
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self._owner = f"{socket.gethostname()[:40]}-{os.getpid()}-{secrets.token_hex(4)}"
+
+    def state(self, job_id: str) -> str:
+        """The state of one job; cheap."""
+        with self._database.read() as connection:
+            return str(connection.execute(select(jobs.c.state).where(jobs.c.id == job_id)).scalar_one())
+
+    def told(self, job_id: str) -> str | None:
+        """The state of a job that this service runs; None when it has lost the job to another."""
+        with self._database.read() as connection:
+            return connection.execute(select(jobs.c.state).where(self._held(job_id))).scalar_one_or_none()
+
+    def load(self) -> tuple[dict[str, int], float | None]:
+        """How many jobs are in each state, and since when the oldest of those that wait is waiting."""
+        with self._database.read() as connection:
+            counts = connection.execute(select(jobs.c.state, func.count()).group_by(jobs.c.state))
+            found = {state: int(count) for state, count in counts}
+            waiting = select(func.min(jobs.c.created)).where(jobs.c.state == "queued")
+            return found, connection.execute(waiting).scalar_one()
+
+    def unfinished(self) -> set[str]:
+        """The ids of all jobs that are not at their end."""
+        with self._database.read() as connection:
+            return set(connection.execute(select(jobs.c.id).where(jobs.c.state.not_in(ENDED))).scalars())
+
+    def claim(self) -> Row | None:
+        """Turn a queued job into a running one of this service and return it; None when none waits.
+
+        Of the tenants that wait, the one with the fewest running jobs is next, then the one whose last job
+        began longest ago; of its jobs the oldest.
+        """
+        of_tenant = jobs.alias()
+        same = of_tenant.c.tenant == jobs.c.tenant
+        running = select(func.count()).where(same, of_tenant.c.state.in_(RUNNING)).scalar_subquery()
+        served = select(func.coalesce(func.max(of_tenant.c.started), 0.0)).where(same).scalar_subquery()
+        next_one = (
+            select(jobs.c.id)
+            .where(jobs.c.state == "queued")
+            .order_by(running, served, jobs.c.number)
+            .limit(1)
+            .with_for_update(skip_locked=True)
+        )
+        with self._database.write() as connection:
+            job_id = connection.execute(next_one).scalar_one_or_none()
+            if job_id is None:
+                return None
+            now = time.time()
+            fresh: Row = {
+                "done": 0,
+                "total": 0,
+                "history": [],
+                "attempts": jobs.c.attempts + 1,
+                "started": now,
+            }
+            lease: Row = {"lease_owner": self._owner, "lease_until": now + LEASE_S}
+            change(connection, job_id, ("queued",), "running", self._owner, **fresh, **lease)
+            claimed = select(jobs).where(jobs.c.id == job_id)
+            return dict(connection.execute(claimed).mappings().one())
+
+    def renew(self) -> None:
+        """Say that this service is still at work on its jobs."""
+        with self._database.write() as connection:
+            mine = jobs.c.lease_owner == self._owner, jobs.c.state.in_(RUNNING)
+            connection.execute(update(jobs).where(*mine).values(lease_until=time.time() + LEASE_S))
+
+    def got_further(self, job_id: str) -> None:
+        """A job that has kept something is no job that kills its service: its attempts count anew."""
+        with self._database.write() as connection:
+            connection.execute(update(jobs).where(self._held(job_id), jobs.c.attempts > 1).values(attempts=1))
+
+    def _held(self, job_id: str) -> ColumnElement[bool]:
+        return and_(jobs.c.id == job_id, jobs.c.lease_owner == self._owner, jobs.c.state.in_(RUNNING))
+
+    def progress(self, job_id: str, done: int, total: int, history: list[Row]) -> None:
+        """Store how far a running job is."""
+        with self._database.write() as connection:
+            connection.execute(
+                update(jobs).where(self._held(job_id)).values(done=done, total=total, history=history)
+            )
+
+    def succeed(self, job_id: str, result: Row | None, into: str = volumes.name) -> bool:
+        """Store the success and the result, if there is one; False when it was cancelled in the meantime.
+
+        Args:
+            job_id: of the job.
+            result: a row; where its tenant has one with this id already, that one stays.
+            into: the name of its table.
+        """
+        with self._database.write() as connection:
+            now = time.time()
+            advice = (result or {}).get("provenance", {}).get("advice")
+            if not self._end(connection, job_id, ("running",), "succeeded", finished=now, advice=advice):
+                return False
+            if result is not None:
+                table = schema.metadata.tables[into]
+                mine = select(jobs.c.tenant).where(jobs.c.id == job_id)
+                tenant = connection.execute(mine).scalar_one()
+                there = select(table.c.id).where(table.c.tenant == tenant, table.c.id == result["id"])
+                if connection.execute(there).first() is None:
+                    row = {**result, "tenant": tenant, "job_id": job_id, "created": now}
+                    connection.execute(insert(table).values(**row))
+            return True
+
+    def fail(self, job_id: str, problem: Row) -> None:
+        """End a job with the problem that stopped it."""
+        with self._database.write() as connection:
+            note, now = str(problem["detail"])[:500], time.time()
+            self._end(connection, job_id, RUNNING, "failed", note, finished=now, error=problem)
+
+    def cancelled(self, job_id: str) -> None:
+        """End a job that has stopped as it was asked to."""
+        with self._database.write() as connection:
+            self._end(connection, job_id, RUNNING, "cancelled", finished=time.time())
+
+    def release(self, job_id: str, note: str) -> None:
+        """Put a running job back in the queue for a reason that is no fault of the job."""
+        with self._database.write() as connection:
+            again: Row = {"started": None, "attempts": jobs.c.attempts - 1}
+            if not self._end(connection, job_id, ("running",), "queued", note, **again):
+                self._end(connection, job_id, ("cancelling",), "cancelled", finished=time.time())
+
+    def _end(
+        self,
+        connection: Connection,
+        job_id: str,
+        before: tuple[str, ...],
+        after: str,
+        note: str = "",
+        **values: Any,
+    ) -> bool:
+        """End a job of this service, or give it back; whether it was still its own and in ``before``."""
+        held = jobs.c.lease_owner == self._owner
+        return change(
+            connection, job_id, before, after, note, held, **values, lease_owner=None, lease_until=None
+        )
+
+    def recover(self, crashed: Row, *, alone: bool) -> int:
+        """Take up what a dead service left: running jobs go back to the queue, cancelling ones end.
+
+        A job that saw ``MAX_ATTEMPTS`` services die without getting any further is failed with the problem
+        ``crashed``.
+
+        Args:
+            crashed: the problem.
+            alone: no other service uses this database, so that what is running and not of this one is left
+                over; otherwise its lease must have ended.
+
+        Returns:
+            how many wait again.
+        """
+        now, again = time.time(), 0
+        dead = jobs.c.lease_owner.is_distinct_from(self._owner)
+        if not alone:
+            dead = and_(dead, func.coalesce(jobs.c.lease_until, 0.0) < now)
+        left = select(jobs).where(jobs.c.state.in_(RUNNING), dead).with_for_update(skip_locked=True)
+        free: Row = {"lease_owner": None, "lease_until": None}
+        with self._database.write() as connection:
+            for row in connection.execute(left).mappings().all():
+                job_id = row["id"]
+                if row["state"] == "cancelling":
+                    change(connection, job_id, ("cancelling",), "cancelled", finished=now, **free)
+                elif row["attempts"] >= MAX_ATTEMPTS:
+                    change(connection, job_id, ("running",), "failed", finished=now, error=crashed, **free)
+                else:
+                    change(
+                        connection, job_id, ("running",), "queued", "the service died", started=None, **free
+                    )
+                    again += 1
+        return again

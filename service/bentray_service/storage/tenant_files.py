@@ -1,0 +1,137 @@
+"""The files of one tenant: the path of each, made from checked ids only."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Collection
+from pathlib import Path
+
+from .ids import PREFIXES, checked
+
+# What a data folder of before there were tenants has at its top.
+KINDS = ("incoming", "datasets", "volumes", "exports", "animations", "meshes", "fields", "work")
+
+
+class TenantFiles:
+    """Folders of one tenant.
+
+    ``incoming/`` holds uploads that no one has checked, ``datasets/`` the canonical files of scans,
+    ``volumes/`` results and the canonical files of uploaded volumes, ``exports/`` volumes in other formats,
+    ``animations/`` turntables, ``meshes/`` the canonical files of meshes, ``fields/`` a folder for each
+    geometry field, ``work/`` one for each job that is not at its end, with its checkpoints. An upload is a
+    dataset, a volume or a mesh, as its id tells.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self._incoming, self._datasets, self._volumes = root / "incoming", root / "datasets", root / "volumes"
+        self._exports, self._animations = root / "exports", root / "animations"
+        self._meshes, self._fields, self._work = root / "meshes", root / "fields", root / "work"
+
+    def prepare(self) -> None:
+        """Make the folders."""
+        # In this order, so that where the last one is the others are too.
+        if not (self.root / KINDS[-1]).is_dir():
+            for name in KINDS:
+                (self.root / name).mkdir(parents=True, exist_ok=True)
+
+    def drop_leftovers(self) -> None:
+        """Remove what a dead process left half done."""
+        for left in self._incoming.iterdir():
+            left.unlink()
+        for folder in (self._volumes, self._exports, self._animations, self._meshes):
+            for left in folder.glob("*.partial"):
+                left.unlink()
+
+    def incoming(self, upload_id: str) -> Path:
+        """Where an upload lands, before anything has looked at it."""
+        return self._incoming / f"{self._canonical(upload_id).stem}.upload"
+
+    def candidate(self, upload_id: str) -> Path:
+        """Where the ingest process writes the canonical file."""
+        return self._incoming / self._canonical(upload_id).name
+
+    def dataset(self, dataset_id: str) -> Path:
+        """The canonical file of a dataset."""
+        return self._datasets / f"{checked('dataset', dataset_id)}.h5"
+
+    def volume(self, volume_id: str) -> Path:
+        """The file of a volume: a reconstruction, or what was uploaded."""
+        return self._volumes / f"{checked('volume', volume_id)}.h5"
+
+    def export(self, volume_id: str, extension: str) -> Path:
+        """A volume in another format; made on demand."""
+        return self._exports / f"{checked('volume', volume_id)}.{extension}"
+
+    def animation(self, job_id: str, extension: str) -> Path:
+        """The result of a turntable."""
+        return self._animations / f"{checked('job', job_id)}.{extension}"
+
+    def mesh(self, mesh_id: str) -> Path:
+        """The canonical file of a mesh."""
+        return self._meshes / f"{checked('mesh', mesh_id)}.h5"
+
+    def field(self, field_id: str) -> Path:
+        """The folder of a geometry field; it is there as a whole or not at all."""
+        return self._fields / checked("field", field_id)
+
+    def work(self, job_id: str) -> Path:
+        """A folder for what a job makes on its way, which outlives the service; made if needed."""
+        folder = self._work / checked("job", job_id)
+        folder.mkdir(exist_ok=True)
+        return folder
+
+    def drop_work(self, job_id: str) -> None:
+        """Remove the folder of a job at its end."""
+        shutil.rmtree(self._work / checked("job", job_id), ignore_errors=True)
+
+    def keep_work(self, job_ids: Collection[str]) -> None:
+        """Remove the folders of all jobs but these."""
+        for folder in self._work.iterdir():
+            if folder.name not in job_ids:
+                shutil.rmtree(folder, ignore_errors=True)
+
+    def discard_candidate(self, upload_id: str) -> None:
+        """Remove a canonical file that was not adopted, also what a killed process left of it."""
+        for left in self._incoming.glob(f"{self.candidate(upload_id).name}*"):
+            left.unlink(missing_ok=True)
+
+    def adopt(self, upload_id: str) -> Path:
+        """Move the checked canonical file to its place, durably."""
+        target = self._canonical(upload_id)
+        self.candidate(upload_id).replace(target)
+        sync_folder(target.parent)
+        return target
+
+    def bytes_used(self) -> int:
+        """The size of all of it, bytes; what vanishes meanwhile is not counted."""
+        return _size(self.root)
+
+    def _canonical(self, upload_id: str) -> Path:
+        place = {PREFIXES["volume"]: self.volume, PREFIXES["mesh"]: self.mesh}
+        return place.get(upload_id.partition("-")[0], self.dataset)(upload_id)
+
+
+def _size(folder: Path) -> int:
+    total = 0
+    try:
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                try:
+                    inside = entry.is_dir(follow_symlinks=False)
+                    total += _size(Path(entry)) if inside else entry.stat(follow_symlinks=False).st_size
+                except FileNotFoundError:
+                    continue
+    except FileNotFoundError:
+        return 0
+    return total
+
+
+def sync_folder(folder: Path) -> None:
+    """Make a rename in ``folder`` survive a power cut."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
