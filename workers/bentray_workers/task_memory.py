@@ -28,8 +28,8 @@ FIELD_BYTES_PER_NODE = 80
 # step between nodes touches the corners of its cells. In space a level ray stays in its plane.
 ENTRIES_LEVEL, ENTRIES_IN_SPACE = 1.55, 3.1
 
-# An entry is a column of 4 bytes and a length of 4; a step keeps a second, weighted copy of the lengths.
-ENTRY_BYTES, STEP_ENTRY_BYTES = 8, 13
+# An entry is a column of 4 bytes and a length of 4.
+ENTRY_BYTES = 8
 
 
 @dataclass(frozen=True)
@@ -138,9 +138,10 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         # The parts of each emitter, and the same put together.
         return base + field + image + 2 * rows_bytes(scan, settings, math.ceil(share * rows))
 
-    def step(rows: int, entry_bytes: int) -> int:
+    def step(rows: int) -> int:
+        # Beside each row its time, what is missed, Huber's weight and their product.
         entries = rows * _entries(settings, scan.in_space)
-        return base + math.ceil(entries * entry_bytes) + 3 * REAL * rows + (8 + 8 * len(shape)) * image
+        return base + math.ceil(entries * ENTRY_BYTES) + 5 * REAL * rows + (8 + 8 * len(shape)) * image
 
     found: dict[str, int] = {}
     if scan.traces_bytes:
@@ -148,18 +149,17 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         found["prepare"] = FLOOR_BYTES + scan.traces_bytes + scan.traces_bytes // 8 + 6 * REAL * scan.pairs
     if settings.method == "gauss-newton":
         found["look"] = look(rays)
-        found["step"] = step(rays, STEP_ENTRY_BYTES)
+        found["step"] = step(rays)
     elif settings.decomposition == "slices" and settings.eikonal == DEVIATION and settings.rays != "adjoint":
         found["advance"] = base + _pass_bytes(shape, scan.receivers)
     else:
         found["advance"] = base + field + 8 * image
     if settings.attenuation and scan.amplitudes:
         found["look_losses"] = look(rays)
-        weighted = settings.method == "gauss-newton" and settings.huber_spreads > 0.0
-        found["attenuate"] = step(rays, STEP_ENTRY_BYTES if weighted else ENTRY_BYTES)
+        found["attenuate"] = step(rays)
     if settings.resolution_check:
         found["look_again"] = look(rays)
-        found["recover"] = step(rays, ENTRY_BYTES)
+        found["recover"] = step(rays)
     return found
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -122,10 +122,10 @@ class Linearised:
         Args:
             steepness: gradient of the quadratic term at the image; stiffness: its second derivative.
         """
-        parts = self._left(image)
-        downhill = np.zeros(image.size)
-        for part in parts:
-            back_project(part.pointers, part.columns, part.lengths, part.residual, downhill)
+        weights, downhill = [], np.zeros(image.size)
+        for part, missed in zip(self.parts, self._missed(image), strict=True):
+            weights.append(self._weights(missed))
+            back_project(part.pointers, part.columns, part.lengths, weights[-1] * missed, downhill)
         residual = self._within(downhill) - np.where(self.region, steepness, 0.0)
         change, direction = np.zeros_like(residual), residual
         square = float((residual**2).sum())
@@ -134,8 +134,8 @@ class Linearised:
             if square <= enough:
                 break
             curved = np.zeros(image.size)
-            for part in parts:
-                normal_product(part.pointers, part.columns, part.lengths, direction.ravel(), curved)
+            for part, weight in zip(self.parts, weights, strict=True):
+                normal_product(part.pointers, part.columns, part.lengths, weight, direction.ravel(), curved)
             bent = self._within(curved) + np.where(self.region, stiffness(direction), 0.0)
             step = square / float((direction * bent).sum())
             change = change + step * direction
@@ -148,18 +148,16 @@ class Linearised:
         """A sum over rows as an image, over the density, in the region."""
         return np.where(self.region, flat.reshape(self.image.shape) / self.density, 0.0)
 
-    def _left(self, image: Floats) -> list[Rows]:
-        """Rows and residuals at an image, multiplied by the square roots of their weights in Huber's loss."""
+    def _missed(self, image: Floats) -> Iterator[Floats]:
+        """What an image leaves of the residuals, part by part, s."""
         change = (image - self.image).ravel()
-        left = []
         for part in self.parts:
             explained = np.empty(part.residual.size)
             project(part.pointers, part.columns, part.lengths, change, explained)
-            missed = part.residual - explained
-            lengths = part.lengths
-            if self.huber < math.inf:
-                root = np.sqrt(self.huber / np.maximum(np.abs(missed), self.huber))
-                missed = missed * root
-                lengths = lengths * np.repeat(root, np.diff(part.pointers)).astype(np.float32)
-            left.append(replace(part, lengths=lengths, residual=missed))
-        return left
+            yield part.residual - explained
+
+    def _weights(self, missed: Floats) -> Floats:
+        """Of rows in Huber's loss: 1, less beyond its limit."""
+        if self.huber == math.inf:
+            return np.ones_like(missed)
+        return self.huber / np.maximum(np.abs(missed), self.huber)

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import random_array
 
-from bentray_kernels.tomography.matrix import back_project, normal_product
+from bentray_kernels.tomography.matrix import back_project, normal_product, project
 
 
 @given(rows=st.integers(1, 30), nodes=st.integers(1, 40), seed=st.integers(0, 2**32 - 1))
@@ -22,5 +22,9 @@ def test_products_are_those_of_the_dense_matrix(rows, nodes, seed):
     # Adjointness: ⟨A·image, values⟩ = ⟨image, Aᵀ·values⟩.
     there, again = (dense @ image) @ values, image @ (back - 1.0)
     assert abs(there - again) <= 1e-12 * (1.0 + abs(there))
-    normal_product(*parts, image, normal)
-    assert np.allclose(normal - 1.0, dense.T @ (dense @ image), atol=1e-12)
+    weights = rng.uniform(size=rows)
+    normal_product(*parts, weights, image, normal)
+    assert np.allclose(normal - 1.0, dense.T @ (weights * (dense @ image)), atol=1e-12)
+    along = np.empty(rows)
+    project(*parts, image, along)
+    assert np.allclose(along, dense @ image, atol=1e-12)
