@@ -54,25 +54,30 @@ def measured(quick: bool, progress: Step) -> Iterable[Row]:
 
 
 def scaling(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
-    """Seconds on one worker over those on two, of slices with SART and of one slice's emitters."""
-    nodes, elements, slices = (64, 64, 8) if quick else (128, 256, 16)
-    several = made_up_scan(folder / "several.h5", elements, slices)
-    one = made_up_scan(folder / "one.h5", elements, 1)
+    """Seconds on one worker over those on two, of slices and of one slice's emitters; R5's volume by SART."""
+    nodes, elements = (64, 64) if quick else (128, 256)
+    sart = Settings(nodes=nodes, sweeps=2 if quick else 3)
+    newton = Settings(nodes=nodes, sweeps=4, method="gauss-newton")
     ways = {
-        "SART slices": (several, Settings(nodes=nodes, sweeps=2 if quick else 3)),
-        "Gauss-Newton emitters": (one, Settings(nodes=nodes, sweeps=4, method="gauss-newton")),
+        "SART slices": (8 if quick else 40, sart),
+        "Gauss-Newton slices": (2 if quick else 8, newton),
+        "Gauss-Newton emitters": (1, newton),
+    }
+    scans = {
+        slices: made_up_scan(folder / f"{slices}.h5", elements, slices) for slices, _ in ways.values()
     }
     taken: dict[str, dict[int, float]] = {name: {} for name in ways}
     for workers in (1, 2):
         with open_cluster(workers=workers, local_directory=folder) as cluster:
-            for name, (path, settings) in ways.items():
+            for name, (slices, settings) in ways.items():
                 progress(workers - 1, 2, f"{name} on {workers} workers")
-                reconstruct(cluster.client, path, settings)
-                run = partial(reconstruct, cluster.client, path, settings)
+                reconstruct(cluster.client, scans[1], settings)
+                run = partial(reconstruct, cluster.client, scans[slices], settings)
                 taken[name][workers] = min(seconds(run) for _ in range(1 if quick else RUNS))
     for name, by_workers in taken.items():
         detail = ", ".join(f"{n} workers {s:.2f} s" for n, s in by_workers.items())
-        what = f"{nodes}², {elements} transducers" + (f", {slices} slices" if "slices" in name else "")
+        slices = f"{ways[name][0]} slices" if ways[name][0] > 1 else "one slice"
+        what = f"{nodes}², {elements} transducers, {slices}"
         yield Row(
             f"scaling 1 to 2, {name}", by_workers[1] / by_workers[2], 1.8, ">=", "", f"{what}: {detail}"
         )
