@@ -6,6 +6,7 @@ import tempfile
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
@@ -16,14 +17,15 @@ from bentray_kernels.tomography import Progress, Reconstruction, Settings
 from bentray_kernels.tomography import (
     reconstruct as reconstruct_here,
 )
-from bentray_kernels.tomography.chains import Call, Chain
+from bentray_kernels.tomography.chains import Call, Calls
 from bentray_kernels.tomography.reconstruction import carried_out, measured
 
 from .attempts import Attempts
 from .checkpoints import Checkpoints
 from .dataset_file import read_dataset, write_dataset
 from .offers import resources_for
-from .scan import FileScan
+from .scan import FileScan, FileWaveScan
+from .trace_reading import trace_samples
 
 # Tasks in flight for each worker: one at work and one ready.
 IN_FLIGHT = 2
@@ -70,7 +72,7 @@ def reconstruct(
         attempts = Attempts(client, Path(folder), resources_for(client, settings))
         path = _prepared(client, attempts, dataset_path, settings, Path(folder), stop)
         checkpoints = Checkpoints(Path(folder) / "checkpoints", on_saved)
-        return _carried_out(client, attempts, path, settings, checkpoints, on_progress, stop)
+        return _carried_out(client, attempts, path, dataset_path, settings, checkpoints, on_progress, stop)
 
 
 def _prepared(
@@ -110,6 +112,7 @@ def _carried_out(
     client: Client,
     attempts: Attempts,
     path: Path,
+    traces: Path,
     settings: Settings,
     checkpoints: Checkpoints,
     on_progress: Callable[[Progress], None] | None,
@@ -118,7 +121,7 @@ def _carried_out(
     stamp = path.stat().st_mtime_ns
     drives = count()
 
-    def drive(chains: Sequence[Chain], before: int, after: int) -> None:
+    def drive(chains: Sequence[Calls], before: int, after: int) -> None:
         # What is driven first, as the trials of ``auto``, is restored as a whole and so decides as it did.
         number = next(drives)
         named = {f"{number}-{k:05d}": chain for k, chain in enumerate(chains)}
@@ -133,13 +136,15 @@ def _carried_out(
         settings,
         lambda plan, part: FileScan(path, stamp, plan, part),
         drive,
+        lambda plan, index: FileWaveScan(traces, traces.stat().st_mtime_ns, plan, index),
+        trace_samples(traces),
     )
 
 
 def _drive(
     client: Client,
     attempts: Attempts,
-    chains: Mapping[str, Chain],
+    chains: Mapping[str, Calls],
     before: int,
     after: int,
     checkpoints: Checkpoints,
@@ -198,8 +203,10 @@ def _reconstruct_here(
     stop: Callable[[], bool] | None,
 ) -> Reconstruction:
     dataset = read_dataset(dataset_path)
+    traces = dataset.waveform if settings.method == "waveform" else None
     if not dataset.picked:
         dataset = pick(dataset, settings.picker)
+    dataset = replace(dataset, waveform=traces)
 
     def report(progress: Progress) -> None:
         if on_progress is not None:

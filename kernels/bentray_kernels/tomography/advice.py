@@ -129,6 +129,7 @@ def advise(
     index: int,
     scan_of: Callable[[Settings, Part], Scan],
     drive: Callable[[Sequence[Chain], int, int], None],
+    after: int = 0,
 ) -> tuple[Settings, tuple[Trial, ...], int]:
     """The settings that explain one slice best, and how all that were tried did.
 
@@ -138,10 +139,11 @@ def advise(
 
     Args:
         dataset: for the noise of its times.
-        settings: with ``method`` auto.
+        settings: that leave rays and method to the trials.
         index: the slice to try.
         scan_of: makes a scan of a part of the pairs.
         drive: runs chains to their end.
+        after: emitter passes that come after the reconstruction, at most.
 
     Returns:
         The settings; the trials, the chosen one first and the others by what they predict; and the emitter
@@ -154,7 +156,7 @@ def advise(
     chains = [
         TrialChain(scan_of(plan, "shown"), index, scan_of(plan, "held-out")) for plan in tried(settings)
     ]
-    drive(chains, 0, passes_to_come(dataset, settings))
+    drive(chains, 0, passes_to_come(dataset, settings) + after)
     trials = [
         Trial(changes, chain.held_out_rms_s, chain.history[-1].residual_rms_s)
         for changes, chain in zip(CANDIDATES, chains, strict=True)
@@ -184,7 +186,9 @@ def _check_parts(settings: Settings, index: int, scan_of: Callable[[Settings, Pa
             scan_of(plan, part).problem(index)
         except InvalidInput as found:
             raise InvalidInput(
-                "method", "'auto'", f"sart or gauss-newton, for slice {index} has no pair that is {part}"
+                "method",
+                repr(settings.method),
+                f"sart or gauss-newton, for slice {index} has no pair that is {part}",
             ) from found
 
 

@@ -6,6 +6,7 @@ import platform
 from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,15 +14,20 @@ from ..acquisition import Dataset
 from ..arrays import Floats
 from . import pairs
 from .advice import Part, advise, part_of
-from .chains import Chain, Scan, attenuate, recover
+from .chains import Calls, Chain, Scan, attenuate, recover
 from .problem import Problem
 from .result import Progress, Reconstruction, Trial
 from .settings import Settings
 from .stages import stages
 
+if TYPE_CHECKING:
+    from ..wave.chain import WaveScan
+    from ..wave.following import Following, WaveScanOf
+    from ..wave.settings import WaveSettings
+
 # Runs chains to their end, and tells the passes done of all after each call; the numbers are of passes made
 # before and of those that come after, at most.
-Drive = Callable[[Sequence[Chain], int, int], None]
+Drive = Callable[[Sequence[Calls], int, int], None]
 
 
 def reconstruct(
@@ -30,7 +36,7 @@ def reconstruct(
     """Reconstruct every slice of a dataset one after the other, or its volume.
 
     Args:
-        dataset: with travel times; traces must have been picked.
+        dataset: with travel times, for ``method`` waveform beside the traces that they were picked from.
         settings: see ``Settings``.
         progress: called after each batch of emitters.
 
@@ -41,7 +47,7 @@ def reconstruct(
         InvalidInput: from the dataset or a setting that does not fit it.
     """
 
-    def drive(chains: Sequence[Chain], before: int, after: int) -> None:
+    def drive(chains: Sequence[Calls], before: int, after: int) -> None:
         for chain in chains:
             waiting = chain.first()
             while waiting:
@@ -50,11 +56,26 @@ def reconstruct(
                 if progress is not None:
                     progress(measured(chains, before, after))
 
-    return carried_out(dataset, settings, lambda plan, part: Here(dataset, plan, part), drive)
+    def waves_of(plan: WaveSettings, index: int) -> WaveScan:
+        from ..wave.continuation import Here as WavesHere
+
+        return WavesHere(dataset, plan, index=index)
+
+    samples = 0
+    if dataset.waveform is not None and dataset.waveform.water is not None:
+        samples = dataset.waveform.object.shape[-1]
+    return carried_out(
+        dataset, settings, lambda plan, part: Here(dataset, plan, part), drive, waves_of, samples
+    )
 
 
 def carried_out(
-    dataset: Dataset, settings: Settings, scan_of: Callable[[Settings, Part], Scan], drive: Drive
+    dataset: Dataset,
+    settings: Settings,
+    scan_of: Callable[[Settings, Part], Scan],
+    drive: Drive,
+    waves_of: WaveScanOf,
+    samples: int = 0,
 ) -> Reconstruction:
     """A reconstruction whose calls are run by ``drive``.
 
@@ -63,6 +84,8 @@ def carried_out(
         settings: see ``Settings``.
         scan_of: makes what tells calls their data.
         drive: runs chains to their end.
+        waves_of: makes what tells the calls of a slice's refinement their data.
+        samples: of each trace of object and water; 0: none.
 
     Raises:
         InvalidInput: from the dataset or a setting that does not fit it, and what ``drive`` raises.
@@ -70,12 +93,27 @@ def carried_out(
     count = pairs.count(dataset, settings)
     trials: tuple[Trial, ...] = ()
     before = 0
-    if settings.method == "auto":
-        settings, trials, before = advise(dataset, settings, count // 2, scan_of, drive)
+    following = _following(dataset, settings, samples, waves_of)
+    after = 0 if following is None else following.total
+    if settings.tries:
+        settings, trials, before = advise(dataset, settings, count // 2, scan_of, drive, after)
     scan = scan_of(settings, "all")
     chains = [Chain(scan, index) for index in range(count)]
-    drive(chains, before, 0)
-    return _assembled(dataset, settings, scan.problem(0), chains, trials)
+    drive(chains, before, after)
+    rays = _assembled(dataset, settings, scan.problem(0), chains, trials)
+    if following is None:
+        return rays
+    return following.refined(rays, drive, before + sum(chain.total for chain in chains))
+
+
+def _following(dataset: Dataset, settings: Settings, samples: int, waves_of: WaveScanOf) -> Following | None:
+    """What comes after the rays; None where only they are asked for."""
+    if settings.method != "waveform":
+        return None
+    # Here, for waves build upon rays; and whoever never asks for them never loads them.
+    from ..wave.following import Following
+
+    return Following(dataset, settings, samples, waves_of)
 
 
 class Here:
@@ -106,7 +144,7 @@ def problem_of(dataset: Dataset, settings: Settings, index: int) -> Problem:
     return problem.each_pair_once() if once else problem
 
 
-def measured(chains: Sequence[Chain], before: int = 0, after: int = 0) -> Progress:
+def measured(chains: Sequence[Calls], before: int = 0, after: int = 0) -> Progress:
     """Progress over all chains and passes before and after them; a stage that ended early counts as whole."""
     history = sorted((s for c in chains for s in c.history), key=lambda s: (s.stage, s.sweep, s.slice))
     done, total = (before + sum(getattr(c, name) for c in chains) for name in ("done", "total"))

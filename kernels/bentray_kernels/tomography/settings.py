@@ -11,7 +11,7 @@ from ..acquisition.dataset import PLAUSIBLE_SPEED_MPS
 from ..eikonal import methods
 from ..errors import InvalidInput
 
-METHODS = ("sart", "gauss-newton", "auto")
+METHODS = ("sart", "gauss-newton", "auto", "waveform")
 RAYS = ("curved", "straight", "adjoint")
 
 # The wave front of the compiled pass over a slice; see ``eikonal.deviation``.
@@ -20,7 +20,9 @@ DEVIATION = "deviation"
 DECOMPOSITIONS = ("slices", "volume")
 PENALTIES = ("total-variation", "laplacian", "tikhonov")
 SPEED_UPDATES = ("fixed", "data-driven")
+WAVE_MISFITS = ("correlation", "least-squares")
 LEAST_NODES = 16
+WAVE_BANDS = 4
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,10 @@ class Settings:
     Attributes:
         method: ``sart`` uses one emitter after the other (chapter 6); ``gauss-newton`` all at once, with bent
             rays and a penalty; ``auto`` tries several on part of the pairs and takes the one that predicts
-            the others best, see ``advice``.
+            the others best, see ``advice``; ``waveform`` does so too, and then refines that image until the
+            traces that waves through it would make agree with those recorded, see ``wave``. It needs slices
+            with traces of object and water; its image has the finest grid that its waves ask for, ``nodes``
+            is that of the rays.
         rays: ``curved`` traces down the travel time of the current image; ``straight`` ignores refraction;
             ``adjoint``, for SART, traces none and takes the sensitivities from the wave front itself.
         eikonal: the wave-front method for curved rays: ``deviation``, made for slices, or one of
@@ -74,6 +79,11 @@ class Settings:
         focusing: take off the amplitudes what refraction does to them, by the spreading of ray tubes in the
             speed image; needs its frequency (``amplitude@frequency_hz``). Experimental.
         resolution_check: also tell how much of a checkerboard the rays recover, node by node.
+        wave_bands: of ``waveform``, how many of the bands of frequency are gone through, from the lowest; the
+            last of the four takes as long as all others and sharpens edges only.
+        wave_misfit: of ``waveform``: ``correlation`` asks for the form of each trace alone, ``least-squares``
+            for its amplitude too.
+        wave_emitters: of ``waveform``, how many are drawn in each band, other ones in each; 0: 32 or 40.
 
     Raises:
         InvalidInput: naming the setting, its value and what is accepted.
@@ -81,7 +91,7 @@ class Settings:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    method: Literal["sart", "gauss-newton", "auto"] = "sart"
+    method: Literal["sart", "gauss-newton", "auto", "waveform"] = "sart"
     rays: Literal["curved", "straight", "adjoint"] = "curved"
     eikonal: str = DEVIATION
     decomposition: Literal["slices", "volume"] = "slices"
@@ -112,6 +122,9 @@ class Settings:
     attenuation: bool = True
     focusing: bool = False
     resolution_check: bool = False
+    wave_bands: int = 4
+    wave_misfit: Literal["correlation", "least-squares"] = "correlation"
+    wave_emitters: int = 0
 
     def __post_init__(self) -> None:
         _one_of("method", self.method, METHODS)
@@ -121,6 +134,7 @@ class Settings:
         _one_of("picker", self.picker, tuple(PICKERS))
         _one_of("decomposition", self.decomposition, DECOMPOSITIONS)
         _one_of("penalty", self.penalty, PENALTIES)
+        _one_of("wave_misfit", self.wave_misfit, WAVE_MISFITS)
         _speeds("speed_bounds_mps", self.speed_bounds_mps)
         if self.speed_range_mps is not None:
             _speeds("speed_range_mps", self.speed_range_mps)
@@ -132,6 +146,10 @@ class Settings:
             raise InvalidInput(
                 "speed_range_mps", None, "(lowest, highest) in m/s, since speed_update is data-driven"
             )
+        if self.method == "waveform" and self.decomposition == "volume":
+            raise InvalidInput("decomposition", "'volume'", "slices, with method waveform")
+        _within("wave_bands", self.wave_bands, 1, WAVE_BANDS)
+        _within("wave_emitters", self.wave_emitters, 0, 4096)
         _within("nodes", self.nodes, LEAST_NODES, 2048)
         if self.axial_room_nodes is not None:
             _within("axial_room_nodes", self.axial_room_nodes, 2, 4096)
@@ -156,6 +174,11 @@ class Settings:
         _within("huber_spreads", self.huber_spreads, 0.0, 100.0)
         _within("stop_rms_s", self.stop_rms_s, 0.0, 1.0)
         _within("seed", self.seed, 0, 2**63 - 1)
+
+    @property
+    def tries(self) -> bool:
+        """Whether rays and method are chosen by trials."""
+        return self.method in ("auto", "waveform")
 
     @property
     def front(self) -> str:

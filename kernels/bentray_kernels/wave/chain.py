@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -16,6 +17,10 @@ from .passes import sweeps
 from .problem import WaveProblem
 from .refine import Look, WaveIterate, WavePass
 from .settings import WaveSettings
+
+# A band whose water shots are simulated with a lower correlation than this with the recorded ones is passed
+# over: its waves are too long for the array and its absorbing edges, or were not sent.
+LEAST_LIKENESS = 0.9
 
 
 @dataclass(frozen=True)
@@ -50,12 +55,19 @@ class BandEnd:
     Attributes:
         image: the image.
         skipped: whether held-out emitters ended the band.
-        history: a record for each image that was looked at.
+        history: a record for each image that was looked at; none of a band that was passed over.
     """
 
     image: Image
     skipped: bool
     history: tuple[WavePass, ...]
+
+    @property
+    def held(self) -> float:
+        """Misfit of held-out emitters in that image; NaN where none was looked at."""
+        if not self.history:
+            return math.nan
+        return self.history[refine.given_by(self.history, skipped=self.skipped)].held
 
 
 @dataclass(frozen=True)
@@ -103,16 +115,24 @@ class WaveChain:
         scan: see ``WaveScan``.
         start: the image to begin with.
         index: of the slice, for the history.
-        earlier: what led to the start; it comes first in the history.
+        earlier: what led to the start, and other slices; it comes first in the history.
+        stage: number of the first band among all stages.
 
     Attributes:
         ends: where bands ended.
         total: emitter passes that it takes at most, but for shortened steps, which count as none.
     """
 
-    def __init__(self, scan: WaveScan, start: Image, index: int = 0, earlier: tuple[Sweep, ...] = ()) -> None:
+    def __init__(
+        self,
+        scan: WaveScan,
+        start: Image,
+        index: int = 0,
+        earlier: tuple[Sweep, ...] = (),
+        stage: int = 0,
+    ) -> None:
         self._scan, self._start = scan, start
-        self._index, self._earlier = index, earlier
+        self._index, self._earlier, self._stage = index, earlier, stage
         self._sizes = [band.looks(scan.settings().held_out) for band in scan.settings().bands]
         self.ends: tuple[BandEnd, ...] = ()
         self._band: Entered | None = None
@@ -145,7 +165,6 @@ class WaveChain:
     @property
     def history(self) -> tuple[Sweep, ...]:
         """What led to the start, then of each band a stage."""
-        stage = 1 + max((sweep.stage for sweep in self._earlier), default=-1)
         passes = [end.history for end in self.ends]
         if self._band is not None:
             passes.append(self._band.state.history)
@@ -158,7 +177,7 @@ class WaveChain:
                 number,
                 of_band,
                 self._index,
-                stage + number,
+                self._stage + number,
                 over=over,
                 skipped=skipped,
             )
@@ -199,6 +218,8 @@ class WaveChain:
         """
         if call.function is enter:
             self._band = given
+            if given is None:
+                self.ends = (*self.ends, BandEnd(self.image, skipped=False, history=()))
             return self.first()
         assert self._band is not None
         if call.function is look_at_waves:
@@ -219,9 +240,11 @@ class WaveChain:
         return self.first()
 
 
-def enter(scan: WaveScan, number: int, image: Image) -> Entered:
-    """Call: what a band begins with."""
+def enter(scan: WaveScan, number: int, image: Image) -> Entered | None:
+    """Call: what a band begins with; None where it is passed over, see ``LEAST_LIKENESS``."""
     problem = scan.problem(number)
+    if problem.likeness < LEAST_LIKENESS:
+        return None
     state = refine.begin(on_grid(image, problem))
     return Entered(state, problem.origin, len(refine.emitters(problem)))
 

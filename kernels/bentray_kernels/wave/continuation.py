@@ -35,11 +35,13 @@ class Refined(NamedTuple):
 
 
 class Here:
-    """A scan in this process."""
+    """A slice of a scan in this process."""
 
-    def __init__(self, dataset: Dataset, settings: WaveSettings, run: Mapping = map) -> None:
+    def __init__(
+        self, dataset: Dataset, settings: WaveSettings, run: Mapping = map, *, index: int = 0
+    ) -> None:
         self._settings = settings
-        self._made = cache(lambda number: prepare(dataset, settings, number, run=run))
+        self._made = cache(lambda number: prepare(dataset.slice(index), settings, number, run=run))
 
     def settings(self) -> WaveSettings:
         return self._settings

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from ..tomography.result import Sweep
-from .refine import WavePass
+from .refine import WavePass, given_by
 from .settings import Band, WaveSettings
 
 
@@ -32,7 +32,7 @@ def sweeps(
         skipped: whether held-out emitters ended it, so that it gave the image that they like best.
     """
     band = settings.bands[number]
-    given = _given(history, skipped=skipped) if over else -1
+    given = given_by(history, skipped=skipped) if over and history else -1
     return [
         Sweep(
             index,
@@ -56,10 +56,3 @@ def shift_s(misfit: float, band: Band) -> float:
     half the energy of their difference over that of one.
     """
     return math.acos(max(1.0 - misfit, -1.0)) / (math.pi * (band.low_hz + band.high_hz))
-
-
-def _given(history: Sequence[WavePass], *, skipped: bool) -> int:
-    """Which image the band gave."""
-    if skipped:
-        return min((record.held, k) for k, record in enumerate(history) if record.taken)[1]
-    return max((k for k, record in enumerate(history) if record.taken), default=-1)

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..acquisition import Dataset
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
 from ..tomography.roi import inside
+from .extent import Extent
 from .points import REACH
 from .problem import WaveProblem
-from .sampling import FALL, Clock, Water
+from .sampling import Clock, Water
 from .settings import WaveSettings
 from .sounding import Mapping, WaterShots, sounded
-from .stencil import longest_step
-
-# Part of the stable time step that is used, for the absorbing edges shorten it.
-SAFE = 0.95
-
-# Times the period of the upper corner that the filter may spread ahead of the first sample.
-LEAD = 2.0
 
 
 def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mapping = map) -> WaveProblem:
@@ -45,7 +37,10 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mappi
     band, spacing = settings.bands[number], settings.bands[number].spacing_m
     flat = dataset.element_position_m
     centre = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
-    nodes = 2 * math.ceil(float(np.abs(flat - centre).max()) / spacing + REACH) + 1
+    samples = dataset.t0_s + np.arange(recorded.object.shape[-1]) / dataset.sampling_rate_hz
+    reach = float(np.abs(flat - centre).max())
+    extent = Extent.of(band, reach, float(samples[-1] - samples[0]), settings.speed_bounds_mps[1])
+    nodes = extent.nodes
     axis = spacing * (np.arange(nodes) - 0.5 * (nodes - 1))
     nearest = float(np.linalg.norm(flat - centre, axis=1).min()) - REACH * spacing
     origin = centre + axis[0]
@@ -55,10 +50,7 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mappi
         region &= inside(dataset, region.shape, spacing, place)
     if not region.any():
         raise InvalidInput("spacing_m", spacing, "nodes inside the array and the region of interest")
-    samples = dataset.t0_s + np.arange(recorded.object.shape[-1]) / dataset.sampling_rate_hz
-    step = SAFE * longest_step(settings.speed_bounds_mps[1], spacing)
-    begin = dataset.t0_s - LEAD / band.high_hz
-    clock = Clock(begin, step, int((samples[-1] - begin) / step))
+    clock = Clock(dataset.t0_s - extent.lead_s, extent.step_s, extent.steps)
     gain, water_gain = (
         recorded.scale * (np.ones(recorded.object.shape[:2]) if factor is None else factor)
         for factor in (recorded.object_scale, recorded.water_scale)
@@ -82,8 +74,7 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mappi
         sampler=np.empty((0, 0), dtype=np.float32),
         used=used,
         held=held,
-        # The product of two fields ends at twice the filter's end; twice that is sampled.
-        every=max(1, int(1.0 / (2.2 * (1.0 + FALL) * band.high_hz) / step)),
+        every=extent.every,
     )
     return sounded(problem, WaterShots(recorded.water, water_gain, samples, settings.window_s), run)
 

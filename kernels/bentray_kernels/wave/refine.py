@@ -207,3 +207,15 @@ def _shortened(settings: WaveSettings, state: WaveIterate, misfit: float) -> Wav
 
 def _moved(settings: WaveSettings, base: Floats, way: Floats) -> Floats:
     return np.clip(base + way, *settings.speed_bounds_mps)
+
+
+def given_by(history: Sequence[WavePass], *, skipped: bool) -> int:
+    """Which of the images that were looked at a finished band gave, from 0.
+
+    Args:
+        history: of the band.
+        skipped: whether held-out emitters ended it, so that it gave the image that they like best.
+    """
+    if skipped:
+        return min((record.held, k) for k, record in enumerate(history) if record.taken)[1]
+    return max(k for k, record in enumerate(history) if record.taken)

@@ -84,4 +84,4 @@ def useful_workers(dataset: Dataset, settings: Settings) -> int:
 
     problems, cores = count(dataset, settings), len(os.sched_getaffinity(0))
     volume = settings.decomposition == "volume" and settings.method == "gauss-newton"
-    return cores if volume or settings.method == "auto" else min(problems, cores)
+    return cores if volume or settings.tries else min(problems, cores)

@@ -42,7 +42,8 @@ OPTIONS = {
         "--method",
         str,
         "sart",
-        "sart: one emitter after the other; gauss-newton: all at once, with a penalty; auto tries both.",
+        "sart: one emitter after the other; gauss-newton: all at once, with a penalty; auto tries both; "
+        "waveform refines what auto gives by simulated waves.",
     ),
     "rays": Option(
         "--rays", str, "curved", "curved follows refraction, straight does not, adjoint traces none."

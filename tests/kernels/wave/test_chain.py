@@ -52,7 +52,9 @@ def test_nothing_stands_before_the_first_band():
 
 
 def test_progress_rises_to_its_end_and_history_tells_the_bands():
-    chain = WaveChain(Here(scan(), SETTINGS), water(), 2, (Sweep(2, 1, 1e-7, 24), Sweep(2, 1, 1e-7, 24, 1)))
+    chain = WaveChain(
+        Here(scan(), SETTINGS), water(), 2, (Sweep(2, 1, 1e-7, 24), Sweep(2, 1, 1e-7, 24, 1)), 2
+    )
     seen, calls = [chain.done], chain.first()
     while calls:
         call = calls.pop(0)

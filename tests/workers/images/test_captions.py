@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.tomography import Settings, Sweep
+from bentray_kernels.tomography import Settings, Sweep, Trial
 from bentray_kernels.tomography.stages import stages
 from bentray_workers.images.captions import facts, stage_names
 
@@ -28,11 +28,11 @@ def test_the_names_are_those_of_the_stages_that_are_made(settings):
     ring, everyone = np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]]), np.arange(3)
     plans = stages(Dataset(ring, everyone, everyone, 1500.0, delta_tof_s=np.zeros((3, 3))), settings)
     names = ["straight" if plan.rays != settings.rays else f"{plan.nodes} nodes" for plan in plans]
-    assert list(stage_names(settings)) == names
+    assert list(stage_names(replace(made(), settings=settings))) == names
 
 
 def test_one_stage_needs_no_name():
-    assert stage_names(Settings()) == ()
+    assert stage_names(replace(made(), settings=Settings())) == ()
 
 
 def test_the_sweeps_of_all_stages_are_counted():
@@ -54,3 +54,18 @@ def test_the_sweeps_of_all_stages_are_counted():
 )
 def test_the_wave_front_method_is_the_one_that_was_used(settings, words):
     assert facts(replace(made(), settings=settings)).startswith(words)
+
+
+def test_waveforms_are_named_after_the_rays_that_they_began_with():
+    bands = (
+        Sweep(0, 1, 1e-7, 36, 1, band_hz=(1e5, 2e5), misfit=0.1),
+        Sweep(0, 1, 5e-8, 36, 3, band_hz=(1e5, 4.5e5), misfit=0.1),
+    )
+    rays = Trial({"rays": "straight", "method": "sart"}, 1e-7, 1e-7)
+    result = replace(
+        made(), settings=Settings(method="waveform"), trials=(rays,), history=(Sweep(0, 1, 2e-7, 36), *bands)
+    )
+    assert facts(result).startswith(
+        "straight rays  ·  SART  ·  then waveforms  ·  3 sweeps in 3 stages  ·  24 by"
+    )
+    assert stage_names(result) == ("128 nodes", "200 kHz", "450 kHz")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from bentray_kernels.tomography import Reconstruction, Settings
 
@@ -32,7 +33,7 @@ def which_slice(result: Reconstruction, index: int) -> str:
 
 def facts(result: Reconstruction) -> str:
     """Rays, method, sweeps, size, water and residual in one line."""
-    settings = result.settings
+    settings = _of_rays(result)
     size = " by ".join(str(n) for n in result.speed.shape)
     found = [
         _rays(settings),
@@ -40,18 +41,30 @@ def facts(result: Reconstruction) -> str:
         f"{size} nodes of {1e3 * result.spacing_m[0]:.2g} mm",
         f"water {result.water_speed_mps:.1f} m/s",
     ]
+    if result.settings.method == "waveform":
+        found.insert(2, "then waveforms")
     if result.residual_rms_s is not None:
-        found.insert(2, _sweeps(result))
+        found.insert(-2, _sweeps(result))
         found.append(f"residual {1e9 * result.residual_rms_s:.0f} ns")
     return "  ·  ".join(found)
 
 
-def stage_names(settings: Settings) -> tuple[str, ...]:
-    """What tells the stages apart that ``bentray_kernels.tomography.stages`` makes; nothing for one."""
+def _of_rays(result: Reconstruction) -> Settings:
+    """Settings of the rays, which waveforms leave to the first of the trials."""
+    if result.settings.method != "waveform" or not result.trials:
+        return result.settings
+    return replace(result.settings, **result.trials[0].settings)
+
+
+def stage_names(result: Reconstruction) -> tuple[str, ...]:
+    """What tells the stages apart: those of ``bentray_kernels.tomography.stages``, bands; nothing for one."""
+    settings = _of_rays(result)
     grids = [-(-settings.nodes // 2**k) for k in range(settings.coarser_grids, -1, -1)]
     names = [f"{nodes} nodes" for nodes in grids]
     if settings.straight_sweeps and settings.rays != "straight":
         names.insert(0, "straight")
+    bands = {sweep.stage: sweep.band_hz for sweep in result.history if sweep.band_hz}
+    names += [f"{1e-3 * band[1]:.0f} kHz" for _, band in sorted(bands.items())]
     return tuple(names) if len(names) > 1 else ()
 
 

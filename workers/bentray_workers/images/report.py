@@ -194,6 +194,6 @@ def _maps(panels: Iterator[Axes], result: Reconstruction, k: int) -> None:
 
 
 def _curves(panels: Iterator[Axes], result: Reconstruction) -> None:
-    draw_history(next(panels), {"residual": result.history}, stage_names(result.settings))
+    draw_history(next(panels), {"residual": result.history}, stage_names(result))
     if result.residuals is not None:
         draw_residuals(next(panels), result.residuals, result.residual_rms_s)

@@ -4,7 +4,7 @@ import { glassOf, queryOf } from "./views.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const RAYS = { curved: "Bent rays", straight: "Straight rays", adjoint: "Without rays" };
-const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton", auto: "auto" };
+const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton", auto: "auto", waveform: "waveforms" };
 const cards = new Map();
 
 function make(tag, className, text) {

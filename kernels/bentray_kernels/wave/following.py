@@ -1,0 +1,128 @@
+"""What waveforms make of a reconstruction along rays: chains that begin with its image, and the result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..acquisition import Dataset
+from ..tomography import pairs
+from ..tomography.reconstruction import Drive, measured
+from ..tomography.result import Reconstruction
+from ..tomography.settings import Settings
+from .asked import check_traces, wave_settings
+from .chain import BandEnd, Image, WaveChain, WaveScan, resampled
+from .settings import WaveSettings
+
+# Makes what tells the calls of one slice their data.
+WaveScanOf = Callable[[WaveSettings, int], WaveScan]
+
+
+class Following:
+    """A refinement that is to come.
+
+    Args:
+        dataset: its traces may still lie in its file.
+        settings: as they were asked for.
+        samples: of each trace of object and water; 0: none.
+        scan_of: see ``WaveScanOf``.
+
+    Attributes:
+        total: emitter passes that it takes at most.
+
+    Raises:
+        InvalidInput: for a scan that lacks what waves need.
+    """
+
+    def __init__(self, dataset: Dataset, settings: Settings, samples: int, scan_of: WaveScanOf) -> None:
+        check_traces(samples)
+        self._settings, self._scan_of = settings, scan_of
+        self._plan = wave_settings(dataset, settings)
+        self.total = pairs.count(dataset, settings) * sum(
+            band.looks(self._plan.held_out) for band in self._plan.bands
+        )
+
+    def refined(self, rays: Reconstruction, drive: Drive, before: int) -> Reconstruction:
+        """The image of the rays, refined slice after slice: the emitters of one are enough for many workers.
+
+        Args:
+            rays: the reconstruction.
+            drive: runs chains to their end.
+            before: emitter passes that were made.
+        """
+        images = _slices(rays, rays.speed)
+        each = self.total // len(images)
+        history, chains = rays.history, []
+        for index, image in enumerate(images):
+            scan = self._scan_of(self._plan, index)
+            chains.append(WaveChain(scan, image, index, history, self._stage(rays)))
+            drive(chains[-1:], before + each * index, self.total - each * (index + 1))
+            history = chains[-1].history
+        return self._result(rays, chains)
+
+    def _stage(self, rays: Reconstruction) -> int:
+        return 1 + max(sweep.stage for sweep in rays.history)
+
+    def _result(self, rays: Reconstruction, chains: Sequence[WaveChain]) -> Reconstruction:
+        """The result of finished chains, on the finest grid that one of them reached."""
+        finest = min((chain.image for chain in chains), key=lambda image: image.spacing)
+
+        def laid(images: Sequence[Image]) -> NDArray[np.float64]:
+            grid = finest.spacing, finest.origin, finest.speed.shape
+            parts = [image.speed if image is finest else resampled(image, *grid) for image in images]
+            return np.ascontiguousarray(np.stack(parts, axis=-1)) if rays.speed.ndim == 3 else parts[0]
+
+        def of_rays(values: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+            return None if values is None else laid(_slices(rays, values))
+
+        coverage = of_rays(rays.coverage)
+        assert coverage is not None
+        return replace(
+            rays,
+            speed=laid([chain.image for chain in chains]),
+            coverage=coverage,
+            attenuation=of_rays(rays.attenuation),
+            recovery=of_rays(rays.recovery),
+            spacing_m=(finest.spacing, finest.spacing, *rays.spacing_m[2:]),
+            origin_m=(*finest.origin, *rays.origin_m[2:]),
+            settings=replace(self._settings, method="waveform"),
+            history=measured(chains[-1:]).history,
+            # They are of the rays' image.
+            residuals=None,
+            provenance={**rays.provenance, "waveform": _told(rays, self._plan, chains)},
+        )
+
+
+def _slices(rays: Reconstruction, values: NDArray[np.float64]) -> list[Image]:
+    """An array of a reconstruction as an image a slice."""
+    origin = (rays.origin_m[0], rays.origin_m[1])
+    every = np.moveaxis(np.atleast_3d(values), -1, 0)
+    return [Image(np.ascontiguousarray(image), rays.spacing_m[0], origin) for image in every]
+
+
+def _told(rays: Reconstruction, plan: WaveSettings, chains: Sequence[WaveChain]) -> str:
+    """What it began with and how each band predicted the emitters that were held out."""
+    used = rays.settings
+    text = f"begun from the image of {used.rays} rays ({used.method})"
+    for number, band in enumerate(plan.bands):
+        ends = [chain.ends[number] for chain in chains if len(chain.ends) > number]
+        if ends:
+            text += f"; {1e-3 * band.low_hz:.0f} to {1e-3 * band.high_hz:.0f} kHz: {_band_told(ends)}"
+    return text
+
+
+def _band_told(ends: Sequence[BandEnd]) -> str:
+    """What a band gave, over all slices that reached it."""
+    looked = [end for end in ends if end.history]
+    if not looked:
+        return "passed over, for its water shots could not be simulated"
+    first, last = np.mean([(end.history[0].held, end.held) for end in looked], axis=0)
+    text = f"misfit of held-out emitters {first:.2g}, then {last:.2g}"
+    skipped = sum(end.skipped for end in looked)
+    if skipped:
+        where = f" in {skipped} slices" if len(ends) > 1 else ""
+        text += f", stopped{where} as it rose: cycles were skipped, or noise was fitted"
+    return text
