@@ -3,53 +3,41 @@
 from __future__ import annotations
 
 from pathlib import Path
-
-import numpy as np
-
-from bentray_kernels.errors import InvalidInput
+from typing import Any
 
 from ..volume_file import read_volume
-from .canvas import drawing, new_figure, to_png
-from .maps import draw_bar, draw_map, robust_limits
-from .slice import COLORMAPS, given_limits
+from .look import Look
+from .maps import robust_limits
+from .plane import UPRIGHT, plane_of
+from .plane_picture import plane_png
+from .slice import given_limits
 
 
 def volume_slice_png(
     path: Path,
     *,
+    axis: str = UPRIGHT,
     index: int | None = None,
     low: float | None = None,
     high: float | None = None,
-    colormap: str = "viridis",
+    **look: Any,
 ) -> bytes:
-    """One slice of an uploaded volume, across its z axis.
+    """One slice of an uploaded volume.
 
     Args:
         path: of a file as ``volume_file.write_volume`` writes it.
-        index: along z; None: the middle one.
+        axis: the one that the slice cuts across: x, y or z.
+        index: along it; None: the middle one.
         low, high: values of the first and the last colour; None: from the slice, but for a few outliers.
-        colormap: one of ``COLORMAPS``.
+        look: as the fields of ``Look``.
 
     Raises:
         InvalidInput: naming the argument, or the field of the file.
     """
-    if colormap not in COLORMAPS:
-        raise InvalidInput("colormap", repr(colormap), "one of " + ", ".join(COLORMAPS))
+    chosen = Look(**look)
     volume = read_volume(path)
-    slices = volume.values.shape[2]
-    k = slices // 2 if index is None else index
-    if not 0 <= k < slices:
-        raise InvalidInput("index", k, f"0 to {slices - 1}")
-    image = volume.values[:, :, k].astype(np.float64)
-    limits = given_limits(robust_limits([image]), low, high)
-    place = 1e3 * (volume.origin_m[2] + k * volume.spacing_m[2])
-    with drawing():
-        figure = new_figure(6.6, 5.9)
-        axes = figure.subplots()
-        title = f"Slice index {k} (0 to {slices - 1}), z = {place:.4g} mm"
-        shown = draw_map(
-            axes, image, volume.spacing_m[:2], volume.origin_m[:2], limits, colormap=colormap, title=title
-        )
-        draw_bar([shown], "value")
-        figure.supxlabel(volume.title[:80], fontsize=8, color="#666666")
-        return to_png(figure)
+    plane = plane_of(volume.values, volume.spacing_m, volume.origin_m, axis, index)
+    limits = given_limits(robust_limits([plane.image]), low, high)
+    where = plane.where()
+    title = where[0].upper() + where[1:]
+    return plane_png(plane, limits, chosen, title=title, unit="value", note=volume.title[:80])

@@ -1,0 +1,100 @@
+"""Slices drawn: the size that was asked for, the bars, and the image alone."""
+
+import io
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.images.look import Look
+from bentray_workers.images.plane import plane_of
+from bentray_workers.images.plane_picture import MOST_OF_WIDTH, plane_png, scale_of
+
+from .pixels import near, pixels
+
+RAMP = np.arange(60.0).reshape(3, 4, 5)
+PLANE = plane_of(RAMP, (1e-2, 1e-2, 2e-2), (0.0, 0.0, 0.0), "x", 1)
+WORDS = {"title": "A title", "unit": "sound speed (m/s)", "note": "a note"}
+WHITE = (255, 255, 255)
+
+
+def drawn_with(**look):
+    return plane_png(PLANE, (20.0, 39.0), Look(**look), **WORDS)
+
+
+def size_of(picture):
+    return Image.open(io.BytesIO(picture)).size
+
+
+@pytest.mark.parametrize("size", [200, 257, 1000, 1777])
+@pytest.mark.parametrize("bars", [True, False])
+def test_the_longest_side_is_as_long_as_asked_for(size, bars):
+    assert max(size_of(drawn_with(size=size, scale_bar=bars, colour_bar=bars))) == size
+
+
+def test_the_frame_tells_everything(drawn):
+    drawn_with(scale_bar=True, interpolation="cubic")
+    assert {"A title", "sound speed (m/s)", "a note", "y (mm)", "z (mm)", "10 mm"} <= set(drawn.words())
+    image = drawn[-1].axes[0].images[0]
+    assert (image.get_interpolation(), image.get_clim()) == ("bicubic", (20.0, 39.0))
+    np.testing.assert_allclose(image.get_extent(), (-5.0, 35.0, -10.0, 90.0))
+
+
+def test_bars_are_left_out(drawn):
+    drawn_with(scale_bar=False, colour_bar=False)
+    assert len(drawn[-1].axes) == 1
+    assert "sound speed (m/s)" not in drawn.words()
+    assert "10 mm" not in drawn.words()
+
+
+def test_the_bare_image_has_a_pixel_a_node_to_scale():
+    # Twice as far between nodes along z: 4 by 10 to scale, the longest side a pixel a node.
+    assert size_of(drawn_with(frame=False)) == (2, 5)
+    assert size_of(drawn_with(frame=False, size=400)) == (160, 400)
+
+
+def test_the_bare_image_is_nothing_but_the_values():
+    picture = pixels(drawn_with(frame=False, size=400, colormap="gray"))
+    middles = [int(400 * (k + 0.5) / 5) for k in range(5)], [int(160 * (k + 0.5) / 4) for k in range(4)]
+    found = picture[np.ix_(*middles)][..., 0].astype(float)
+    # Rows run down, z runs up.
+    expected = 255.0 * (RAMP[1].T[::-1] - 20.0) / 19.0
+    np.testing.assert_allclose(found, expected, atol=2.0)
+
+
+def test_the_scale_bar_is_as_long_as_it_says():
+    plain, barred = (pixels(drawn_with(frame=False, size=1000, scale_bar=bar)) for bar in (False, True))
+    assert near(plain, WHITE)[0].size == 0
+    rows, columns = near(barred, WHITE)
+    counts = np.bincount(rows)
+    # 40 mm across 400 pixels; the bar says 10 mm.
+    assert counts.max() == pytest.approx(100, abs=4)
+    assert columns.min() > 0
+    assert np.argmax(counts) > 900
+
+
+@given(st.floats(1e-9, 1e6))
+def test_scales_are_round_and_short_enough(width):
+    scale = scale_of(width)
+    assert scale <= MOST_OF_WIDTH * width
+    assert scale > 0.39 * MOST_OF_WIDTH * width
+    assert float(f"{scale:.1e}"[0]) in (1.0, 2.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("how", "field"),
+    [
+        ({"size": 199}, "size"),
+        ({"size": 31, "frame": False}, "size"),
+        ({"size": 4097}, "size"),
+        ({"colormap": "jet"}, "colormap"),
+        ({"interpolation": "linear"}, "interpolation"),
+    ],
+)
+def test_refusals(how, field):
+    with pytest.raises(InvalidInput) as caught:
+        Look(**how)
+    assert caught.value.field == field
