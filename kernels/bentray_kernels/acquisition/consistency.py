@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from ..arrays import Flags
 from .dataset import Dataset, Floats
 
 # Emitters and receivers, itself included, that a pick is compared with: 3 × 5 pairs.
@@ -32,7 +33,21 @@ def consistent(dataset: Dataset, delta: Floats, skip_s: float) -> Floats:
     Returns:
         (ntx, nrx), s; a new array.
     """
-    kept = delta.copy()
+    outlying, _ = outliers(dataset, delta, skip_s)
+    kept = np.where(outlying, np.nan, delta)
+    kept[unreciprocal(dataset, kept, skip_s)] = np.nan
+    return kept
+
+
+def outliers(dataset: Dataset, delta: Floats, skip_s: float) -> tuple[Flags, Floats]:
+    """Picks that their neighbours contradict, and how far each pick lies from the median of its neighbours.
+
+    Args:
+        dataset, delta, skip_s: as ``consistent`` takes them.
+
+    Returns:
+        (ntx, nrx) flags, and departures, s; NaN where a pick or its neighbours are missing.
+    """
     around = _neighbours(dataset, delta)
     known = np.isfinite(around)
     count = known.sum(axis=0)
@@ -40,10 +55,20 @@ def consistent(dataset: Dataset, delta: Floats, skip_s: float) -> Floats:
     around = np.where(count > 0, around, 0.0)
     middle = np.nanmedian(around, axis=0)
     spread = 1.4826 * np.nanmedian(np.abs(around - middle), axis=0)
+    departure = np.where(count >= 3, delta - middle, np.nan)
     with np.errstate(invalid="ignore"):
-        far = np.abs(delta - middle) > np.maximum(skip_s, OUTLYING * spread)
-    kept[far & (count >= 3)] = np.nan
-    return _reciprocal(dataset, kept, skip_s)
+        far = np.abs(departure) > np.maximum(skip_s, OUTLYING * spread)
+    return far, departure
+
+
+def unreciprocal(dataset: Dataset, delta: Floats, skip_s: float) -> Flags:
+    """(ntx, nrx): picks that differ by more than ``skip_s`` from their reverse."""
+    elements = len(dataset.element_position_m)
+    full = np.full((elements, elements), np.nan)
+    full[np.ix_(dataset.tx, dataset.rx)] = delta
+    with np.errstate(invalid="ignore"):
+        differ = np.abs(full - full.T) > skip_s
+    return np.asarray(differ[np.ix_(dataset.tx, dataset.rx)])
 
 
 def _neighbours(dataset: Dataset, delta: Floats) -> Floats:
@@ -66,12 +91,3 @@ def _nearest(position: Floats, count: int) -> NDArray[np.intp]:
     return np.asarray(KDTree(position).query(position, k=count)[1], dtype=np.intp).reshape(
         len(position), count
     )
-
-
-def _reciprocal(dataset: Dataset, delta: Floats, skip_s: float) -> Floats:
-    elements = len(dataset.element_position_m)
-    full = np.full((elements, elements), np.nan)
-    full[np.ix_(dataset.tx, dataset.rx)] = delta
-    with np.errstate(invalid="ignore"):
-        full[np.abs(full - full.T) > skip_s] = np.nan
-    return full[np.ix_(dataset.tx, dataset.rx)]

@@ -29,6 +29,7 @@ def pick(
     *,
     predicted_s: Floats | None = None,
     reach_s: float | None = None,
+    screened: bool = True,
 ) -> Dataset:
     """Read the travel times of a scan from its traces.
 
@@ -50,6 +51,7 @@ def pick(
         predicted_s: (…, ntx, nrx), s: object minus water as a model has it; the object's window is then
             about it and not where plausible speeds put it. NaN where the model says nothing.
         reach_s: how far from the prediction a pick may lie, s; None: a period.
+        screened: false keeps what neighbours or reverse contradict, for ``quality`` to name.
 
     Returns:
         The dataset with ``delta_tof_s``, ``sigma_s`` and ``picker`` set, and without its traces and any
@@ -78,7 +80,8 @@ def pick(
         if one.valid is not None:
             delta[k][~one.valid] = np.nan
         delta[k][dataset.tx[:, None] == dataset.rx[None, :]] = np.nan
-        delta[k] = consistent(one, delta[k], 0.5 / dataset.center_frequency_hz)
+        if screened:
+            delta[k] = consistent(one, delta[k], 0.5 / dataset.center_frequency_hz)
     sigma = np.where(np.isfinite(delta), sigma, np.nan)
     if dataset.slice_z_m is None:
         delta, sigma = delta[0], sigma[0]

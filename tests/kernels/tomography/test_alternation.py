@@ -12,7 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_kernels.tomography.alternation import alternate, predicted_delta
 
-from ..acquisition.traces import RADIUS_M, WATER_MPS, ring, scan
+from ..acquisition.traces import RADIUS_M, blob_delay, scan
 
 ELEMENTS = 24
 SETTINGS = Settings(
@@ -20,18 +20,8 @@ SETTINGS = Settings(
 )
 
 
-def blob_delay() -> np.ndarray:
-    """Straight-ray delays of a slow disc of 20 mm about the centre, (elements, elements), s."""
-    place = ring(ELEMENTS)
-    along = np.linspace(0.0, 1.0, 401)[:, None, None, None]
-    path = place[None, :, None] * (1.0 - along) + place[None, None, :] * along
-    inside = np.exp(-((np.linalg.norm(path, axis=-1) / 0.02) ** 4)).mean(axis=0)
-    distance = np.linalg.norm(place[:, None] - place[None], axis=-1)
-    return inside * distance * (1.0 / 1450.0 - 1.0 / WATER_MPS)
-
-
 def test_an_image_predicts_the_times_it_was_made_from():
-    delay = blob_delay()
+    delay = blob_delay(ELEMENTS)
     picked = pick(scan(delay, elements=ELEMENTS))
     result = reconstruct(picked, SETTINGS)
     predicted = predicted_delta(picked, result)
@@ -43,7 +33,7 @@ def test_an_image_predicts_the_times_it_was_made_from():
 
 
 def test_slices_are_predicted_one_by_one():
-    picked = pick(scan(blob_delay(), elements=ELEMENTS))
+    picked = pick(scan(blob_delay(ELEMENTS), elements=ELEMENTS))
     two = replace(
         picked,
         slice_z_m=np.array([0.0, 0.01]),
@@ -57,7 +47,7 @@ def test_slices_are_predicted_one_by_one():
 
 
 def test_in_noise_the_image_finds_more_arrivals_and_no_worse_ones():
-    delay = blob_delay()
+    delay = blob_delay(ELEMENTS)
     noisy = scan(delay, elements=ELEMENTS, noise=0.22, seed=4)
     far = noisy.distance_m() > RADIUS_M
     alone = pick(noisy).delta_tof_s
@@ -74,7 +64,7 @@ def test_in_noise_the_image_finds_more_arrivals_and_no_worse_ones():
 
 
 def test_without_rounds_nothing_is_guided_and_settled_picks_end_it():
-    quiet = scan(blob_delay(), elements=ELEMENTS)
+    quiet = scan(blob_delay(ELEMENTS), elements=ELEMENTS)
     seen: list[int] = []
     picked, _ = alternate(quiet, SETTINGS, rounds=0, progress=lambda p: seen.append(p.done))
     np.testing.assert_array_equal(picked.delta_tof_s, pick(quiet).delta_tof_s)

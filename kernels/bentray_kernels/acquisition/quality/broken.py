@@ -1,0 +1,61 @@
+"""Single traces that cannot be read: not finite, constant, cut off."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Flags
+from ..dataset import Dataset
+from .finding import Finding
+from .measures import Measures
+
+# From this part of the pairs on, cut-off traces are a gain set wrong and not chance.
+MOST_CLIPPED = 0.25
+
+
+def broken(dataset: Dataset, measures: Measures, which: str, known: Flags) -> list[Finding]:
+    """Traces with samples that are not finite, and constant ones.
+
+    Args:
+        dataset: of one slice.
+        measures: of its traces.
+        which: ``object`` or ``water``.
+        known: (ntx, nrx), pairs that another finding has left out already.
+    """
+    findings = []
+    other = (dataset.tx[:, None] != dataset.rx[None, :]) & ~known
+    for check, flags, found, accepted in (
+        ("values", measures.broken, "samples that are not finite", "finite samples"),
+        ("constant traces", measures.constant, "one and the same value throughout", "a recording"),
+    ):
+        pairs = flags & other
+        if pairs.any():
+            words = f"{which}: {int(pairs.sum())} traces with {found}"
+            findings.append(
+                Finding(
+                    check, words, accepted, "left out", pairs=pairs, value=float(pairs.sum()), unit="traces"
+                )
+            )
+    return findings
+
+
+def clipped(dataset: Dataset, measures: Measures, which: str) -> list[Finding]:
+    """Traces whose pulse was cut off; their times stay, for an onset lies before the peak, their amplitudes
+    do not mean anything."""
+    pairs = measures.clipped & (dataset.tx[:, None] != dataset.rx[None, :])
+    if not pairs.any():
+        return []
+    part = float(pairs.sum()) / max(int(measures.heard.sum()), 1)
+    words = f"{which}: {int(pairs.sum())} traces cut off at their highest or lowest value"
+    many = ", a gain set too high" if part > MOST_CLIPPED else ""
+    return [
+        Finding(
+            "clipping",
+            words + many,
+            "pulses within the range of the recorder",
+            "reported",
+            pairs=np.asarray(pairs),
+            value=part,
+            unit="of all traces",
+        )
+    ]

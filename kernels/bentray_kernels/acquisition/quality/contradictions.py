@@ -1,0 +1,70 @@
+"""Travel times that others contradict: their neighbours, by whole cycles or otherwise, or their reverse."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...arrays import Flags, Floats
+from ..consistency import OUTLYING, outliers, unreciprocal
+from ..dataset import Dataset
+from .finding import Finding
+
+# A departure counts as whole cycles when it is this near to them, periods.
+NEAR_A_CYCLE = 0.25
+
+# 90 % of a normal distribution lie within so many standard deviations.
+NINETY = 1.645
+
+
+def contradictions(dataset: Dataset, delta: Floats) -> list[Finding]:
+    """Cycle jumps, outliers and pairs that differ from their reverse, each pair under one of them.
+
+    Args:
+        dataset: of one slice.
+        delta: (ntx, nrx), s.
+    """
+    period = None if dataset.center_frequency_hz is None else 1.0 / dataset.center_frequency_hz
+    _, departure = outliers(dataset, delta, math.inf)
+    skip = 0.5 * period if period is not None else _usual(departure)
+    outlying, departure = outliers(dataset, delta, skip)
+    cycles = np.zeros_like(outlying)
+    if period is not None:
+        count = np.abs(departure[outlying]) / period
+        cycles[outlying] = np.abs(count - np.rint(count)) <= NEAR_A_CYCLE
+    # What neighbours have taken out cannot speak against its reverse.
+    differ = unreciprocal(dataset, np.where(outlying, np.nan, delta), skip)
+    allowed = f"within {1e9 * skip:.0f} ns"
+    return [
+        *_left_out("cycle jumps", cycles, departure, "whole periods off their neighbours", allowed),
+        *_left_out("outliers", outlying & ~cycles, departure, "off the median of their neighbours", allowed),
+        *_left_out("reciprocity", differ, departure, "that differ when emitter and receiver change", allowed),
+    ]
+
+
+def _usual(departure: Floats) -> float:
+    """What a pick may be off where no period says so, s: four standard deviations of nine in ten picks.
+
+    Times that were rounded to steps have no median departure, but nine in ten are no outliers.
+    """
+    size = np.abs(departure[np.isfinite(departure)])
+    return OUTLYING * float(np.percentile(size, 90.0)) / NINETY if size.size else math.inf
+
+
+def _left_out(check: str, pairs: Flags, departure: Floats, found: str, accepted: str) -> list[Finding]:
+    if not pairs.any():
+        return []
+    off = np.abs(departure[pairs])
+    off = off[np.isfinite(off)]
+    return [
+        Finding(
+            check,
+            f"{int(pairs.sum())} pairs {found}",
+            accepted,
+            "left out",
+            pairs=np.asarray(pairs),
+            value=float(np.median(off)) if off.size else math.nan,
+            unit="s, median",
+        )
+    ]

@@ -1,0 +1,143 @@
+"""The dataset that goes on: what a report says is corrected or left out, and a refused scan does not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import InvalidInput
+from ..dataset import Dataset
+from ..waveform import Waveform
+from .finding import Finding, Report
+from .time_zero import OBJECT, RECORDING
+
+
+def corrected(dataset: Dataset, report: Report) -> Dataset:
+    """The dataset with the report's corrections: dead pairs masked, channels put back, signs turned, offsets
+    taken off.
+
+    Args:
+        dataset: as it was examined.
+        report: of it.
+
+    Raises:
+        InvalidInput: for a refused scan, with the reason.
+    """
+    refusal = report.refusal
+    if refusal is not None:
+        raise InvalidInput(refusal.check, refusal.found, refusal.accepted)
+    if not report.findings:
+        return dataset
+    if dataset.slice_z_m is None:
+        return apply(dataset, report.findings)
+    parts = [
+        apply(dataset.slice(k), [f for f in report.findings if f.slice == k]) for k in range(dataset.slices)
+    ]
+    return stacked(dataset, parts)
+
+
+def apply(dataset: Dataset, findings: Iterable[Finding]) -> Dataset:
+    """One slice with findings applied, in their order."""
+    for finding in findings:
+        if finding.action == "corrected":
+            dataset = _corrected(dataset, finding)
+        elif finding.action == "left out" and finding.pairs is not None:
+            valid = np.ones(finding.pairs.shape, dtype=bool) if dataset.valid is None else dataset.valid
+            dataset = replace(dataset, valid=valid & ~finding.pairs)
+    return dataset
+
+
+def stacked(dataset: Dataset, parts: list[Dataset]) -> Dataset:
+    """The slices of a dataset as one again."""
+
+    def several(name: str) -> np.ndarray | None:
+        arrays = [getattr(part, name) for part in parts]
+        if all(array is None for array in arrays):
+            return None
+        # Slices in which nothing is wrong have no mask of their own.
+        shape = next(array.shape for array in arrays if array is not None)
+        return np.stack([np.ones(shape, dtype=bool) if array is None else array for array in arrays])
+
+    names = ("tof_s", "delta_tof_s", "sigma_s", "log_ratio_np", "valid")
+    waveform = None
+    if dataset.waveform is not None and all(part.waveform is not None for part in parts):
+        held = [part.waveform for part in parts]
+        pieces = {
+            name: None if getattr(held[0], name) is None else np.stack([getattr(w, name) for w in held])
+            for name in ("object", "water", "object_scale", "water_scale")
+        }
+        waveform = replace(dataset.waveform, **pieces)  # type: ignore[arg-type]
+    first = parts[0]
+    return replace(
+        dataset,
+        waveform=waveform,
+        t0_s=first.t0_s,
+        picker=first.picker,
+        **{name: several(name) for name in names},  # type: ignore[arg-type]
+    )
+
+
+def _corrected(dataset: Dataset, finding: Finding) -> Dataset:
+    if finding.check == RECORDING:
+        return replace(dataset, t0_s=dataset.t0_s - finding.value)
+    if finding.check == OBJECT:
+        taken_off = {
+            name: getattr(dataset, name) - finding.value
+            for name in ("tof_s", "delta_tof_s")
+            if getattr(dataset, name) is not None
+        }
+        return replace(dataset, **taken_off)
+    if finding.check == "polarity":
+        return replace(dataset, waveform=_turned(dataset, finding))
+    return _put_back(dataset, finding)
+
+
+def _turned(dataset: Dataset, finding: Finding) -> Waveform | None:
+    traces = dataset.waveform
+    if traces is None:
+        return None
+    where = _places(dataset, finding)
+
+    def turned(array: np.ndarray) -> np.ndarray:
+        array = array.copy()
+        # The lowest whole number has no opposite.
+        if array.dtype.kind == "i":
+            array[where] = -np.maximum(array[where], np.iinfo(array.dtype).min + 1)
+        else:
+            array[where] = -array[where]
+        return array
+
+    water = None if traces.water is None else turned(traces.water)
+    return replace(traces, object=turned(traces.object), water=water)
+
+
+def _put_back(dataset: Dataset, finding: Finding) -> Dataset:
+    """Two channels exchanged in everything that was recorded."""
+    axis = 0 if finding.role == "emission" else 1
+    element = dataset.tx if finding.role == "emission" else dataset.rx
+    order = np.arange(len(element))
+    a, b = (np.flatnonzero(element == k) for k in finding.elements)
+    order[a], order[b] = b, a
+
+    def moved(array: np.ndarray | None) -> np.ndarray | None:
+        return None if array is None else np.take(array, order, axis=axis)
+
+    pairs = {
+        name: moved(getattr(dataset, name))
+        for name in ("tof_s", "delta_tof_s", "sigma_s", "log_ratio_np", "valid")
+    }
+    traces = dataset.waveform
+    if traces is not None:
+        names = ("object", "water", "object_scale", "water_scale")
+        traces = replace(traces, **{name: moved(getattr(traces, name)) for name in names})  # type: ignore[arg-type]
+    return replace(dataset, waveform=traces, **pairs)  # type: ignore[arg-type]
+
+
+def _places(dataset: Dataset, finding: Finding) -> tuple[np.ndarray, ...] | np.ndarray:
+    element = dataset.tx if finding.role == "emission" else dataset.rx
+    wrong = np.isin(element, finding.elements)
+    pairs = np.zeros((len(dataset.tx), len(dataset.rx)), dtype=bool)
+    pairs[wrong if finding.role == "emission" else (slice(None), wrong)] = True
+    return pairs

@@ -1,0 +1,97 @@
+"""Inverted elements: their water pulses are those of the others upside down."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...arrays import Floats
+from ..dataset import Dataset
+from .finding import Finding, Role
+from .water_line import WaterLine
+
+# Periods before and after the strongest swing's time that are compared.
+REACH = 1.0
+
+# Part of an element's pulses that must be upside down.
+MOST = 0.6
+
+
+def polarity(dataset: Dataset, line: WaterLine) -> list[Finding]:
+    """Elements to turn over, in emission and in reception.
+
+    Pulses are compared at the straight time and the common delay, where another cycle does not pass for an
+    inverted one.
+
+    Args:
+        dataset: of one slice, with water traces, channels in their places, and a centre frequency.
+        line: through its water times.
+    """
+    sign = _signs(dataset, line)
+    findings = []
+    # An inverted receiver must not turn the emitters over, so both are found in turn.
+    emission, reception = np.ones(len(dataset.tx)), np.ones(len(dataset.rx))
+    for _ in range(4):
+        emission = _majority(sign * reception[None, :], 1)
+        reception = _majority(sign * emission[:, None], 0)
+    roles: tuple[tuple[Role, Floats, object], ...] = (
+        ("emission", emission, dataset.tx),
+        ("reception", reception, dataset.rx),
+    )
+    for role, of_role, element in roles:
+        wrong = np.flatnonzero(of_role < 0.0)
+        if wrong.size:
+            findings.append(
+                Finding(
+                    "polarity",
+                    f"{wrong.size} inverted in {role}",
+                    "pulses as those of most elements",
+                    "corrected",
+                    tuple(int(k) for k in np.asarray(element)[wrong]),
+                    role,
+                    value=float(wrong.size),
+                    unit="elements",
+                )
+            )
+    return findings
+
+
+def _signs(dataset: Dataset, line: WaterLine) -> Floats:
+    """(ntx, nrx): likeness with the median pulse, from -1 to 1; NaN where there is no pulse to compare."""
+    assert dataset.waveform is not None
+    assert dataset.waveform.water is not None
+    assert dataset.sampling_rate_hz is not None
+    assert dataset.center_frequency_hz is not None
+    period = dataset.sampling_rate_hz / dataset.center_frequency_hz
+    reach = math.ceil(REACH * period)
+    place = dataset.distance_m() / dataset.water_speed_mps + line.intercept_s - dataset.t0_s
+    place *= dataset.sampling_rate_hz
+    nt = dataset.waveform.water.shape[-1]
+    pieces = np.full((*place.shape, 2 * reach + 1), np.nan)
+    steps = np.arange(-reach, reach + 1)
+    for e in range(len(place)):
+        at = place[e][:, None] + steps
+        inside = (at[:, 0] >= 0.0) & (at[:, -1] <= nt - 2) & np.isfinite(line.residual_s[e])
+        low = np.clip(np.floor(at).astype(np.int64), 0, nt - 2)
+        trace = np.array(dataset.waveform.water[e], dtype=np.float64)
+        trace[~np.isfinite(trace).all(axis=1)] = 0.0
+        trace = trace - np.median(trace, axis=1, keepdims=True)
+        left, right = (np.take_along_axis(trace, low + k, axis=1) for k in (0, 1))
+        piece = left + (at - low) * (right - left)
+        size = np.linalg.norm(piece, axis=1)
+        good = inside & (size > 0.0) & np.isfinite(size)
+        pieces[e][good] = piece[good] / size[good][:, None]
+    known = np.isfinite(pieces[..., 0])
+    if not known.any():
+        return np.full(place.shape, np.nan)
+    common = np.median(pieces[known], axis=0)
+    size = float(np.linalg.norm(common))
+    return np.asarray(pieces @ (common / size)) if size > 0.0 else np.full(place.shape, np.nan)
+
+
+def _majority(sign: Floats, axis: int) -> Floats:
+    """-1 for rows (axis 1) or columns (axis 0) of which most are upside down, else 1."""
+    known = np.isfinite(sign)
+    down = ((sign < -0.3) & known).sum(axis=axis) / np.maximum(known.sum(axis=axis), 1)
+    return np.where(down > MOST, -1.0, 1.0)

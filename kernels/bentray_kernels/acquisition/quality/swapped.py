@@ -1,0 +1,84 @@
+"""Swapped channels: two elements whose water times fit each other's places."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from ...arrays import Floats
+from ..dataset import Dataset
+from .finding import Finding, Role
+from .water_line import WaterLine
+
+# An element is suspected when its times scatter by this part of a period, and so many times the usual.
+SUSPECT_PERIODS = 0.15
+SUSPECT_TIMES = 4.0
+
+# Exchanged, both must scatter by less than this part of what they did.
+BETTER = 0.4
+
+
+def swapped(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list[Finding]:
+    """Pairs of channels to put back, first of receivers, then of emitters.
+
+    Args:
+        dataset: of one slice, with a centre frequency.
+        strongest_s: (ntx, nrx), of the water.
+        line: through them.
+    """
+    straight = dataset.distance_m() / dataset.water_speed_mps + line.intercept_s
+    roles: tuple[tuple[Role, Floats, Floats], ...] = (
+        ("reception", strongest_s, straight),
+        ("emission", strongest_s.T, straight.T),
+    )
+    findings = []
+    for role, times, expected in roles:
+        element = dataset.rx if role == "reception" else dataset.tx
+        for a, b, before in _exchanged(times, expected, _period(dataset)):
+            findings.append(
+                Finding(
+                    "swapped channels",
+                    f"elements {element[a]} and {element[b]} fit each other's places in {role}",
+                    "water times that fit an element's own place",
+                    "corrected",
+                    (int(element[a]), int(element[b])),
+                    role,
+                    value=before,
+                    unit="s of scatter as they are",
+                )
+            )
+    return findings
+
+
+def _period(dataset: Dataset) -> float:
+    assert dataset.center_frequency_hz is not None
+    return 1.0 / dataset.center_frequency_hz
+
+
+def _exchanged(times: Floats, expected: Floats, period: float) -> list[tuple[int, int, float]]:
+    """Columns (a, b) to exchange, and how they scatter now."""
+    own = np.array([_scatter(times[:, r] - expected[:, r]) for r in range(times.shape[1])])
+    known = np.isfinite(own)
+    if not known.any():
+        return []
+    least = max(SUSPECT_PERIODS * period, SUSPECT_TIMES * float(np.median(own[known])))
+    suspects = np.flatnonzero(known & (own > least))
+    found = []
+    for a, b in combinations(suspects.tolist(), 2):
+        there, back = _scatter(times[:, a] - expected[:, b]), _scatter(times[:, b] - expected[:, a])
+        if max(there, back) < BETTER * min(own[a], own[b]):
+            found.append((max(there, back) / min(own[a], own[b]), a, b))
+    taken: set[int] = set()
+    swaps = []
+    for _, a, b in sorted(found):
+        if not taken & {a, b}:
+            taken |= {a, b}
+            swaps.append((a, b, float(max(own[a], own[b]))))
+    return swaps
+
+
+def _scatter(off: Floats) -> float:
+    """Median size of what an element's times are off; NaN where few are known."""
+    off = off[np.isfinite(off)]
+    return float(np.median(np.abs(off))) if off.size >= 4 else np.nan

@@ -1,0 +1,82 @@
+"""Time zero: of the recording, by the water's straight line; of the object's scan, by chords that miss it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Floats
+from ..dataset import Dataset
+from .finding import Finding
+from .water_line import WaterLine
+
+RECORDING = "time zero of the recording"
+OBJECT = "time zero of the object scan"
+
+# Periods that the water's strongest swing may lie off the straight time: pickers look a little further.
+LARGEST_DELAY = 3.0
+
+# Chords that stay this part of the array's radius away from its centre are taken to miss the object.
+OUTSIDE = 0.88
+FEWEST = 12
+
+# Their median may be off zero by this part of a period; without a frequency, by this time, s.
+LARGEST_OFFSET = 0.1
+LARGEST_OFFSET_S = 5e-8
+
+
+def recording(dataset: Dataset, line: WaterLine) -> list[Finding]:
+    """A start of the recording that is wrong by more than the pulse's own delay can be."""
+    assert dataset.center_frequency_hz is not None
+    if abs(line.intercept_s) <= LARGEST_DELAY / dataset.center_frequency_hz:
+        return []
+    return [
+        Finding(
+            RECORDING,
+            f"water pulses {1e6 * line.intercept_s:.3g} µs off their straight time",
+            f"within {LARGEST_DELAY:g} periods",
+            "corrected",
+            value=line.intercept_s,
+            unit="s",
+        )
+    ]
+
+
+def object_scan(dataset: Dataset, delta: Floats) -> list[Finding]:
+    """A trigger that came earlier or later with the object than without: all times are off by as much.
+
+    Args:
+        dataset: of one slice.
+        delta: (ntx, nrx), s.
+    """
+    missing = delta[_outside(dataset) & np.isfinite(delta)]
+    if missing.size < FEWEST:
+        return []
+    offset = float(np.median(missing))
+    scatter = 1.4826 * float(np.median(np.abs(missing - offset)))
+    frequency = dataset.center_frequency_hz
+    largest = LARGEST_OFFSET_S if frequency is None else LARGEST_OFFSET / frequency
+    if abs(offset) <= max(largest, scatter):
+        return []
+    return [
+        Finding(
+            OBJECT,
+            f"pairs beside the object are {1e9 * offset:.0f} ns off water ({missing.size} pairs)",
+            f"within {1e9 * largest:.0f} ns",
+            "corrected",
+            value=offset,
+            unit="s",
+        )
+    ]
+
+
+def _outside(dataset: Dataset) -> np.ndarray:
+    """(ntx, nrx): pairs whose chord stays near the rim; none where the array is no ring about its middle."""
+    place = dataset.element_position_m[:, :2]
+    centre = 0.5 * (place.min(axis=0) + place.max(axis=0))
+    a = (place - centre)[dataset.tx][:, None, :]
+    b = (place - centre)[dataset.rx][None, :, :]
+    along = b - a
+    length = np.maximum((along**2).sum(axis=-1), 1e-30)
+    part = np.clip(-(a * along).sum(axis=-1) / length, 0.0, 1.0)
+    nearest = np.linalg.norm(a + part[..., None] * along, axis=-1)
+    return np.asarray(nearest >= OUTSIDE * np.linalg.norm(place - centre, axis=1).max())

@@ -1,0 +1,66 @@
+"""Time against distance in water: the line that tells sampling rate and time zero, and what lies off it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Floats
+from ..dataset import Dataset
+
+# Rounds of a straight line through the points within four robust deviations of the last one.
+ROUNDS = 6
+FEWEST = 8
+
+
+@dataclass(frozen=True)
+class WaterLine:
+    """crest of the pulse = intercept + distance / speed.
+
+    Attributes:
+        speed_mps: apparent speed of the water.
+        intercept_s: delay of the crest behind the straight time, the pulse's own included.
+        residual_s: (ntx, nrx), from the line of the water's stated speed, the median taken off.
+    """
+
+    speed_mps: float
+    intercept_s: float
+    residual_s: Floats
+
+    @classmethod
+    def of(cls, dataset: Dataset, strongest_s: Floats) -> WaterLine | None:
+        """The line through the water's crests; None where too few were heard.
+
+        Args:
+            dataset: of one slice.
+            strongest_s: (ntx, nrx), NaN where there is none.
+        """
+        distance = dataset.distance_m()
+        known = np.isfinite(strongest_s) & (distance > 0.25 * distance.max())
+        if known.sum() < FEWEST or np.ptp(distance[known]) == 0.0:
+            return None
+        x, y = distance[known], strongest_s[known]
+        slope, _ = _robust_line(x, y)
+        late = strongest_s - distance / dataset.water_speed_mps
+        residual = np.where(known, late - np.median(late[known]), np.nan)
+        speed = 1.0 / slope if slope > 0.0 else np.inf
+        return cls(float(speed), float(np.median(late[known])), residual)
+
+
+def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
+    """Slope and intercept: the median slope of many pairs of points, then least squares without outliers."""
+    order = np.argsort(x, kind="stable")
+    half = len(x) // 2
+    near, far = order[:half], order[-half:]
+    run = x[far] - x[near]
+    slope = float(np.median((y[far] - y[near])[run > 0.0] / run[run > 0.0])) if (run > 0.0).any() else 0.0
+    intercept = float(np.median(y - slope * x))
+    for _ in range(ROUNDS):
+        off = y - slope * x - intercept
+        spread = 1.4826 * float(np.median(np.abs(off - np.median(off))))
+        kept = np.abs(off - np.median(off)) <= 4.0 * spread + 1e-12
+        if kept.sum() < FEWEST or np.ptp(x[kept]) == 0.0:
+            break
+        slope, intercept = (float(v) for v in np.polyfit(x[kept], y[kept], 1))
+    return slope, intercept

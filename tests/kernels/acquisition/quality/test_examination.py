@@ -1,0 +1,279 @@
+"""Planted faults: each is found, named, and survived or refused with a reason; a clean scan has none."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.acquisition.quality import Examined, corrected, examine
+from bentray_kernels.errors import InvalidInput
+
+from ..traces import FREQUENCY_HZ, RATE_HZ, blob_delay, scan
+
+ELEMENTS = 32
+
+
+@cache
+def clean() -> Dataset:
+    return scan(blob_delay(ELEMENTS), elements=ELEMENTS, noise=0.01)
+
+
+@cache
+def sought() -> np.ndarray:
+    """What the clean scan gives: what every survivor must give too."""
+    found = examine(clean()).picked
+    assert found is not None
+    return found.differential_tof()
+
+
+def with_traces(change) -> Dataset:
+    """The clean scan after ``change(object, water)`` has worked on copies of its traces."""
+    both = clean().waveform.object.copy(), clean().waveform.water.copy()
+    given = change(*both)
+    return replace(clean(), waveform=Waveform(*(both if given is None else given)))
+
+
+def names(examined: Examined) -> list[str]:
+    return [finding.check for finding in examined.report.findings]
+
+
+def assert_survived(examined: Examined, lost: np.ndarray | None = None, atol: float = 2e-9) -> None:
+    """The times are those of the clean scan but where they were lost."""
+    assert examined.picked is not None
+    delta = examined.picked.differential_tof()
+    kept = np.isfinite(sought()) if lost is None else np.isfinite(sought()) & ~lost
+    assert np.isfinite(delta[kept]).mean() > 0.99
+    both = kept & np.isfinite(delta)
+    np.testing.assert_allclose(delta[both], sought()[both], atol=atol)
+
+
+def test_a_clean_scan_has_no_findings_and_goes_on_whole():
+    examined = examine(clean())
+    assert examined.report.verdict == "clean"
+    assert examined.report.findings == ()
+    assert corrected(clean(), examined.report) is clean()
+    assert examined.report.usable > 0.8 * examined.report.pairs
+
+
+def test_three_dead_elements_are_named_and_left_out():
+    dead = [3, 11, 20]
+    random = np.random.default_rng(0)
+
+    def kill(object_, water):
+        for traces in (object_, water):
+            noise = 0.01 * random.standard_normal(traces.shape)
+            traces[dead] = noise[dead]
+            traces[:, dead] = noise[:, dead]
+
+    examined = examine(with_traces(kill))
+    found = [f for f in examined.report.findings if f.check == "dead elements"]
+    assert [(f.elements, f.role, f.action) for f in found] == [
+        ((3, 11, 20), "emission", "left out"),
+        ((3, 11, 20), "reception", "left out"),
+    ]
+    lost = np.zeros((ELEMENTS, ELEMENTS), dtype=bool)
+    lost[dead] = lost[:, dead] = True
+    assert np.isnan(examined.picked.differential_tof()[lost]).all()
+    assert_survived(examined, lost)
+
+
+@given(pair=st.lists(st.integers(0, ELEMENTS - 1), min_size=2, max_size=2, unique=True))
+@settings(max_examples=4, deadline=None)
+def test_two_swapped_elements_are_put_back(pair):
+    order = np.arange(ELEMENTS)
+    order[pair] = order[pair[::-1]]
+    examined = examine(
+        with_traces(lambda object_, water: (object_[order][:, order].copy(), water[order][:, order].copy()))
+    )
+    found = [f for f in examined.report.findings if f.check == "swapped channels"]
+    assert [(set(f.elements), f.role, f.action) for f in found] == [
+        (set(pair), "reception", "corrected"),
+        (set(pair), "emission", "corrected"),
+    ]
+    assert_survived(examined)
+
+
+@pytest.mark.parametrize("roles", [("emission",), ("reception",), ("emission", "reception")])
+def test_an_inverted_element_is_turned_over(roles):
+    def invert(object_, water):
+        for traces in (object_, water):
+            if "emission" in roles:
+                traces[7] *= -1.0
+            if "reception" in roles:
+                traces[:, 7] *= -1.0
+
+    dataset = with_traces(invert)
+    examined = examine(dataset)
+    found = [f for f in examined.report.findings if f.check == "polarity"]
+    assert [(f.elements, f.role, f.action) for f in found] == [((7,), role, "corrected") for role in roles]
+    assert_survived(examined)
+    turned = corrected(dataset, examined.report)
+    np.testing.assert_array_equal(turned.waveform.water, clean().waveform.water)
+
+
+def test_a_trigger_offset_of_the_object_scan_is_taken_off():
+    late = scan(blob_delay(ELEMENTS) + 4.0e-7, elements=ELEMENTS, noise=0.01)
+    examined = examine(late)
+    (found,) = (f for f in examined.report.findings if f.check == "time zero of the object scan")
+    assert found.action == "corrected"
+    assert found.value == pytest.approx(4.0e-7, abs=5e-9)
+    assert_survived(examined, atol=8e-9)
+
+
+def test_a_recording_that_starts_at_the_wrong_time_is_moved():
+    examined = examine(replace(clean(), t0_s=clean().t0_s + 8.0e-6))
+    (found,) = (f for f in examined.report.findings if f.check == "time zero of the recording")
+    assert found.value == pytest.approx(8.0e-6, abs=2e-8)
+    assert_survived(examined, atol=4e-9)
+
+
+def test_outliers_and_cycle_jumps_are_told_apart_and_left_out():
+    random = np.random.default_rng(2)
+    delta = np.array(sought())
+    known = np.argwhere(np.isfinite(delta))
+    wrong = known[random.permutation(len(known))[: len(known) // 20]]
+    half = len(wrong) // 2
+    planted = np.zeros_like(delta, dtype=bool)
+    planted[tuple(wrong.T)] = True
+    sign = random.choice([-1.0, 1.0], len(wrong))
+    delta[tuple(wrong[:half].T)] += sign[:half] / FREQUENCY_HZ
+    delta[tuple(wrong[half:].T)] += sign[half:] * 1.5 / FREQUENCY_HZ
+    examined = examine(replace(clean(), waveform=None, delta_tof_s=delta))
+    by_name = {f.check: f for f in examined.report.findings}
+    assert by_name["cycle jumps"].action == by_name["outliers"].action == "left out"
+    jumps, outliers = by_name["cycle jumps"].pairs, by_name["outliers"].pairs
+    assert jumps[tuple(wrong[:half].T)].mean() > 0.9
+    assert outliers[tuple(wrong[half:].T)].mean() > 0.9
+    found = np.isnan(examined.picked.differential_tof()) & np.isfinite(delta)
+    assert found[planted].mean() > 0.98
+    # The reverse of an outlier is not at fault.
+    assert found[~planted].mean() < 0.01
+
+
+def test_a_whole_region_that_contradicts_its_reverse_is_left_out():
+    delta = np.array(sought())
+    delta[4:14, 17:30] += 8.0e-7
+    examined = examine(replace(clean(), waveform=None, delta_tof_s=delta))
+    assert "reciprocity" in names(examined)
+    left = np.isnan(examined.picked.differential_tof())
+    assert left[6:12, 20:27].all()
+    assert left.T[6:12, 20:27].all()
+
+
+def test_without_a_water_shot_traces_are_refused_and_travel_times_are_not():
+    alone = replace(clean(), waveform=Waveform(clean().waveform.object))
+    examined = examine(alone)
+    assert examined.picked is None
+    assert examined.report.refusal.check == "water shot"
+    with pytest.raises(InvalidInput, match="water shot: found none; accepted: the same scan without"):
+        corrected(alone, examined.report)
+    assert examine(replace(alone, delta_tof_s=sought())).report.refusal is None
+
+
+def test_clipped_traces_are_reported_and_their_times_kept():
+    examined = examine(with_traces(lambda o, w: (np.clip(o, -0.3, 0.5), np.clip(w, -0.3, 0.5))))
+    found = [f for f in examined.report.findings if f.check == "clipping"]
+    assert [f.action for f in found] == ["reported", "reported"]
+    assert "gain set too high" in found[0].found
+    assert_survived(examined, atol=3e-8)
+
+
+@pytest.mark.parametrize(
+    ("value", "check"), [(5.0, "constant traces"), (np.nan, "values"), (np.inf, "values")]
+)
+@pytest.mark.parametrize("which", [0, 1])
+def test_constant_and_broken_traces_are_left_out(value, check, which):
+    lost = np.zeros((ELEMENTS, ELEMENTS), dtype=bool)
+    lost[[2, 9], [15, 30]] = True
+
+    def spoil(*both):
+        both[which][lost] = value
+
+    examined = examine(with_traces(spoil))
+    (found,) = examined.report.findings
+    assert (found.check, found.action) == (check, "left out")
+    np.testing.assert_array_equal(found.pairs, lost)
+    assert_survived(examined, lost)
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.9, 1.25, 2.0])
+def test_a_wrong_sampling_rate_is_refused(factor):
+    examined = examine(replace(clean(), sampling_rate_hz=factor * RATE_HZ))
+    assert examined.picked is None
+    assert examined.report.verdict == "refused"
+    refusal = examined.report.refusal
+    assert refusal.check in ("sampling rate", "centre frequency")
+    assert refusal.value == pytest.approx(factor, rel=0.1)
+
+
+@pytest.mark.parametrize("factor", [0.4, 2.5])
+def test_a_wrong_centre_frequency_is_refused(factor):
+    examined = examine(replace(clean(), center_frequency_hz=factor * FREQUENCY_HZ))
+    assert examined.report.refusal.check == "centre frequency"
+    assert examined.report.refusal.value == pytest.approx(1.0 / factor, rel=0.25)
+
+
+def test_an_eccentricity_of_a_millimetre_is_no_false_fault():
+    """Positions off by 1 mm are for the calibration; no element is taken for dead, swapped or inverted."""
+    angle = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
+    off = 1e-3 * np.column_stack((np.cos(2.0 * angle), np.zeros(ELEMENTS)))
+    examined = examine(replace(clean(), element_position_m=clean().element_position_m + off))
+    assert not set(names(examined)) & {"dead elements", "swapped channels", "polarity", "sampling rate"}
+    assert examined.picked is not None
+
+
+def test_slices_are_examined_one_by_one():
+    damaged = with_traces(lambda o, w: (o, np.where(np.arange(ELEMENTS)[:, None, None] == 5, -w, w)))
+    broken = replace(
+        damaged,
+        waveform=Waveform(
+            np.where(
+                np.arange(ELEMENTS)[:, None, None] == 5, -damaged.waveform.object, damaged.waveform.object
+            ),
+            damaged.waveform.water,
+        ),
+    )
+    both = replace(
+        clean(),
+        slice_z_m=np.array([0.0, 0.01]),
+        waveform=Waveform(
+            np.stack([clean().waveform.object, broken.waveform.object]),
+            np.stack([clean().waveform.water, broken.waveform.water]),
+        ),
+    )
+    examined = examine(both)
+    assert [(f.check, f.slice) for f in examined.report.findings] == [("polarity", 1)]
+    delta = examined.picked.differential_tof()
+    np.testing.assert_array_equal(np.isfinite(delta[0]), np.isfinite(delta[1]))
+    np.testing.assert_allclose(delta[0], delta[1], atol=1e-12)
+    np.testing.assert_array_equal(corrected(both, examined.report).waveform.water[1], clean().waveform.water)
+
+
+def test_the_report_is_plain_json():
+    examined = examine(replace(clean(), waveform=None, delta_tof_s=np.where(np.eye(32) > 0, np.nan, 1e-6)))
+    told = json.loads(json.dumps(examined.report.to_dict(), allow_nan=False))
+    assert told["verdict"] == "usable"
+    assert told["findings"][0]["check"] == "time zero of the object scan"
+    assert told["usable_pairs"] == ELEMENTS * (ELEMENTS - 1)
+
+
+@pytest.mark.parametrize("fill", [0.0, 3.0, np.nan, np.inf, "noise"])
+@pytest.mark.parametrize("shape", [(3, 3, 40), (1, 8, 2), (8, 2, 300)])
+def test_a_scan_of_nothing_is_refused_with_a_reason(fill, shape):
+    random = np.random.default_rng(0)
+    ntx, nrx, _ = shape
+    traces = [
+        (random.standard_normal(shape) if fill == "noise" else np.full(shape, fill)).astype(np.float32)
+        for _ in range(2)
+    ]
+    some = replace(clean(), tx=np.arange(ntx), rx=np.arange(16, 16 + nrx), waveform=Waveform(*traces))
+    examined = examine(some)
+    assert examined.picked is None
+    assert examined.report.refusal.accepted
