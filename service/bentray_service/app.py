@@ -15,6 +15,10 @@ from bentray_workers.cluster import open_cluster
 
 from . import __version__, errors
 from .compute import Cluster, Compute
+from .housekeeping import Housekeeper
+from .ingest.append import Hold
+from .ingest.canonical import Limits
+from .ingest.reader import Store, UploadReader
 from .jobs.runner import Runner
 from .metrics import Metrics
 from .routes import (
@@ -26,19 +30,24 @@ from .routes import (
     meshes,
     pages,
     refraction,
+    tus,
     uploads,
     volumes,
 )
 from .settings import ServiceSettings
 from .storage.database import open_database
 from .storage.datasets import Datasets
+from .storage.deletion import Deletion
 from .storage.files import Files, lock
 from .storage.geometry_fields import GeometryFields
 from .storage.jobs import Jobs
 from .storage.meshes import Meshes
 from .storage.queue import Queue
+from .storage.uploads import Uploads
 from .storage.volumes import Volumes
 from .web.headers import SecurityHeaders
+from .web.pace import Pace
+from .web.tus_headers import TusHeaders
 from .wiring import Parts
 
 DESCRIPTION = (
@@ -79,10 +88,12 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     # Set by whoever stops the server, so that endless answers end before it waits for them.
     app.state.leaving = threading.Event()
     errors.install(app)
+    app.add_middleware(Pace, seconds=settings.upload_patience_s)
+    app.add_middleware(TusHeaders)
     app.add_middleware(SecurityHeaders)
     app.state.metrics = Metrics()
     app.add_middleware(app.state.metrics.middleware)
-    for part in (datasets, jobs, events, volumes, refraction, meshes, geometry_fields, health, pages):
+    for part in (tus, datasets, jobs, events, volumes, refraction, meshes, geometry_fields, health, pages):
         app.include_router(part.router)
     app.include_router(health.metrics_router)
     app.mount("/static", StaticFiles(directory=pages.WEB / "static"), name="static")
@@ -121,6 +132,19 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
     )
     runner.start()
     stack.callback(runner.stop)
+    pieces, deletion, hold = Uploads(database), Deletion(database, files), Hold()
+    stores: dict[str, Store] = {
+        "dataset": Datasets(database),
+        "volume": Volumes(database),
+        "mesh": Meshes(database),
+    }
+    limits = Limits(settings.ingest_memory_bytes, settings.ingest_seconds, files.scratch)
+    reader = UploadReader(pieces, files, stores, limits, settings.upload_keep_s)
+    reader.start()
+    stack.callback(reader.stop)
+    housekeeper = Housekeeper(pieces, files, deletion, hold, settings.keep_days)
+    housekeeper.start()
+    stack.callback(housekeeper.stop)
     return Parts(
         settings=settings,
         database=database,
@@ -131,6 +155,11 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
         volumes=Volumes(database),
         meshes=Meshes(database),
         geometry_fields=GeometryFields(database),
+        uploads=pieces,
+        deletion=deletion,
+        hold=hold,
+        reader=reader,
+        housekeeper=housekeeper,
         compute=compute,
         runner=runner,
     )

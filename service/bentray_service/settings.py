@@ -29,7 +29,7 @@ class ServiceSettings(BaseSettings):
     )
     host: str = Field("127.0.0.1", description="Address to listen on; 0.0.0.0 for every interface.")
     port: int = Field(8000, ge=0, le=65535, description="TCP port to listen on; 0 picks a free one.")
-    max_upload_bytes: int = Field(2 * GIB, gt=0, description="Largest dataset file accepted, in bytes.")
+    max_upload_bytes: int = Field(2 * GIB, gt=0, description="Largest upload accepted, in bytes.")
     dask_scheduler_address: str | None = Field(
         None,
         validation_alias=AliasChoices("dask_scheduler_address", "DASK_SCHEDULER_ADDRESS"),
@@ -61,6 +61,17 @@ class ServiceSettings(BaseSettings):
         description="Address space of the process that opens an uploaded file, in bytes.",
     )
     ingest_seconds: float = Field(120.0, gt=0, description="Time that process may take, in seconds.")
+    upload_patience_s: float = Field(
+        60.0, gt=0, description="Time in which 64 KiB of a body must come, in seconds; else it is broken off."
+    )
+    upload_keep_s: float = Field(
+        86400.0,
+        gt=0,
+        description="How long an unfinished upload is kept after something came, in seconds.",
+    )
+    keep_days: float | None = Field(
+        None, gt=0, description="Age at which datasets, volumes and meshes are deleted; never without it."
+    )
     min_free_bytes: int = Field(
         GIB // 2,
         ge=0,

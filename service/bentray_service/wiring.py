@@ -8,16 +8,21 @@ from typing import Annotated, cast
 from fastapi import Depends, Request
 
 from .compute import Compute
+from .housekeeping import Housekeeper
+from .ingest.append import Hold
+from .ingest.reader import UploadReader
 from .jobs.runner import Runner
 from .settings import ServiceSettings
 from .storage.database import Database
 from .storage.datasets import Datasets
+from .storage.deletion import Deletion
 from .storage.files import Files
 from .storage.geometry_fields import GeometryFields
 from .storage.jobs import Jobs
 from .storage.meshes import Meshes
 from .storage.queue import Queue
 from .storage.tenants import LOCAL, Tenant
+from .storage.uploads import Uploads
 from .storage.volumes import Volumes
 
 
@@ -34,6 +39,11 @@ class Parts:
     volumes: Volumes
     meshes: Meshes
     geometry_fields: GeometryFields
+    uploads: Uploads
+    deletion: Deletion
+    hold: Hold
+    reader: UploadReader
+    housekeeper: Housekeeper
     compute: Compute
     runner: Runner
 

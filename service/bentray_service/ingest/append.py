@@ -84,7 +84,7 @@ async def append(
 
     Args:
         stream: the chunks of the body.
-        path: the file, of ``offset`` bytes.
+        path: the file, of ``offset`` bytes; made if it is not there.
         offset: where the body begins.
         length: of the whole upload, bytes.
         checksum: of the body.
@@ -97,6 +97,7 @@ async def append(
         WrongChecksum, StorageFull: as their names say.
     """
     digest = _hasher(checksum.algorithm) if checksum is not None else None
+    await run_in_threadpool(path.touch)
     file = await run_in_threadpool(path.open, "r+b", 0)
     whole = False
     try:
@@ -113,6 +114,14 @@ async def append(
             await run_in_threadpool(file.truncate, offset)
         await run_in_threadpool(file.close)
     return offset + size
+
+
+def size_of(path: Path) -> int:
+    """Bytes that are there, of a file that is not made before the first of them."""
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:
+        return 0
 
 
 def _hasher(algorithm: str) -> hashlib._Hash:

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Query, Request, Response, status
 
 from ..errors import described
+from ..storage.deletion import Stored
 from ..storage.ids import new_id
 from ..wiring import CallerTenant, Service
 from .bodies import only
@@ -51,3 +52,9 @@ def list_datasets(
 def show_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> DatasetRecord:
     """One dataset."""
     return dataset_record(service.datasets.get(tenant, dataset_id))
+
+
+@router.delete("/{dataset_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409))
+def delete_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> None:
+    """Delete a scan, its jobs, and the volumes that they made; not while a job needs it."""
+    service.deletion.delete(Stored(tenant, "dataset", dataset_id))

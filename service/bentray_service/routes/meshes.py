@@ -12,6 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.isosurface_mesh import MOST_STEP, check_nodes
 
 from ..errors import described
+from ..storage.deletion import Stored
 from ..storage.ids import new_id
 from ..wiring import CallerTenant, Service
 from .bodies import only
@@ -67,6 +68,12 @@ def list_meshes(
 def show_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> MeshRecord:
     """One mesh: its size, its handles and holes, and what was repaired."""
     return mesh_record(service.meshes.get(tenant, mesh_id))
+
+
+@router.delete("/meshes/{mesh_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409))
+def delete_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> None:
+    """Delete a mesh, its geometry fields and the jobs that made them; not while a job needs it."""
+    service.deletion.delete(Stored(tenant, "mesh", mesh_id))
 
 
 @router.post(

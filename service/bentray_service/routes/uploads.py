@@ -9,9 +9,9 @@ import anyio
 from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 
+from ..ingest.canonical import Limits, make_canonical
 from ..ingest.child import ACCEPTED
 from ..ingest.receive import Received, receive
-from ..ingest.sandbox import ingest
 from ..storage.tenants import Tenant
 from ..wiring import Parts
 
@@ -53,19 +53,9 @@ async def take_in(
     path = files.incoming(upload_id)
 
     def check_and_store(received: Received) -> Row:
-        try:
-            summary = ingest(
-                what,
-                path,
-                files.candidate(upload_id),
-                memory_bytes=service.settings.ingest_memory_bytes,
-                seconds=service.settings.ingest_seconds,
-                scratch=service.files.scratch,
-                given=given,
-            )
-            files.adopt(upload_id)
-        finally:
-            files.discard_candidate(upload_id)
+        settings = service.settings
+        limits = Limits(settings.ingest_memory_bytes, settings.ingest_seconds, service.files.scratch)
+        summary = make_canonical(what, path, upload_id, files, limits, given)
         return store(received.size, received.sha256, summary)
 
     try:

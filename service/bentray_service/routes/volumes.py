@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,12 +12,14 @@ from fastapi.responses import FileResponse
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import described
+from ..storage.deletion import Stored
 from ..storage.exports import values_as_nifti, values_as_npy
 from ..storage.ids import new_id
 from ..wiring import CallerTenant, Service
 from .bodies import only
 from .pictures import PICTURE, picture
 from .records import VolumeList, VolumeRecord, volume_record
+from .upload_metadata import volume_given
 from .uploads import body_of, take_in
 
 MEDIA_TYPES = ("application/octet-stream", "application/x-npy", "application/x-hdf5")
@@ -57,12 +58,7 @@ async def upload_volume(
     ] = None,
 ) -> VolumeRecord:
     """Upload a volume. Its content tells the format; a process of its own reads it, or says why not."""
-    given = {
-        "title": title,
-        "spacing_m": _numbers("spacing_m", spacing_m, float, "0.001 or 0.001,0.001,0.002"),
-        "shape": _numbers("shape", shape, int, "nx,ny,nz"),
-        "dtype": dtype,
-    }
+    given = volume_given(title, spacing_m, shape, dtype)
     volume_id = new_id("volume")
 
     def store(size: int, sha256: str, summary: dict[str, Any]) -> dict[str, Any]:
@@ -85,6 +81,12 @@ def list_volumes(
 def show_volume(volume_id: str, service: Service, tenant: CallerTenant) -> VolumeRecord:
     """Shape, axes, spacing, origin and range of one volume."""
     return volume_record(service.volumes.get(tenant, volume_id))
+
+
+@router.delete("/{volume_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409))
+def delete_volume(volume_id: str, service: Service, tenant: CallerTenant) -> None:
+    """Delete a volume, the job that made it and its turntables; not while a job needs it."""
+    service.deletion.delete(Stored(tenant, "volume", volume_id))
 
 
 @router.head("/{volume_id}/slice.png", include_in_schema=False)
@@ -165,13 +167,3 @@ def download(
     exported = export(source, service.files.of(tenant).export(volume["id"], extension), uploaded=uploaded)
     name = f"{volume['id']}-{'values' if uploaded else 'speed'}.{extension}"
     return FileResponse(exported, media_type="application/octet-stream", filename=name)
-
-
-def _numbers(field: str, text: str | None, kind: Callable[[str], float], accepted: str) -> list[float] | None:
-    """The numbers in a query parameter, which commas part."""
-    if text is None:
-        return None
-    try:
-        return [kind(part) for part in text.split(",")]
-    except ValueError:
-        raise InvalidInput(field, repr(text), accepted) from None

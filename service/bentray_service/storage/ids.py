@@ -7,7 +7,7 @@ import secrets
 
 from ..refusals import UnknownId
 
-PREFIXES = {"dataset": "ds", "job": "job", "volume": "vol", "mesh": "mesh", "field": "field"}
+PREFIXES = {"dataset": "ds", "job": "job", "volume": "vol", "mesh": "mesh", "field": "field", "upload": "up"}
 _RANDOM = re.compile(r"[0-9a-f]{20}")
 
 

@@ -93,7 +93,7 @@ def _to_2(connection: Connection) -> None:
 
 
 def _to_3(connection: Connection) -> None:
-    """Every row has a tenant, jobs a lease; meshes, geometry fields and keys have tables."""
+    """Every row has a tenant, jobs a lease; meshes, geometry fields, keys and uploads have tables."""
     for table in ("datasets", "uploaded_volumes", "volumes", "jobs"):
         tenant = "tenant VARCHAR(64) NOT NULL DEFAULT 'local'"
         connection.execute(text(f"ALTER TABLE {table} ADD COLUMN {tenant}"))
@@ -117,7 +117,7 @@ def _to_3(connection: Connection) -> None:
         ("jobs_by_age", "jobs", "number"),
     ):
         connection.execute(text(f"CREATE INDEX {name} ON {table} (tenant, {order})"))
-    for new in (schema.meshes, schema.geometry_fields, schema.keys):
+    for new in (schema.meshes, schema.geometry_fields, schema.keys, schema.uploads):
         new.create(connection)
 
 

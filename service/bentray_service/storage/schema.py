@@ -197,6 +197,28 @@ geometry_fields = Table(
     Index("geometry_fields_by_tenant", "tenant", "number"),
 )
 
+# What comes in by pieces. How far one is, the size of its file tells.
+uploads = Table(
+    "uploads",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(32), nullable=False, unique=True),
+    # What it becomes, and the id that this will have.
+    Column("what", String(16), nullable=False),
+    Column("result_id", String(32), nullable=False),
+    Column("length", BigInteger, nullable=False),
+    # What the user says of it: as the ingest process takes it, and as it was sent.
+    Column("given", JSON, nullable=False),
+    Column("metadata", String(4000), nullable=False),
+    # receiving, reading, done or refused, and then why.
+    Column("state", String(16), nullable=False),
+    Column("problem", JSON(none_as_null=True)),
+    Column("created", Float, nullable=False),
+    Column("expires", Float, nullable=False),
+    _tenant(),
+    Index("uploads_by_state", "state", "number"),
+)
+
 # What lets a caller in. The secret itself is nowhere: only its digest is.
 keys = Table(
     "keys",

@@ -10,13 +10,14 @@ from pathlib import Path
 from .ids import PREFIXES, checked
 
 # What a data folder of before there were tenants has at its top.
-KINDS = ("incoming", "datasets", "volumes", "exports", "animations", "meshes", "fields", "work")
+KINDS = ("incoming", "uploads", "datasets", "volumes", "exports", "animations", "meshes", "fields", "work")
 
 
 class TenantFiles:
     """Folders of one tenant.
 
-    ``incoming/`` holds uploads that no one has checked, ``datasets/`` the canonical files of scans,
+    ``incoming/`` holds uploads that no one has checked, ``uploads/`` those that come in pieces,
+    ``datasets/`` the canonical files of scans,
     ``volumes/`` results and the canonical files of uploaded volumes, ``exports/`` volumes in other formats,
     ``animations/`` turntables, ``meshes/`` the canonical files of meshes, ``fields/`` a folder for each
     geometry field, ``work/`` one for each job that is not at its end, with its checkpoints. An upload is a
@@ -26,6 +27,7 @@ class TenantFiles:
     def __init__(self, root: Path) -> None:
         self.root = root
         self._incoming, self._datasets, self._volumes = root / "incoming", root / "datasets", root / "volumes"
+        self._uploads = root / "uploads"
         self._exports, self._animations = root / "exports", root / "animations"
         self._meshes, self._fields, self._work = root / "meshes", root / "fields", root / "work"
 
@@ -51,6 +53,10 @@ class TenantFiles:
     def candidate(self, upload_id: str) -> Path:
         """Where the ingest process writes the canonical file."""
         return self._incoming / self._canonical(upload_id).name
+
+    def upload(self, upload_id: str) -> Path:
+        """What has come of an upload that comes in pieces; it outlives the service."""
+        return self._uploads / checked("upload", upload_id)
 
     def dataset(self, dataset_id: str) -> Path:
         """The canonical file of a dataset."""
@@ -103,6 +109,16 @@ class TenantFiles:
         self.candidate(upload_id).replace(target)
         sync_folder(target.parent)
         return target
+
+    def remove(self, stored_id: str) -> None:
+        """Remove all files of a dataset, a volume, a mesh, a field or a job, in every format."""
+        what = {prefix: name for name, prefix in PREFIXES.items()}.get(stored_id.partition("-")[0], "dataset")
+        for folder in KINDS:
+            for path in (self.root / folder).glob(f"{checked(what, stored_id)}*"):
+                if path.is_dir():
+                    shutil.rmtree(path)
+                else:
+                    path.unlink(missing_ok=True)
 
     def bytes_used(self) -> int:
         """The size of all of it, bytes; what vanishes meanwhile is not counted."""

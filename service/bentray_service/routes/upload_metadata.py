@@ -1,0 +1,68 @@
+"""What a client says of an upload: in the query of a one-shot POST, or in the metadata of tus."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from collections.abc import Callable
+from typing import Any
+
+from bentray_kernels.errors import InvalidInput
+
+from ..ingest.child import ACCEPTED
+
+Row = dict[str, Any]
+
+LONGEST_TITLE = 200
+FORM = "names, each with its value in base 64, parted by commas"
+
+
+def read_metadata(header: str) -> tuple[str, Row]:
+    """What the upload becomes, and what the ingest process is told of it.
+
+    Args:
+        header: as ``kind bWVzaA==,title Tm9zZQ==``; names that are not known are left alone.
+
+    Raises:
+        InvalidInput: for what is not of that form, and for values that cannot be used.
+    """
+    found = {}
+    for pair in filter(None, (part.strip() for part in header.split(","))):
+        name, _, value = pair.partition(" ")
+        try:
+            found[name] = base64.b64decode(value.strip(), validate=True).decode()
+        except (binascii.Error, ValueError):
+            raise InvalidInput("Upload-Metadata", repr(pair[:80]), FORM) from None
+    what = found.get("kind", "dataset")
+    if what not in ACCEPTED:
+        raise InvalidInput("Upload-Metadata kind", repr(what[:80]), " or ".join(ACCEPTED))
+    title = found.get("title", "")[:LONGEST_TITLE]
+    if what == "mesh":
+        return what, {"title": title}
+    if what == "volume":
+        return what, volume_given(title, found.get("spacing_m"), found.get("shape"), found.get("dtype"))
+    return what, {}
+
+
+def volume_given(title: str, spacing_m: str | None, shape: str | None, dtype: str | None) -> Row:
+    """As ``volume_reading.Given`` takes it.
+
+    Raises:
+        InvalidInput: for what are no numbers.
+    """
+    return {
+        "title": title,
+        "spacing_m": _numbers("spacing_m", spacing_m, float, "0.001 or 0.001,0.001,0.002"),
+        "shape": _numbers("shape", shape, int, "nx,ny,nz"),
+        "dtype": dtype,
+    }
+
+
+def _numbers(field: str, text: str | None, kind: Callable[[str], float], accepted: str) -> list[float] | None:
+    """The numbers in a text, which commas part."""
+    if text is None:
+        return None
+    try:
+        return [kind(part) for part in text.split(",")]
+    except ValueError:
+        raise InvalidInput(field, repr(text[:80]), accepted) from None

@@ -1,0 +1,150 @@
+"""Deleting what is stored, with all that was made of it: the files first, then the rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from typing import NamedTuple
+
+from sqlalchemy import ColumnElement, Connection, Table, delete, or_, select, update
+
+from ..refusals import InUse, UnknownId
+from .database import Database
+from .files import Files
+from .ids import checked
+from .schema import (
+    ENDED,
+    datasets,
+    events,
+    geometry_fields,
+    jobs,
+    meshes,
+    uploaded_volumes,
+    uploads,
+    volumes,
+)
+from .tenants import Tenant
+
+
+class Stored(NamedTuple):
+    """One thing that can be deleted; ``what`` is ``dataset``, ``volume`` or ``mesh``."""
+
+    tenant: Tenant
+    what: str
+    id: str
+
+
+class Deletion:
+    """Deletes datasets, volumes and meshes of a tenant.
+
+    A dataset goes with its jobs and their volumes, a volume with the job that made it, its turntables and its
+    exports, a mesh with its jobs and their fields. A mesh made of a volume stays.
+
+    A death on the way leaves rows whose files are gone, and deleting once more finishes it.
+    """
+
+    def __init__(self, database: Database, files: Files) -> None:
+        self._database = database
+        self._files = files
+
+    def delete(self, stored: Stored) -> None:
+        """Delete one thing and all that was made of it.
+
+        Raises:
+            UnknownId: when the tenant has no such one.
+            InUse: when a job that needs it is not at its end; nothing is deleted then.
+        """
+        name = checked(stored.what, stored.id)
+        with self._database.write() as connection:
+            if not any(_has(connection, table, stored.tenant, name) for table in _TABLES[stored.what]):
+                raise UnknownId(stored.what, stored.id)
+            gone = _JOBS[stored.what](connection, stored.tenant, name)
+            results = set(
+                connection.execute(select(volumes.c.id).where(volumes.c.job_id.in_(gone))).scalars()
+            )
+            gone |= _of(connection, stored.tenant, jobs.c.volume_id.in_(results))
+            self._refuse_unfinished(connection, stored, gone)
+            fields = _fields(connection, stored.tenant, name, gone)
+            files = self._files.of(stored.tenant)
+            for each in (name, *results, *fields, *gone):
+                files.remove(each)
+            _forget(connection, stored.tenant, {name, *results}, fields, gone)
+
+    def older_than(self, time: float) -> Iterator[Stored]:
+        """What every tenant has from before a time, in seconds since 1970."""
+        for what, tables in _TABLES.items():
+            for table in tables:
+                query = select(table.c.tenant, table.c.id).where(table.c.created < time)
+                with self._database.read() as connection:
+                    found = connection.execute(query).all()
+                yield from (Stored(Tenant(tenant), what, name) for tenant, name in found)
+
+    def _refuse_unfinished(self, connection: Connection, stored: Stored, gone: Collection[str]) -> None:
+        needing = jobs.c.id.in_(gone), jobs.c.state.not_in(ENDED)
+        busy = connection.execute(select(jobs.c.id, jobs.c.state).where(*needing)).first()
+        if busy is not None:
+            found = f"{stored.id}, which {busy.id} needs ({busy.state})"
+            raise InUse(stored.what, found, "one that no unfinished job needs; cancel the job first")
+
+
+def _has(connection: Connection, table: Table, tenant: Tenant, name: str) -> bool:
+    mine = select(table.c.id).where(table.c.tenant == tenant, table.c.id == name)
+    return connection.execute(mine).first() is not None
+
+
+def _of(connection: Connection, tenant: Tenant, condition: ColumnElement[bool]) -> set[str]:
+    """The ids of the jobs of a tenant for which a condition holds."""
+    return set(connection.execute(select(jobs.c.id).where(jobs.c.tenant == tenant, condition)).scalars())
+
+
+def _of_volume(connection: Connection, tenant: Tenant, name: str) -> set[str]:
+    made_it = select(volumes.c.job_id).where(volumes.c.id == name)
+    return _of(connection, tenant, or_(jobs.c.volume_id == name, jobs.c.id.in_(made_it)))
+
+
+def _fields(connection: Connection, tenant: Tenant, mesh: str, gone: Collection[str]) -> set[str]:
+    """The geometry fields that go with a mesh; one that a job on another mesh shares is given to that."""
+    mine = geometry_fields.c.tenant == tenant
+    found = connection.execute(
+        select(geometry_fields.c.id).where(
+            mine, or_(geometry_fields.c.mesh_id == mesh, geometry_fields.c.job_id.in_(gone))
+        )
+    )
+    going = set()
+    for field in found.scalars().all():
+        sharing = jobs.c.tenant == tenant, jobs.c.field_id == field, jobs.c.id.not_in(gone)
+        heir = connection.execute(
+            select(jobs.c.id, jobs.c.mesh_id).where(*sharing, jobs.c.state == "succeeded").limit(1)
+        ).first()
+        if heir is None:
+            going.add(field)
+        else:
+            now = {"job_id": heir.id, "mesh_id": heir.mesh_id}
+            connection.execute(update(geometry_fields).where(mine, geometry_fields.c.id == field).values(now))
+    return going
+
+
+def _forget(
+    connection: Connection,
+    tenant: Tenant,
+    names: Collection[str],
+    fields: Collection[str],
+    gone: Collection[str],
+) -> None:
+    """Delete the rows, those that point at others first."""
+    mine = geometry_fields.c.tenant == tenant, geometry_fields.c.id.in_(fields)
+    connection.execute(delete(geometry_fields).where(*mine))
+    connection.execute(delete(events).where(events.c.job_id.in_(gone)))
+    connection.execute(delete(volumes).where(volumes.c.id.in_(names)))
+    connection.execute(delete(jobs).where(jobs.c.id.in_(gone)))
+    for table in (datasets, uploaded_volumes, meshes):
+        connection.execute(delete(table).where(table.c.id.in_(names)))
+    connection.execute(delete(uploads).where(uploads.c.result_id.in_(names), uploads.c.state == "done"))
+    connection.execute(update(meshes).where(meshes.c.volume_id.in_(names)).values(volume_id=None))
+
+
+_TABLES = {"dataset": (datasets,), "volume": (volumes, uploaded_volumes), "mesh": (meshes,)}
+_JOBS: dict[str, Callable[[Connection, Tenant, str], set[str]]] = {
+    "dataset": lambda connection, tenant, name: _of(connection, tenant, jobs.c.dataset_id == name),
+    "volume": _of_volume,
+    "mesh": lambda connection, tenant, name: _of(connection, tenant, jobs.c.mesh_id == name),
+}

@@ -1,0 +1,113 @@
+"""The rows of uploads that come in pieces; how far one is, the size of its file tells."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from sqlalchemy import ColumnElement, insert, select, update
+from sqlalchemy import delete as delete_from
+
+from ..refusals import UnknownId
+from .database import Database
+from .ids import checked, new_id
+from .schema import uploads
+from .tenants import Tenant
+
+Row = dict[str, Any]
+
+
+class Uploads:
+    """Uploads from ``receiving`` through ``reading`` to ``done`` or ``refused``.
+
+    A row goes some time after its last change, however it ended.
+    """
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(self, tenant: Tenant, what: str, length: int, given: Row, metadata: str, keep_s: float) -> Row:
+        """Store a new upload.
+
+        Args:
+            tenant: whose it is.
+            what: it becomes: ``dataset``, ``volume`` or ``mesh``.
+            length: of all of it, bytes.
+            given: what the user says of it, as the ingest process wants it.
+            metadata: the same as it was sent.
+            keep_s: how long it is kept unless something comes, s.
+        """
+        upload_id, now = new_id("upload"), time.time()
+        with self._database.write() as connection:
+            connection.execute(
+                insert(uploads).values(
+                    id=upload_id,
+                    tenant=tenant,
+                    what=what,
+                    # Named at once, so that reading it a second time makes the same file.
+                    result_id=new_id(what),
+                    length=length,
+                    given=given,
+                    metadata=metadata,
+                    state="receiving",
+                    created=now,
+                    expires=now + keep_s,
+                )
+            )
+        return self.get(tenant, upload_id)
+
+    def get(self, tenant: Tenant, upload_id: str) -> Row:
+        """One upload of this tenant.
+
+        Raises:
+            UnknownId: when it has no such one.
+        """
+        name = checked("upload", upload_id)
+        found = self._where(uploads.c.tenant == tenant, uploads.c.id == name)
+        if not found:
+            raise UnknownId("upload", upload_id)
+        return found[0]
+
+    def unread(self) -> list[Row]:
+        """Every tenant's uploads that are whole and not yet read, the oldest first."""
+        return self._where(uploads.c.state == "reading")
+
+    def receiving(self) -> list[Row]:
+        """Every tenant's uploads that are not whole, as far as was noticed."""
+        return self._where(uploads.c.state == "receiving")
+
+    def expired(self) -> list[Row]:
+        """Every tenant's uploads whose time is over, but for those that are being read."""
+        return self._where(uploads.c.state != "reading", uploads.c.expires < time.time())
+
+    def keep(self, upload_id: str, keep_s: float) -> float:
+        """Something came: keep it that much longer, s. Returns when it goes."""
+        expires = time.time() + keep_s
+        self._change(upload_id, expires=expires)
+        return expires
+
+    def arrived(self, upload_id: str) -> None:
+        """All of it is there."""
+        self._change(upload_id, state="reading")
+
+    def done(self, upload_id: str, keep_s: float) -> None:
+        """It has become what it was sent as."""
+        self._change(upload_id, state="done", expires=time.time() + keep_s)
+
+    def refuse(self, upload_id: str, problem: Row, keep_s: float) -> None:
+        """It cannot be read."""
+        self._change(upload_id, state="refused", problem=problem, expires=time.time() + keep_s)
+
+    def remove(self, upload_id: str) -> None:
+        """Forget it."""
+        with self._database.write() as connection:
+            connection.execute(delete_from(uploads).where(uploads.c.id == upload_id))
+
+    def _where(self, *conditions: ColumnElement[bool]) -> list[Row]:
+        query = select(uploads).where(*conditions).order_by(uploads.c.number)
+        with self._database.read() as connection:
+            return [dict(row) for row in connection.execute(query).mappings()]
+
+    def _change(self, upload_id: str, **values: Any) -> None:
+        with self._database.write() as connection:
+            connection.execute(update(uploads).where(uploads.c.id == upload_id).values(**values))

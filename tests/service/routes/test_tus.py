@@ -1,0 +1,343 @@
+"""/v1/uploads: tus 1.0 in every point, and what becomes of what was sent."""
+
+import base64
+import hashlib
+import io
+import os
+import time
+from email.utils import parsedate_to_datetime
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from sqlalchemy import update
+
+from bentray_service.storage import schema
+
+TUS = {"Tus-Resumable": "1.0.0"}
+PIECE = {**TUS, "Content-Type": "application/offset+octet-stream"}
+PATIENCE_S = 30.0
+
+
+def metadata(**said):
+    return ",".join(f"{name} {base64.b64encode(text.encode()).decode()}" for name, text in said.items())
+
+
+def begin(http, length, **said):
+    headers = {**TUS, "Upload-Length": str(length), **({"Upload-Metadata": metadata(**said)} if said else {})}
+    answer = http.post("/v1/uploads", headers=headers)
+    assert answer.status_code == 201, answer.text
+    return answer.headers["location"]
+
+
+def piece(http, place, offset, content, **headers):
+    return http.patch(place, headers={**PIECE, "Upload-Offset": str(offset), **headers}, content=content)
+
+
+def offset(http, place):
+    return int(http.head(place, headers=TUS).headers["upload-offset"])
+
+
+def settled(http, place):
+    deadline = time.monotonic() + PATIENCE_S
+    while time.monotonic() < deadline:
+        record = http.get(place).json()
+        if record["state"] in ("done", "refused"):
+            return record
+        time.sleep(0.02)
+    raise AssertionError(record)
+
+
+def problem(answer, status):
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.headers["tus-resumable"] == "1.0.0"
+    return answer.json()
+
+
+def left_in(http):
+    root = http.app.state.parts.files.root
+    return sorted(path.name for name in ("uploads", "incoming") for path in root.glob(f"tenants/*/{name}/*"))
+
+
+def test_what_is_possible_is_told(start):
+    answer = start(max_upload_bytes=12345).options("/v1/uploads")
+    assert answer.status_code == 204
+    assert answer.headers["tus-version"] == answer.headers["tus-resumable"] == "1.0.0"
+    assert answer.headers["tus-extension"] == "creation,checksum,expiration,termination"
+    assert answer.headers["tus-max-size"] == "12345"
+    assert answer.headers["tus-checksum-algorithm"] == "sha256,sha1,md5"
+
+
+def test_a_scan_in_pieces_becomes_a_dataset(start, scan):
+    http, content = start(), scan().read_bytes()
+    place = begin(http, len(content), filename="scan.h5", odd="ü")
+    assert http.get(place).json()["state"] == "receiving"
+    at = 0
+    for end in (1000, 1001, 5000, len(content)):
+        answer = piece(http, place, at, content[at:end])
+        assert (answer.status_code, answer.headers["upload-offset"]) == (204, str(end))
+        at = end
+    record = settled(http, place)
+    assert (record["state"], record["offset"], record["problem"]) == ("done", len(content), None)
+    dataset = http.get(record["links"]["result"]).json()
+    assert dataset["id"] == record["result"]
+    assert dataset["title"] == "Sixteen elements"
+    assert (dataset["bytes"], dataset["sha256"]) == (len(content), hashlib.sha256(content).hexdigest())
+    head = http.head(place, headers=TUS)
+    assert head.headers["bentray-result"] == f"/v1/datasets/{dataset['id']}"
+    assert (head.headers["upload-offset"], head.headers["upload-length"]) == (str(len(content)),) * 2
+    assert head.headers["upload-metadata"] == metadata(filename="scan.h5", odd="ü")
+    assert head.headers["cache-control"] == "no-store"
+    assert left_in(http) == []
+
+
+def test_it_can_be_reconstructed(start, scan, submitted, until, work):
+    http, content = start(), scan().read_bytes()
+    place = begin(http, len(content))
+    piece(http, place, 0, content)
+    job = submitted(http, settled(http, place)["result"])
+    assert until(http, job["id"])["state"] == "succeeded"
+
+
+def test_volumes_and_meshes_too(start):
+    http, buffer = start(), io.BytesIO()
+    np.save(buffer, np.arange(60.0).reshape(3, 4, 5))
+    content = buffer.getvalue()
+    place = begin(http, len(content), kind="volume", title="A head", spacing_m="0.002")
+    piece(http, place, 0, content)
+    volume = http.get(settled(http, place)["links"]["result"]).json()
+    assert (volume["title"], volume["spacing_m"]) == ("A head", [0.002] * 3)
+    content = b"OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
+    place = begin(http, len(content), kind="mesh", title="Tetra")
+    piece(http, place, 0, content)
+    mesh = http.get(settled(http, place)["links"]["result"]).json()
+    assert (mesh["title"], mesh["vertices"], mesh["faces"]) == ("Tetra", 4, 4)
+
+
+def test_what_cannot_be_read_is_refused_with_its_problem(start, scan):
+    def spoil(file):
+        file["geometry/element_position_m"][5] = np.nan
+
+    http, content = start(), scan(spoil).read_bytes()
+    place = begin(http, len(content))
+    piece(http, place, 0, content)
+    record = settled(http, place)
+    assert (record["state"], record["result"]) == ("refused", None)
+    assert record["problem"]["field"] == "geometry/element_position_m"
+    assert record["problem"]["instance"] == place
+    assert http.get("/v1/datasets").json() == {"datasets": []}
+    assert left_in(http) == []
+
+
+@given(cuts=st.lists(st.integers(0, 6000), max_size=6), wrong=st.integers(1, 5000))
+@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_piece_goes_where_the_upload_stands_and_nowhere_else(start, cuts, wrong):
+    http = start(folder=f"data-{time.monotonic_ns()}")
+    content, at = os.urandom(6001), 0
+    place = begin(http, len(content))
+    for end in sorted(cuts):
+        body = problem(piece(http, place, at + wrong, content[at:end]), 409)
+        assert (body["type"], body["field"], body["found"]) == (
+            "/problems/wrong-offset",
+            "Upload-Offset",
+            str(at + wrong),
+        )
+        assert piece(http, place, at, content[at:end]).status_code == 204
+        at = end
+        assert offset(http, place) == at
+    files = http.app.state.parts.files
+    stored = next(files.root.glob("tenants/*/uploads/*"), None)
+    assert (b"" if stored is None else stored.read_bytes()) == content[:at]
+
+
+@pytest.mark.parametrize("algorithm", ["sha256", "sha1", "md5"])
+def test_checksums(start, algorithm):
+    http = start()
+    place = begin(http, 100)
+    digest = base64.b64encode(hashlib.new(algorithm, b"right").digest()).decode()
+    header = {"Upload-Checksum": f"{algorithm} {digest}"}
+    body = problem(piece(http, place, 0, b"wrong", **header), 460)
+    assert body["type"] == "/problems/wrong-checksum"
+    assert offset(http, place) == 0
+    assert piece(http, place, 0, b"right", **header).status_code == 204
+    assert offset(http, place) == 5
+
+
+def test_unknown_checksum(start):
+    http = start()
+    body = problem(piece(http, begin(http, 9), 0, b"x", **{"Upload-Checksum": "crc32 AAAA"}), 400)
+    assert (body["field"], body["accepted"]) == ("Upload-Checksum", "sha256 or sha1 or md5")
+
+
+def test_the_protocol_must_be_spoken(start):
+    http = start()
+    place = begin(http, 10)
+    for answer in (
+        http.post("/v1/uploads", headers={"Tus-Resumable": "0.2.2", "Upload-Length": "9"}),
+        http.head(place, headers={"Tus-Resumable": "2.0.0"}),
+        http.delete(place, headers={"Tus-Resumable": "2.0.0"}),
+        piece(http, place, 0, b"x", **{"Tus-Resumable": "2.0.0"}),
+    ):
+        assert (answer.status_code, answer.headers["tus-version"]) == (412, "1.0.0")
+    body = problem(http.patch(place, headers={**TUS, "Upload-Offset": "0"}, content=b"x"), 415)
+    assert body["accepted"] == "application/offset+octet-stream"
+    assert http.get(place).json()["offset"] == 0
+
+
+@pytest.mark.parametrize("length", ["", "0", "-1", "many", str(2**64)])
+def test_a_length_must_be_given(start, length):
+    body = problem(start().post("/v1/uploads", headers={**TUS, "Upload-Length": length}), 422)
+    assert body["field"] == "upload-length"
+
+
+def test_too_large_is_said_before_a_byte_comes(start, monkeypatch):
+    http = start(max_upload_bytes=1000)
+    body = problem(http.post("/v1/uploads", headers={**TUS, "Upload-Length": "1001"}), 413)
+    assert "1000" in body["accepted"]
+    http = start("another", max_upload_bytes=2**60)
+    body = problem(http.post("/v1/uploads", headers={**TUS, "Upload-Length": str(2**59)}), 507)
+    assert "free" in body["accepted"]
+
+
+def test_a_piece_may_not_go_beyond_the_length(start):
+    http = start()
+    place = begin(http, 10)
+    assert piece(http, place, 0, b"1234").status_code == 204
+    problem(piece(http, place, 4, b"5678901"), 413)
+    assert offset(http, place) == 4
+    problem(piece(http, place, 4, iter([b"567", b"8901"])), 413)
+    assert offset(http, place) in (4, 7)
+
+
+@pytest.mark.parametrize(
+    ("said", "field"),
+    [
+        ("kind c29tZXRoaW5n", "Upload-Metadata kind"),
+        ("kind !", "Upload-Metadata"),
+        ("title /w==", "Upload-Metadata"),
+        ("kind dm9sdW1l,spacing_m eA==", "spacing_m"),
+        ("kind dm9sdW1l,shape MS41", "shape"),
+    ],
+)
+def test_wrong_metadata_is_named(start, said, field):
+    headers = {**TUS, "Upload-Length": "9", "Upload-Metadata": said}
+    assert problem(start().post("/v1/uploads", headers=headers), 422)["field"] == field
+
+
+def test_termination_leaves_nothing(start):
+    http = start()
+    place = begin(http, 10)
+    piece(http, place, 0, b"123")
+    assert len(left_in(http)) == 1
+    assert http.delete(place, headers=TUS).status_code == 204
+    assert left_in(http) == []
+    for answer in (
+        http.get(place),
+        http.head(place, headers=TUS),
+        http.delete(place, headers=TUS),
+        piece(http, place, 3, b"4"),
+    ):
+        assert answer.status_code == 404
+
+
+def test_termination_by_a_proxy_that_knows_post_alone(start):
+    http = start()
+    place = begin(http, 10)
+    assert http.post(place, headers={**TUS, "X-HTTP-Method-Override": "DELETE"}).status_code == 204
+    assert http.get(place).status_code == 404
+
+
+def test_what_it_became_outlives_it(start, scan):
+    http, content = start(), scan().read_bytes()
+    place = begin(http, len(content))
+    piece(http, place, 0, content)
+    record = settled(http, place)
+    assert http.delete(place, headers=TUS).status_code == 204
+    assert http.get(record["links"]["result"]).is_success
+
+
+def test_expired_uploads_are_swept(start):
+    http = start(upload_keep_s=1000.0)
+    parts = http.app.state.parts
+    old, young, held = (begin(http, 10) for _ in range(3))
+    for place in (old, young, held):
+        answer = piece(http, place, 0, b"123")
+        left = parsedate_to_datetime(answer.headers["upload-expires"]).timestamp() - time.time()
+        assert 900 < left <= 1001
+    with parts.database.write() as connection:
+        connection.execute(
+            update(schema.uploads)
+            .where(schema.uploads.c.id.in_([old.rpartition("/")[2], held.rpartition("/")[2]]))
+            .values(expires=time.time() - 1)
+        )
+    with parts.hold(held.rpartition("/")[2]):
+        parts.housekeeper.sweep()
+    assert [http.get(place).status_code for place in (old, young, held)] == [404, 200, 200]
+    assert len(left_in(http)) == 2
+
+
+def test_one_writer_at_a_time(start):
+    http = start()
+    place = begin(http, 10)
+    with http.app.state.parts.hold(place.rpartition("/")[2]):
+        assert problem(piece(http, place, 0, b"x"), 423)["type"] == "/problems/locked"
+        problem(http.delete(place, headers=TUS), 423)
+        assert offset(http, place) == 0
+    assert piece(http, place, 0, b"x").status_code == 204
+
+
+@pytest.mark.parametrize("upload", ["up-" + "0" * 20, "nonsense", "..%2f..%2fetc%2fpasswd", "ds-" + "0" * 20])
+def test_unknown_and_hostile_ids(start, upload):
+    http = start()
+    assert http.head(f"/v1/uploads/{upload}", headers=TUS).status_code == 404
+    problem(http.get(f"/v1/uploads/{upload}"), 404)
+    problem(piece(http, f"/v1/uploads/{upload}", 0, b"x"), 404)
+
+
+def test_an_upload_goes_on_after_a_restart(start, scan):
+    content = scan().read_bytes()
+    http = start()
+    place = begin(http, len(content))
+    piece(http, place, 0, content[:3000])
+    http.__exit__()
+    http = start()
+    assert offset(http, place) == 3000
+    piece(http, place, 3000, content[3000:])
+    assert settled(http, place)["state"] == "done"
+
+
+@pytest.mark.parametrize("state", ["receiving", "reading"])
+def test_what_was_whole_at_a_death_is_read_at_the_next_start(start, scan, state):
+    """Death after the last byte, before that was stored; and while it was read, with half a file left."""
+    content = scan().read_bytes()
+    http = start()
+    place = begin(http, len(content))
+    row = http.app.state.parts.uploads.receiving()[0]
+    files = http.app.state.parts.files.of("local")
+    http.app.state.parts.reader.stop()
+    files.upload(row["id"]).write_bytes(content)
+    files.candidate(row["result_id"]).write_bytes(content[:500])
+    if state == "reading":
+        http.app.state.parts.uploads.arrived(row["id"])
+    http.__exit__()
+    http = start()
+    assert settled(http, place)["result"] == row["result_id"]
+    assert http.get(f"/v1/datasets/{row['result_id']}").json()["elements"] == 16
+    assert left_in(http) == []
+
+
+def test_what_was_stored_at_a_death_is_not_stored_twice(start, scan):
+    content = scan().read_bytes()
+    http = start()
+    place = begin(http, len(content))
+    piece(http, place, 0, content)
+    done = settled(http, place)
+    upload = place.rpartition("/")[2]
+    http.__exit__()
+    http = start()
+    http.app.state.parts.uploads.arrived(upload)
+    http.app.state.parts.reader.notify()
+    assert settled(http, place)["result"] == done["result"]
+    assert len(http.get("/v1/datasets").json()["datasets"]) == 1
