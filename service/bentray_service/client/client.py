@@ -1,23 +1,26 @@
-"""The synchronous client: upload a scan, run a job, fetch the result."""
+"""The client for programs that wait: upload a scan, run a job, fetch the result."""
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Self, TypeVar
 
 import httpx
 
-from bentray_kernels.errors import InvalidInput
+from . import flows
+from .errors import ClientError, NoAnswer, from_response
+from .flows import Format, Record
+from .results import Result
+from .saving import saving
+from .steps import CHUNK_BYTES, Ask, Fetch, Listen, Pause, Step, settings_of
+from .uploading import Kind, OnBytes, upload
+from .waiting import wait
 
-from .errors import ClientError, from_problem, from_response
-
-CHUNK_BYTES = 1024 * 1024
-ENDED = ("succeeded", "failed", "cancelled")
+T = TypeVar("T")
 
 
 class Client:
@@ -25,18 +28,23 @@ class Client:
 
     Every method raises :class:`ClientError` when the service refuses or does not answer.
 
+    Args:
+        url: of the service.
+        key: an API key, where the service asks for one.
+        timeout_s: how long an answer may take.
+        poll_s: how often a job is looked at where its events do not come through.
+
     Raises:
         InvalidInput: for a ``url`` that is no web address.
     """
 
-    def __init__(self, url: str, *, timeout_s: float = 300.0, poll_s: float = 0.3) -> None:
-        self.url = _checked(url).rstrip("/")
+    def __init__(
+        self, url: str, *, key: str | None = None, timeout_s: float = 300.0, poll_s: float = 0.3
+    ) -> None:
+        settings = settings_of(url, key, timeout_s)
+        self.url: str = settings["base_url"]
         self._poll_s = poll_s
-        # The answer to an upload comes after the service has read the whole file.
-        timeout = httpx.Timeout(timeout_s, connect=10.0)
-        self._http = httpx.Client(
-            base_url=self.url, timeout=timeout, transport=httpx.HTTPTransport(retries=2)
-        )
+        self._http = httpx.Client(**settings, transport=httpx.HTTPTransport(retries=2))
 
     def __enter__(self) -> Self:
         return self
@@ -51,94 +59,119 @@ class Client:
         self._http.close()
 
     def upload(
-        self, path: Path | str, on_progress: Callable[[int, int], None] | None = None
-    ) -> dict[str, Any]:
-        """Upload a dataset file; ``on_progress(sent, total)`` counts bytes. Returns the dataset record."""
-        path = Path(path)
-        try:
-            total = path.stat().st_size
-            with path.open("rb") as file:
-                headers = {"Content-Type": "application/x-hdf5", "Content-Length": str(total)}
-                body = _chunks(file.read, total, on_progress)
-                return self._json("POST", "/v1/datasets", content=body, headers=headers)
-        except OSError as error:
-            raise ClientError(f"{path} cannot be read: {error.strerror}") from error
+        self,
+        path: Path | str,
+        on_progress: OnBytes | None = None,
+        *,
+        kind: Kind = "dataset",
+        resume: str | None = None,
+        **said: str,
+    ) -> Record:
+        """Upload a file, a large one in pieces, which go on after the connection broke.
 
-    def submit(self, dataset_id: str, settings: dict[str, Any] | None = None) -> dict[str, Any]:
+        Args:
+            path: of the file.
+            on_progress: told ``(sent, total)``, bytes.
+            kind: what it is.
+            resume: the id of an upload to go on with: ``ClientError.upload`` of the one that was broken off.
+            said: of a volume or a mesh its ``title``, of a volume ``spacing_m``, ``shape`` and ``dtype`` too.
+
+        Returns:
+            The record of the dataset, the volume or the mesh.
+        """
+        return self._run(upload(Path(path), on_progress, kind, resume, said))
+
+    def submit(self, dataset_id: str, settings: Mapping[str, Any] | None = None) -> Record:
         """Start a reconstruction; settings left out take their defaults. Returns the job record."""
-        asked = {"kind": "reconstruction", "dataset": dataset_id, "settings": settings or {}}
-        return self._json("POST", "/v1/jobs", json=asked)
+        return self._run(flows.submit(dataset_id, settings))
 
-    def job(self, job_id: str) -> dict[str, Any]:
+    def job(self, job_id: str) -> Record:
         """The job record as it is now."""
-        return self._json("GET", f"/v1/jobs/{job_id}")
+        return self._run(flows.record("GET", f"/v1/jobs/{job_id}"))
 
-    def cancel(self, job_id: str) -> dict[str, Any]:
+    def cancel(self, job_id: str) -> Record:
         """Ask a job to stop."""
-        return self._json("POST", f"/v1/jobs/{job_id}/cancel")
+        return self._run(flows.record("POST", f"/v1/jobs/{job_id}/cancel"))
 
     def wait(
         self,
         job_id: str,
-        on_progress: Callable[[dict[str, Any]], None] | None = None,
+        on_progress: Callable[[Record], None] | None = None,
         timeout_s: float | None = None,
-    ) -> dict[str, Any]:
+    ) -> Record:
         """Wait until a job has succeeded and return its record; ``on_progress`` gets every record before.
 
         Raises:
             ClientError: when the job failed (with its problem), was cancelled, or exceeds ``timeout_s``.
         """
-        deadline = None if timeout_s is None else time.monotonic() + timeout_s
-        while True:
-            job = self.job(job_id)
-            if on_progress is not None:
-                on_progress(job)
-            if job["state"] == "succeeded":
-                return job
-            if job["state"] == "failed":
-                raise from_problem(job["error"])
-            if job["state"] == "cancelled":
-                raise ClientError(f"{job_id} was cancelled")
-            if deadline is not None and time.monotonic() > deadline:
-                raise ClientError(f"{job_id} is still {job['state']} after {timeout_s:g} s")
-            time.sleep(self._poll_s)
+        return self._run(wait(job_id, on_progress, timeout_s, self._poll_s))
 
-    def volume(self, volume_id: str) -> dict[str, Any]:
+    def volume(self, volume_id: str) -> Record:
         """The metadata of a result."""
-        return self._json("GET", f"/v1/volumes/{volume_id}")
+        return self._run(flows.record("GET", f"/v1/volumes/{volume_id}"))
 
     def slice_png(self, volume_id: str, **how: str | float) -> bytes:
         """One slice as PNG; ``how``: index, quantity, low, high, colormap."""
-        with self._request("GET", f"/v1/volumes/{volume_id}/slice.png", params=how) as response:
-            return response.read()
+        return self._run(flows.picture(f"/v1/volumes/{volume_id}/slice.png", how))
 
-    def download(self, volume_id: str, format: Literal["hdf5", "nifti", "npy"], path: Path | str) -> Path:  # noqa: A002
+    def download(self, volume_id: str, format: Format, path: Path | str) -> Path:  # noqa: A002
         """Fetch a result into ``path``; the file is there whole or not at all."""
-        path = Path(path)
-        partial = path.with_name(f"{path.name}.partial")
-        try:
-            with (
-                self._request("GET", f"/v1/volumes/{volume_id}/data", params={"format": format}) as response,
-                partial.open("wb") as file,
-            ):
-                for chunk in response.iter_bytes(CHUNK_BYTES):
-                    file.write(chunk)
-                file.flush()
-                os.fsync(file.fileno())
-            partial.replace(path)
-        except OSError as error:
-            raise ClientError(f"{path} cannot be written: {error.strerror}") from error
-        finally:
-            partial.unlink(missing_ok=True)
-        return path
+        return self._run(flows.download(volume_id, format, Path(path)))
 
-    def _json(self, method: str, path: str, **request: Any) -> dict[str, Any]:
-        with self._request(method, path, **request) as response:
-            response.read()
-            return dict(response.json())
+    def result(self, volume_id: str) -> Result:
+        """A volume as arrays with coordinates; ``.to_xarray()`` makes a dataset of xarray of it."""
+        return self._run(flows.result(volume_id))
+
+    def delete(self, stored_id: str) -> None:
+        """Delete a dataset, a volume or a mesh with all that was made of it."""
+        self._run(flows.delete(stored_id))
+
+    def _run(self, flow: Generator[Step, Any, T]) -> T:
+        answer: Any = None
+        error: ClientError | None = None
+        with ExitStack() as streams:
+            listening: dict[str, Iterator[str]] = {}
+            while True:
+                try:
+                    step = flow.send(answer) if error is None else flow.throw(error)
+                except StopIteration as end:
+                    value: T = end.value
+                    return value
+                try:
+                    answer, error = self._do(step, streams, listening), None
+                except ClientError as failure:
+                    answer, error = None, failure
+
+    def _do(self, step: Step, streams: ExitStack, listening: dict[str, Iterator[str]]) -> Any:
+        if isinstance(step, Pause):
+            return time.sleep(step.seconds)
+        if isinstance(step, Ask):
+            content = None if step.body is None else step.body()
+            with self._answer(step.method, step.path, content=content, **step.options) as response:
+                response.read()
+                return response
+        if isinstance(step, Fetch):
+            with self._answer("GET", step.path, **step.options) as response, saving(step.target) as save:
+                for chunk in response.iter_bytes(CHUNK_BYTES):
+                    save(chunk)
+            return None
+        return self._listen(step, streams, listening)
+
+    def _listen(self, step: Listen, streams: ExitStack, listening: dict[str, Iterator[str]]) -> str | None:
+        if step.path not in listening:
+            response = streams.enter_context(self._answer("GET", step.path, timeout=step.seconds))
+            listening[step.path] = response.iter_lines()
+        try:
+            line = next(listening[step.path], None)
+        except httpx.TransportError as error:
+            del listening[step.path]
+            raise NoAnswer(f"no answer from {self.url}: {error}") from error
+        if line is None:
+            del listening[step.path]
+        return line
 
     @contextmanager
-    def _request(self, method: str, path: str, **request: Any) -> Iterator[httpx.Response]:
+    def _answer(self, method: str, path: str, **request: Any) -> Iterator[httpx.Response]:
         try:
             with self._http.stream(method, path, **request) as response:
                 if not response.is_success:
@@ -146,25 +179,4 @@ class Client:
                     raise from_response(response)
                 yield response
         except httpx.TransportError as error:
-            raise ClientError(f"no answer from {self.url}: {error}") from error
-
-
-def _checked(url: str) -> str:
-    try:
-        parsed = httpx.URL(url)
-    except httpx.InvalidURL:
-        parsed = httpx.URL()
-    if parsed.scheme not in ("http", "https") or not parsed.host:
-        raise InvalidInput("url", repr(url), "a web address, such as http://127.0.0.1:8000")
-    return url
-
-
-def _chunks(
-    read: Callable[[int], bytes], total: int, on_progress: Callable[[int, int], None] | None
-) -> Iterator[bytes]:
-    sent = 0
-    while chunk := read(CHUNK_BYTES):
-        yield chunk
-        sent += len(chunk)
-        if on_progress is not None:
-            on_progress(sent, total)
+            raise NoAnswer(f"no answer from {self.url}: {error}") from error

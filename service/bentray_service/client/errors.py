@@ -14,6 +14,7 @@ class ClientError(Exception):
         status: the HTTP status, or None when there was no answer.
         field, found, accepted: from the problem, or None.
         problem: the whole problem, empty when there was none.
+        upload: the id of the upload that was broken off; ``upload(…, resume=…)`` goes on with it.
     """
 
     def __init__(
@@ -25,6 +26,11 @@ class ClientError(Exception):
         self.field: str | None = self.problem.get("field")
         self.found: str | None = self.problem.get("found")
         self.accepted: str | None = self.problem.get("accepted")
+        self.upload: str | None = None
+
+
+class NoAnswer(ClientError):  # noqa: N818 - names what happened, to whoever tries again
+    """The connection could not be made, or broke."""
 
 
 def from_problem(problem: dict[str, Any], status: int | None = None) -> ClientError:

@@ -1,0 +1,51 @@
+"""What a client can be asked for, as flows: requests in order, and what they give."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Generator, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from .errors import ClientError
+from .results import Result, read_result
+from .steps import Ask, Fetch, Step
+from .uploading import PLACES
+
+Record = dict[str, Any]
+Format = Literal["hdf5", "nifti", "npy"]
+
+PREFIXES = {"ds": "dataset", "vol": "volume", "mesh": "mesh"}
+
+
+def record(method: str, path: str, **options: Any) -> Generator[Step, Any, Record]:
+    """The JSON that one request gives."""
+    return dict((yield Ask(method, path, options)).json())
+
+
+def submit(dataset_id: str, settings: Mapping[str, Any] | None) -> Generator[Step, Any, Record]:
+    asked = {"kind": "reconstruction", "dataset": dataset_id, "settings": dict(settings or {})}
+    return (yield from record("POST", "/v1/jobs", json=asked))
+
+
+def picture(path: str, how: Mapping[str, str | float]) -> Generator[Step, Any, bytes]:
+    return bytes((yield Ask("GET", path, {"params": dict(how)})).content)
+
+
+def download(volume_id: str, kind: Format, target: Path) -> Generator[Step, Any, Path]:
+    yield Fetch(f"/v1/volumes/{volume_id}/data", {"params": {"format": kind}}, target)
+    return target
+
+
+def result(volume_id: str) -> Generator[Step, Any, Result]:
+    about = yield from record("GET", f"/v1/volumes/{volume_id}")
+    with tempfile.TemporaryDirectory() as folder:
+        path = yield from download(volume_id, "hdf5", Path(folder) / "volume.h5")
+        return read_result(path, about)
+
+
+def delete(stored_id: str) -> Generator[Step, Any, None]:
+    kind = PREFIXES.get(stored_id.partition("-")[0])
+    if kind is None:
+        raise ClientError(f"{stored_id!r} is not the id of a dataset, a volume or a mesh")
+    yield Ask("DELETE", f"{PLACES[kind]}/{stored_id}")

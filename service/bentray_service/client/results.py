@@ -1,0 +1,93 @@
+"""A volume as arrays with coordinates and units, from the file that the service gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import ClientError
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class Result:
+    """What is in a volume.
+
+    Attributes:
+        axes: names of the axes in order, ``x``, ``y`` and, in space, ``z``.
+        values: arrays over these by name: of a reconstruction ``speed``, ``coverage`` and, where it has them,
+            ``attenuation`` and ``recovery``; of an upload ``value``.
+        coordinates: place of each node along each axis, m; of slices at uneven heights the z are missing.
+        units: of each array.
+        attributes: where it comes from: ids, title, settings, versions.
+    """
+
+    axes: tuple[str, ...]
+    values: Mapping[str, NDArray[Any]]
+    coordinates: Mapping[str, NDArray[np.float64]]
+    units: Mapping[str, str]
+    attributes: Mapping[str, str] = field(default_factory=dict)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same as a dataset of xarray, with the units in ``attrs``.
+
+        Raises:
+            ClientError: where xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError as error:
+            raise ClientError("xarray is not installed: pip install 'bentray[xarray]'") from error
+        arrays = {
+            name: xarray.DataArray(array, dims=self.axes, attrs={"units": self.units[name]})
+            for name, array in self.values.items()
+        }
+        places = {
+            name: xarray.DataArray(place, dims=(name,), attrs={"units": "m"})
+            for name, place in self.coordinates.items()
+        }
+        return xarray.Dataset(arrays, coords=places, attrs=dict(self.attributes))
+
+
+# Unit of each array of a reconstruction.
+UNITS = {"speed": "m/s", "coverage": "m", "attenuation": "Np/m", "recovery": "1"}
+
+
+def read_result(path: Path, record: Mapping[str, Any]) -> Result:
+    """Read a volume's HDF5 file.
+
+    Args:
+        path: of the file.
+        record: of the volume, as the service tells it.
+    """
+    from bentray_workers.reconstruction_file import read_reconstruction
+    from bentray_workers.volume_file import read_volume
+
+    told = {name: record[name] for name in ("id", "title", "job", "dataset", "sha256") if record.get(name)}
+    spacing: tuple[float, ...]
+    origin: tuple[float, ...]
+    if record["source"] == "upload":
+        volume = read_volume(path)
+        values, units = {"value": volume.values}, {"value": record["unit"]}
+        spacing, origin = volume.spacing_m, volume.origin_m
+    else:
+        found = read_reconstruction(path)
+        values = {name: getattr(found, name) for name in UNITS if getattr(found, name) is not None}
+        units = {name: UNITS[name] for name in values}
+        spacing, origin = found.spacing_m, found.origin_m
+        told |= {**found.provenance, "settings": str(found.settings.to_dict())}
+    shape = next(iter(values.values())).shape
+    axes = tuple(record["axes"].split(","))
+    coordinates = {
+        axis: start + step * np.arange(n)
+        for axis, n, start, step in zip(axes, shape, origin, spacing, strict=True)
+        if np.isfinite(start) and np.isfinite(step)
+    }
+    return Result(axes, values, coordinates, units, told)

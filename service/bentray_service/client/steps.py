@@ -1,0 +1,89 @@
+"""What a client does one after the other, told apart from how: each call is a generator of steps.
+
+A flow yields steps and is sent their answers; a step that fails is thrown into it as :class:`ClientError`.
+``Client`` and ``AsyncClient`` walk through the same flows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from bentray_kernels.errors import InvalidInput
+
+CHUNK_BYTES = 1024 * 1024
+CONNECT_S = 10.0
+
+
+@dataclass(frozen=True)
+class Ask:
+    """A request; its answer is the response, read, once it is a success.
+
+    Attributes:
+        method, path: of the service.
+        options: as ``httpx`` takes them: ``params``, ``json``, ``headers``.
+        body: makes the chunks of the body.
+    """
+
+    method: str
+    path: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    body: Callable[[], Iterator[bytes]] | None = None
+
+
+@dataclass(frozen=True)
+class Fetch:
+    """Download into a file, which is there whole or not at all; no answer."""
+
+    path: str
+    options: Mapping[str, Any]
+    target: Path
+
+
+@dataclass(frozen=True)
+class Listen:
+    """Wait for the next line of a stream of events, which is opened at the first time.
+
+    The answer is the line, or None when the stream has ended.
+
+    Attributes:
+        path: of the stream.
+        seconds: of silence after which the connection counts as broken.
+    """
+
+    path: str
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Pause:
+    """Wait so long; no answer."""
+
+    seconds: float
+
+
+Step = Ask | Fetch | Listen | Pause
+
+
+def settings_of(url: str, key: str | None, timeout_s: float) -> dict[str, Any]:
+    """What both kinds of ``httpx`` clients are made with.
+
+    Raises:
+        InvalidInput: for a ``url`` that is no web address.
+    """
+    try:
+        parsed = httpx.URL(url)
+    except httpx.InvalidURL:
+        parsed = httpx.URL()
+    if parsed.scheme not in ("http", "https") or not parsed.host:
+        raise InvalidInput("url", repr(url), "a web address, such as http://127.0.0.1:8000")
+    return {
+        "base_url": url.rstrip("/"),
+        "headers": {} if key is None else {"Authorization": f"Bearer {key}"},
+        # The answer to an upload comes after the service has read the whole file.
+        "timeout": httpx.Timeout(timeout_s, connect=CONNECT_S),
+    }

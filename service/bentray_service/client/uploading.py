@@ -1,0 +1,131 @@
+"""The flow of an upload: small files in one request, larger ones by tus, over broken connections."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Generator, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import httpx
+
+from bentray_kernels.errors import InvalidInput
+
+from .errors import ClientError, NoAnswer, from_problem
+from .steps import CHUNK_BYTES, Ask, Pause, Step
+
+Kind = Literal["dataset", "volume", "mesh"]
+Record = dict[str, Any]
+OnBytes = Callable[[int, int], None]
+
+# Where each kind goes in one request.
+PLACES: Mapping[str, str] = {"dataset": "/v1/datasets", "volume": "/v1/volumes", "mesh": "/v1/meshes"}
+
+# Larger ones go in pieces: less than this is sent again quickly.
+ONE_REQUEST_BYTES = 32 * 2**20
+
+# How often in a row a connection may break without a byte getting through, and the pauses between, s.
+TRIES = 6
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 15.0
+# Between two looks at an upload that is being read, s.
+FIRST_LOOK_S, LONGEST_LOOK_S = 0.05, 1.0
+
+TUS = {"Tus-Resumable": "1.0.0"}
+OCTETS = {"Content-Type": "application/octet-stream"}
+PIECE = {"Content-Type": "application/offset+octet-stream"}
+
+
+def upload(
+    path: Path, on_progress: OnBytes | None, kind: Kind, resume: str | None, said: Mapping[str, str]
+) -> Generator[Step, Any, Record]:
+    """Upload a file; its value is the record of what it became."""
+    if kind not in PLACES:
+        raise InvalidInput("kind", repr(kind), " or ".join(PLACES))
+    try:
+        total = path.stat().st_size
+    except OSError as error:
+        raise _unreadable(path, error) from error
+    if resume is None and total <= ONE_REQUEST_BYTES:
+        options = {"headers": {**OCTETS, "Content-Length": str(total)}, "params": dict(said)}
+        body = _chunks(path, 0, total, on_progress)
+        return dict((yield Ask("POST", PLACES[kind], options, body)).json())
+    if resume is None:
+        place = yield from _begin(total, {"filename": path.name, **said, "kind": kind})
+    else:
+        place = f"/v1/uploads/{resume}"
+    try:
+        yield from _send(path, place, total, on_progress)
+    except ClientError as error:
+        error.upload = place.rpartition("/")[2]
+        raise
+    return (yield from _read(place))
+
+
+def _begin(total: int, said: Mapping[str, str]) -> Generator[Step, Any, str]:
+    metadata = ",".join(f"{name} {base64.b64encode(text.encode()).decode()}" for name, text in said.items())
+    headers = {**TUS, "Upload-Length": str(total), "Upload-Metadata": metadata}
+    answer = yield Ask("POST", "/v1/uploads", {"headers": headers})
+    return httpx.URL(answer.headers["Location"]).path
+
+
+def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Generator[Step, Any, None]:
+    """Send what is missing, as often as it takes."""
+    failures, reached, pause = 0, -1, FIRST_PAUSE_S
+    while True:
+        try:
+            there = yield Ask("HEAD", place, {"headers": TUS})
+            offset, length = int(there.headers["Upload-Offset"]), int(there.headers["Upload-Length"])
+            if length != total:
+                raise ClientError(f"{path} has {total} bytes; the upload at {place} is one of {length}")
+            if offset > reached:
+                failures, reached, pause = 0, offset, FIRST_PAUSE_S
+            if offset == total:
+                return
+            headers = {**TUS, **PIECE, "Upload-Offset": str(offset), "Content-Length": str(total - offset)}
+            yield Ask("PATCH", place, {"headers": headers}, _chunks(path, offset, total, on_progress))
+            return
+        except ClientError as error:
+            # Locked: the service has not noticed yet that the connection before is gone.
+            if not isinstance(error, NoAnswer) and error.status not in (408, 409, 423, 502, 503, 504):
+                raise
+            failures += 1
+            if failures == TRIES:
+                raise
+        yield Pause(pause)
+        pause = min(2.0 * pause, LONGEST_PAUSE_S)
+
+
+def _read(place: str) -> Generator[Step, Any, Record]:
+    """Wait until the service has read the upload."""
+    pause = FIRST_LOOK_S
+    while True:
+        record = (yield Ask("GET", place)).json()
+        if record["state"] == "done":
+            return dict((yield Ask("GET", record["links"]["result"])).json())
+        if record["state"] == "refused":
+            raise from_problem(record["problem"])
+        yield Pause(pause)
+        pause = min(1.5 * pause, LONGEST_LOOK_S)
+
+
+def _chunks(
+    path: Path, offset: int, total: int, on_progress: OnBytes | None
+) -> Callable[[], Iterator[bytes]]:
+    def chunks() -> Iterator[bytes]:
+        sent = offset
+        try:
+            with path.open("rb") as file:
+                file.seek(offset)
+                while sent < total and (chunk := file.read(min(CHUNK_BYTES, total - sent))):
+                    yield chunk
+                    sent += len(chunk)
+                    if on_progress is not None:
+                        on_progress(sent, total)
+        except OSError as error:
+            raise _unreadable(path, error) from error
+
+    return chunks
+
+
+def _unreadable(path: Path, error: OSError) -> ClientError:
+    return ClientError(f"{path} cannot be read: {error.strerror}")

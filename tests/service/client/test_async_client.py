@@ -1,0 +1,83 @@
+"""The client for event loops: the same calls give the same."""
+
+import asyncio
+import inspect
+
+import pytest
+
+from bentray_service.client import AsyncClient, Client, ClientError
+
+
+def run(serve, call):
+    async def within():
+        async with AsyncClient(serve(), poll_s=0.02) as client:
+            return await call(client)
+
+    return asyncio.run(within())
+
+
+def test_whole_path(serve, work, scan, tmp_path):
+    sent, seen = [], []
+
+    async def call(client):
+        dataset = await client.upload(scan(), lambda done, total: sent.append((done, total)))
+        job = await client.submit(dataset["id"], {"nodes": 16, "sweeps": 2})
+        done = await client.wait(job["id"], seen.append)
+        assert (await client.job(job["id"]))["state"] == "succeeded"
+        assert (await client.volume(done["volume"]))["shape"] == [16, 16]
+        assert (await client.slice_png(done["volume"])).startswith(b"\x89PNG")
+        await client.download(done["volume"], "npy", tmp_path / "speed.npy")
+        result = await client.result(done["volume"])
+        await client.delete(dataset["id"])
+        with pytest.raises(ClientError) as gone:
+            await client.volume(done["volume"])
+        assert gone.value.status == 404
+        return dataset, done, result
+
+    dataset, done, result = run(serve, call)
+    assert sent[-1] == (dataset["bytes"], dataset["bytes"])
+    assert seen[-1] == done
+    assert result.values["speed"].shape == (16, 16)
+    assert (tmp_path / "speed.npy").stat().st_size > 0
+
+
+def test_refusals_and_ends(serve, work, scan, tmp_path):
+    work.hold.clear()
+
+    async def call(client):
+        dataset = (await client.upload(scan()))["id"]
+        with pytest.raises(ClientError, match="magic"):
+            await client.submit(dataset, {"eikonal": "magic"})
+        job = await client.submit(dataset, {"nodes": 16})
+        with pytest.raises(ClientError, match=r"after 0\.1 s"):
+            await client.wait(job["id"], timeout_s=0.1)
+        await client.cancel(job["id"])
+        with pytest.raises(ClientError, match="was cancelled"):
+            await client.wait(job["id"])
+        with pytest.raises(ClientError, match="cannot be read"):
+            await client.upload(tmp_path / "none.h5")
+        with pytest.raises(ClientError, match="not the id"):
+            await client.delete("nothing")
+
+    run(serve, call)
+
+
+def test_nobody_there():
+    async def call():
+        async with AsyncClient("http://127.0.0.1:9") as client:
+            await client.job("x")
+
+    with pytest.raises(ClientError, match=r"no answer from http://127\.0\.0\.1:9"):
+        asyncio.run(call())
+
+
+def test_it_has_every_call_of_the_other():
+    def calls(of):
+        return {
+            name: list(inspect.signature(call).parameters)
+            for name, call in inspect.getmembers(of, inspect.isfunction)
+            if not name.startswith("_")
+        }
+
+    assert calls(AsyncClient) == calls(Client)
+    assert inspect.signature(AsyncClient) == inspect.signature(Client)
