@@ -168,8 +168,11 @@ class Machine:
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
-        left = [pid for session in sessions for pid in of_session(session)]
-        assert not left, [command_of(pid) for pid in left]
+        # What watches a dead process ends after it.
+        deadline = time.monotonic() + 30.0
+        while left := [pid for session in sessions for pid in of_session(session)]:
+            assert time.monotonic() < deadline, [command_of(pid) for pid in left]
+            time.sleep(0.1)
 
 
 def below(pid: int) -> list[int]:

@@ -13,7 +13,7 @@ from distributed.scheduler import NoValidWorkerError, NoWorkerError
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_kernels.tomography.chains import Chain
 from bentray_workers import slices
-from bentray_workers.attempts import Attempts
+from bentray_workers.attempts import Attempts, ResultsLostError
 from bentray_workers.checkpoints import Checkpoints
 from bentray_workers.dask_settings import NO_DASHBOARD, SETTINGS
 from bentray_workers.lanes import OFFERED, THREADS
@@ -54,7 +54,7 @@ def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):
             while True:
                 try:
                     return part()
-                except (NoValidWorkerError, NoWorkerError):
+                except (NoValidWorkerError, NoWorkerError, ResultsLostError):
                     continue
 
         threads = [threading.Thread(target=again_and_again, args=[part]) for part in (innocent, poisoned)]

@@ -1,28 +1,43 @@
 """Attempts: a call that only waited on a dead worker is innocent, one that ran there is not for ever."""
 
+import distributed
 import pytest
 from distributed import KilledWorker
 
 from bentray_workers import attempts
-from bentray_workers.attempts import MOST_STRIKES, Attempts, watched
+from bentray_workers.attempts import MOST_STRIKES, Attempts, ResultsLostError, watched
 
 
-class Future:
+class Future(distributed.Future):
     """One that ends as the test says."""
+
+    status = "pending"
+    __hash__ = object.__hash__
+    __eq__ = object.__eq__
 
     def __init__(self, work):
         self.work = work
-        self.status = "pending"
         self.error = None
 
-    def exception(self):
-        return self.error
+    def __repr__(self):
+        return f"<{self.status} {self.work[1:]}>"
+
+    def __del__(self):
+        """Nothing of a real one is to be released."""
+
+    def result(self):
+        if self.error is not None:
+            raise self.error
+        return "given"
+
+    def ended(self, status, error=None):
+        self.status, self.error = status, error
+        return self
 
     def killed(self, while_running):
         if while_running:
             self.work[0].touch()
-        self.status, self.error = "error", KilledWorker("task", None, 2)
-        return self
+        return self.ended("error", KilledWorker("task", None, 2))
 
 
 class Client:
@@ -40,26 +55,46 @@ def made(tmp_path):
 def test_who_only_waited_is_tried_again_for_ever(made):
     future = made.submit(print, 1)
     for _ in range(20):
-        future = made.again(future.killed(while_running=False))
+        future, _ = made.ended(future.killed(while_running=False))
         assert future.work[1:] == (print, 1)
 
 
 def test_who_ran_is_given_up(made):
     future = made.submit(print, 1)
     for _ in range(MOST_STRIKES):
-        future = made.again(future.killed(while_running=True))
-        assert future is not None
+        future, _ = made.ended(future.killed(while_running=True))
         assert not future.work[0].exists()
-    assert made.again(future.killed(while_running=True)) is None
+    with pytest.raises(KilledWorker):
+        made.ended(future.killed(while_running=True))
 
 
-@pytest.mark.parametrize(
-    ("status", "error"), [("finished", None), ("error", ValueError()), ("cancelled", None)]
-)
-def test_every_other_end_is_an_end(made, status, error):
+def test_a_result_that_went_with_its_worker_is_made_again(made):
+    future = made.submit(print, 1)
+    future.killed(while_running=False).status = "finished"
+    again, _ = made.ended(future)
+    assert again.work[1:] == (print, 1)
+
+
+def test_what_is_kept_is_not_fetched(made):
     future = made.submit(print)
-    future.status, future.error = status, error
-    assert made.again(future) is None
+    future.error = AssertionError("it was fetched")
+    future.status = "finished"
+    assert made.ended(future, keep=True) == (None, future)
+
+
+def test_what_needs_a_lost_result_is_not_tried_for_ever(made):
+    needed = made.submit(print).ended("finished")
+    future = made.submit(print, [needed], 1)
+    future, _ = made.ended(future.killed(while_running=False))
+    needed.status = "error"
+    with pytest.raises(ResultsLostError):
+        made.ended(future.killed(while_running=False))
+
+
+def test_an_end_is_an_end(made):
+    assert made.ended(made.submit(print).ended("finished")) == (None, "given")
+    with pytest.raises(ZeroDivisionError):
+        made.ended(made.submit(print).ended("error", ZeroDivisionError()), keep=True)
 
 
 def test_the_file_is_there_as_long_as_the_call_runs(tmp_path):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +13,10 @@ from .lanes import RECONSTRUCTION
 
 # How often a call may see its workers die while it runs.
 MOST_STRIKES = 2
+
+
+class ResultsLostError(ConnectionError):
+    """What a call needs has gone with its workers; whoever drives begins again from its checkpoint."""
 
 
 class _Attempt(NamedTuple):
@@ -42,23 +46,52 @@ class Attempts:
         self._made: dict[Future, _Attempt] = {}
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
-        """Begin a call; its future is to be handed to ``again`` once it has ended."""
+        """Begin a call; its future is to be handed to ``ended`` once it has ended."""
         return self._submit(_Attempt(function, arguments, 0, next(self._markers)))
 
-    def again(self, future: Future) -> Future | None:
-        """The same call once more, where its workers died and it may not be the cause; None otherwise."""
+    def ended(self, future: Future, *, keep: bool = False) -> tuple[Future | None, Any]:
+        """What a call gave; or the same call once more, where its workers died and it may not be the cause.
+
+        A result may go with its worker after it was made. Dask then makes it again by itself, and may blame
+        it for the next death.
+
+        Args:
+            future: of a call that has ended.
+            keep: leave the result where it is, and give the future for it.
+
+        Returns:
+            The future of the new attempt, or None and what the call gave.
+
+        Raises:
+            KilledWorker: for a call that kills its workers.
+            ResultsLostError: where what it needs was lost with its workers and could not be made again.
+        """
         made = self._made.pop(future)
-        if future.status != "error" or not isinstance(future.exception(), KilledWorker):
-            return None
-        strikes = made.strikes + made.marker.exists()
-        made.marker.unlink(missing_ok=True)
-        return self._submit(made._replace(strikes=strikes)) if strikes <= MOST_STRIKES else None
+        try:
+            return None, future if keep and future.status == "finished" else future.result()
+        except KilledWorker as error:
+            strikes = made.strikes + made.marker.exists()
+            made.marker.unlink(missing_ok=True)
+            if strikes > MOST_STRIKES:
+                raise
+            if any(needed.status == "error" for needed in _futures(made.arguments)):
+                raise ResultsLostError("what it needs was lost with its workers") from error
+            return self._submit(made._replace(strikes=strikes)), None
 
     def _submit(self, attempt: _Attempt) -> Future:
         work = attempt.marker, attempt.function, *attempt.arguments
         future = self._client.submit(watched, *work, resources=self._resources, pure=False)
         self._made[future] = attempt
         return future
+
+
+def _futures(arguments: Iterable[Any]) -> Iterator[Future]:
+    """Those among arguments, and in lists among them."""
+    for argument in arguments:
+        if isinstance(argument, Future):
+            yield argument
+        elif isinstance(argument, list):
+            yield from _futures(argument)
 
 
 def watched(marker: Path, function: Callable[..., Any], *arguments: Any) -> Any:

@@ -85,14 +85,14 @@ def _prepared(
 ) -> Path:
     """What ``prepare`` gives; picking may take a while, and a stop does not wait for its end."""
     picking: Future | None = attempts.submit(prepare, dataset_path, settings, folder)
+    path: Path | None = None
     while picking is not None:
-        last = picking
-        while not finished(client, [last]):
+        while not finished(client, [picking]):
             if stop is not None and stop():
-                last.cancel()
+                picking.cancel()
                 raise Cancelled
-        picking = attempts.again(last)
-    path: Path = last.result()
+        picking, path = attempts.ended(picking)
+    assert path is not None
     return path
 
 
@@ -170,11 +170,10 @@ def _drive(
                 running[attempts.submit(call.function, *call.arguments)] = name, call
             for future in finished(client, list(running)):
                 name, call = running.pop(future)
-                again = attempts.again(future)
+                again, given = attempts.ended(future, keep=call.keep)
                 if again is not None:
                     running[again] = name, call
                     continue
-                given = future if call.keep and future.status == "finished" else future.result()
                 # Before other slices begin: what an iteration keeps is freed by its end.
                 ready.extendleft((name, later) for later in reversed(chains[name].after(call, given)))
                 checkpoints.keep(name, chains[name].standing)
