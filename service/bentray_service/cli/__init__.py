@@ -6,7 +6,21 @@ from typing import Annotated
 
 import typer
 
-from . import bench, demo, devices, geometry_field, reconstruct, render, serve, simulate, submit, worker
+from . import (
+    audit,
+    bench,
+    demo,
+    devices,
+    geometry_field,
+    keys,
+    quality,
+    reconstruct,
+    render,
+    serve,
+    simulate,
+    submit,
+    worker,
+)
 from .endings import Commands
 from .repeated_words import SpacingInRow
 
@@ -27,13 +41,16 @@ for command in (
     worker.worker,
     submit.submit,
     reconstruct.reconstruct,
+    quality.quality,
     simulate.simulate,
     bench.bench,
     geometry_field.geometry_field,
     devices.devices,
+    audit.audit,
 ):
     app.command()(command)
 app.command(cls=SpacingInRow)(render.render)
+app.add_typer(keys.keys, name="keys")
 
 
 def _version(asked: bool) -> None:

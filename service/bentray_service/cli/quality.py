@@ -1,0 +1,61 @@
+"""`bentray quality`: what is wrong with a scan, before it is reconstructed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .endings import WorkFailed
+from .paths import input_file, output_folder
+from .terminal import AsJson, print_json, print_lines, print_table
+
+
+def quality(
+    file: Annotated[Path, typer.Argument(help="Dataset file (HDF5, format uct-transmission).")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the report; made if absent.")],
+    picker: Annotated[str, typer.Option(help="How times are read from raw traces.")] = "aic",
+    as_json: AsJson = False,
+) -> None:
+    """Examine a scan: OUTPUT/quality.json and .png say what was found, picked.h5 is what goes on.
+
+    Dead elements, swapped and inverted channels, wrong time zeros, cycle jumps, outliers and the like are
+    named, and left out or corrected in picked.h5. A scan that must not be used ends with exit code 1.
+
+    Example:  bentray quality scan.h5 -o report
+    """
+    source, folder = input_file(file), output_folder(output)
+
+    from bentray_workers.atomic import write_bytes
+    from bentray_workers.dataset_file import write_dataset
+    from bentray_workers.quality import examine_file
+
+    found = examine_file(source, picker)
+    paths = {kind: folder / f"quality.{kind}" for kind in ("json", "png")}
+    if found.picked is not None:
+        paths["h5"] = folder / "picked.h5"
+        write_dataset(paths["h5"], found.picked)
+    told: dict[str, Any] = {
+        "file": str(source),
+        **found.report,
+        "outputs": {kind: str(path) for kind, path in paths.items()},
+    }
+    write_bytes(paths["png"], found.page)
+    write_bytes(paths["json"], (json.dumps(told, indent=2, allow_nan=False) + "\n").encode())
+    if as_json:
+        print_json(told)
+    else:
+        lines = [(f["check"], f["found"], _elements(f), f["action"]) for f in found.report["findings"]]
+        title = f"{source.name}: {found.report['verdict']}"
+        print_table(title, ("check", "found", "elements", "done"), lines)
+        usable = f"{found.report['usable_pairs']} of {found.report['pairs']} pairs usable"
+        print_lines([usable, *told["outputs"].values()])
+    if found.picked is None:
+        refused = next(f for f in found.report["findings"] if f["action"] == "refused")
+        raise WorkFailed(f"{refused['check']}: {refused['found']}; accepted: {refused['accepted']}")
+
+
+def _elements(finding: dict[str, Any]) -> str:
+    return ", ".join(map(str, finding["elements"][:8])) + (", …" if len(finding["elements"]) > 8 else "")

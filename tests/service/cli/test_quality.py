@@ -1,0 +1,57 @@
+"""`bentray quality`: the report, the page and what goes on; a scan of no use fails with a reason."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from typer.testing import Result
+
+from bentray_workers.dataset_file import read_dataset, write_dataset
+
+from ...kernels.acquisition.traces import blob_delay, scan
+
+
+def test_faults_are_told_and_the_rest_goes_on(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    faulty = scan(blob_delay(24), elements=24, noise=0.01)
+    faulty.waveform.object[:, 5] = faulty.waveform.water[:, 5] = 0.0
+    faulty.waveform.object[9] *= -1.0
+    faulty.waveform.water[9] *= -1.0
+    write_dataset(tmp_path / "scan.h5", faulty)
+    result = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out", "--json")
+    assert result.exit_code == 0
+    said = json.loads(result.stdout)
+    assert said["verdict"] == "usable"
+    found = {(f["check"], tuple(f["elements"]), f["role"], f["action"]) for f in said["findings"]}
+    assert ("dead elements", (5,), "reception", "left out") in found
+    assert ("polarity", (9,), "emission", "corrected") in found
+    assert json.loads((tmp_path / "out" / "quality.json").read_text()) == said
+    assert (tmp_path / "out" / "quality.png").read_bytes().startswith(b"\x89PNG\r\n")
+    picked = read_dataset(tmp_path / "out" / "picked.h5")
+    assert np.isnan(picked.differential_tof()[:, 5]).all()
+    assert np.isfinite(picked.differential_tof()[9]).sum() > 15
+    table = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out")
+    assert "dead elements" in table.stdout
+    assert "picked.h5" in table.stdout
+
+
+def test_a_refused_scan_fails_with_the_reason_and_leaves_its_report(
+    bentray: Callable[..., Result], tmp_path: Path
+) -> None:
+    write_dataset(tmp_path / "scan.h5", replace(scan(elements=16), sampling_rate_hz=4.0e6))
+    result = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out")
+    assert result.exit_code == 1
+    assert "sampling rate: arrivals in water at" in " ".join(result.stderr.split())
+    told = json.loads((tmp_path / "out" / "quality.json").read_text())
+    assert told["verdict"] == "refused"
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["quality.json", "quality.png"]
+
+
+def test_an_unknown_picker_is_bad_input(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    write_dataset(tmp_path / "scan.h5", scan(elements=8))
+    result = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out", "--picker", "eye")
+    assert result.exit_code == 2
+    assert "one of aic, threshold" in " ".join(result.stderr.split())
