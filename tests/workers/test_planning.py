@@ -16,6 +16,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_workers.planning import Offer, blocks_of, plan
 from bentray_workers.task_memory import MIB, Summary, field_bytes
+from bentray_workers.wave_memory import Traces
 
 PROGRAM = Path(__file__).with_name("call_memory.py")
 RING = Summary(256, 256, 256 * 256, 1, False, 0.0, 0.16, 0, True)
@@ -114,6 +115,19 @@ def test_traces_are_planned_for():
     found = plan(replace(RING, traces_bytes=3 * 2**30), Settings(nodes=64), [])
     assert found.largest[0] == "prepare"
     assert found.largest[1] > 3 * 2**30
+
+
+def test_waves_are_planned_for():
+    asked = Settings(method="waveform")
+    with pytest.raises(InvalidInput, match="traces of object and water"):
+        plan(RING, asked, [])
+    heard = replace(RING, traces=Traces(256, 256, 1000, 2, 1e7, 4e5, 1500.0))
+    found = plan(heard, asked, [LARGE])
+    assert {"enter", "look_at_waves", "step_by_waves"} < set(found.call_bytes)
+    assert found.tasks > plan(heard, replace(asked, method="auto"), [LARGE]).tasks
+    with pytest.raises(InvalidInput) as refusal:
+        plan(heard, replace(asked, nodes=32), [Offer(760 * MIB, BOTH)])
+    assert refusal.value.field == "wave_bands"
 
 
 @given(

@@ -13,6 +13,8 @@ from bentray_kernels.tomography.settings import Settings
 from .dataset_reading import NUMERIC
 from .hdf5_reading import Limits, Reader, opened
 from .task_memory import Summary
+from .trace_reading import samples_in
+from .wave_memory import Traces
 
 
 def summary_of(path: Path, settings: Settings) -> Summary:
@@ -32,6 +34,7 @@ def summary_of(path: Path, settings: Settings) -> Summary:
         times = any(_bytes(reader, f"traveltime/{name}") for name in ("delta_tof_s", "tof_s"))
         traces = sum(_bytes(reader, f"waveform/{name}") for name in ("object", "water"))
         amplitudes = _bytes(reader, "amplitude/log_ratio_np") > 0
+        waves = _traces(reader, len(tx), len(rx))
     slices = 1 if z is None else len(z)
     heights = position[:, 2] if position.shape[1] == 3 else np.zeros(1) if z is None else z
     elements = len(np.union1d(tx, rx))
@@ -46,7 +49,22 @@ def summary_of(path: Path, settings: Settings) -> Summary:
         width_m=float(np.ptp(position[:, :2], axis=0).max()),
         traces_bytes=0 if times else traces,
         amplitudes=amplitudes,
+        traces=waves,
     )
+
+
+def _traces(reader: Reader, emissions: int, receivers: int) -> Traces | None:
+    samples = samples_in(reader)
+    rate, centre = (
+        reader.number("acquisition", name, "Hz") for name in ("sampling_rate_hz", "center_frequency_hz")
+    )
+    if not samples or rate is None or centre is None:
+        return None
+    # As far as sizes go all waters are alike.
+    water = reader.number("water", "sound_speed_mps", "m/s") or 1500.0
+    received = reader.checked("waveform/object", NUMERIC, "traces")
+    size = 2 if received is not None and received.dtype.kind != "f" else 4
+    return Traces(emissions, receivers, samples, size, rate, centre, water)
 
 
 def _wanted(reader: Reader, path: str) -> np.ndarray:

@@ -25,6 +25,7 @@ from .task_memory import (
     sounding_of,
     state_bytes,
 )
+from .wave_memory import wave_call_bytes, wave_tasks
 
 Decomposition = Literal["slices", "emitters", "volume"]
 Lane = Literal["recon", "opencl"]
@@ -112,24 +113,27 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[Offer]) -> Plan:
             "eikonal", f"{settings.eikonal!r}, which no connected worker offers", "a method without a device"
         )
     ways = [settings]
-    if settings.method == "auto":
+    if settings.tries:
         ways = [replace(settings, **changes) for changes in CANDIDATES]
     calls: dict[str, int] = {}
     for way in ways:
         for name, size in call_bytes(scan, way).items():
             calls[name] = max(size, calls.get(name, 0))
+    waves = wave_call_bytes(scan.traces, scan.width_m, settings)
+    calls |= waves
     room = max((offer.task_bytes for offer in fitting), default=math.inf)
     name, size = max(calls.items(), key=lambda item: item[1])
     if size > room:
+        field, found = ("wave_bands", settings.wave_bands) if name in waves else ("nodes", settings.nodes)
         raise InvalidInput(
-            "nodes",
-            f"{settings.nodes}, for which a task ({name}) takes {size} bytes",
+            field,
+            f"{found}, for which a task ({name}) takes {size} bytes",
             f"settings whose tasks take at most {room:.0f} bytes" + _advice(scan, settings, room),
         )
     able = [offer for offer in fitting if offer.task_bytes >= size]
     shape = shape_of(scan, settings)
     decomposition = _decomposition(settings)
-    tasks = sum(_tasks(scan, way, shape) for way in ways)
+    tasks = sum(_tasks(scan, way, shape) for way in ways) + scan.slices * wave_tasks(scan.traces, settings)
     return Plan(
         decomposition,
         lane,
@@ -204,7 +208,7 @@ def _advice(scan: Summary, settings: Settings, room: float) -> str:
     def fits(nodes: int) -> bool:
         return max(call_bytes(scan, replace(settings, nodes=nodes, coarser_grids=0)).values()) <= room
 
-    if settings.method == "auto" or not fits(LEAST_NODES):
+    if settings.tries or not fits(LEAST_NODES):
         return ""
     low, high = LEAST_NODES, settings.nodes
     while high - low > 1:

@@ -15,6 +15,8 @@ from bentray_kernels.tomography.chains import BATCH
 from bentray_kernels.tomography.problem import MARGIN_NODES
 from bentray_kernels.tomography.settings import DEVIATION, Settings
 
+from .wave_memory import Traces
+
 REAL = 8
 MIB = 2**20
 
@@ -45,6 +47,7 @@ class Summary:
         width_m: of the array, m.
         traces_bytes: of the waveforms, 0 where there are travel times.
         amplitudes: whether there are any.
+        traces: of object and water, which waves may refine from; None where one of them is not there.
     """
 
     emitters: int
@@ -56,6 +59,7 @@ class Summary:
     width_m: float
     traces_bytes: int
     amplitudes: bool
+    traces: Traces | None = None
 
 
 def field_bytes(shape: tuple[int, ...], method: str) -> int:

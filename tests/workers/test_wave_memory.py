@@ -1,0 +1,73 @@
+"""What a plan counts for the calls of a refinement is what they really take; it grows with the scan."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bentray_kernels.tomography import Settings
+from bentray_workers.dataset_file import write_dataset
+from bentray_workers.dataset_summary import summary_of
+from bentray_workers.task_memory import MIB
+from bentray_workers.wave_memory import Traces, wave_call_bytes
+
+from ..kernels.wave.scans import CENTRE_HZ, ELEMENTS, RATE_HZ, WATER, scan
+
+PROGRAM = Path(__file__).with_name("wave_call_memory.py")
+SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("asked", "elements", "samples"), [({"wave_bands": 2, "wave_emitters": 16}, 64, 260), ({}, 128, 300)]
+)
+def test_calls_take_what_the_plan_says(asked, elements, samples):
+    # Freed arrays go back at once, so that a fork's peak is that of its own.
+    environment = {**os.environ, "MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "65536"}
+    command = [sys.executable, str(PROGRAM), json.dumps(asked), str(elements), str(samples)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    measured = json.loads(done.stdout)
+    traces = replace(SCAN, emissions=elements, receivers=elements, samples=samples)
+    told = wave_call_bytes(traces, 0.1, Settings(method="waveform", **asked))
+    assert set(told) == set(measured)
+    wrong = {
+        name: (told[name], taken)
+        for name, taken in measured.items()
+        if not taken <= told[name] <= 1.5 * taken + 4 * MIB
+    }
+    assert not wrong
+
+
+@given(
+    bands=st.integers(1, 3),
+    emissions=st.integers(8, 512),
+    samples=st.integers(300, 3000),
+    width=st.floats(0.05, 0.3),
+)
+def test_more_of_anything_never_takes_less(bands, emissions, samples, width):
+    traces = replace(SCAN, emissions=emissions, samples=samples)
+    settings = Settings(method="waveform", wave_bands=bands)
+    found = wave_call_bytes(traces, width, settings)
+    for other in (
+        wave_call_bytes(replace(traces, emissions=emissions + 64), width, settings),
+        wave_call_bytes(replace(traces, samples=samples + 300), width, settings),
+        wave_call_bytes(traces, width + 0.05, settings),
+    ):
+        assert all(other[name] > size for name, size in found.items())
+    more = wave_call_bytes(traces, width, replace(settings, wave_bands=bands + 1))
+    assert all(more[name] >= size for name, size in found.items())
+
+
+def test_traces_are_summed_up_where_there_are_both(tmp_path):
+    write_dataset(tmp_path / "scan.h5", scan())
+    found = summary_of(tmp_path / "scan.h5", Settings()).traces
+    assert found == Traces(12, ELEMENTS, 120, 4, RATE_HZ, CENTRE_HZ, WATER)
+    alone = replace(scan().waveform, water=None)
+    write_dataset(tmp_path / "alone.h5", replace(scan(), waveform=alone))
+    assert summary_of(tmp_path / "alone.h5", Settings()).traces is None

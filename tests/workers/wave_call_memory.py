@@ -1,0 +1,102 @@
+"""Peak memory of the calls of a refinement by waveforms, in processes of their own; see ``call_memory``.
+
+Called as ``wave_call_memory.py SETTINGS ELEMENTS SAMPLES``, the settings as JSON; prints bytes by call as
+JSON, of the last of the bands.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from call_memory import held, peak
+
+from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.acquisition.simulation import Ring
+from bentray_kernels.tomography import Settings
+from bentray_kernels.wave import chain as waves
+from bentray_kernels.wave.asked import wave_settings
+from bentray_kernels.wave.continuation import Here
+from bentray_kernels.wave.medium import Medium
+from bentray_kernels.wave.refine import WavePass
+from bentray_kernels.wave.simulation import simulate
+
+CENTRE_HZ, RATE_HZ, RADIUS_M, WATER = 2.5e5, 2.5e6, 0.05, 1500.0
+FINER, SPACING_M = 4, 1e-3
+
+
+def scan(elements: int, samples: int) -> Dataset:
+    """Water, seen by a ring: one shot, turned to every emitter."""
+    ring = Ring(elements, RADIUS_M).positions()
+    half = int(RADIUS_M / SPACING_M) + 6
+    step = 1.0 / (RATE_HZ * FINER)
+    late = (step * np.arange(samples * FINER) - 8e-6) * CENTRE_HZ
+    wavelet = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
+    medium = Medium.of(np.full((2 * half + 1, 2 * half + 1), WATER), SPACING_M, step, edge_nodes=40)
+    positions = ring + SPACING_M * half
+    shot = simulate(medium, positions[0], positions, wavelet)[:, ::FINER].astype(np.float32)
+    every = np.arange(elements)
+    traces = np.stack([np.roll(shot, k, axis=0) for k in every])
+    return Dataset(
+        ring,
+        every,
+        every,
+        WATER,
+        waveform=Waveform(traces, traces.copy()),
+        center_frequency_hz=CENTRE_HZ,
+        sampling_rate_hz=RATE_HZ,
+    )
+
+
+def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
+    """Of each call in the last band; of a step with all pairs of changes that it may have."""
+    plan = wave_settings(dataset, settings)
+    number = len(plan.bands) - 1
+    start = waves.Image(np.full((32, 32), WATER), 2.2 * RADIUS_M / 31, (-1.1 * RADIUS_M, -1.1 * RADIUS_M))
+    nothing = peak(lambda: None)
+    assert dataset.waveform is not None
+    traces = held(dataset.waveform.object, dataset.waveform.water)
+    fresh = Here(dataset, plan)
+    found = {"enter": traces + peak(lambda: waves.enter(fresh, number, start)) - nothing}
+    here = Here(dataset, plan)
+    entered = waves.enter(here, number, start)
+    assert entered is not None
+    # As ``held`` counts the problem, which holds the traces of the object.
+    problem = here.problem(number)
+    speed = entered.state.speed
+
+    def look() -> waves.Look:
+        return waves.look_at_waves(here, number, speed, 0)
+
+    kept = held(problem)
+    found["look_at_waves"] = kept + held(speed) + peak(look) - nothing
+    looks = [look()] * entered.emitters
+    random = np.random.default_rng(0)
+    pairs = random.normal(size=(plan.memory, *speed.shape))
+    state = replace(
+        entered.state,
+        speed=speed + 1.0,
+        illumination=np.ones_like(speed),
+        steps=pairs,
+        changes=pairs.copy(),
+        history=(WavePass(1.0, 1.0, taken=True),),
+    )
+    copies = 2 * len(looks) * speed.nbytes
+    found["step_by_waves"] = (
+        kept + held(state) + copies + peak(lambda: waves.step_by_waves(here, number, state, looks)) - nothing
+    )
+    return found
+
+
+def main(settings: dict[str, Any], elements: int, samples: int) -> None:
+    # Loading compiled code takes memory too, here and not in the forks.
+    bytes_of(scan(16, 260), Settings(method="waveform", wave_bands=2))
+    asked = Settings(method="waveform", **settings)
+    sys.stdout.write(json.dumps(bytes_of(scan(elements, samples), asked)) + "\n")
+
+
+if __name__ == "__main__":
+    main(json.loads(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))

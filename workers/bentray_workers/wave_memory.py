@@ -1,0 +1,122 @@
+"""Bytes that the calls of a refinement by waveforms take, counted from the arrays that the kernels make.
+
+``tests/workers/test_wave_memory.py`` holds them against measured peaks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from bentray_kernels.tomography.settings import Settings
+from bentray_kernels.wave import Band, WaveSettings, bands
+from bentray_kernels.wave.asked import check_traces
+from bentray_kernels.wave.extent import Extent
+from bentray_kernels.wave.sounding import SHOTS
+
+# Python's own part of any call.
+FLOOR_BYTES = 7 * 2**20 // 2
+
+# Bytes a sample: of the simulated water shots with recorded ones, spectra and windows; of one emitter's
+# traces, window and residuals; of an entry of the resampler while it is made.
+SHOT_BYTES, LOOK_BYTES, SAMPLER_BYTES = 140, 96, 64
+
+# Bytes a node: of what a medium is made of and its fields; of an image in a step, beside pairs of changes.
+MEDIUM_BYTES, STEP_BYTES = 72, 280
+
+
+@dataclass(frozen=True)
+class Traces:
+    """The traces of a dataset as a plan sees them.
+
+    Attributes:
+        emissions, receivers: of one slice.
+        samples: of each trace.
+        sample_bytes: of one.
+        rate_hz: of the samples.
+        frequency_hz: of the middle of the pulse.
+        water_mps: speed of the water.
+    """
+
+    emissions: int
+    receivers: int
+    samples: int
+    sample_bytes: int
+    rate_hz: float
+    frequency_hz: float
+    water_mps: float
+
+    @property
+    def object_bytes(self) -> int:
+        """Of the object's traces in one slice."""
+        return self.emissions * self.receivers * self.samples * self.sample_bytes
+
+
+def plan_of(traces: Traces, settings: Settings) -> tuple[Band, ...]:
+    """The bands that are gone through."""
+    found = bands(traces.frequency_hz, traces.water_mps)[: settings.wave_bands]
+    if settings.wave_emitters:
+        found = tuple(replace(band, emitters=settings.wave_emitters) for band in found)
+    return found
+
+
+def wave_tasks(traces: Traces | None, settings: Settings) -> int:
+    """Calls of one slice: looks of single emitters and steps, unless some are shortened; 0 without waves."""
+    if settings.method != "waveform" or traces is None:
+        return 0
+    plan = plan_of(traces, settings)
+    held_out = WaveSettings(plan).held_out
+    return sum(band.looks(held_out) + band.iterations + 2 for band in plan)
+
+
+def wave_call_bytes(traces: Traces | None, width_m: float, settings: Settings) -> dict[str, int]:
+    """Bytes of each kind of call, over all bands.
+
+    Args:
+        traces: of the dataset.
+        width_m: of the array.
+        settings: as asked for.
+
+    Returns:
+        By the call's name in ``wave.chain``; nothing where ``method`` is not waveform.
+
+    Raises:
+        InvalidInput: for a refinement without traces.
+    """
+    if settings.method != "waveform":
+        return {}
+    check_traces(0 if traces is None else traces.samples)
+    assert traces is not None
+    found = {"enter": 0, "look_at_waves": 0, "step_by_waves": 0}
+    for band in plan_of(traces, settings):
+        for name, size in _band_bytes(traces, width_m, settings, band).items():
+            found[name] = max(size, found[name])
+    return found
+
+
+def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) -> dict[str, int]:
+    record_s = (traces.samples - 1) / traces.rate_hz
+    extent = Extent.of(band, 0.5 * width_m, record_s, settings.speed_bounds_mps[1])
+    image, padded = 8 * extent.nodes**2, extent.padded**2
+    samples = traces.receivers * extent.steps
+    # What a process keeps of a problem: recorded traces, and what takes them to the simulator's time.
+    kept = traces.object_bytes + 4 * traces.samples * extent.steps
+    looks = band.emitters + WaveSettings((band,)).held_out
+    base = FLOOR_BYTES + kept
+    medium = MEDIUM_BYTES * padded
+    return {
+        "enter": base
+        + traces.object_bytes
+        + max(SAMPLER_BYTES * traces.samples * extent.steps, SHOTS * SHOT_BYTES * samples)
+        + medium
+        + 12 * image,
+        "look_at_waves": base
+        + 4 * extent.nodes**2 * -(-extent.steps // extent.every)
+        + LOOK_BYTES * samples
+        + medium
+        + 4 * image,
+        # The looks of all emitters, and the pairs of changes before and after.
+        "step_by_waves": base
+        + 2 * image * looks
+        + 4 * WaveSettings((band,)).memory * image
+        + STEP_BYTES * extent.nodes**2,
+    }
