@@ -25,14 +25,15 @@ EMISSIONS = 16
 FAR = 10.0
 
 
-def measured_pulse(dataset: Dataset) -> Floats:
-    """The pulse that water carries, about its straight time: the median over pairs, each scaled to its peak.
+def measured_pulse(dataset: Dataset, arrival_s: Floats | None = None) -> Floats:
+    """The pulse that water carries, about its arrival: the median over pairs, each scaled to its peak.
 
     Args:
         dataset: of one slice, with water traces, sampling rate and centre frequency.
+        arrival_s: (ntx, nrx), s, NaN where unknown; None: the straight times.
 
     Returns:
-        (n,), the straight time ``BEFORE`` periods after the first sample.
+        (n,), the arrival ``BEFORE`` periods after the first sample.
 
     Raises:
         InvalidInput: where no water trace holds the pulse whole.
@@ -45,25 +46,28 @@ def measured_pulse(dataset: Dataset) -> Floats:
     before, length = math.ceil(BEFORE * period), math.ceil((BEFORE + AFTER) * period)
     distance = dataset.distance_m()
     least = min(FAR * dataset.water_speed_mps / dataset.center_frequency_hz, 0.5 * float(distance.max()))
+    if arrival_s is None:
+        arrival_s = distance / dataset.water_speed_mps
     found: list[Floats] = []
     for e in range(0, len(dataset.tx), max(1, len(dataset.tx) // EMISSIONS)):
-        straight = (distance[e] / dataset.water_speed_mps - dataset.t0_s) * dataset.sampling_rate_hz
-        found += _pieces(dataset.waveform.water[e], straight, distance[e] >= least, before, length)
+        place = (arrival_s[e] - dataset.t0_s) * dataset.sampling_rate_hz
+        heard = (distance[e] >= least) & np.isfinite(place)
+        found += _pieces(dataset.waveform.water[e], place, heard, before, length)
     if not found:
         raise InvalidInput(
-            "waveform/water", "no pulse whole in any trace", "traces that hold it about its straight time"
+            "waveform/water", "no pulse whole in any trace", "traces that hold it about its arrival"
         )
     return np.asarray(np.median(found, axis=0), dtype=np.float64)
 
 
 def _pieces(
-    traces: NDArray[Any], straight: Floats, heard: NDArray[np.bool_], before: int, length: int
+    traces: NDArray[Any], place: Floats, heard: NDArray[np.bool_], before: int, length: int
 ) -> list[Floats]:
     """The pulses of one emission, moved by fractions of a sample to the same place, peak 1."""
     turn = -2j * np.pi * np.fft.rfftfreq(length)
     pieces = []
     for r in np.flatnonzero(heard):
-        begin = math.floor(straight[r]) - before
+        begin = math.floor(place[r]) - before
         if begin < 0 or begin + length > traces.shape[1]:
             continue
         piece = traces[r, begin : begin + length].astype(np.float64)
@@ -74,7 +78,7 @@ def _pieces(
         peak = np.abs(piece).max()
         if peak == 0.0:
             continue
-        part = straight[r] - math.floor(straight[r])
+        part = place[r] - math.floor(place[r])
         pieces.append(np.fft.irfft(np.fft.rfft(piece / peak) * np.exp(-turn * part), length))
     return pieces
 

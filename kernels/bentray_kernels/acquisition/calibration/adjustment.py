@@ -1,0 +1,247 @@
+"""Adjustment of the water shot: positions, delays and speed by damped, reweighted least squares."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import cho_factor, cho_solve
+
+from ...arrays import Flags, Floats, Ints
+from ...errors import InvalidInput
+from ..dataset import Dataset
+from .result import Calibration
+
+# Iterations end when the largest move of an element is below this, m.
+SETTLED_M = 1e-8
+MOST_ITERATIONS = 30
+
+# No element moves further than this in one iteration, m.
+LONGEST_STEP_M = 2e-3
+
+# Residuals beyond this many robust deviations are left out.
+OUTLYING = 4.0
+
+# An element is adjusted when it is in so many pairs: two coordinates, two delays, and one to tell an error.
+FEWEST = 6
+
+
+@dataclass(frozen=True)
+class _Unknowns:
+    """Where each kind of unknown lies in the vector: positions, emission, reception, common, speed."""
+
+    elements: int
+    ntx: int
+    nrx: int
+
+    @property
+    def emission(self) -> int:
+        return 2 * self.elements
+
+    @property
+    def reception(self) -> int:
+        return self.emission + self.ntx
+
+    @property
+    def common(self) -> int:
+        return self.reception + self.nrx
+
+    @property
+    def count(self) -> int:
+        """With the slowness of the water as the last one."""
+        return self.common + 2
+
+
+def calibrate(
+    dataset: Dataset, times_s: Floats, *, sigma_s: float | None = None, fit_speed: bool = False
+) -> Calibration:
+    """Positions, delays and speed that explain the times of the water shot best.
+
+    t_er = common + emission_e + reception_r + |p_e - p_r| / c, by Gauss–Newton. A water shot does not tell
+    where the array stands, how it is turned, or how the mean delay is shared; nor its size and the speed.
+    These stay as the drawing has them: centroid, orientation, delays of mean 0; and the speed, or with
+    ``fit_speed`` the size.
+
+    Args:
+        dataset: elements as drawn, and the water's speed, as from its temperature.
+        times_s: (ntx, nrx), s, see ``water_times``; NaN where there is none.
+        sigma_s: standard deviation of a time, s; None: as the residuals have it.
+        fit_speed: fit the water's speed; for arrays whose size is better known than the temperature.
+
+    Raises:
+        InvalidInput: elements in space, too few times, or times that leave the unknowns open.
+    """
+    if dataset.element_position_m.shape[1] != 2:
+        raise InvalidInput(
+            "geometry/element_position_m", "elements in space", "elements in a plane, to be calibrated"
+        )
+    if times_s.shape != (len(dataset.tx), len(dataset.rx)):
+        accepted = f"({len(dataset.tx)}, {len(dataset.rx)})"
+        raise InvalidInput("times_s", f"shape {times_s.shape}", accepted)
+    at = _Unknowns(len(dataset.element_position_m), len(dataset.tx), len(dataset.rx))
+    emitter, receiver = np.nonzero(np.isfinite(times_s) & (dataset.tx[:, None] != dataset.rx[None, :]))
+    time = times_s[emitter, receiver]
+    used = _used(dataset, emitter, receiver)
+    value = np.zeros(at.count)
+    value[: at.emission] = dataset.element_position_m.ravel()
+    value[-1] = 1.0 / dataset.water_speed_mps
+    for _ in range(MOST_ITERATIONS):
+        rows, residual = _linear(dataset, at, value, emitter, receiver, time)
+        kept = used & _near(residual, used)
+        free = _free(dataset, at, emitter[kept], receiver[kept], fit_speed)
+        step, covariance = _step(dataset, at, rows[kept], residual[kept], free, fit_speed)
+        moved = np.abs(step[: at.emission]).max()
+        value[free] += step[free] * min(1.0, LONGEST_STEP_M / max(moved, 1e-30))
+        if moved < SETTLED_M:
+            break
+    _, residual = _linear(dataset, at, value, emitter, receiver, time)
+    spare = int(kept.sum()) - int(free.sum()) + _gauges(fit_speed)
+    noise = sigma_s if sigma_s is not None else math.sqrt(float((residual[kept] ** 2).sum()) / max(spare, 1))
+    deviation = np.full(at.count, np.nan)
+    deviation[free] = noise * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return _told(at, value, deviation, residual[kept], int(used.sum() - kept.sum()), fit_speed)
+
+
+def _gauges(fit_speed: bool) -> int:
+    """How many unknowns are fixed by convention."""
+    return 6 if fit_speed else 5
+
+
+def _used(dataset: Dataset, emitter: Ints, receiver: Ints) -> Flags:
+    """Pairs whose elements are in enough pairs.
+
+    Raises:
+        InvalidInput: where hardly any are left.
+    """
+    used = np.ones(len(emitter), dtype=bool)
+    for _ in range(len(dataset.element_position_m)):
+        counts = np.bincount(emitter[used], minlength=len(dataset.tx))
+        heard = np.bincount(receiver[used], minlength=len(dataset.rx))
+        enough = used & (counts[emitter] >= FEWEST) & (heard[receiver] >= FEWEST)
+        if (enough == used).all():
+            break
+        used = enough
+    if used.sum() < 4 * FEWEST:
+        raise InvalidInput(
+            "times_s", f"{int(used.sum())} usable times", f"at least {4 * FEWEST} of a water shot"
+        )
+    return used
+
+
+def _linear(
+    dataset: Dataset, at: _Unknowns, value: Floats, emitter: Ints, receiver: Ints, time: Floats
+) -> tuple[sparse.csr_array, Floats]:
+    """Derivatives of the times, and what is left of them."""
+    position, slowness = value[: at.emission].reshape(-1, 2), value[-1]
+    a, b = dataset.tx[emitter], dataset.rx[receiver]
+    along = position[a] - position[b]
+    distance = np.linalg.norm(along, axis=1)
+    toward = slowness * along / np.maximum(distance, 1e-12)[:, None]
+    one = np.ones(len(time))
+    entries = (
+        (2 * a, toward[:, 0]),
+        (2 * a + 1, toward[:, 1]),
+        (2 * b, -toward[:, 0]),
+        (2 * b + 1, -toward[:, 1]),
+        (at.emission + emitter, one),
+        (at.reception + receiver, one),
+        (np.full(len(time), at.common), one),
+        (np.full(len(time), at.count - 1), distance),
+    )
+    row = np.tile(np.arange(len(time)), len(entries))
+    columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
+    rows = sparse.csr_array((values, (row, columns)), shape=(len(time), at.count))
+    delay = value[at.emission + emitter] + value[at.reception + receiver] + value[at.common]
+    return rows, np.asarray(time - delay - slowness * distance)
+
+
+def _near(residual: Floats, used: Flags) -> Flags:
+    """Residuals that are not outlying; their median is the common delay until that is known."""
+    middle = float(np.median(residual[used]))
+    spread = 1.4826 * float(np.median(np.abs(residual[used] - middle)))
+    return np.asarray(np.abs(residual - middle) <= OUTLYING * spread + 1e-12)
+
+
+def _free(dataset: Dataset, at: _Unknowns, emitter: Ints, receiver: Ints, fit_speed: bool) -> Flags:
+    """Unknowns that some pair tells of."""
+    free = np.zeros(at.count, dtype=bool)
+    elements = np.union1d(dataset.tx[emitter], dataset.rx[receiver])
+    free[2 * elements] = free[2 * elements + 1] = True
+    free[at.emission + np.unique(emitter)] = True
+    free[at.reception + np.unique(receiver)] = True
+    free[at.common] = True
+    free[-1] = fit_speed
+    return free
+
+
+def _step(
+    dataset: Dataset,
+    at: _Unknowns,
+    rows: sparse.csr_array,
+    residual: Floats,
+    free: Flags,
+    fit_speed: bool,
+) -> tuple[Floats, Floats]:
+    """Change of all unknowns, and the covariance of the free ones for times of deviation 1.
+
+    Raises:
+        InvalidInput: where the times leave unknowns open.
+    """
+    fixed = _conventions(dataset, at, fit_speed)[:, free]
+    part = rows[:, np.flatnonzero(free)]
+    normal = (part.T @ part).toarray()
+    # Unknowns are metres, seconds and s/m: scaled, they are alike.
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-30))
+    normal *= scale[:, None] * scale[None, :]
+    held = fixed * scale[None, :]
+    held /= np.maximum(np.linalg.norm(held, axis=1, keepdims=True), 1e-30)
+    # The conventions are met exactly with any weight; one like the data's keeps the sum well posed.
+    normal += held.T @ held * len(scale)
+    try:
+        factor = cho_factor(normal)
+    except np.linalg.LinAlgError:
+        raise InvalidInput(
+            "times_s", "times that leave positions or delays open", "more pairs, around the whole array"
+        ) from None
+    change = np.zeros(at.count)
+    change[free] = scale * cho_solve(factor, scale * (part.T @ residual))
+    inverse = cho_solve(factor, np.eye(len(scale)))
+    # What the weight of the conventions adds along them is no uncertainty of the data.
+    covariance = inverse - inverse @ held.T @ np.linalg.solve(held @ inverse @ held.T, held @ inverse)
+    return change, covariance * scale[:, None] * scale[None, :]
+
+
+def _conventions(dataset: Dataset, at: _Unknowns, fit_speed: bool) -> Floats:
+    """Rows whose product with a change must be 0: no shift, no turn, delays of mean 0, and no growth."""
+    place = dataset.element_position_m - dataset.element_position_m.mean(axis=0)
+    rows = np.zeros((_gauges(fit_speed), at.count))
+    rows[0, 0 : at.emission : 2] = 1.0
+    rows[1, 1 : at.emission : 2] = 1.0
+    rows[2, 0 : at.emission : 2], rows[2, 1 : at.emission : 2] = -place[:, 1], place[:, 0]
+    rows[3, at.emission : at.reception] = 1.0
+    rows[4, at.reception : at.common] = 1.0
+    if fit_speed:
+        rows[5, : at.emission] = place.ravel()
+    return rows
+
+
+def _told(
+    at: _Unknowns, value: Floats, deviation: Floats, residual: Floats, left_out: int, fit_speed: bool
+) -> Calibration:
+    slowness = float(value[-1])
+    return Calibration(
+        element_position_m=value[: at.emission].reshape(-1, 2).copy(),
+        position_sigma_m=deviation[: at.emission].reshape(-1, 2).copy(),
+        emission_delay_s=value[at.emission : at.reception].copy(),
+        emission_sigma_s=deviation[at.emission : at.reception].copy(),
+        reception_delay_s=value[at.reception : at.common].copy(),
+        reception_sigma_s=deviation[at.reception : at.common].copy(),
+        common_delay_s=float(value[at.common]),
+        water_speed_mps=1.0 / slowness,
+        water_speed_sigma_mps=float(deviation[-1]) / slowness**2 if fit_speed else 0.0,
+        residual_rms_s=math.sqrt(float(np.mean(residual**2))),
+        pairs=len(residual),
+        left_out=left_out,
+    )

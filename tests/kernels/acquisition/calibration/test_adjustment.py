@@ -1,0 +1,153 @@
+"""Calibration: planted positions, delays and speed come back, with deviations that tell the truth."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.calibration import calibrate
+from bentray_kernels.errors import InvalidInput
+
+from ..traces import WATER_MPS, ring
+
+ELEMENTS = 32
+COMMON_S = 1.3e-6
+
+
+def drawn(speed: float = WATER_MPS) -> Dataset:
+    every = np.arange(ELEMENTS)
+    return Dataset(ring(ELEMENTS), every, every, speed, delta_tof_s=np.zeros((ELEMENTS, ELEMENTS)))
+
+
+def without_gauge(change: np.ndarray, *, size: bool = False) -> np.ndarray:
+    """A displacement less its shift and turn, which no water shot tells."""
+    place = ring(ELEMENTS) - ring(ELEMENTS).mean(axis=0)
+    turn = np.column_stack((-place[:, 1], place[:, 0]))
+    modes = [np.tile([1.0, 0.0], (ELEMENTS, 1)), np.tile([0.0, 1.0], (ELEMENTS, 1)), turn]
+    if size:
+        modes.append(place)
+    for mode in modes:
+        change = change - mode * (change * mode).sum() / (mode * mode).sum()
+    return change
+
+
+class Planted:
+    """Errors of an array and the times of its water shot."""
+
+    def __init__(self, seed: int = 0, *, off_m=3e-4, delay_s=1e-7, noise_s=0.0, speed=WATER_MPS, size=False):
+        random = np.random.default_rng(seed)
+        self.change = without_gauge(off_m * random.standard_normal((ELEMENTS, 2)), size=size)
+        emission, reception = delay_s * random.standard_normal((2, ELEMENTS))
+        self.emission, self.reception = emission - emission.mean(), reception - reception.mean()
+        place = ring(ELEMENTS) + self.change
+        distance = np.linalg.norm(place[:, None] - place[None], axis=-1)
+        self.times = COMMON_S + self.emission[:, None] + self.reception[None] + distance / speed
+        self.times += noise_s * random.standard_normal(self.times.shape)
+        np.fill_diagonal(self.times, np.nan)
+
+
+@given(seed=st.integers(0, 999))
+@settings(max_examples=8, deadline=None)
+def test_positions_and_delays_come_back_exactly_without_noise(seed):
+    planted = Planted(seed)
+    found = calibrate(drawn(), planted.times)
+    # Conventions hold for small changes; a turn by the square of a change remains.
+    off = without_gauge(found.element_position_m - ring(ELEMENTS) - planted.change)
+    assert np.abs(off).max() < 2e-8
+    np.testing.assert_allclose(found.emission_delay_s, planted.emission, atol=2e-11)
+    np.testing.assert_allclose(found.reception_delay_s, planted.reception, atol=2e-11)
+    assert found.common_delay_s == pytest.approx(COMMON_S, abs=1e-10)
+    assert found.residual_rms_s < 1e-11
+
+
+def test_an_eccentricity_of_a_millimetre_comes_back():
+    """A ring that is 1 mm longer one way than drawn, and shorter the other."""
+    planted = Planted(off_m=0.0, delay_s=0.0)
+    angle = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
+    change = 1e-3 * np.column_stack((np.cos(angle), -np.sin(angle)))
+    place = ring(ELEMENTS) + change
+    planted.times = COMMON_S + np.linalg.norm(place[:, None] - place[None], axis=-1) / WATER_MPS
+    found = calibrate(drawn(), planted.times)
+    assert np.abs(without_gauge(found.element_position_m - place)).max() < 1e-7
+
+
+def test_a_shift_and_a_turn_of_the_whole_array_are_not_seen():
+    place = ring(ELEMENTS) @ np.array([[0.8, -0.6], [0.6, 0.8]]) + [1e-3, 0.0]
+    times = np.linalg.norm(place[:, None] - place[None], axis=-1) / WATER_MPS
+    found = calibrate(drawn(), times)
+    np.testing.assert_allclose(found.element_position_m, ring(ELEMENTS), atol=1e-8)
+
+
+def test_the_deviations_tell_the_errors():
+    normalised: dict[str, list[np.ndarray]] = {"position": [], "emission": [], "reception": []}
+    for seed in range(12):
+        planted = Planted(seed, noise_s=2e-8)
+        found = calibrate(drawn(), planted.times)
+        off = found.element_position_m - ring(ELEMENTS) - planted.change
+        normalised["position"].append((off / found.position_sigma_m).ravel())
+        normalised["emission"].append((found.emission_delay_s - planted.emission) / found.emission_sigma_s)
+        normalised["reception"].append(
+            (found.reception_delay_s - planted.reception) / found.reception_sigma_s
+        )
+        assert found.residual_rms_s == pytest.approx(2e-8, rel=0.15)
+    for name, values in normalised.items():
+        assert 0.85 < np.concatenate(values).std() < 1.2, name
+
+
+@pytest.mark.parametrize("speed", [1450.0, 1510.0])
+def test_the_speed_is_fitted_where_the_size_is_trusted(speed):
+    errors = []
+    for seed in range(8):
+        planted = Planted(seed, speed=speed, noise_s=1e-8, size=True)
+        found = calibrate(drawn(), planted.times, fit_speed=True)
+        errors.append((found.water_speed_mps - speed) / found.water_speed_sigma_mps)
+        assert abs(found.water_speed_mps - speed) < 2.0
+    assert np.sqrt(np.mean(np.square(errors))) < 2.5
+    given_speed = calibrate(drawn(), planted.times)
+    assert given_speed.water_speed_mps == pytest.approx(WATER_MPS)
+    assert given_speed.water_speed_sigma_mps == 0.0
+
+
+def test_wrong_times_are_left_out_and_dead_elements_stay_where_they_are():
+    planted = Planted(3, noise_s=1e-8)
+    random = np.random.default_rng(1)
+    wrong = random.random(planted.times.shape) < 0.05
+    planted.times[wrong] += random.choice([-1e-6, 1e-6], int(wrong.sum()))
+    planted.times[7] = planted.times[:, 7] = np.nan
+    found = calibrate(drawn(), planted.times)
+    others = np.arange(ELEMENTS) != 7
+    np.testing.assert_array_equal(found.element_position_m[7], ring(ELEMENTS)[7])
+    assert np.isnan(found.position_sigma_m[7]).all()
+    assert np.isnan(found.emission_sigma_s[7])
+    assert found.left_out >= 0.9 * (wrong & np.isfinite(planted.times)).sum()
+    off = (found.element_position_m - ring(ELEMENTS) - planted.change)[others]
+    off -= off.mean(axis=0)
+    assert np.sqrt((off**2).mean()) < 5e-5
+    told = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert told["position_sigma_m"][7] == [None, None]
+
+
+def test_a_calibrated_dataset_has_the_positions_and_the_speed():
+    planted = Planted(5, speed=1500.0, size=True)
+    found = calibrate(drawn(), planted.times, fit_speed=True)
+    applied = found.applied(replace(drawn(), water_temperature_c=20.0))
+    np.testing.assert_array_equal(applied.element_position_m, found.element_position_m)
+    assert applied.water_speed_mps == found.water_speed_mps
+    assert applied.water_temperature_c is None
+
+
+def test_what_cannot_be_calibrated_is_refused():
+    planted = Planted()
+    with pytest.raises(InvalidInput, match="times_s: found shape"):
+        calibrate(drawn(), planted.times[1:])
+    with pytest.raises(InvalidInput, match="usable times"):
+        calibrate(drawn(), np.full_like(planted.times, np.nan))
+    space = replace(drawn(), element_position_m=np.column_stack((ring(ELEMENTS), np.zeros(ELEMENTS))))
+    with pytest.raises(InvalidInput, match="elements in a plane"):
+        calibrate(space, planted.times)
