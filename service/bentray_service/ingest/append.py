@@ -54,7 +54,8 @@ class Hold:
     """Who is at work on which upload: one at a time."""
 
     def __init__(self) -> None:
-        self._held: set[str] = set()
+        # Where each stood when it was held, as far as that matters.
+        self._held: dict[str, int | None] = {}
         self._lock = threading.Lock()
 
     @contextmanager
@@ -67,12 +68,20 @@ class Hold:
         with self._lock:
             if upload_id in self._held:
                 raise Locked("upload", f"{upload_id}, to which another request writes", "one at a time")
-            self._held.add(upload_id)
+            self._held[upload_id] = None
         try:
             yield
         finally:
             with self._lock:
-                self._held.discard(upload_id)
+                del self._held[upload_id]
+
+    def doubt(self, upload_id: str, offset: int) -> None:
+        """What comes after ``offset`` counts once the upload is let go: it may be cut off again."""
+        self._held[upload_id] = offset
+
+    def sure(self, upload_id: str) -> int | None:
+        """The offset beyond which there are doubts; None where there are none."""
+        return self._held.get(upload_id)
 
 
 async def append(

@@ -158,6 +158,8 @@ async def send_piece(
             announced = int(request.headers.get("content-length", 0))
             if announced > length - offset:
                 raise TooLarge("body", f"{announced} bytes", f"at most {length - offset} bytes")
+            if checksum is not None:
+                service.hold.doubt(upload_id, offset)
             try:
                 offset = await append(request.stream(), path, offset, length, checksum)
             finally:
@@ -184,10 +186,14 @@ def end_upload(upload_id: str, service: Service, tenant: CallerTenant) -> None:
 
 
 def offset_of(service: Parts, tenant: Tenant, row: Row) -> int:
-    """How many bytes are there: the size of the file, of one that has been read its length."""
+    """How many bytes are there: the size of the file, of one that is whole its length.
+
+    Those of a piece that is to be checked do not count before it is.
+    """
     if row["state"] != "receiving":
         return int(row["length"])
-    return size_of(service.files.of(tenant).upload(row["id"]))
+    sure = service.hold.sure(row["id"])
+    return size_of(service.files.of(tenant).upload(row["id"])) if sure is None else sure
 
 
 def http_date(seconds: float) -> str:

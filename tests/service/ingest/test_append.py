@@ -89,4 +89,6 @@ def test_one_writer_at_a_time_also_after_a_failure():
     with pytest.raises(ConnectionError):
         fail()
     with hold("a"), hold("b"):
-        pass
+        hold.doubt("a", 7)
+        assert (hold.sure("a"), hold.sure("b")) == (7, None)
+    assert hold.sure("a") is None

@@ -1,0 +1,72 @@
+"""Waiting: by events while they come, by looking where they do not."""
+
+import pytest
+
+from bentray_service.client.errors import ClientError, NoAnswer
+from bentray_service.client.steps import Ask, Listen, Pause
+from bentray_service.client.waiting import STREAMS, wait
+
+
+class Answer:
+    def __init__(self, **record):
+        self.record = {"state": "running", "error": None, **record}
+
+    def json(self):
+        return self.record
+
+
+def walk(answers, timeout_s=None):
+    """The kinds of steps of a flow that gets these answers, and its value."""
+    flow, steps, answer = wait("job-1", None, timeout_s, 0.01), [], None
+    answers = iter(answers)
+    try:
+        while True:
+            step = flow.throw(answer) if isinstance(answer, Exception) else flow.send(answer)
+            steps.append(type(step))
+            answer = None if isinstance(step, Pause) else next(answers)
+    except StopIteration as end:
+        return steps, end.value
+
+
+def test_events_make_it_look():
+    steps, job = walk(
+        [
+            Answer(),
+            "event: progress",
+            "data: {}",
+            Answer(),
+            ": still here",
+            "",
+            "data: {}",
+            Answer(state="succeeded"),
+        ]
+    )
+    assert steps == [Ask, Listen, Listen, Ask, Listen, Listen, Listen, Ask]
+    assert job["state"] == "succeeded"
+
+
+def test_the_end_of_the_stream_makes_it_look():
+    steps, _ = walk([Answer(), None, Answer(state="succeeded")])
+    assert steps == [Ask, Listen, Ask]
+
+
+def test_where_no_events_come_it_looks_now_and_then():
+    broken = [Answer(), NoAnswer("gone")] * STREAMS
+    steps, _ = walk([*broken, Answer(), Answer(), Answer(state="succeeded")])
+    assert steps == [Ask, Listen, Pause] * STREAMS + [Ask, Pause, Ask, Pause, Ask]
+
+
+def test_a_service_that_is_gone_is_told():
+    with pytest.raises(NoAnswer):
+        walk([Answer(), NoAnswer("gone"), NoAnswer("gone for good")])
+
+
+def test_ends():
+    problem = {"title": "No", "detail": "nothing there", "field": "x"}
+    with pytest.raises(ClientError, match="nothing there") as failed:
+        walk([Answer(state="failed", error=problem)])
+    assert failed.value.field == "x"
+    with pytest.raises(ClientError, match="cancelled"):
+        walk([Answer(state="cancelled")])
+    with pytest.raises(ClientError, match="still running"):
+        walk([Answer()], timeout_s=-1.0)
