@@ -1,0 +1,236 @@
+"""Deleting: nothing of it is left on the disk or in the database, and nothing else goes."""
+
+import time
+
+import pytest
+from sqlalchemy import func, insert, select, update
+
+from bentray_service.housekeeping import DAY_S, Housekeeper
+from bentray_service.refusals import InUse, UnknownId
+from bentray_service.storage import schema
+from bentray_service.storage.database import open_database
+from bentray_service.storage.datasets import Datasets
+from bentray_service.storage.deletion import Deletion, Stored
+from bentray_service.storage.files import Files
+from bentray_service.storage.geometry_fields import GeometryFields
+from bentray_service.storage.ids import new_id, volume_of
+from bentray_service.storage.jobs import Jobs
+from bentray_service.storage.meshes import Meshes
+from bentray_service.storage.tenants import LOCAL, Tenant
+from bentray_service.storage.volumes import Volumes
+
+OTHER = Tenant("other")
+SCAN = {
+    "title": "",
+    "source": "",
+    "license": "",
+    "dimension": 2,
+    "elements": 8,
+    "ntx": 8,
+    "nrx": 8,
+    "slices": 1,
+}
+SCAN |= {"has_traces": False, "has_travel_times": True, "has_truth": False, "water_speed_mps": 1500.0}
+GRID = {"shape": [2, 2, 2], "spacing_m": [1.0] * 3, "origin_m": [0.0] * 3}
+SURFACE = {"title": "", "format": "ply", "vertices": 4, "faces": 4, "genus": 0, "holes": 0, "coloured": False}
+SENT = {"size": 1, "sha256": "0" * 64}
+
+
+class Shelf:
+    """A database and a folder, filled as the service fills them."""
+
+    def __init__(self, database, root):
+        self.database, self.files = database, Files(root)
+        self.files.prepare()
+        self.jobs, self.volumes = Jobs(database), Volumes(database)
+        self.deletion = Deletion(database, self.files)
+
+    def dataset(self, tenant=LOCAL):
+        name = new_id("dataset")
+        Datasets(self.database).add(tenant, name, summary=SCAN, **SENT)
+        self.files.of(tenant).dataset(name).write_bytes(b"x")
+        return name
+
+    def ended(self, job, tenant=LOCAL, state="succeeded"):
+        with self.database.write() as connection:
+            change = update(schema.jobs).where(schema.jobs.c.id == job["id"])
+            connection.execute(change.values(state=state))
+        return job["id"]
+
+    def reconstruction(self, dataset, tenant=LOCAL):
+        """A job that has succeeded, its volume, and the exports of that."""
+        job = self.ended(self.jobs.add(tenant, "reconstruction", {}, dataset))
+        name, files = volume_of(job), self.files.of(tenant)
+        row = {
+            **GRID,
+            "axes": "x,y,z",
+            "speed_range_mps": [1.0, 2.0],
+            "water_speed_mps": 1.0,
+            "provenance": {},
+        }
+        with self.database.write() as connection:
+            values = {"id": name, "job_id": job, "created": time.time(), "bytes": 1, "tenant": tenant}
+            connection.execute(insert(schema.volumes).values(**values, **row))
+        for path in (files.volume(name), files.export(name, "npy"), files.export(name, "nii")):
+            path.write_bytes(b"x")
+        return job, name
+
+    def turntable(self, volume, tenant=LOCAL):
+        job = self.ended(self.jobs.add(tenant, "refraction", {}, volume_id=volume))
+        self.files.of(tenant).animation(job, "zip").write_bytes(b"x")
+        return job
+
+    def upload(self, tenant=LOCAL):
+        name = new_id("volume")
+        self.volumes.add(tenant, name, summary={"title": "", **GRID, "value_range": [0.0, 1.0]}, **SENT)
+        self.files.of(tenant).volume(name).write_bytes(b"x")
+        return name
+
+    def mesh(self, content="c" * 64, **more):
+        name = new_id("mesh")
+        summary = {**SURFACE, "repairs": {}, "content": content, **more}
+        Meshes(self.database).add(LOCAL, name, summary=summary, **SENT)
+        self.files.of(LOCAL).mesh(name).write_bytes(b"x")
+        return name
+
+    def field(self, mesh, field):
+        job = self.ended(self.jobs.add(LOCAL, "geometry-field", {}, mesh_id=mesh, field_id=field))
+        folder = self.files.of(LOCAL).field(field)
+        if not folder.exists():
+            folder.mkdir()
+            (folder / "outer.npy").write_bytes(b"x")
+            row = {"mesh_id": mesh, "job_id": job, "created": 1.0, "bytes": 1, "settings": {}, "figures": {}}
+            with self.database.write() as connection:
+                connection.execute(insert(schema.geometry_fields).values(id=field, tenant=LOCAL, **row))
+        return job
+
+    def delete(self, what, name, tenant=LOCAL):
+        self.deletion.delete(Stored(tenant, what, name))
+
+    def left(self):
+        """The files of all tenants."""
+        return sorted(path.name for path in self.files.root.glob("tenants/**/*") if path.is_file())
+
+    def rows(self):
+        with self.database.read() as connection:
+            tables = [table for table in schema.metadata.sorted_tables if table.name != "about"]
+            counts = {
+                table.name: connection.execute(select(func.count()).select_from(table)).scalar_one()
+                for table in tables
+            }
+        return {name: count for name, count in counts.items() if count}
+
+
+@pytest.fixture
+def shelf(tmp_path):
+    database = open_database(f"sqlite:///{tmp_path / 'b.sqlite'}")
+    yield Shelf(database, tmp_path / "data")
+    database.close()
+
+
+def test_a_scan_goes_with_all_that_was_made_of_it(shelf):
+    dataset = shelf.dataset()
+    for _ in range(2):
+        _, volume = shelf.reconstruction(dataset)
+        shelf.turntable(volume)
+    shelf.ended(shelf.jobs.add(LOCAL, "reconstruction", {}, dataset), state="failed")
+    shelf.delete("dataset", dataset)
+    assert (shelf.left(), shelf.rows()) == ([], {})
+    with pytest.raises(UnknownId):
+        shelf.delete("dataset", dataset)
+
+
+def test_nothing_else_goes(shelf):
+    kept, other = shelf.dataset(), shelf.dataset(OTHER)
+    job, volume = shelf.reconstruction(kept)
+    animation = shelf.turntable(volume)
+    shelf.upload(OTHER)
+    before = shelf.left(), shelf.rows()
+    gone = shelf.dataset()
+    shelf.reconstruction(gone)
+    shelf.delete("dataset", gone)
+    assert (shelf.left(), shelf.rows()) == before
+    for stored in (kept, volume):
+        with pytest.raises(UnknownId):
+            shelf.delete({"ds": "dataset", "vol": "volume"}[stored.partition("-")[0]], stored, OTHER)
+    assert (shelf.left(), shelf.rows()) == before
+    assert {shelf.jobs.get(LOCAL, each)["id"] for each in (job, animation)} == {job, animation}
+    assert Datasets(shelf.database).get(OTHER, other)["id"] == other
+
+
+@pytest.mark.parametrize("state", ["queued", "running", "cancelling"])
+def test_what_a_job_needs_stays_whole(shelf, state):
+    dataset = shelf.dataset()
+    _, volume = shelf.reconstruction(dataset)
+    busy = shelf.ended(shelf.jobs.add(LOCAL, "refraction", {}, volume_id=volume), state=state)
+    before = shelf.left(), shelf.rows()
+    for what, name in (("dataset", dataset), ("volume", volume)):
+        with pytest.raises(InUse, match=busy):
+            shelf.delete(what, name)
+    assert (shelf.left(), shelf.rows()) == before
+    shelf.ended({"id": busy}, state="cancelled")
+    shelf.delete("dataset", dataset)
+    assert (shelf.left(), shelf.rows()) == ([], {})
+
+
+def test_a_result_goes_with_its_job_and_leaves_the_scan(shelf):
+    dataset = shelf.dataset()
+    job, volume = shelf.reconstruction(dataset)
+    shelf.turntable(volume)
+    shelf.delete("volume", volume)
+    assert (shelf.left(), shelf.rows()) == ([f"{dataset}.h5"], {"datasets": 1})
+    with pytest.raises(UnknownId):
+        shelf.jobs.get(LOCAL, job)
+
+
+def test_an_uploaded_volume_leaves_its_mesh(shelf):
+    volume = shelf.upload()
+    shelf.turntable(volume)
+    mesh = shelf.mesh(volume_id=volume, iso=0.5)
+    shelf.delete("volume", volume)
+    assert (shelf.left(), shelf.rows()) == ([f"{mesh}.h5"], {"meshes": 1})
+    assert Meshes(shelf.database).get(LOCAL, mesh)["volume_id"] is None
+
+
+def test_a_mesh_goes_with_its_field_unless_another_mesh_shares_it(shelf):
+    field = "field-" + "0" * 20
+    first, second = shelf.mesh(), shelf.mesh()
+    shelf.field(first, field)
+    heir = shelf.field(second, field)
+    shelf.delete("mesh", first)
+    row = GeometryFields(shelf.database).get(LOCAL, field)
+    assert (row["mesh_id"], row["job_id"]) == (second, heir)
+    assert shelf.left() == [f"{second}.h5", "outer.npy"]
+    shelf.delete("mesh", second)
+    assert (shelf.left(), shelf.rows()) == ([], {})
+
+
+def test_files_that_are_gone_already_do_not_matter(shelf):
+    dataset = shelf.dataset()
+    shelf.files.of(LOCAL).dataset(dataset).unlink()
+    shelf.delete("dataset", dataset)
+    assert shelf.rows() == {}
+
+
+def test_old_data_go_and_young_data_stay(shelf):
+    old, young, needed = shelf.dataset(), shelf.dataset(), shelf.dataset(OTHER)
+    shelf.reconstruction(old)
+    volume, mesh = shelf.upload(), shelf.mesh()
+    shelf.jobs.add(OTHER, "reconstruction", {}, needed)
+    with shelf.database.write() as connection:
+        for table in (schema.datasets, schema.uploaded_volumes, schema.meshes):
+            aged = update(table).where(table.c.id != young)
+            connection.execute(aged.values(created=time.time() - 31 * DAY_S))
+    keeper = Housekeeper(NoUploads(), shelf.files, shelf.deletion, None, None)
+    keeper.sweep()
+    assert shelf.rows()["datasets"] == 3
+    Housekeeper(NoUploads(), shelf.files, shelf.deletion, None, 30.0).sweep()
+    assert shelf.left() == sorted([f"{young}.h5", f"{needed}.h5"])
+    assert shelf.rows() == {"datasets": 2, "jobs": 1, "events": 1}
+    for gone in (volume, mesh):
+        assert not any(gone in name for name in shelf.left())
+
+
+class NoUploads:
+    def expired(self):
+        return []
