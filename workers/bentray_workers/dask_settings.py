@@ -13,6 +13,8 @@ SETTINGS = {
     # page faults took nearly half of a straight-ray reconstruction. These are glibc's own limits, in bytes.
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**25,
+    # A step of a refinement takes the images of many steps before it; Dask would warn from 10 MB on.
+    "distributed.admin.large-graph-warning-threshold": "100MB",
     # Dask starts a web server in every process and has no way to ask who calls: it is given no pages.
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],

@@ -12,7 +12,7 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from .medium import Medium
 from .points import Points, place
-from .stencil import weights
+from .stencil import HALO, weights
 from .stepping import advance, curvature, inject, read, spread
 
 # Nodes that the shortest wave of a source must have. Of the phase, space alone takes 6.3 % at 2.5 nodes,
@@ -24,17 +24,20 @@ LEAST_POINTS = 2.5
 BAND_EDGE = 0.03
 
 
-def simulate(medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floats) -> Floats:
+def simulate(
+    medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floats, order: int = 2 * HALO
+) -> Floats:
     """Traces of a point source.
 
-    Order 2 in time and 8 in space; free of temporal dispersion where wavelet and traces are taken through
-    ``sampling.resampler``. Releases the GIL.
+    Order 2 in time, in space 8 or what is asked for; free of temporal dispersion where wavelet and traces
+    are taken through ``sampling.resampler``. Releases the GIL.
 
     Args:
         medium: to travel through.
         emitter: (2,), m, node 0 of the image at 0.
         receivers: (nrx, 2), m.
         wavelet: (nt,), the source s(t) of (1/c^2) p'' - laplacian p = s(t) delta(x), a sample a time step.
+        order: in space; see ``stencil.weights``. Data of another one than a refinement's test it honestly.
 
     Returns:
         (nrx, nt), of the medium's type; sample n is the pressure at n time steps.
@@ -43,7 +46,7 @@ def simulate(medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floats
         InvalidInput: elements outside the image, a wavelet with waves too short for the grid.
     """
     source, heard = placed(medium, np.atleast_2d(emitter), wavelet), placed(medium, receivers)
-    return forward(medium, source, heard, wavelet, 0)[0]
+    return forward(medium, source, heard, wavelet, 0, order)[0]
 
 
 def placed(medium: Medium, positions: Floats, wavelet: Floats | None = None) -> Points:
@@ -71,13 +74,14 @@ def points_per_wavelength(medium: Medium, wavelet: Floats) -> float:
 
 
 def forward(
-    medium: Medium, source: Points, heard: Points, wavelet: Floats, every: int
+    medium: Medium, source: Points, heard: Points, wavelet: Floats, every: int, order: int = 2 * HALO
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Traces, and the source of scattered waves in the image at every ``every``-th step.
 
     Args:
         source, heard: as ``placed`` gives them.
         every: 0: keep nothing.
+        order: in space.
 
     Returns:
         traces: (nrx, nt).
@@ -97,7 +101,7 @@ def forward(
         medium.keep,
         medium.fade,
         medium.drive,
-        weights().astype(kind),
+        weights(order).astype(kind),
         source.first[0],
         source.weights[0],
         heard.first,

@@ -8,24 +8,31 @@ from fractions import Fraction
 import numpy as np
 
 from ..arrays import Floats
+from ..errors import InvalidInput
 
 # Nodes on either side of the centre; the order in space is twice that.
 HALO = 4
 
 
-def weights() -> Floats:
-    """Weights of the second derivative of order 8 at distances 0 to 4 nodes, times spacing squared, (5,).
+def weights(order: int = 2 * HALO) -> Floats:
+    """Weights of the second derivative at distances 0 to 4 nodes, times spacing squared, (5,).
 
-    They follow from the demand that every polynomial up to degree 9 be differentiated exactly, which for
-    equally spaced nodes has a closed form (Fornberg, Math. Comp. 51, 1988).
+    They follow from the demand that every polynomial up to degree ``order + 1`` be differentiated exactly,
+    which for equally spaced nodes has a closed form (Fornberg, Math. Comp. 51, 1988).
+
+    Args:
+        order: even, at most 8; of a lower one the outermost weights are 0. The longest stable step of order
+            8 is the shortest of them.
     """
-    m = HALO
+    if order not in range(2, 2 * HALO + 1, 2):
+        raise InvalidInput("order", order, "2, 4, 6 or 8")
+    m = order // 2
     sides = [
         Fraction(2 * (-1) ** (k + 1) * math.factorial(m) ** 2)
         / (k * k * math.factorial(m - k) * math.factorial(m + k))
         for k in range(1, m + 1)
     ]
-    return np.array([float(w) for w in (-2 * sum(sides), *sides)])
+    return np.array([float(w) for w in (-2 * sum(sides), *sides)] + [0.0] * (HALO - m))
 
 
 def symbol(angle: Floats) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
@@ -65,10 +66,25 @@ def simulate(
     snr: Annotated[
         float | None, typer.Option(help="Signal over noise of times and amplitudes, as 10; none without it.")
     ] = None,
+    waveform: Annotated[
+        bool,
+        typer.Option(
+            "--waveform", help="table6: simulate waves and record traces of object and water, not times."
+        ),
+    ] = False,
+    frequency: Annotated[
+        float | None, typer.Option(show_default="500000", help="--waveform: middle of the pulse, Hz.")
+    ] = None,
+    emissions: Annotated[
+        int | None, typer.Option(show_default="64", help="--waveform: elements that send.")
+    ] = None,
+    side: Annotated[
+        float | None, typer.Option(show_default="0.12", help="--waveform: side of the square, m.")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate the travel times of a breast phantom and keep its truth beside them.
+    """Simulate the travel times of a breast phantom, or its traces, and keep its truth beside them.
 
     Example:  bentray simulate -o phantom.h5 --coupling 1375 --noise-ns 20
     """
@@ -79,6 +95,26 @@ def simulate(
     from bentray_workers.simulation import simulate as simulate_plane
     from bentray_workers.volume_simulation import VolumeSimulationSettings, simulate_volume
 
+    own_of_waves = {"--frequency": frequency, "--emissions": emissions, "--side": side}
+    if waveform:
+        times = {"--slices": slices, "--array": array, "--three-d": three_d or None, "--noise-ns": noise_ns}
+        _refuse("without --waveform", {**times, "--attenuation": attenuation or None})
+        _refuse("--phantom is table6", {"--waveform": None if phantom is Phantom.TABLE6 else "with table7"})
+        from .wave_simulation import simulate_to
+
+        asked = {
+            "frequency_hz": frequency,
+            "emissions": emissions,
+            "side_m": side,
+            "nodes": nodes,
+            "snr": snr,
+        }
+        asked |= {"elements": elements, "coupling_mps": coupling, "seed": seed}
+        simulate_to(
+            path, {name: value for name, value in asked.items() if value is not None}, as_json=as_json
+        )
+        return
+    _refuse("with --waveform", own_of_waves)
     both: dict[str, Any] = {
         "nodes": nodes,
         "elements": elements,
@@ -92,13 +128,15 @@ def simulate(
     started = time.perf_counter()
     with progress_bar("Simulating") as step:
         if phantom is Phantom.TABLE7:
-            _refuse("table6", {"--noise-ns": noise_ns})
+            _refuse("--phantom is table6", {"--noise-ns": noise_ns})
             own: dict[str, Any] = {"slices": slices, "array": array and array.value}
             own = {name: value for name, value in own.items() if value is not None}
             settings = VolumeSimulationSettings(**both, **own, three_d=three_d)
             dataset = simulate_volume(None, settings, lambda now: step(now.done, now.total, "emitters"))
         else:
-            _refuse("table7", {"--slices": slices, "--array": array, "--three-d": three_d or None})
+            _refuse(
+                "--phantom is table7", {"--slices": slices, "--array": array, "--three-d": three_d or None}
+            )
             settings = SimulationSettings(**both, noise_s=(noise_ns or 0.0) * 1e-9)
             dataset = simulate_plane(None, settings, lambda now: step(now.done, now.total, "emitters"))
     seconds = time.perf_counter() - started
@@ -111,10 +149,10 @@ def simulate(
     print_lines([str(path)])
 
 
-def _refuse(phantom: str, given: dict[str, object]) -> None:
+def _refuse(unless: str, given: Mapping[str, object]) -> None:
     for option, value in given.items():
         if value is not None:
-            raise InvalidInput(option, value, f"nothing, unless --phantom is {phantom}")
+            raise InvalidInput(option, value, f"nothing, unless {unless}")
 
 
 def _rows(settings: SimulationSettings | VolumeSimulationSettings, radius_m: float) -> list[tuple[str, str]]:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bentray_kernels.errors import InvalidInput
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
 from bentray_kernels.wave.stencil import HALO, longest_step, phase_error, symbol, turning, weights
@@ -18,6 +19,21 @@ def test_polynomials_up_to_degree_nine_are_differentiated_exactly(degree):
     both = weights()[np.abs(offsets)]
     expected = 2.0 if degree == 2 else 0.0
     assert (both * offsets.astype(float) ** degree).sum() == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("order", [2, 4, 6])
+def test_lower_orders_are_exact_as_far_as_they_say(order):
+    offsets = np.arange(-HALO, HALO + 1).astype(float)
+    both = weights(order)[np.abs(offsets).astype(int)]
+    for degree in range(order + 2):
+        assert (both * offsets**degree).sum() == pytest.approx(2.0 if degree == 2 else 0.0, abs=1e-9)
+    assert abs((both * offsets ** (order + 2)).sum()) > 0.1
+    assert not weights(order)[order // 2 + 1 :].any()
+
+
+def test_odd_orders_are_refused():
+    with pytest.raises(InvalidInput, match="order"):
+        weights(5)
 
 
 def test_degree_ten_is_not():

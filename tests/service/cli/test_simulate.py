@@ -115,6 +115,11 @@ def test_a_file_that_exists_is_kept_without_force(bentray: Callable[..., Result]
         ((*SOLID, "--noise-ns", 0), "--noise-ns"),
         ((*SOLID, "--slices", 1), "slices"),
         ((*SOLID, "--array", "rings"), "array"),
+        ((*SOLID[:2], "--waveform"), "--waveform"),
+        (("--waveform", "--noise-ns", 5), "--noise-ns"),
+        (("--waveform", "--attenuation"), "--attenuation"),
+        (("--waveform", "--emissions", 500), "emissions"),
+        (("--frequency", 3e5), "--frequency"),
     ],
 )
 def test_bad_words_are_one_line(
@@ -125,3 +130,25 @@ def test_bad_words_are_one_line(
     assert result.stderr.startswith(f"bentray: {field}: found ")
     assert result.stderr.count("\n") == 1
     assert not (tmp_path / "x.h5").exists()
+
+
+@pytest.mark.parametrize("as_json", [True, False])
+def test_waves_are_simulated_with_their_traces(
+    bentray: Callable[..., Result], tmp_path: Path, as_json: bool
+) -> None:
+    small = ("--nodes", 24, "--elements", 12, "--emissions", 3, "--frequency", 2e5, "--side", 0.04)
+    path = tmp_path / "waves.h5"
+    result = bentray("simulate", "-o", path, "--waveform", *small, *(["--json"] if as_json else []))
+    assert result.exit_code == 0
+    if as_json:
+        said = json.loads(result.stdout)
+        assert said["settings"]["emissions"] == 3
+        assert 0.0 < said["phase_speed_error"]["highest"] < 3e-3
+    else:
+        assert "dispersion" in result.stdout
+    dataset = read_dataset(path)
+    assert dataset.waveform is not None
+    assert dataset.waveform.water is not None
+    assert dataset.waveform.object.shape[:2] == (3, 12)
+    assert dataset.center_frequency_hz == 2e5
+    assert not dataset.picked

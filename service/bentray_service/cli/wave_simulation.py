@@ -1,0 +1,48 @@
+"""The part of `bentray simulate` that simulates waves: a ring scan with traces of object and water."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from .terminal import print_json, print_lines, print_table, progress_bar
+
+
+def simulate_to(path: Path, asked: dict[str, Any], *, as_json: bool) -> None:
+    """Simulate a scan into a dataset file, and say how.
+
+    Args:
+        path: of the file.
+        asked: of ``WaveSimulationSettings``, what was given.
+        as_json: for machines.
+    """
+    from bentray_workers.dataset_file import write_dataset
+    from bentray_workers.wave_simulation import WaveSimulationSettings, simulate_waves
+
+    settings = WaveSimulationSettings(**asked)
+    started = time.perf_counter()
+    with progress_bar("Simulating") as step:
+        dataset = simulate_waves(None, settings, lambda now: step(now.done, now.total, "emissions"))
+    seconds = time.perf_counter() - started
+    write_dataset(path, dataset)
+    centre, highest = settings.dispersion
+    if as_json:
+        found = {"output": str(path), "seconds": round(seconds, 3), "settings": asdict(settings)}
+        print_json({**found, "phase_speed_error": {"centre": centre, "highest": highest}})
+        return
+    grid = f"{settings.fine_nodes} by {settings.fine_nodes} nodes of {1e3 * settings.spacing_m:.3g} mm"
+    rows = [
+        ("elements", f"{settings.elements}, {settings.emissions} of them send"),
+        ("ring", f"{1e3 * (dataset.radius_m or 0.0):.1f} mm radius"),
+        ("coupling", f"{settings.coupling_mps:g} m/s"),
+        ("pulse", f"{1e-3 * settings.frequency_hz:g} kHz"),
+        ("traces", f"{settings.samples} samples at {1e-6 * (dataset.sampling_rate_hz or 0.0):.3g} MHz"),
+        ("simulated on", f"{grid}, steps of {1e9 * settings.step_s:.3g} ns"),
+        ("dispersion", f"phase speed wrong by {centre:.1e} at the centre, {highest:.1e} at the upper end"),
+        ("noise", "none" if settings.snr is None else f"1/{settings.snr:g} of the pulse in water"),
+        ("time", f"{seconds:.1f} s"),
+    ]
+    print_table(dataset.title, ("figure", "value"), rows)
+    print_lines([str(path)])
