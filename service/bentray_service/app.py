@@ -5,15 +5,20 @@ from __future__ import annotations
 import threading
 from collections.abc import AsyncIterator
 from contextlib import ExitStack, asynccontextmanager
+from typing import Any
 
 import anyio
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
+from fastapi.security import HTTPBearer
 from fastapi.staticfiles import StaticFiles
 from starlette.concurrency import run_in_threadpool
 
 from bentray_workers.cluster import open_cluster
 
 from . import __version__, errors
+from .access.audit import Audit
+from .access.door import Door
+from .access.guard import Guard
 from .compute import Cluster, Compute
 from .housekeeping import Housekeeper
 from .ingest.append import Hold
@@ -22,6 +27,7 @@ from .ingest.reader import Store, UploadReader
 from .jobs.runner import Runner
 from .metrics import Metrics
 from .routes import (
+    access,
     datasets,
     events,
     geometry_fields,
@@ -41,12 +47,14 @@ from .storage.deletion import Deletion
 from .storage.files import Files, lock
 from .storage.geometry_fields import GeometryFields
 from .storage.jobs import Jobs
+from .storage.keys import Keys
 from .storage.meshes import Meshes
 from .storage.queue import Queue
 from .storage.uploads import Uploads
 from .storage.volumes import Volumes
 from .web.headers import SecurityHeaders
 from .web.pace import Pace
+from .web.request_id import RequestIds
 from .web.tus_headers import TusHeaders
 from .wiring import Parts
 
@@ -55,6 +63,12 @@ DESCRIPTION = (
     "watch it, fetch the image. Every error is a problem+json that names the field, what was found and "
     "what is accepted."
 )
+
+# What is told of routes that the guard keeps; it looks at every request, whatever is said here.
+CLOSED: Any = {
+    "dependencies": [Depends(HTTPBearer(auto_error=False, description="A key, where one is asked for."))],
+    "responses": errors.described(401, 403, 429),
+}
 
 
 def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> FastAPI:
@@ -90,12 +104,16 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     errors.install(app)
     app.add_middleware(Pace, seconds=settings.upload_patience_s)
     app.add_middleware(TusHeaders)
+    app.add_middleware(Guard)
     app.add_middleware(SecurityHeaders)
+    app.add_middleware(RequestIds)
     app.state.metrics = Metrics()
     app.add_middleware(app.state.metrics.middleware)
-    for part in (tus, datasets, jobs, events, volumes, refraction, meshes, geometry_fields, health, pages):
-        app.include_router(part.router)
-    app.include_router(health.metrics_router)
+    for part in (tus, datasets, jobs, events, volumes, refraction, meshes, geometry_fields, access):
+        app.include_router(part.router, **CLOSED)
+    app.include_router(health.metrics_router, **CLOSED)
+    for public in (health, pages):
+        app.include_router(public.router)
     app.mount("/static", StaticFiles(directory=pages.WEB / "static"), name="static")
     return app
 
@@ -109,6 +127,7 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
     files.drop_leftovers()
     database = open_database(settings.database)
     stack.callback(database.close)
+    door = Door(settings, Keys(database))
     if cluster is None:
         cluster = stack.enter_context(
             open_cluster(
@@ -154,12 +173,14 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
         queue=queue,
         volumes=Volumes(database),
         meshes=Meshes(database),
-        geometry_fields=GeometryFields(database),
         uploads=pieces,
         deletion=deletion,
         hold=hold,
         reader=reader,
         housekeeper=housekeeper,
+        geometry_fields=GeometryFields(database),
         compute=compute,
         runner=runner,
+        door=door,
+        audit=Audit(files.audit),
     )

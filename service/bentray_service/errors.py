@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,6 +22,8 @@ from starlette.routing import Match, Mount
 from bentray_kernels.errors import InvalidInput
 
 from . import refusals
+from .web.headers import HEADERS as SECURITY
+from .web.request_id import REQUEST_ID
 
 log = logging.getLogger("bentray.errors")
 
@@ -82,6 +85,10 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.Finished: Kind(409, "job-finished", "The job has ended already"),
     refusals.KeyReused: Kind(409, "key-reused", "The key belongs to another request"),
     refusals.QueueFull: Kind(429, "queue-full", "Too many jobs wait"),
+    refusals.NotLetIn: Kind(401, "not-let-in", "A key is needed"),
+    refusals.NotAllowed: Kind(403, "not-allowed", "This is not allowed"),
+    refusals.TooOften: Kind(429, "too-often", "Too many requests"),
+    refusals.QuotaUsedUp: Kind(507, "quota-used-up", "The tenant stores as much as it may"),
     refusals.NoAnimation: Kind(404, "no-animation", "The job has no animation"),
     refusals.StorageFull: Kind(507, "storage-full", "The disk of the service is full"),
     refusals.Busy: Kind(503, "busy", "No worker was free in time"),
@@ -164,13 +171,22 @@ def _respond(problem: Problem, headers: Mapping[str, str] | None = None) -> Resp
 
 def _refused(request: Request, error: Exception) -> Response:
     assert isinstance(error, InvalidInput)
-    headers = {}
+    return refused(error, request.url.path)
+
+
+def refused(error: InvalidInput, path: str) -> Response:
+    """The answer that says what an :class:`InvalidInput` (or a refusal) says."""
+    headers: dict[str, str] = {}
     if isinstance(error, refusals.Busy | refusals.QueueFull):
         headers["Retry-After"] = RETRY_AFTER
+    if isinstance(error, refusals.TooOften):
+        headers["Retry-After"] = str(math.ceil(error.wait_s))
+    if isinstance(error, refusals.NotLetIn):
+        headers["WWW-Authenticate"] = 'Bearer realm="bentray"'
     if isinstance(error, refusals.TooSlow):
         # The rest of the body is not waited for.
         headers["Connection"] = "close"
-    return _respond(from_exception(error, request.url.path), headers)
+    return _respond(from_exception(error, path), headers)
 
 
 def _not_ready(request: Request, error: Exception) -> Response:
@@ -226,10 +242,15 @@ def _gone(request: Request, error: Exception) -> Response:
 
 
 def _unexpected(request: Request, error: Exception) -> Response:
-    number = secrets.token_hex(8)
-    log.error("%s %s failed [%s]", request.method, request.url.path, number, exc_info=error)
+    # The id of the request is in every line that it logged, and the client has it or gave it.
+    number = getattr(request.state, "request_id", None) or secrets.token_hex(8)
+    figures = {"request": number}
+    words = "%s %s failed [%s]"
+    log.error(words, request.method, request.url.path, number, exc_info=error, extra={"figures": figures})
     detail = f"an error of the service, not of the request; it is in the log under {number}"
-    return _respond(make(INTERNAL, detail, instance=request.url.path, correlation_id=number))
+    # This answer passes by every middleware.
+    headers = {**SECURITY, REQUEST_ID: number}
+    return _respond(make(INTERNAL, detail, instance=request.url.path, correlation_id=number), headers)
 
 
 def _short(value: object) -> str:

@@ -76,6 +76,30 @@ class QueueFull(InvalidInput):
     """So many jobs wait already that no more are taken for now."""
 
 
+class NotLetIn(InvalidInput):
+    """The caller is not known."""
+
+
+class NotAllowed(InvalidInput):
+    """The caller is known, and may not do this."""
+
+
+class TooOften(InvalidInput):
+    """The tenant asks more often than it may.
+
+    Attributes:
+        wait_s: after which it may again.
+    """
+
+    def __init__(self, field: str, value: str, accepted: str, wait_s: float) -> None:
+        super().__init__(field, value, accepted)
+        self.wait_s = wait_s
+
+
+class QuotaUsedUp(InvalidInput):
+    """The tenant stores as much as it may."""
+
+
 class NoAnimation(InvalidInput):
     """The job is none of kind refraction, or has no result."""
 

@@ -78,6 +78,27 @@ class ServiceSettings(BaseSettings):
         description="Free disk space below which the service is not ready and begins no job, in bytes.",
     )
 
+    first_key_file: Path | None = Field(
+        None,
+        description="File with the first key, of tenant local with every scope; read while there is none.",
+    )
+    trusted_proxies: str = Field(
+        "", description="Addresses or networks, parted by commas, of proxies that are believed who calls."
+    )
+    proxy_user_header: str = Field(
+        "X-Forwarded-User",
+        pattern=r"^[A-Za-z0-9-]+$",
+        description="Header in which such a proxy names the user, who is a tenant.",
+    )
+    requests_per_minute: int = Field(
+        1200, ge=0, description="Requests of a tenant, where keys or a proxy are used; 0: any number."
+    )
+    renders_per_minute: int = Field(240, ge=0, description="The same of pictures that are drawn.")
+    max_tenant_bytes: int = Field(100 * GIB, gt=0, description="Bytes that a tenant may store.")
+    log_format: Literal["text", "json"] = Field(
+        "text", description="Form of the log: warnings as words, or every request as a line of JSON."
+    )
+
     @classmethod
     def load(cls, **given: Any) -> Self:
         """Read the environment; what is ``given`` wins.

@@ -7,6 +7,9 @@ from typing import Annotated, cast
 
 from fastapi import Depends, Request
 
+from .access.audit import Audit
+from .access.caller import Caller
+from .access.door import Door
 from .compute import Compute
 from .housekeeping import Housekeeper
 from .ingest.append import Hold
@@ -21,7 +24,7 @@ from .storage.geometry_fields import GeometryFields
 from .storage.jobs import Jobs
 from .storage.meshes import Meshes
 from .storage.queue import Queue
-from .storage.tenants import LOCAL, Tenant
+from .storage.tenants import Tenant
 from .storage.uploads import Uploads
 from .storage.volumes import Volumes
 
@@ -46,16 +49,25 @@ class Parts:
     housekeeper: Housekeeper
     compute: Compute
     runner: Runner
+    door: Door
+    audit: Audit
 
 
-def _parts(request: Request) -> Parts:
+def parts_of(request: Request) -> Parts:
+    """Those of the service that answers."""
     return cast(Parts, request.app.state.parts)
 
 
-def _tenant() -> Tenant:
-    return LOCAL
+def caller_of(request: Request) -> Caller:
+    """Who asks; there is nobody where nobody was let in, and then this fails."""
+    return cast(Caller, request.state.caller)
 
 
-Service = Annotated[Parts, Depends(_parts)]
+def _tenant(request: Request) -> Tenant:
+    return caller_of(request).tenant
+
+
+Service = Annotated[Parts, Depends(parts_of)]
+Asking = Annotated[Caller, Depends(caller_of)]
 # Whose request it is; every query takes it.
 CallerTenant = Annotated[Tenant, Depends(_tenant)]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import errno
-import ipaddress
 import json
+import logging
 import os
 import socket
 from contextlib import suppress
@@ -20,6 +20,8 @@ from .terminal import print_lines, remark
 
 if TYPE_CHECKING:
     from ..settings import ServiceSettings
+
+log = logging.getLogger("bentray.serve")
 
 OPTIONS = {
     "host": "--host",
@@ -102,6 +104,7 @@ def _listen(host: str, port: int) -> socket.socket:
 def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> None:
     import uvicorn
 
+    from .. import logs
     from ..app import create_app
 
     host, port = listening.getsockname()[:2]
@@ -114,8 +117,8 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
                 here = {"url": url, "pid": os.getpid(), "data": str(settings.data_dir.resolve())}
                 print_lines([json.dumps(here)])
             if self.started:
-                remark(f"Bentray is at {url} (data in {settings.data_dir}); Ctrl-C stops it.")
-                remark(_reach(host))
+                _say(settings, f"Bentray is at {url} (data in {settings.data_dir}); Ctrl-C stops it.")
+                _say(settings, _reach(asks=not made.state.parts.door.open()))
 
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
             made.state.leaving.set()
@@ -123,9 +126,13 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
 
     made = create_app(settings)
     app = _Starting(made)
-    server = Announcing(uvicorn.Config(app, log_level="warning", lifespan="on"))
+    # Whether a proxy is believed is for the door to say, by who really called.
+    config = uvicorn.Config(
+        app, log_config=None, log_level="warning", access_log=False, proxy_headers=False, lifespan="on"
+    )
+    server = Announcing(config)
     # Uvicorn ends the process when the application cannot start; here the reason has the last word.
-    with suppress(SystemExit):
+    with suppress(SystemExit), logs.configured(settings.log_format):
         server.run(sockets=[listening])
     if app.failure is not None:
         raise app.failure
@@ -154,7 +161,17 @@ class _Starting:
             self.failure = error
 
 
-def _reach(host: str) -> str:
-    if ipaddress.ip_address(host).is_loopback:
-        return "It is open on loopback only: nothing but this machine can reach it."
-    return "Whoever can reach this address can use it: it asks for no key. Put a proxy that does before it."
+def _say(settings: ServiceSettings, words: str) -> None:
+    if settings.log_format == "json":
+        log.info(words)
+    else:
+        remark(words)
+
+
+def _reach(*, asks: bool) -> str:
+    if asks:
+        return "Every caller is asked for a key, or comes through a trusted proxy."
+    return (
+        "It is open on loopback only: nothing but this machine can reach it, and nobody here is asked for a "
+        "key. The first one, of `bentray keys create`, changes that."
+    )

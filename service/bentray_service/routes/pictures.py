@@ -13,12 +13,13 @@ from bentray_workers.scene_cache import check_size
 
 from .. import __version__
 from ..errors import described
+from ..wiring import caller_of, parts_of
 
 # What a route that gives a picture may answer.
 PICTURE: dict[int | str, dict[str, Any]] = {
     200: {"content": {"image/png": {}}, "description": "The picture."},
     304: {"description": "The picture that the client has is still right."},
-    **described(404, 503),
+    **described(404, 429, 503),
 }
 
 
@@ -55,4 +56,5 @@ def picture(
         # That of the empty body; the picture's is not known before it is drawn.
         del answer.headers["content-length"]
         return answer
+    parts_of(request).door.check_render(caller_of(request))
     return Response(draw(), media_type="image/png", headers=headers)

@@ -1,0 +1,1 @@
+"""Who may do what: keys, proxies, scopes, rates, and the record of who did."""

@@ -1,0 +1,61 @@
+"""Addresses that are this machine, and proxies that are believed."""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+from ipaddress import IPv4Network, IPv6Network
+
+from bentray_kernels.errors import InvalidInput
+
+Network = IPv4Network | IPv6Network
+
+
+def is_loopback(host: str) -> bool:
+    """Whether all that ``host`` means, a name or an address, is reached from this machine alone."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        pass
+    try:
+        found = socket.getaddrinfo(host, None)
+    except (OSError, UnicodeError):
+        return False
+    return all(ipaddress.ip_address(str(one[4][0]).partition("%")[0]).is_loopback for one in found)
+
+
+def named_loopback(host: str) -> bool:
+    """Whether a Host or Origin header names this machine, as ``localhost:8000``; no name is looked up."""
+    name = host.rpartition("://")[2]
+    bare = name[1:].partition("]")[0] if name.startswith("[") else name.partition(":")[0]
+    try:
+        return ipaddress.ip_address(bare).is_loopback
+    except ValueError:
+        return bare.lower() == "localhost"
+
+
+def networks(words: str) -> tuple[Network, ...]:
+    """The networks in a list with commas; a single address is one too.
+
+    Raises:
+        InvalidInput: naming ``BENTRAY_TRUSTED_PROXIES``.
+    """
+    found = []
+    for word in filter(None, (part.strip() for part in words.split(","))):
+        try:
+            found.append(ipaddress.ip_network(word))
+        except ValueError:
+            accepted = "addresses or networks, as 10.0.0.7,10.1.0.0/16"
+            raise InvalidInput("BENTRAY_TRUSTED_PROXIES", repr(word[:80]), accepted) from None
+    return tuple(found)
+
+
+def within(address: str, trusted: tuple[Network, ...]) -> bool:
+    """Whether an address is in one of the networks."""
+    try:
+        found = ipaddress.ip_address(address)
+    except ValueError:
+        return False
+    if isinstance(found, ipaddress.IPv6Address) and found.ipv4_mapped is not None:
+        found = found.ipv4_mapped
+    return any(found in network for network in trusted if network.version == found.version)

@@ -1,0 +1,72 @@
+"""The record of who read and changed what: a line of JSON for each request, in a file for each day."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import re
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+log = logging.getLogger("bentray.audit")
+
+Entry = dict[str, Any]
+
+# How jobs stand is asked for again and again, and tells nothing of anybody's measurements.
+LEFT_OUT = frozenset(
+    {
+        ("GET", "/v1/jobs"),
+        ("GET", "/v1/jobs/{job_id}"),
+        ("GET", "/v1/jobs/{job_id}/events"),
+        ("GET", "/v1/access"),
+    }
+)
+_NAME = re.compile(r"(\d{4}-\d{2}-\d{2})\.jsonl")
+
+
+class Audit:
+    """Appends entries to files in a folder; nothing there is ever changed.
+
+    An entry has ``time``, ``request``, ``tenant``, ``how``, ``who``, ``method``, ``route``, ``ids``,
+    ``status``, ``received`` and ``sent`` (bytes): no query, no header, no content.
+    """
+
+    def __init__(self, folder: Path, now: Callable[[], datetime] = lambda: datetime.now(UTC)) -> None:
+        self._folder = folder
+        self._now = now
+
+    def note(self, entry: Entry) -> None:
+        """Append one entry; what cannot be stored is in the log at least."""
+        if (entry["method"], entry["route"]) in LEFT_OUT:
+            return
+        now = self._now()
+        line = json.dumps({"time": now.isoformat(timespec="milliseconds"), **entry})
+        path = self._folder / f"{now:%Y-%m-%d}.jsonl"
+        try:
+            # One write to the end, so that no two lines mix; only who runs the service may read it.
+            handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+            try:
+                os.write(handle, f"{line}\n".encode())
+            finally:
+                os.close(handle)
+        except OSError as error:
+            log.error("the audit could not store (%s): %s", error.strerror, line)
+
+
+def entries(folder: Path) -> Iterator[Entry]:
+    """All entries, oldest first; a line that was torn is passed over, and said."""
+    for path in sorted(folder.glob("*.jsonl")):
+        if not _NAME.fullmatch(path.name):
+            continue
+        with path.open(encoding="utf-8", errors="replace") as file:
+            for number, line in enumerate(file, 1):
+                try:
+                    entry = json.loads(line)
+                except ValueError:
+                    log.warning("%s:%d is torn and passed over", path.name, number)
+                    continue
+                if isinstance(entry, dict):
+                    yield entry

@@ -1,0 +1,55 @@
+"""How often a tenant may ask: a bucket each, that fills evenly and holds a minute's worth."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+# Buckets that are full again are as good as none; looked for when there are so many.
+MANY = 10_000
+
+
+@dataclass
+class _Bucket:
+    left: float
+    seen: float
+
+
+class Rates:
+    """Counts requests of each tenant.
+
+    Args:
+        per_minute: how many may come in a minute, evenly or at once; 0: as many as do.
+        clock: seconds.
+    """
+
+    def __init__(self, per_minute: int, clock: Callable[[], float] = time.monotonic) -> None:
+        self.per_minute = per_minute
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._buckets: dict[str, _Bucket] = {}
+
+    def take(self, tenant: str) -> float:
+        """0 where a request may go on; else the seconds until one may."""
+        if not self.per_minute:
+            return 0.0
+        with self._lock:
+            now = self._clock()
+            if len(self._buckets) >= MANY:
+                self._forget(now)
+            bucket = self._buckets.setdefault(tenant, _Bucket(self.per_minute, now))
+            bucket.left, bucket.seen = self._level(bucket, now), now
+            if bucket.left < 1.0:
+                return (1.0 - bucket.left) * 60.0 / self.per_minute
+            bucket.left -= 1.0
+            return 0.0
+
+    def _level(self, bucket: _Bucket, now: float) -> float:
+        return min(float(self.per_minute), bucket.left + (now - bucket.seen) * self.per_minute / 60.0)
+
+    def _forget(self, now: float) -> None:
+        full = [name for name, one in self._buckets.items() if self._level(one, now) >= self.per_minute]
+        for name in full:
+            del self._buckets[name]

@@ -1,0 +1,78 @@
+"""`bentray audit`: who read and changed what, from the record that the service keeps."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+import typer
+
+from bentray_kernels.errors import InvalidInput
+
+from .keys import Data
+from .terminal import AsJson, print_json, print_table
+
+COLUMNS = ("time", "tenant", "how", "who", "method", "route", "ids", "status", "sent")
+
+
+def audit(
+    tenant: Annotated[str | None, typer.Option(help="Only of this tenant.", show_default="all")] = None,
+    who: Annotated[
+        str | None, typer.Option(help="Only of this key (its id) or user of a proxy.", show_default="all")
+    ] = None,
+    touched: Annotated[
+        str | None, typer.Option("--id", help="Only what named or made this id.", show_default="all")
+    ] = None,
+    since: Annotated[
+        str | None, typer.Option(help="Only from this day on, as 2026-11-22.", show_default="the first")
+    ] = None,
+    last: Annotated[int, typer.Option(min=1, max=1_000_000, help="At most so many, the newest.")] = 1000,
+    data: Data = None,
+    as_json: AsJson = False,
+) -> None:
+    """Show who read and changed what, oldest first.
+
+    Each request of a caller who was let in is there, but for asking how jobs stand. The files, one a day in
+    DATA/audit, are only ever appended to; move old ones away as you like.
+
+    Example:  bentray audit --id ds-0123456789abcdef0123 --since 2026-11-01
+    """
+    from ..access.audit import entries
+    from ..settings import ServiceSettings
+    from ..storage.files import Files
+
+    settings = ServiceSettings.load(**({} if data is None else {"data_dir": data}))
+    folder, first = Files(settings.data_dir).audit, _day(since)
+    if not folder.is_dir():
+        raise InvalidInput("data_dir", f"{settings.data_dir}, without an audit", "a service's data folder")
+
+    def wanted() -> Iterator[dict[str, Any]]:
+        for entry in entries(folder):
+            told = {"tenant": tenant, "who": who}
+            if any(value is not None and entry.get(name) != value for name, value in told.items()):
+                continue
+            if touched is not None and touched not in entry.get("ids", []):
+                continue
+            if str(entry.get("time", "")) >= first:
+                yield entry
+
+    found = deque(wanted(), maxlen=last)
+    if as_json:
+        print_json(list(found))
+        return
+    print_table("Audit", COLUMNS, [tuple(_cell(entry.get(name)) for name in COLUMNS) for entry in found])
+
+
+def _day(text: str | None) -> str:
+    if text is None:
+        return ""
+    try:
+        return datetime.strptime(text, "%Y-%m-%d").replace(tzinfo=UTC).strftime("%Y-%m-%d")
+    except ValueError:
+        raise InvalidInput("since", repr(text[:40]), "a day, as 2026-11-22") from None
+
+
+def _cell(value: Any) -> str:
+    return " ".join(value) if isinstance(value, list) else str(value)

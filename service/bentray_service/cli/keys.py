@@ -1,0 +1,148 @@
+"""`bentray keys`: make, list and revoke the keys that let callers in."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from bentray_kernels.errors import InvalidInput
+
+from .terminal import AsJson, print_json, print_lines, print_table, remark
+
+if TYPE_CHECKING:
+    from ..storage.keys import Keys
+
+Data = Annotated[
+    Path | None,
+    typer.Option("--data", help="Data folder of the service.", show_default="as bentray serve has it"),
+]
+ACCEPTED_AGES = "a number and h, d or w, as 12h, 90d, 52w; never without it"
+SECONDS = {"h": 3600.0, "d": 86400.0, "w": 604800.0}
+LONGEST_NAME = 100
+
+keys = typer.Typer(
+    help="Keys of the REST interface: who holds one acts for its tenant. They are in the database of the "
+    "service, which may be running; from the first key on it asks everybody for one.",
+    no_args_is_help=True,
+)
+
+
+@keys.command()
+def create(
+    name: Annotated[str, typer.Option(help="What it is for, to recognise it by.")],
+    tenant: Annotated[str, typer.Option(help="Whose data it opens.")] = "local",
+    scopes: Annotated[str, typer.Option(help="Of read, write and metrics, parted by commas.")] = "read,write",
+    expires: Annotated[
+        str | None, typer.Option(help="After how long it ends: 12h, 90d, 52w.", show_default="never")
+    ] = None,
+    data: Data = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make a key and show it, this once: only a digest of it is kept.
+
+    Example:  bentray keys create --tenant clinic --name scanner --expires 90d
+    """
+    from ..access.caller import checked_scopes
+    from ..access.token import Token
+    from ..storage.tenants import checked_tenant
+
+    asked, whose = checked_scopes(scopes), checked_tenant(tenant)
+    if not (1 <= len(name) <= LONGEST_NAME and name.isprintable()):
+        raise InvalidInput("name", repr(name[:LONGEST_NAME]), f"1 to {LONGEST_NAME} printable characters")
+    until = None if expires is None else time.time() + _seconds(expires)
+    token = Token.new()
+    with _opened(data) as store:
+        row = store.add(token, whose, name, asked, until)
+    if as_json:
+        print_json({**_shown(row), "key": token.shown()})
+    else:
+        remark(f"A key of the tenant {whose}; it is not shown again. Set BENTRAY_KEY to it, or send it as")
+        remark("Authorization: Bearer …")
+        print_lines([token.shown()])
+
+
+@keys.command("list")
+def list_keys(
+    tenant: Annotated[str | None, typer.Option(help="Only its keys.", show_default="all")] = None,
+    data: Data = None,
+    as_json: AsJson = False,
+) -> None:
+    """List the keys, without what is secret of them.
+
+    Example:  bentray keys list --tenant clinic
+    """
+    from ..storage.tenants import checked_tenant
+
+    whose = None if tenant is None else checked_tenant(tenant)
+    with _opened(data) as store:
+        found = [_shown(row) for row in store.all(whose)]
+    if as_json:
+        print_json(found)
+        return
+    columns = ("id", "tenant", "name", "scopes", "state", "expires", "used")
+    rows = [tuple(_cell(key[column]) for column in columns) for key in found]
+    print_table("Keys", columns, rows)
+
+
+@keys.command()
+def revoke(
+    key_id: Annotated[str, typer.Argument(metavar="ID", help="As `bentray keys list` shows it.")],
+    data: Data = None,
+    as_json: AsJson = False,
+) -> None:
+    """End a key for good; a service that runs refuses it from the next request on.
+
+    Example:  bentray keys revoke 0f3a5c7e9b1d
+    """
+    with _opened(data) as store:
+        found = _shown(store.revoke(key_id))
+    if as_json:
+        print_json(found)
+    else:
+        print_lines([f"{found['id']} of {found['tenant']} is revoked"])
+
+
+@contextmanager
+def _opened(data: Path | None) -> Iterator[Keys]:
+    from ..settings import ServiceSettings
+    from ..storage.database import open_database
+    from ..storage.files import Files
+    from ..storage.keys import Keys
+
+    settings = ServiceSettings.load(**({} if data is None else {"data_dir": data}))
+    Files(settings.data_dir).prepare()
+    database = open_database(settings.database)
+    try:
+        yield Keys(database)
+    finally:
+        database.close()
+
+
+def _seconds(text: str) -> float:
+    found = re.fullmatch(r"([1-9][0-9]{0,4})([hdw])", text)
+    if found is None:
+        raise InvalidInput("expires", repr(text[:40]), ACCEPTED_AGES)
+    return int(found[1]) * SECONDS[found[2]]
+
+
+def _shown(row: dict[str, Any]) -> dict[str, Any]:
+    times = {name: _time(row[name]) for name in ("created", "expires", "revoked", "used")}
+    same = {name: row[name] for name in ("id", "tenant", "name", "scopes")}
+    expired = row["expires"] is not None and row["expires"] <= time.time()
+    state = "revoked" if row["revoked"] is not None else "expired" if expired else "valid"
+    return {**same, "state": state, **times}
+
+
+def _time(seconds: float | None) -> str | None:
+    return None if seconds is None else datetime.fromtimestamp(seconds, UTC).isoformat(timespec="seconds")
+
+
+def _cell(value: Any) -> str:
+    return ", ".join(value) if isinstance(value, list) else str(value or "never")

@@ -1,0 +1,101 @@
+"""Lines of the log: as words for a person or as JSON, with the request and the job, without any secret."""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from datetime import UTC, datetime
+from typing import Literal
+
+# What is being worked on: the id of the request, of the job.
+_ABOUT: ContextVar[dict[str, str]] = ContextVar("bentray_about")
+
+# Whole keys, and passwords in addresses of databases; what is in the first group stays.
+_SECRETS = (
+    re.compile(r"(bentray_[0-9a-f]{12}_)[0-9a-f]{40}"),
+    re.compile(r"(://[^\s:/@]*:)[^\s/@]+(?=@)"),
+)
+
+
+@contextmanager
+def about(**what: str) -> Iterator[None]:
+    """Every line logged in the block, also by threads that it starts tasks in, says what it is about."""
+    token = _ABOUT.set({**_ABOUT.get({}), **what})
+    try:
+        yield
+    finally:
+        _ABOUT.reset(token)
+
+
+def without_secrets(text: str) -> str:
+    """The same with ``***`` in place of every key and password."""
+    for secret in _SECRETS:
+        text = secret.sub(r"\1***", text)
+    return text
+
+
+class Words(logging.Formatter):
+    """For a terminal; what a client sent cannot begin a line of its own."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - the name of the library
+        return "".join(
+            one if one.isprintable() else one.encode("unicode_escape").decode()
+            for one in super().formatMessage(record)
+        )
+
+    def format(self, record: logging.LogRecord) -> str:
+        said = super().format(record)
+        named = ", ".join(f"{name} {value}" for name, value in _ABOUT.get({}).items())
+        if named:
+            first, line, rest = said.partition("\n")
+            said = f"{first} ({named}){line}{rest}"
+        return without_secrets(said)
+
+
+class Lines(logging.Formatter):
+    """JSON, one object a line."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        line = {
+            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": record.getMessage(),
+            **_ABOUT.get({}),
+            **getattr(record, "figures", {}),
+        }
+        if record.exc_info:
+            line["error"] = self.formatException(record.exc_info)
+        return without_secrets(json.dumps(line, default=str))
+
+
+@contextmanager
+def configured(form: Literal["text", "json"]) -> Iterator[None]:
+    """In the block every logger of this process writes to stderr, in one form.
+
+    As words, what a person should know of; as JSON also a line for each request. Enter it once all that has
+    handlers of its own, as Dask does, is imported.
+    """
+    handler = logging.StreamHandler()
+    handler.setFormatter(Words() if form == "text" else Lines())
+    root, own = logging.getLogger(), logging.getLogger("bentray")
+    known = [logging.getLogger(name) for name in list(logging.Logger.manager.loggerDict)]
+    before = [(logger, logger.handlers[:], logger.propagate) for logger in (root, *known)]
+    level = own.level
+    for logger, handlers, _ in before:
+        if handlers:
+            logger.handlers[:] = []
+            logger.propagate = True
+    root.addHandler(handler)
+    if form == "json":
+        own.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        for logger, handlers, propagate in before:
+            logger.handlers[:], logger.propagate = handlers, propagate
+        own.setLevel(level)

@@ -1,0 +1,377 @@
+"""Every route and verb of the OpenAPI description: closed to strangers, other tenants and invented paths.
+
+Nothing is listed by hand: a route that is new is tried too, and one whose ids or headers nothing here knows
+fails by name.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import json
+import re
+import sqlite3
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from fastapi import FastAPI
+from fastapi.testclient import TestClient
+from sqlalchemy import insert
+
+from bentray_kernels.tomography.result import Reconstruction
+from bentray_kernels.tomography.settings import Settings
+from bentray_service import errors
+from bentray_service.access.token import Token
+from bentray_service.app import create_app
+from bentray_service.routes.surface_records import FieldErrors, FieldSeconds, FieldSizes, Repairs
+from bentray_service.settings import ServiceSettings
+from bentray_service.storage import schema
+from bentray_service.storage.ids import new_id, volume_of
+from bentray_service.storage.keys import Keys
+from bentray_service.storage.tenants import Tenant
+from bentray_workers.reconstruction_file import write_reconstruction
+
+from ..conftest import FakeCluster
+
+ACME, OTHER = Tenant("acme"), Tenant("other")
+VERBS = (*errors.METHODS, "OPTIONS")
+# What a header that is required holds.
+REQUIRED = {"tus-resumable": "1.0.0", "upload-offset": "0", "upload-length": "4"}
+# Texts that mean nothing to the service, so that anything may be in them.
+FREE = {"title", "idempotency-key", "upload-metadata"}
+HOSTILE = ("../../../outside", "/etc/passwd\x00", "..%2f..%2foutside")
+
+
+class Place(NamedTuple):
+    """A running application, its folder, what two tenants have, and headers by who sends them."""
+
+    http: TestClient
+    folder: Path
+    ids: dict[str, str]
+    auth: dict[str, dict[str, str]]
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
+    """One service for all tests: tenant acme has one of everything, tenant other nothing."""
+    folder = tmp_path_factory.mktemp("access")
+    # Jobs stay where they are: no disk has so much room.
+    settings = ServiceSettings(
+        data_dir=folder / "data", min_free_bytes=2**60, requests_per_minute=0, renders_per_minute=0
+    )
+    app = create_app(settings, FakeCluster())
+    with TestClient(app, base_url="http://localhost", raise_server_exceptions=False) as http:
+        parts = app.state.parts
+        keys = Keys(parts.database)
+        auth: dict[str, dict[str, str]] = {}
+        for name, tenant, scopes in (
+            ("acme", ACME, ("read", "write")),
+            ("reader", ACME, ("read",)),
+            ("writer", ACME, ("write",)),
+            ("metrics", ACME, ("metrics",)),
+            ("other", OTHER, ("read", "write")),
+        ):
+            token = Token.new()
+            keys.add(token, tenant, name, scopes)
+            auth[name] = {"Authorization": f"Bearer {token.shown()}"}
+        yield Place(http, folder, _stored(app, http, auth["acme"]), auth)
+
+
+def _stored(app: FastAPI, http: TestClient, auth: dict[str, str]) -> dict[str, str]:
+    """One of everything of acme, by the name that paths give its id."""
+    parts = app.state.parts
+    files = parts.files.of(ACME)
+    dataset, mesh, field = new_id("dataset"), new_id("mesh"), new_id("field")
+    scan = dict.fromkeys(("dimension", "elements", "ntx", "nrx", "slices", "water_speed_mps"), 0)
+    scan |= dict.fromkeys(("title", "source", "license"), "")
+    scan |= dict.fromkeys(("has_traces", "has_travel_times", "has_truth"), False)
+    parts.datasets.add(ACME, dataset, size=1, sha256="0" * 64, summary=scan)
+    surface = {"vertices": 4, "faces": 4, "genus": 0, "holes": 0, "coloured": False}
+    surface["repairs"] = dict.fromkeys(Repairs.model_fields, 0)
+    surface |= {"title": "", "format": "ply", "content": "0" * 64}
+    parts.meshes.add(ACME, mesh, size=1, sha256="0" * 64, summary=surface)
+    job = parts.jobs.add(ACME, "reconstruction", {}, dataset)["id"]
+    cube = {"axes": "x,y,z", "shape": [4, 4, 4], "spacing_m": [1.0] * 3, "origin_m": [0.0] * 3}
+    cube |= {"speed_range_mps": [1.0, 2.0], "water_speed_mps": 1.0, "provenance": {}, "bytes": 1}
+    # At its end, so that its events have one too.
+    parts.jobs.request_cancel(ACME, job)
+    figures = dict.fromkeys((*FieldSizes.model_fields, *FieldErrors.model_fields), 1)
+    figures |= {f"{name}_seconds": 1.0 for name in FieldSeconds.model_fields}
+    with parts.database.write() as connection:
+        made = {"tenant": ACME, "job_id": job, "created": 1.0}
+        connection.execute(insert(schema.volumes).values(id=volume_of(job), **made, **cube))
+        made |= {"mesh_id": mesh, "bytes": 1, "settings": {}, "figures": figures}
+        connection.execute(insert(schema.geometry_fields).values(id=field, **made))
+    for path in (files.dataset(dataset), files.mesh(mesh)):
+        path.write_bytes(b"of acme")
+    ones = np.ones((4, 4, 4))
+    result = Reconstruction(ones, ones, (1.0,) * 3, (0.0,) * 3, 1.0, Settings())
+    write_reconstruction(files.volume(volume_of(job)), result)
+    name = base64.b64encode(b"dataset").decode()
+    begun = http.post(
+        "/v1/uploads",
+        headers={**auth, "Tus-Resumable": "1.0.0", "Upload-Length": "9", "Upload-Metadata": f"kind {name}"},
+    )
+    assert begun.status_code == 201, begun.text
+    return {
+        "dataset_id": dataset,
+        "mesh_id": mesh,
+        "job_id": job,
+        "volume_id": volume_of(job),
+        "field_id": field,
+        "upload_id": begun.headers["location"].rpartition("/")[2],
+    }
+
+
+class Asked(NamedTuple):
+    """One operation of the description."""
+
+    verb: str
+    path: str
+    what: Mapping[str, Any]
+
+    def parameters(self, where: str) -> list[Mapping[str, Any]]:
+        return [one for one in self.what.get("parameters", []) if one["in"] == where]
+
+    def headers(self) -> dict[str, str]:
+        """Those that it needs beside the key."""
+        needed = [one["name"].lower() for one in self.parameters("header") if one.get("required")]
+        body = self.what.get("requestBody")
+        media = {"content-type": next(iter(body["content"]))} if body else {}
+        return {**{name: REQUIRED[name] for name in needed}, **media}
+
+
+def operations(place: Place) -> list[Asked]:
+    document = place.http.app.openapi()
+    return [
+        Asked(verb.upper(), path, what)
+        for path, verbs in document["paths"].items()
+        for verb, what in verbs.items()
+    ]
+
+
+def filled(path: str, ids: Mapping[str, str]) -> str:
+    return re.sub(r"\{(\w+)\}", lambda found: ids[found[1]], path)
+
+
+def unread(app: FastAPI, verb: str, path: str, headers: Mapping[str, str]) -> tuple[int, dict[str, Any]]:
+    """Status and body of an answer that is given without a byte of the request's body being read."""
+    sent: list[Any] = []
+
+    async def receive() -> Any:
+        raise AssertionError(f"{verb} {path} read of the body")
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    given = {"host": "localhost", "content-length": "999999", **headers}
+    scope = {
+        "type": "http",
+        "asgi": {"version": "3.0"},
+        "http_version": "1.1",
+        "method": verb,
+        "scheme": "http",
+        "path": path,
+        "raw_path": path.encode(),
+        "query_string": b"",
+        "headers": [(name.lower().encode(), value.encode()) for name, value in given.items()],
+        "client": ("127.0.0.1", 1),
+        "server": ("localhost", 80),
+    }
+    asyncio.run(app(scope, receive, send))
+    body = b"".join(message.get("body", b"") for message in sent)
+    return sent[0]["status"], json.loads(body) if body else {}
+
+
+def stored(place: Place, beside: str = "") -> dict[str, Any]:
+    """Every file but the record of who asked, and every row but when keys were used."""
+    found: dict[str, Any] = {
+        str(path.relative_to(place.folder)): path.stat().st_size
+        for path in place.folder.rglob("*")
+        if path.is_file() and path.parent.name != "audit" and not path.name.startswith("bentray.sqlite")
+    }
+    with closing(sqlite3.connect(place.folder / "data" / "bentray.sqlite")) as rows:
+        for table in schema.metadata.tables:
+            if table not in ("keys", "about"):
+                found[table] = rows.execute(f"SELECT * FROM {table} ORDER BY 1").fetchall()
+    return {name: value for name, value in found.items() if not beside or not name.startswith(beside)}
+
+
+def test_everything_is_described(place: Place) -> None:
+    """Guards these tests: what the application routes and does not describe is a page or a HEAD."""
+    known = {asked.path for asked in operations(place)}
+    routes = [
+        one
+        for route in place.http.app.routes
+        for one in getattr(getattr(route, "original_router", None), "routes", [route])
+    ]
+    hidden = {route.path for route in routes if route.path not in known}
+    assert hidden <= {"/", "/docs", "/openapi.json", "/static", "/problems/{slug}"}
+    assert len(known) > 20
+
+
+def test_a_stranger_is_sent_away_unread(place: Place) -> None:
+    before, public = stored(place), set()
+    invented = {"Authorization": f"Bearer {Token.new().shown()}"}
+    garbled = {"Authorization": "Bearer bentray_é"}
+    for path in {*(asked.path for asked in operations(place)), "/v1/nowhere", "/nowhere", "//v1/jobs"}:
+        if path.startswith("/health/"):
+            public.add(path)
+            continue
+        for verb in VERBS:
+            here = filled(path, place.ids)
+            for auth in ({}, invented, garbled, {"Authorization": "Basic YTpi"}):
+                status, problem = unread(place.http.app, verb, here, auth)
+                assert (status, problem.get("type")) == (401, "/problems/not-let-in"), (verb, here, auth)
+                assert not re.search("é|YTpi", str(problem))
+    assert public == {"/health/live", "/health/ready"}
+    assert stored(place) == before
+
+
+def test_what_is_another_tenants_is_as_if_it_were_not(place: Place) -> None:
+    before, tried = stored(place), 0
+    for asked in operations(place):
+        if "{" not in asked.path or not asked.path.startswith("/v1/"):
+            continue
+        here = filled(asked.path, place.ids)
+        verbs = (asked.verb, "HEAD") if asked.verb == "GET" else (asked.verb,)
+        for verb in verbs:
+            owner = place.http.request(verb, here, headers=place.auth["acme"]) if verb == "GET" else None
+            # What HEAD needs is not described.
+            needed = REQUIRED if verb == "HEAD" else asked.headers()
+            headers = {**needed, **place.auth["other"]}
+            theirs = place.http.request(verb, here, headers=headers, content=b"x")
+            # A path without HEAD has none for anybody.
+            expected = (404, 405) if verb == "HEAD" else (404,)
+            assert theirs.status_code in expected, (verb, here, theirs.text)
+            if verb == "HEAD":
+                continue
+            assert theirs.json()["type"] == "/problems/unknown-id", (verb, here)
+            nothing = filled(asked.path, {name: f"{one[:-20]}{'0' * 20}" for name, one in place.ids.items()})
+            unknown = place.http.request(verb, nothing, headers=headers, content=b"x")
+            assert alike(theirs.text) == alike(unknown.text)
+            if owner is not None:
+                assert "unknown-id" not in owner.text, here
+            tried += 1
+    assert tried > 15
+    assert stored(place) == before
+
+
+def alike(text: str) -> str:
+    """An answer without the ids in it."""
+    return re.sub(r"[0-9a-f]{20}", "…", text)
+
+
+def test_lists_show_what_is_ones_own(place: Place) -> None:
+    shown = set()
+    for asked in operations(place):
+        if asked.verb != "GET" or "{" in asked.path or not asked.path.startswith("/v1/"):
+            continue
+        mine = place.http.get(asked.path, headers=place.auth["acme"])
+        theirs = place.http.get(asked.path, headers=place.auth["other"])
+        assert (mine.status_code, theirs.status_code) == (200, 200), asked.path
+        shown |= {name for name, one in place.ids.items() if one in mine.text}
+        assert not [name for name, one in place.ids.items() if one in theirs.text], asked.path
+    assert shown >= {"dataset_id", "mesh_id", "job_id", "volume_id", "field_id"}
+
+
+def test_ids_in_bodies_and_queries_too(place: Place) -> None:
+    before = stored(place)
+    for kind, name, key in (
+        ("reconstruction", "dataset", "dataset_id"),
+        ("refraction", "volume", "volume_id"),
+        ("geometry-field", "mesh", "mesh_id"),
+    ):
+        asked = {"kind": kind, name: place.ids[key]}
+        answer = place.http.post("/v1/jobs", json=asked, headers=place.auth["other"])
+        assert (answer.status_code, answer.json()["field"]) == (404, name)
+    answer = place.http.get("/v1/jobs", params={"before": place.ids["job_id"]}, headers=place.auth["other"])
+    assert answer.status_code == 404
+    assert stored(place) == before
+
+
+def test_a_key_does_what_its_scopes_say_and_no_more(place: Place) -> None:
+    before = stored(place)
+    for asked in operations(place):
+        here = filled(asked.path, place.ids)
+        if asked.path.startswith("/health/"):
+            continue
+        needed = (
+            "metrics" if here == "/metrics" else "reader" if asked.verb in ("GET", "OPTIONS") else "writer"
+        )
+        for name in {"reader", "writer", "metrics"} - {needed}:
+            status, problem = unread(place.http.app, asked.verb, here, place.auth[name])
+            assert (status, problem["type"]) == (403, "/problems/not-allowed"), (asked.verb, here, name)
+    assert place.http.get("/metrics", headers=place.auth["metrics"]).status_code == 200
+    assert place.http.get("/v1/datasets", headers=place.auth["reader"]).status_code == 200
+    assert stored(place) == before
+
+
+def test_no_string_leads_anywhere(place: Place) -> None:
+    """In every path, query, header and field of JSON that takes a string."""
+    mine = "data/tenants/acme/"
+    tried = set()
+    (place.folder / "outside").write_text("not theirs")
+    before = stored(place, mine)
+    for asked in operations(place):
+        if asked.path.startswith("/health/") or asked.path == "/metrics":
+            continue
+        for where, name, hostile in strings(place, asked):
+            headers = {**asked.headers(), **place.auth["acme"]}
+            ids, query, body = dict(place.ids), {}, b"x"
+            if where == "path":
+                ids[name] = hostile.replace("\x00", "%00")
+            elif where == "query":
+                query[name] = hostile
+            elif where == "header":
+                headers[name] = hostile.replace("\x00", "")
+            else:
+                body = json.dumps(within(name.split("."), hostile, place.ids)).encode()
+            answer = place.http.request(
+                asked.verb, filled(asked.path, ids), params=query, headers=headers, content=body
+            )
+            refused = 400 <= answer.status_code < 500 or name in FREE
+            assert refused, (asked.verb, asked.path, where, name, hostile, answer.status_code, answer.text)
+            assert not re.search("root:|not theirs", answer.text)
+            tried.add((where, name))
+    assert {where for where, _ in tried} == {"path", "query", "header", "body"}
+    after = {name: value for name, value in stored(place, mine).items() if "/" in name or name == "outside"}
+    assert after == {name: value for name, value in before.items() if "/" in name or name == "outside"}
+    for path in (place.folder / "data" / "tenants").rglob("*"):
+        assert path.is_dir() or re.fullmatch(r"[a-z]+-[0-9a-f]{20}\.\w+", path.name), path
+
+
+def strings(place: Place, asked: Asked) -> Iterator[tuple[str, str, str]]:
+    """Where, its name, and what is put there."""
+    for hostile in HOSTILE:
+        for one in asked.what.get("parameters", []):
+            if "string" in json.dumps(one["schema"]):
+                name = one["name"] if one["in"] == "path" else one["name"].lower()
+                yield one["in"], name, hostile
+        body = asked.what.get("requestBody", {}).get("content", {}).get("application/json")
+        if body is None:
+            continue
+        known = place.http.app.openapi()["components"]["schemas"]
+        for choice in body["schema"]["oneOf"]:
+            model = known[choice["$ref"].rpartition("/")[2]]
+            kind = model["properties"]["kind"]["const"]
+            for name, one in model["properties"].items():
+                if "$ref" not in json.dumps(one):
+                    yield "body", f"{kind}.{name}", hostile
+                    continue
+                inner = known[re.search(r"schemas/(\w+)", json.dumps(one))[1]]["properties"]
+                yield from (("body", f"{kind}.{name}.{field}", hostile) for field in inner)
+
+
+def within(names: list[str], value: str, ids: Mapping[str, str]) -> dict[str, Any]:
+    """A job request of a kind with a value somewhere in it."""
+    kind, *rest = names
+    read = {"reconstruction": "dataset", "refraction": "volume", "geometry-field": "mesh"}[kind]
+    asked: dict[str, Any] = {"kind": kind, read: ids[f"{read}_id"]}
+    if len(rest) == 1:
+        return {**asked, rest[0]: value}
+    return {**asked, rest[0]: {rest[1]: value}}
