@@ -82,8 +82,8 @@ class ServiceSettings(BaseSettings):
         None,
         description="File with the first key, of tenant local with every scope; read while there is none.",
     )
-    trusted_proxies: str = Field(
-        "", description="Addresses or networks, parted by commas, of proxies that are believed who calls."
+    trusted_proxies: str | None = Field(
+        None, description="Addresses or networks, parted by commas, of proxies that are believed who calls."
     )
     proxy_user_header: str = Field(
         "X-Forwarded-User",

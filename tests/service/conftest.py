@@ -189,7 +189,9 @@ def start(tmp_path: Path, cluster: FakeCluster) -> Iterator[Callable[..., TestCl
         def go(folder: str = "data", **settings: Any) -> TestClient:
             given = ServiceSettings(data_dir=tmp_path / folder, **settings)
             app = create_app(given, settings.pop("cluster", cluster))
-            return stack.enter_context(TestClient(app, raise_server_exceptions=False))
+            return stack.enter_context(
+                TestClient(app, base_url="http://localhost", raise_server_exceptions=False)
+            )
 
         yield go
 

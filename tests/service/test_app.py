@@ -44,7 +44,7 @@ def test_dataset_in_image_out(start, uploaded, submitted, until, work):
 def test_whole_path_with_the_real_kernels(tmp_path, uploaded, submitted, until):
     with open_cluster(workers=1, processes=False) as cluster:
         app = create_app(ServiceSettings(data_dir=tmp_path / "data"), cluster)
-        with TestClient(app) as http:
+        with TestClient(app, base_url="http://localhost") as http:
             job = submitted(http, uploaded(http), rays="straight", nodes=24, sweeps=3)
             done = until(http, job["id"])
             assert done["state"] == "succeeded", done["error"]
@@ -66,12 +66,12 @@ def test_an_injected_cluster_stays_open(start, cluster):
 def test_clean_stop_puts_a_running_job_back(tmp_path, cluster, uploaded, submitted, until, work):
     settings = ServiceSettings(data_dir=tmp_path / "data")
     work.hold.clear()
-    with TestClient(create_app(settings, cluster)) as http:
+    with TestClient(create_app(settings, cluster), base_url="http://localhost") as http:
         job = submitted(http, uploaded(http))
         until(http, job["id"], "running")
     work.hold.set()
     app = create_app(settings, cluster)
-    with TestClient(app) as http:
+    with TestClient(app, base_url="http://localhost") as http:
         assert until(http, job["id"])["state"] == "succeeded"
         states = [event["state"] for event in app.state.parts.jobs.events(LOCAL, job["id"])]
     assert states == ["queued", "running", "queued", "running", "succeeded"]
@@ -95,12 +95,12 @@ def test_jobs_of_a_dead_process(tmp_path, cluster, uploaded, submitted, until, w
     settings = ServiceSettings(data_dir=tmp_path / "data")
     work.hold.clear()
     app = create_app(settings, cluster)
-    with TestClient(app) as http:
+    with TestClient(app, base_url="http://localhost") as http:
         job = submitted(http, uploaded(http))
         until(http, job["id"], "running")
     left_running(app, job["id"], state, attempts)
     work.hold.set()
-    with TestClient(create_app(settings, cluster)) as http:
+    with TestClient(create_app(settings, cluster), base_url="http://localhost") as http:
         done = until(http, job["id"])
     assert done["state"] == end
     if end == "failed":

@@ -43,7 +43,7 @@ class Door:
         InvalidInput: where the service would be open to more than its own machine, or a setting is wrong.
         """
         self._keys = keys
-        self._trusted = networks(settings.trusted_proxies)
+        self._trusted = networks(settings.trusted_proxies or "")
         self._user_header = settings.proxy_user_header
         self._requests = Rates(settings.requests_per_minute)
         self._renders = Rates(settings.renders_per_minute)

@@ -41,7 +41,7 @@ def serving(tmp_path, workers):
     @contextmanager
     def go():
         app = create_app(ServiceSettings(data_dir=tmp_path / "data"), workers)
-        with TestClient(app, raise_server_exceptions=False) as http:
+        with TestClient(app, base_url="http://localhost", raise_server_exceptions=False) as http:
             yield http
 
     return go

@@ -63,7 +63,7 @@ def here(http, made):
 def serving(folder):
     with open_cluster(workers=1, processes=False) as cluster:
         app = create_app(ServiceSettings(data_dir=folder), cluster)
-        with TestClient(app, raise_server_exceptions=False) as http:
+        with TestClient(app, base_url="http://localhost", raise_server_exceptions=False) as http:
             yield http
 
 

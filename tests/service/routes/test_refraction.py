@@ -258,7 +258,7 @@ def test_a_picture_beside_reconstructions(tmp_path):
     """On a real cluster: the lane is free although every other one is busy."""
     with open_cluster(workers=1, processes=False) as cluster:
         app = create_app(ServiceSettings(data_dir=tmp_path / "data"), cluster)
-        with TestClient(app) as http:
+        with TestClient(app, base_url="http://localhost") as http:
             here = put(http)
             http.get(here, params=SMALL)
             busy = [
@@ -276,7 +276,7 @@ def test_a_picture_that_no_worker_takes_is_503(tmp_path, monkeypatch):
     monkeypatch.setattr(compute, "RENDER_SECONDS", 0.3)
     with open_cluster(workers=1, processes=False) as cluster:
         app = create_app(ServiceSettings(data_dir=tmp_path / "data"), cluster)
-        with TestClient(app) as http:
+        with TestClient(app, base_url="http://localhost") as http:
             here = put(http)
             busy = cluster.client.submit(time.sleep, 2.0, pure=False, resources={"render": 1})
             answer = http.get(here, params=SMALL)
