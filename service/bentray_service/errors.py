@@ -89,6 +89,7 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.NotAllowed: Kind(403, "not-allowed", "This is not allowed"),
     refusals.TooOften: Kind(429, "too-often", "Too many requests"),
     refusals.QuotaUsedUp: Kind(507, "quota-used-up", "The tenant stores as much as it may"),
+    refusals.NoSuchPart: Kind(416, "no-such-part", "The part of the file is not there"),
     refusals.NoAnimation: Kind(404, "no-animation", "The job has no animation"),
     refusals.StorageFull: Kind(507, "storage-full", "The disk of the service is full"),
     refusals.Busy: Kind(503, "busy", "No worker was free in time"),
@@ -183,6 +184,8 @@ def refused(error: InvalidInput, path: str) -> Response:
         headers["Retry-After"] = str(math.ceil(error.wait_s))
     if isinstance(error, refusals.NotLetIn):
         headers["WWW-Authenticate"] = 'Bearer realm="bentray"'
+    if isinstance(error, refusals.NoSuchPart):
+        headers["Content-Range"] = f"bytes */{error.size}"
     if isinstance(error, refusals.TooSlow):
         # The rest of the body is not waited for.
         headers["Connection"] = "close"

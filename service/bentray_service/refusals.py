@@ -100,6 +100,18 @@ class QuotaUsedUp(InvalidInput):
     """The tenant stores as much as it may."""
 
 
+class NoSuchPart(InvalidInput):
+    """A part of a file was asked for that begins beyond its end.
+
+    Attributes:
+        size: of the file, bytes.
+    """
+
+    def __init__(self, found: str, size: int) -> None:
+        super().__init__("Range", repr(found), f"a part that begins within the {size} bytes")
+        self.size = size
+
+
 class NoAnimation(InvalidInput):
     """The job is none of kind refraction, or has no result."""
 

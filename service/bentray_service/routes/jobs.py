@@ -6,8 +6,7 @@ from functools import partial
 from typing import Annotated, Literal
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Body, Depends, Header, Query, Response, status
-from fastapi.responses import FileResponse
+from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, status
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from bentray_kernels.tomography.settings import Settings
@@ -20,6 +19,7 @@ from ..refusals import NoAnimation
 from ..storage.ids import field_of
 from ..wiring import CallerTenant, Service
 from .bodies import SmallBody, only
+from .downloads import download, download_of
 from .pictures import check_renderable
 from .records import JobKind, JobList, JobRecord, State, job_record
 
@@ -154,19 +154,20 @@ def cancel_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord
     return job_record(service.jobs.request_cancel(tenant, job_id))
 
 
+@router.head("/{job_id}/animation", include_in_schema=False)
 @router.get(
     "/{job_id}/animation",
-    response_class=FileResponse,
-    responses={
-        200: {"content": {media: {} for media in ANIMATIONS.values()}, "description": "The file."},
-        **described(404),
-    },
+    response_class=Response,
+    responses={**download_of(*ANIMATIONS.values()), **described(404)},
 )
-def animation(job_id: str, service: Service, tenant: CallerTenant) -> FileResponse:
-    """The pictures of a job of kind refraction, once it has succeeded."""
+def animation(job_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
+    """The pictures of a job of kind refraction, once it has succeeded.
+
+    A download that broke off goes on with Range, and If-Range with the ETag of the first answer.
+    """
     job = service.jobs.get(tenant, job_id)
     if job["kind"] != "refraction" or job["state"] != "succeeded":
         raise NoAnimation(job["id"], job["kind"], job["state"])
     extension = job["settings"]["format"]
     path = service.files.of(tenant).animation(job["id"], extension)
-    return FileResponse(path, media_type=ANIMATIONS[extension], filename=path.name)
+    return download(request, path, repr((job["id"], job["finished"])), ANIMATIONS[extension])

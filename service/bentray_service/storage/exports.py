@@ -2,44 +2,103 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bentray_workers.atomic import replacing
+from bentray_workers.mat_writing import write_mat
+from bentray_workers.metaimage_writing import write_metaimage
 from bentray_workers.nifti_writing import write_nifti
-from bentray_workers.reconstruction_file import read_reconstruction
+from bentray_workers.reconstruction_file import IMAGES, read_reconstruction
 from bentray_workers.volume_file import read_volume
 
 
-def values_as_npy(volume: Path, target: Path, *, uploaded: bool) -> Path:
-    """A volume's numbers, (x, y[, z]), as a NumPy file; made when first asked for.
+@dataclass(frozen=True)
+class Content:
+    """What is in the file of a volume.
+
+    Attributes:
+        values: (nx, ny[, nz]): the speed of a reconstruction, m/s, or the values of an upload.
+        spacing_m, origin_m: one an axis, m; NaN where heights are uneven.
+        title: what it is.
+        images: every array of it by its name, these values among them.
+    """
+
+    values: NDArray[Any]
+    spacing_m: Sequence[float]
+    origin_m: Sequence[float]
+    title: str
+    images: Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format: the end of its files' names, their media type, and what writes one."""
+
+    extension: str
+    media_type: str
+    write: Callable[[Path, Content], None]
+
+
+def exported(volume: Path, target: Path, file_format: Format, *, uploaded: bool) -> Path:
+    """A volume in another format; made when first asked for.
 
     Args:
         volume: its file.
         target: the file to make.
-        uploaded: whether it was; else it is a reconstruction, whose speed is taken, m/s.
-    """
-    if target.exists():
-        return target
-    values = read_volume(volume).values if uploaded else read_reconstruction(volume).speed
-    with replacing(target) as partial, partial.open("wb") as file:
-        np.save(file, np.ascontiguousarray(values), allow_pickle=False)
-    return target
-
-
-def values_as_nifti(volume: Path, target: Path, *, uploaded: bool) -> Path:
-    """The same with spacing and origin as a NIfTI file.
+        file_format: of ``FORMATS``.
+        uploaded: whether it was; else it is a reconstruction.
 
     Raises:
-        InvalidInput: naming ``volume``, for slices at uneven heights.
+        InvalidInput: naming ``volume``, for what the format cannot tell.
     """
-    if target.exists():
-        return target
-    if uploaded:
-        own = read_volume(volume)
-        write_nifti(target, own.values, own.spacing_m, own.origin_m, own.title)
-    else:
-        result = read_reconstruction(volume)
-        write_nifti(target, result.speed, result.spacing_m, result.origin_m, "Speed of sound, m/s")
+    if not target.exists():
+        file_format.write(target, _uploaded(volume) if uploaded else _reconstructed(volume))
     return target
+
+
+def _uploaded(volume: Path) -> Content:
+    own = read_volume(volume)
+    return Content(own.values, own.spacing_m, own.origin_m, own.title, {"values": own.values})
+
+
+def _reconstructed(volume: Path) -> Content:
+    own = read_reconstruction(volume)
+    held = {place: getattr(own, name) for name, place in IMAGES.items()}
+    images = {place: image for place, image in held.items() if image is not None}
+    return Content(own.speed, own.spacing_m, own.origin_m, "Speed of sound, m/s", images)
+
+
+def _npy(target: Path, content: Content) -> None:
+    with replacing(target) as partial, partial.open("wb") as file:
+        np.save(file, np.ascontiguousarray(content.values), allow_pickle=False)
+
+
+def _nifti(target: Path, content: Content) -> None:
+    write_nifti(target, content.values, content.spacing_m, content.origin_m, content.title)
+
+
+def _metaimage(target: Path, content: Content) -> None:
+    write_metaimage(target, content.values, content.spacing_m, content.origin_m, content.title)
+
+
+def _mat(target: Path, content: Content) -> None:
+    grid = {"spacing_m": np.array(content.spacing_m), "origin_m": np.array(content.origin_m)}
+    axes = ",".join("xyz"[: content.values.ndim])
+    write_mat(target, {**content.images, **grid, "axes": axes, "title": content.title})
+
+
+FORMATS: Mapping[str, Format] = MappingProxyType(
+    {
+        "npy": Format("npy", "application/octet-stream", _npy),
+        "nifti": Format("nii", "application/octet-stream", _nifti),
+        "metaimage": Format("mha", "application/octet-stream", _metaimage),
+        "mat": Format("mat", "application/x-matlab-data", _mat),
+    }
+)

@@ -122,7 +122,11 @@ def test_an_uploaded_volume_comes_back_as_nifti_and_goes_in_again(start):
 
 def test_wrong_format(http, here):
     body = http.get(f"{here}/data?format=jpeg").json()
-    assert (body["status"], body["field"], body["accepted"]) == (422, "format", "'hdf5', 'nifti' or 'npy'")
+    assert (body["status"], body["field"], body["accepted"]) == (
+        422,
+        "format",
+        "'hdf5', 'nifti', 'metaimage', 'mat' or 'npy'",
+    )
 
 
 @pytest.mark.parametrize("volume", ["vol-" + "0" * 20, "nonsense", "..%2f..%2fetc"])

@@ -1,0 +1,78 @@
+"""Files sent so that a broken download goes on: a tag for the content, parts of it, and a name."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.responses import FileResponse
+from starlette.types import Receive, Scope, Send
+
+from ..errors import described
+from ..refusals import NoSuchPart
+
+# One part; of several at once, or of a form that nobody knows, the whole file is sent, as RFC 9110 allows.
+ONE_PART = re.compile(r"bytes=(\d*)-(\d*)")
+
+
+def download_of(*media_types: str) -> dict[int | str, dict[str, Any]]:
+    """What a route that sends a file may answer, for its OpenAPI description."""
+    content = {media: {"schema": {"type": "string", "format": "binary"}} for media in media_types}
+    return {
+        200: {"content": content, "description": "The file."},
+        206: {"content": content, "description": "The part that Range asked for."},
+        304: {"description": "The file that the client has is still right."},
+        **described(416),
+    }
+
+
+def download(request: Request, path: Path, seed: str, media_type: str, name: str | None = None) -> Response:
+    """A file, the part of it that was asked for, or 304 where the client has it.
+
+    Args:
+        request: its ``Range``, ``If-Range`` and ``If-None-Match`` count.
+        path: of a file that is replaced whole or not at all.
+        seed: what tells the content from all others; the tag follows from it and from the file's own age.
+        media_type: of the file.
+        name: that the client is to give it; None: its own.
+
+    Raises:
+        NoSuchPart: for a part beyond the end.
+    """
+    state = path.stat()
+    told = f"{seed}/{path.name}/{state.st_mtime_ns}/{state.st_size}"
+    tag = f'"{hashlib.sha256(told.encode()).hexdigest()[:32]}"'
+    headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
+    known = request.headers.get("if-none-match")
+    if known is not None and (tag in known or known.strip() == "*"):
+        return Response(status_code=304, headers=headers)
+    kind = FileResponse if _part_asked_for(request, tag, state.st_size) else Whole
+    return kind(path, headers=headers, media_type=media_type, filename=name or path.name, stat_result=state)
+
+
+class Whole(FileResponse):
+    """A file that is sent whole, whatever part the request names."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        headers = [(name, value) for name, value in scope["headers"] if name != b"range"]
+        await super().__call__({**scope, "headers": headers}, receive, send)
+
+
+def _part_asked_for(request: Request, tag: str, size: int) -> bool:
+    """Whether a part is to be sent; raises NoSuchPart for one that is not there."""
+    found = ONE_PART.fullmatch(request.headers.get("range", ""))
+    if found is None or found.groups() == ("", ""):
+        return False
+    # Only the tag tells for sure that it is the same file: another one is sent whole.
+    if request.headers.get("if-range", tag) != tag:
+        return False
+    first, last = found.groups()
+    if first and last and int(last) < int(first):
+        return False
+    begins_inside = int(first) < size if first else int(last) > 0
+    if not begins_inside:
+        raise NoSuchPart(found.group(), size)
+    return True

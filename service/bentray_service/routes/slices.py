@@ -1,0 +1,86 @@
+"""/v1/volumes/{id}/slice.png: a slice of a volume as a picture."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Depends, Query, Request, Response
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.images.look import COLORMAPS, LEAST_FRAMED, LEAST_SIZE, MOST_SIZE, Look
+from bentray_workers.images.plane import check_plane
+
+from ..wiring import CallerTenant, Service
+from .pictures import PICTURE, picture
+
+router = APIRouter()
+
+
+def asked_look(
+    colormap: Annotated[
+        str, Query(max_length=40, description="One of " + ", ".join(COLORMAPS) + ".")
+    ] = "viridis",
+    size: Annotated[
+        int | None,
+        Query(
+            description=f"Longest side in pixels, {LEAST_FRAMED} to {MOST_SIZE}, without a frame from "
+            f"{LEAST_SIZE}. Without it text has its usual size, and the bare image a pixel a node."
+        ),
+    ] = None,
+    interpolation: Annotated[
+        Literal["nearest", "cubic"], Query(description="Between the values of nodes.")
+    ] = "nearest",
+    scale_bar: Annotated[bool, Query(description="A bar of a round length in the image.")] = False,
+    colour_bar: Annotated[bool, Query(description="The colours with values and unit; in a frame.")] = True,
+    frame: Annotated[
+        bool, Query(description="Title, axes in mm and notes; without it there is the image alone.")
+    ] = True,
+) -> Look:
+    """How a picture shall look."""
+    return Look(colormap, size, interpolation, scale_bar, colour_bar, frame)
+
+
+@router.head("/{volume_id}/slice.png", include_in_schema=False)
+@router.get("/{volume_id}/slice.png", response_class=Response, responses=PICTURE)
+def slice_png(
+    volume_id: str,
+    request: Request,
+    service: Service,
+    tenant: CallerTenant,
+    look: Annotated[Look, Depends(asked_look)],
+    axis: Annotated[Literal["x", "y", "z"], Query(description="The axis that the slice cuts across.")] = "z",
+    index: Annotated[
+        int | None, Query(ge=0, description="Along this axis; the middle slice without it.")
+    ] = None,
+    quantity: Annotated[
+        Literal["speed", "coverage", "attenuation", "recovery", "value"] | None,
+        Query(
+            description="What to show. Of a reconstruction: speed, which it is without this, coverage, "
+            "attenuation where the scan had amplitudes, recovery where resolution_check was set. Of an "
+            "upload: value."
+        ),
+    ] = None,
+    low: Annotated[float | None, Query(description="Value of the darkest colour; m/s for speed.")] = None,
+    high: Annotated[float | None, Query(description="Value of the brightest colour.")] = None,
+) -> Response:
+    """One slice as a PNG, drawn by a worker.
+
+    HEAD gives the tag at once, without drawing, so Content-Length is absent.
+    """
+    volume = service.volumes.get(tenant, volume_id)
+    check_plane(volume["shape"], volume["spacing_m"], axis, index)
+    for name, value in (("low", low), ("high", high)):
+        if value is not None and not math.isfinite(value):
+            raise InvalidInput(name, value, "a finite number")
+    how: dict[str, Any] = {"axis": axis, "index": index, "low": low, "high": high, **asdict(look)}
+    path = service.files.of(tenant).volume(volume["id"])
+    if "job_id" in volume:
+        if quantity == "value":
+            raise InvalidInput("quantity", "'value'", "speed, coverage, attenuation or recovery")
+        how["quantity"] = quantity or "speed"
+        return picture(request, volume, how, lambda: service.compute.slice_png(path, **how))
+    if quantity not in (None, "value"):
+        raise InvalidInput("quantity", repr(quantity), "value: this volume was uploaded")
+    return picture(request, volume, how, lambda: service.compute.volume_slice_png(path, **how))

@@ -1,0 +1,57 @@
+"""/v1/volumes/{id}/data: a volume as a file, in any of the formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+
+from ..errors import described
+from ..storage.exports import FORMATS, exported
+from ..wiring import CallerTenant, Service
+from .downloads import download, download_of
+
+HDF5 = "application/x-hdf5"
+
+router = APIRouter()
+
+
+@router.head("/{volume_id}/data", include_in_schema=False)
+@router.get(
+    "/{volume_id}/data",
+    response_class=Response,
+    responses={
+        **download_of(HDF5, *sorted({one.media_type for one in FORMATS.values()})),
+        **described(404, 422),
+    },
+)
+def volume_data(
+    volume_id: str,
+    request: Request,
+    service: Service,
+    tenant: CallerTenant,
+    format: Annotated[  # noqa: A002 - the name of the query parameter
+        Literal["hdf5", "nifti", "metaimage", "mat", "npy"],
+        Query(
+            description="hdf5: everything; mat: every image and the grid for MATLAB (version 5); npy: the "
+            "values alone, speed in m/s; nifti and metaimage (.mha): these with spacing and origin in mm, "
+            "for even spacing."
+        ),
+    ] = "hdf5",
+) -> Response:
+    """The volume as a file.
+
+    A download that broke off goes on with Range, and If-Range with the ETag of the first answer.
+    """
+    volume = service.volumes.get(tenant, volume_id)
+    files = service.files.of(tenant)
+    path: Path = files.volume(volume["id"])
+    seed = repr((volume["id"], volume["created"], format))
+    if format == "hdf5":
+        return download(request, path, seed, HDF5)
+    chosen = FORMATS[format]
+    uploaded = "job_id" not in volume
+    made = exported(path, files.export(volume["id"], chosen.extension), chosen, uploaded=uploaded)
+    name = f"{volume['id']}-{'values' if uploaded else 'speed'}.{chosen.extension}"
+    return download(request, made, seed, chosen.media_type, name)
