@@ -13,7 +13,7 @@ from .steps import Ask, Fetch, Step
 from .uploading import PLACES
 
 Record = dict[str, Any]
-Format = Literal["hdf5", "nifti", "npy"]
+Format = Literal["hdf5", "nifti", "metaimage", "mat", "npy"]
 
 PREFIXES = {"ds": "dataset", "vol": "volume", "mesh": "mesh"}
 
