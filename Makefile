@@ -40,8 +40,9 @@ bench: install ## run benchmarks/NAME.py; NAME=reconstruction ARGS=--quick
 
 lock: ## compile the lock files anew (needs uv on the PATH)
 	@command -v uv >/dev/null || { echo "make lock needs uv: pip install uv" >&2; exit 1; }
-	$(call compile,requirements.lock,--extra build --extra postgres)
-	$(call compile,requirements-dev.lock,--extra build --extra postgres --extra test --extra lint -c requirements.lock)
+	$(call compile,requirements.lock,--extra build --extra postgres pyproject.toml)
+	$(call compile,requirements-dev.lock,--extra build --extra postgres --extra test --extra lint -c requirements.lock pyproject.toml)
+	$(call compile,requirements-generator.lock,--group generator)
 
 clean: ## remove what was built or written here, .venv too
 	rm -rf .venv build dist demo-output .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
@@ -50,7 +51,7 @@ clean: ## remove what was built or written here, .venv too
 # The lock holds every platform's wheels (--universal) and no address, so that it works behind any mirror.
 define compile
 uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-config \
-  --no-emit-index-url --no-annotate --no-header $(2) pyproject.toml -o $(1)
+  --no-emit-index-url --no-annotate --no-header $(2) -o $(1)
 endef
 
 # The newest Python on the PATH that starts, is 3.11 or newer and can make an environment with pip in it.
