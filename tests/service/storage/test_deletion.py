@@ -20,17 +20,9 @@ from bentray_service.storage.tenants import LOCAL, Tenant
 from bentray_service.storage.volumes import Volumes
 
 OTHER = Tenant("other")
-SCAN = {
-    "title": "",
-    "source": "",
-    "license": "",
-    "dimension": 2,
-    "elements": 8,
-    "ntx": 8,
-    "nrx": 8,
-    "slices": 1,
-}
-SCAN |= {"has_traces": False, "has_travel_times": True, "has_truth": False, "water_speed_mps": 1500.0}
+SCAN = {"title": "", "source": "", "license": "", "dimension": 2, "elements": 8, "ntx": 8, "nrx": 8}
+SCAN |= {"slices": 1, "has_traces": False, "has_travel_times": True, "has_truth": False}
+SCAN |= {"water_speed_mps": 1500.0}
 GRID = {"shape": [2, 2, 2], "spacing_m": [1.0] * 3, "origin_m": [0.0] * 3}
 SURFACE = {"title": "", "format": "ply", "vertices": 4, "faces": 4, "genus": 0, "holes": 0, "coloured": False}
 SENT = {"size": 1, "sha256": "0" * 64}
