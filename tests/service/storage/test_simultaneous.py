@@ -1,0 +1,83 @@
+"""Many at once, on every database: one job a key, one end a job, and nobody is told anything else."""
+
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
+import pytest
+
+from bentray_service.refusals import Finished, KeyReused
+from bentray_service.storage.tenants import LOCAL
+
+AT_ONCE = 50
+
+
+def at_once(ask):
+    """What each of many simultaneous calls gave: its result, or the refusal that it raised."""
+    begin = Barrier(AT_ONCE)
+
+    def call(number):
+        begin.wait()
+        try:
+            return ask(number)
+        except (Finished, KeyReused) as refusal:
+            return refusal
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        return list(pool.map(call, range(AT_ONCE)))
+
+
+def states(jobs, job_id):
+    return [event["state"] for event in jobs.events(LOCAL, job_id)]
+
+
+def test_one_key_makes_one_job(jobs, dataset):
+    made = at_once(lambda _: jobs.add(LOCAL, "reconstruction", {"nodes": 16}, dataset, key="once"))
+    assert len({job["id"] for job in made}) == 1
+    assert len(jobs.newest(LOCAL, 2 * AT_ONCE)) == 1
+    assert states(jobs, made[0]["id"]) == ["queued"]
+
+
+def test_a_key_for_several_requests_is_the_firsts(jobs, dataset):
+    made = at_once(lambda n: jobs.add(LOCAL, "reconstruction", {"nodes": 16 + n % 2}, dataset, key="once"))
+    refused = [one for one in made if isinstance(one, KeyReused)]
+    assert len(refused) == AT_ONCE // 2
+    assert len(jobs.newest(LOCAL, 2 * AT_ONCE)) == 1
+
+
+def test_without_keys_each_makes_its_own(jobs, dataset):
+    made = at_once(lambda _: jobs.add(LOCAL, "reconstruction", {}, dataset))
+    assert len({job["id"] for job in made}) == AT_ONCE
+
+
+def test_a_queued_job_is_cancelled_once(jobs, dataset):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)["id"]
+    told = Counter(type(one) for one in at_once(lambda _: jobs.request_cancel(LOCAL, job)))
+    assert told == {dict: 1, Finished: AT_ONCE - 1}
+    assert states(jobs, job) == ["queued", "cancelled"]
+
+
+def test_a_running_job_is_asked_to_stop_once(jobs, queue, dataset):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)["id"]
+    assert queue.claim()["id"] == job
+    told = at_once(lambda _: jobs.request_cancel(LOCAL, job)["state"])
+    assert told == ["cancelling"] * AT_ONCE
+    assert states(jobs, job) == ["queued", "running", "cancelling"]
+
+
+@pytest.mark.parametrize("end", ["succeed", "cancelled"])
+def test_a_job_that_ends_while_it_is_cancelled_has_one_end(jobs, queue, dataset, end):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)["id"]
+    queue.claim()
+
+    def ask(number):
+        if number:
+            return jobs.request_cancel(LOCAL, job)
+        return queue.succeed(job, None) if end == "succeed" else queue.cancelled(job)
+
+    at_once(ask)
+    if jobs.get(LOCAL, job)["state"] == "cancelling":
+        queue.cancelled(job)
+    told = states(jobs, job)
+    assert len([state for state in told if state in ("succeeded", "cancelled")]) == 1
+    assert len(told) == len(set(told))
