@@ -136,7 +136,8 @@ def trace_type(path: str, array: NDArray[Any]) -> NDArray[Any]:
         InvalidInput: naming ``path``, for integers that are wider.
     """
     if array.dtype.kind == "f":
-        with np.errstate(over="ignore"):
+        # A damaged NaN may signal, which is no reason to warn.
+        with np.errstate(over="ignore", invalid="ignore"):
             return np.ascontiguousarray(array, dtype=np.float32).reshape(array.shape)
     if not np.can_cast(array.dtype, np.int16):
         raise InvalidInput(path, f"{array.dtype}", TRACES)

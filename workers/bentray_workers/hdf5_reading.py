@@ -65,6 +65,11 @@ class Reader:
         """Whether a group or array of that path is there."""
         return self._object(path) is not None
 
+    def names(self) -> tuple[str, ...]:
+        """Names of what lies in the root."""
+        with refusing("file", "a whole HDF5 file"):
+            return tuple(self._file)
+
     def array(self, path: str, kinds: str, accepted: str) -> NDArray[Any] | None:
         """An array, or None where it is absent.
 

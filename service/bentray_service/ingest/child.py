@@ -26,7 +26,7 @@ PACKING = 2
 
 # What may be ingested, and how the user is told of it.
 ACCEPTED = {
-    "dataset": "an HDF5 file in the format uct-transmission",
+    "dataset": "a scan in the format uct-transmission (HDF5), in MATLAB 5 or 7.3, or as .npz of plain arrays",
     "volume": "a volume as NumPy (.npy), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype",
     "mesh": "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB",
 }
@@ -85,9 +85,9 @@ def convert(what: str, source: Path, target: Path, given: dict[str, Any]) -> dic
 
 
 def _dataset(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
-    from bentray_workers.dataset_file import copy_dataset
+    from bentray_workers.foreign_scans import convert_dataset
 
-    return summary(copy_dataset(source, target))
+    return summary(convert_dataset(source, target))
 
 
 def _volume(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
@@ -112,7 +112,7 @@ def _mesh(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
 CONVERTED = {"dataset": _dataset, "volume": _volume, "mesh": _mesh}
 # Each needs its own reader alone: what starts for every upload should start fast.
 READERS = {
-    "dataset": "bentray_workers.dataset_file",
+    "dataset": "bentray_workers.foreign_scans",
     "volume": "bentray_workers.volume_reading",
     "mesh": "bentray_workers.mesh_reading",
 }

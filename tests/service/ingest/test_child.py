@@ -49,7 +49,7 @@ def test_a_reader_that_breaks_is_the_fault_of_the_file(scan, tmp_path, monkeypat
     def broken(source, target):
         raise error
 
-    monkeypatch.setattr("bentray_workers.dataset_file.copy_dataset", broken)
+    monkeypatch.setattr("bentray_workers.foreign_scans.convert_dataset", broken)
     answer = child.convert("dataset", scan(), tmp_path / "out.h5", {})
     assert answer["error"]["field"] == "file"
 
@@ -58,7 +58,7 @@ def test_a_full_disk_is_no_fault_of_the_file(scan, tmp_path, monkeypatch):
     def full(source, target):
         raise OSError(errno.ENOSPC, "No space left on device", str(target))
 
-    monkeypatch.setattr("bentray_workers.dataset_file.copy_dataset", full)
+    monkeypatch.setattr("bentray_workers.foreign_scans.convert_dataset", full)
     assert child.convert("dataset", scan(), tmp_path / "out.h5", {}) == {"full": True}
 
 

@@ -1,0 +1,75 @@
+"""A scan of any accepted format into a canonical file: told by its content, an emission at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+from bentray_kernels.acquisition import Dataset
+
+from ..dataset_copying import copy_dataset
+from ..dataset_reading import trace_type
+from ..dataset_writing import Piece, write_dataset
+from ..hdf5_reading import SIGNATURE, Limits, opened
+from . import matlab5, npz
+from .arrays import Arrays
+from .layouts import layout_of
+from .matlab73 import Matlab73
+
+# HDF5 may begin after a block of the user's; that of MATLAB 7.3 has 512 bytes.
+USER_BLOCK = 512
+MATLAB73 = b"MATLAB 7.3 MAT-file"
+
+
+def convert_dataset(source: Path, target: Path, limits: Limits | None = None) -> Dataset:
+    """Check a scan and write it as a canonical file, with no more than one emission in memory.
+
+    Taken are the upload format itself, MATLAB 5 and 7.3 and NumPy archives; the name of the file says
+    nothing. What is neither is treated as the upload format, and refused as such.
+
+    Args:
+        source: of the scan.
+        target: replaced whole or not touched.
+        limits: of HDF5 files; None: the defaults of ``Limits``.
+
+    Returns:
+        What it holds, with stand-ins for traces.
+
+    Raises:
+        InvalidInput: naming the first field that is missing or wrong, what was found and what is accepted.
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    with source.open("rb") as file:
+        start = file.read(USER_BLOCK + len(SIGNATURE))
+    if start.startswith(matlab5.START):
+        return _converted(matlab5.Matlab5(source), target)
+    if start.startswith(npz.START):
+        with closing(npz.Npz(source)) as archive:
+            return _converted(archive, target)
+    if start.startswith(MATLAB73) and start[USER_BLOCK:] == SIGNATURE:
+        with opened(source, limits or Limits()) as reader:
+            return _converted(Matlab73(reader), target)
+    if start.startswith(SIGNATURE):
+        with opened(source, limits or Limits()) as reader:
+            # Written by h5py or another tool, for MATLAB users: no user block, and no format of ours.
+            if reader.attribute("", "format") is None and _foreign(reader.names()):
+                return _converted(Matlab73(reader), target)
+    return copy_dataset(source, target, limits)
+
+
+def _foreign(names: tuple[str, ...]) -> bool:
+    return bool({"delta_tof", "element_positions", "full_dataset", "transducerPositionsXY"} & set(names))
+
+
+def _converted(arrays: Arrays, target: Path) -> Dataset:
+    layout = layout_of(arrays)
+
+    def pieces(name: str, chunk: tuple[int, ...]) -> Iterator[Piece]:
+        place = layout.traces[name]
+        for e, emission in enumerate(arrays.rows(place)):
+            where = (slice(e, e + 1), slice(0, emission.shape[0]), slice(0, emission.shape[1]))
+            yield where, trace_type(place, emission[None])
+
+    write_dataset(target, layout.dataset, pieces)
+    return layout.dataset

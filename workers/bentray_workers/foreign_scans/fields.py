@@ -1,0 +1,97 @@
+"""Single fields of a scan from foreign arrays: numbers, indices, water, truth, and where they are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.acquisition import Truth, speed_from_temperature
+from bentray_kernels.errors import InvalidInput
+
+from ..dataset_reading import trace_type
+from .arrays import Arrays, small
+
+# Where a file does not say how warm the water is; what is made of it says so.
+USUAL_C = 20.0
+
+
+def water(arrays: Arrays) -> tuple[float, float | None, str]:
+    """Speed and temperature of the water, and a word on where they come from if not from the file."""
+    speed, temperature = (number(arrays, f"water/{name}") for name in ("sound_speed_mps", "temperature_c"))
+    if speed is not None:
+        return speed, temperature, ""
+    if temperature is not None:
+        return speed_from_temperature(temperature), temperature, ""
+    assumed = f"; it does not say how warm the water was, {USUAL_C:g} °C is assumed"
+    return speed_from_temperature(USUAL_C), USUAL_C, assumed
+
+
+def truth(arrays: Arrays) -> Truth | None:
+    """Under its own group alone: its speed has the name of the water's."""
+    speed = small(arrays, "truth/sound_speed_mps", "numbers in m/s")
+    if speed is None:
+        return None
+    spacing, origin = (
+        wanted(arrays, f"truth/{name}", "a number in m for each axis").ravel()
+        for name in ("spacing_m", "origin_m")
+    )
+    losses = small(arrays, "truth/attenuation_np_m", "numbers in Np/m")
+    return Truth(
+        np.asarray(speed, dtype=np.float64),
+        tuple(float(v) for v in (np.repeat(spacing, speed.ndim) if spacing.size == 1 else spacing)),
+        tuple(float(v) for v in origin),
+        None if losses is None else np.asarray(losses, dtype=np.float64),
+        "x,y" if speed.ndim == 2 else "x,y,z",
+    )
+
+
+def there(arrays: Arrays, place: str) -> str:
+    """The name that an array of the upload format has in this file: with its group or without."""
+    leaf = place.rpartition("/")[2]
+    return place if place in arrays.names() or leaf not in arrays.names() else leaf
+
+
+def wanted(arrays: Arrays, name: str, accepted: str) -> NDArray[np.float64]:
+    array = small(arrays, name, accepted)
+    if array is None:
+        raise InvalidInput(name, "nothing", accepted)
+    return np.asarray(array, dtype=np.float64)
+
+
+def declared(arrays: Arrays, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    found = arrays.declared(name)
+    if found is None:
+        raise InvalidInput(name, "nothing", "an array")
+    return found
+
+
+def indices(arrays: Arrays, name: str) -> NDArray[np.int64]:
+    accepted = "(n,) integers that count elements from 0"
+    array = small(arrays, name, accepted)
+    if array is None or array.dtype.kind not in "iu":
+        raise InvalidInput(name, "nothing" if array is None else f"{array.dtype}", accepted)
+    if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
+        raise InvalidInput(name, array.max(), accepted)
+    return np.ascontiguousarray(array, dtype=np.int64)
+
+
+def number(arrays: Arrays, place: str) -> float | None:
+    name = there(arrays, place)
+    array = small(arrays, name, "one number")
+    if array is None:
+        return None
+    if array.size != 1 or not np.isfinite(array).all():
+        raise InvalidInput(
+            name, f"shape {array.shape}" if array.size != 1 else array.ravel()[0], "one finite number"
+        )
+    return float(array.ravel()[0])
+
+
+def stand_in(arrays: Arrays, name: str) -> NDArray[Any]:
+    """The traces' shape and type in an array that takes no memory."""
+    shape, dtype = declared(arrays, name)
+    if len(shape) != 3:
+        raise InvalidInput(name, f"shape {shape}", "(ntx, nrx, nt)")
+    return np.broadcast_to(trace_type(name, np.zeros((), dtype=dtype)), shape)

@@ -1,0 +1,54 @@
+"""MATLAB files of version 7.3, which are HDF5: plain arrays of numbers by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.errors import InvalidInput
+
+from ..hdf5_reading import Reader, refusing
+from .arrays import check_row
+
+NUMBERS = "a plain array of real numbers"
+
+
+class Matlab73:
+    """The arrays of one file; see ``Arrays``. HDF5 holds them with their axes reversed."""
+
+    kind = "a MATLAB 7.3 file"
+    reversed_axes = True
+
+    def __init__(self, reader: Reader) -> None:
+        self._reader = reader
+
+    def names(self) -> tuple[str, ...]:
+        return self._reader.names()
+
+    def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
+        found = self._reader.checked(name, "iuf", NUMBERS)
+        if found is None:
+            return None
+        # MATLAB marks an array without elements, whose numbers are its shape.
+        if self._reader.attribute(name, "MATLAB_empty") is not None:
+            raise InvalidInput(name, "an empty array", NUMBERS)
+        return found.shape, found.dtype
+
+    def whole(self, name: str) -> NDArray[Any]:
+        array = self._reader.array(name, "iuf", NUMBERS)
+        if array is None:
+            raise InvalidInput(name, "nothing", NUMBERS)
+        return array
+
+    def rows(self, name: str) -> Iterator[NDArray[Any]]:
+        found = self._reader.checked(name, "iuf", NUMBERS)
+        if found is None:
+            raise InvalidInput(name, "nothing", NUMBERS)
+        check_row(name, found.shape, found.dtype)
+        for k in range(found.shape[0]):
+            with refusing(name, NUMBERS):
+                row = np.asarray(found[k])
+            yield row

@@ -1,0 +1,110 @@
+"""NumPy archives of plain arrays: a zip of .npy files, none of which is ever unpickled."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.errors import InvalidInput
+
+from ..bounded_reading import LONGEST_HEADER, refusing
+from ..npy_headers import PARSING
+from .arrays import check_declared, check_row
+
+START = b"PK\x03\x04"
+SUFFIX = ".npy"
+MOST_MEMBERS = 1000
+
+# Deflate packs at best 1032 times.
+PACKING = 1100.0
+
+WHOLE = "a whole .npz of plain arrays"
+
+
+class Npz:
+    """The arrays of one archive; see ``Arrays``.
+
+    Raises:
+        InvalidInput: for an archive that is damaged.
+    """
+
+    kind = "a NumPy archive"
+    reversed_axes = False
+
+    def __init__(self, path: Path) -> None:
+        with refusing("file", WHOLE):
+            self._zip = zipfile.ZipFile(path)
+        found = self._zip.infolist()
+        if len(found) > MOST_MEMBERS:
+            raise InvalidInput("file", f"{len(found)} members", f"at most {MOST_MEMBERS}")
+        self._members = {
+            member.filename.removesuffix(SUFFIX): member
+            for member in found
+            if member.filename.endswith(SUFFIX)
+        }
+
+    def names(self) -> tuple[str, ...]:
+        return tuple(self._members)
+
+    def close(self) -> None:
+        self._zip.close()
+
+    def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
+        if name not in self._members:
+            return None
+        with refusing(name, WHOLE), self._open(name) as file:
+            shape, _, dtype = self._header(name, file)
+        return shape, dtype
+
+    def whole(self, name: str) -> NDArray[Any]:
+        with refusing(name, WHOLE), self._open(name) as file:
+            shape, fortran, dtype = self._header(name, file)
+            data = _exactly(name, file, math.prod(shape) * dtype.itemsize)
+            flat = np.frombuffer(data, dtype=dtype)
+            return flat.reshape(shape[::-1]).T if fortran else flat.reshape(shape)
+
+    def rows(self, name: str) -> Iterator[NDArray[Any]]:
+        with self._open(name) as file:
+            with refusing(name, WHOLE):
+                shape, fortran, dtype = self._header(name, file)
+            if fortran and len(shape) > 1:
+                raise InvalidInput(name, "an array in Fortran order", "numpy.ascontiguousarray of it")
+            check_row(name, shape, dtype)
+            for _ in range(shape[0]):
+                with refusing(name, WHOLE):
+                    data = _exactly(name, file, math.prod(shape[1:]) * dtype.itemsize)
+                yield np.frombuffer(data, dtype=dtype).reshape(shape[1:])
+
+    def _open(self, name: str) -> IO[bytes]:
+        with refusing(name, WHOLE):
+            member = self._members[name]
+            if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) or member.flag_bits & 1:
+                raise InvalidInput(name, "another packing, or a password", "numpy.savez or savez_compressed")
+            return self._zip.open(member)
+
+    def _header(self, name: str, file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+        version = np.lib.format.read_magic(file)
+        with PARSING:
+            read = (
+                np.lib.format.read_array_header_1_0
+                if version == (1, 0)
+                else np.lib.format.read_array_header_2_0
+            )
+            shape, fortran, dtype = read(file, max_header_size=LONGEST_HEADER)
+        if dtype.hasobject:
+            raise InvalidInput(name, "Python objects", "plain numbers; nothing is ever unpickled")
+        check_declared(name, shape, dtype, self._members[name].compress_size, PACKING)
+        return tuple(int(n) for n in shape), bool(fortran), dtype
+
+
+def _exactly(name: str, file: IO[bytes], count: int) -> bytes:
+    data = file.read(count)
+    if len(data) < count:
+        raise InvalidInput(name, f"{len(data)} bytes of data", f"{count}, as its header says")
+    return data
