@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
@@ -12,8 +13,9 @@ import numpy as np
 
 from ..acquisition import Dataset
 from ..arrays import Floats
+from ..errors import InvalidInput
 from . import pairs
-from .advice import Part, advise, part_of
+from .advice import Part, advise, noise_of, part_of
 from .chains import Calls, Chain, Scan, attenuate, recover
 from .problem import Problem
 from .result import Progress, Reconstruction, Trial
@@ -93,7 +95,9 @@ def carried_out(
     count = pairs.count(dataset, settings)
     trials: tuple[Trial, ...] = ()
     before = 0
-    following = _following(dataset, settings, samples, waves_of)
+    waves = _waves(dataset, settings, samples, waves_of)
+    allowed = waves is not None and (settings.method == "waveform" or waves.minutes <= settings.wave_minutes)
+    following = waves if allowed else None
     after = 0 if following is None else following.total
     if settings.tries:
         settings, trials, before = advise(dataset, settings, count // 2, scan_of, drive, after)
@@ -101,19 +105,27 @@ def carried_out(
     chains = [Chain(scan, index) for index in range(count)]
     drive(chains, before, after)
     rays = _assembled(dataset, settings, scan.problem(0), chains, trials)
+    if waves is not None and following is None:
+        told = waves.worth(trials[0], noise_of(dataset))
+        return replace(rays, provenance={**rays.provenance, "waveform": told})
     if following is None:
         return rays
     return following.refined(rays, drive, before + sum(chain.total for chain in chains))
 
 
-def _following(dataset: Dataset, settings: Settings, samples: int, waves_of: WaveScanOf) -> Following | None:
-    """What comes after the rays; None where only they are asked for."""
-    if settings.method != "waveform":
+def _waves(dataset: Dataset, settings: Settings, samples: int, waves_of: WaveScanOf) -> Following | None:
+    """What may come after the rays; None where only they are asked for, or ``auto`` could not go on."""
+    if settings.method not in ("waveform", "auto") or (settings.method == "auto" and not samples):
         return None
     # Here, for waves build upon rays; and whoever never asks for them never loads them.
     from ..wave.following import Following
 
-    return Following(dataset, settings, samples, waves_of)
+    try:
+        return Following(dataset, settings, samples, waves_of)
+    except InvalidInput:
+        if settings.method == "waveform":
+            raise
+        return None
 
 
 class Here:

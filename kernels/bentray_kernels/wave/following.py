@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -10,11 +11,13 @@ from numpy.typing import NDArray
 
 from ..acquisition import Dataset
 from ..tomography import pairs
+from ..tomography.advice import CLEARLY
 from ..tomography.reconstruction import Drive, measured
-from ..tomography.result import Reconstruction
+from ..tomography.result import Reconstruction, Trial
 from ..tomography.settings import Settings
 from .asked import check_traces, wave_settings
 from .chain import BandEnd, Image, WaveChain, WaveScan, resampled
+from .effort import core_seconds, worth
 from .settings import WaveSettings
 
 # Makes what tells the calls of one slice their data.
@@ -32,6 +35,7 @@ class Following:
 
     Attributes:
         total: emitter passes that it takes at most.
+        minutes: about how long a core works on it.
 
     Raises:
         InvalidInput: for a scan that lacks what waves need.
@@ -41,9 +45,9 @@ class Following:
         check_traces(samples)
         self._settings, self._scan_of = settings, scan_of
         self._plan = wave_settings(dataset, settings)
-        self.total = pairs.count(dataset, settings) * sum(
-            band.looks(self._plan.held_out) for band in self._plan.bands
-        )
+        slices = pairs.count(dataset, settings)
+        self.minutes = slices * core_seconds(dataset, self._plan, samples) / 60.0
+        self.total = slices * sum(band.looks(self._plan.held_out) for band in self._plan.bands)
 
     def refined(self, rays: Reconstruction, drive: Drive, before: int) -> Reconstruction:
         """The image of the rays, refined slice after slice: the emitters of one are enough for many workers.
@@ -61,7 +65,14 @@ class Following:
             chains.append(WaveChain(scan, image, index, history, self._stage(rays)))
             drive(chains[-1:], before + each * index, self.total - each * (index + 1))
             history = chains[-1].history
+        if self._settings.method == "auto" and not preferred(chains):
+            told = f"{_told(rays, self._plan, chains)}; not clearly better, so the image of the rays is given"
+            return replace(rays, history=history, provenance={**rays.provenance, "waveform": told})
         return self._result(rays, chains)
+
+    def worth(self, rays: Trial, noise_s: float) -> str:
+        """As ``effort.worth``."""
+        return worth(rays, noise_s, self.minutes)
 
     def _stage(self, rays: Reconstruction) -> int:
         return 1 + max(sweep.stage for sweep in rays.history)
@@ -94,6 +105,17 @@ class Following:
             residuals=None,
             provenance={**rays.provenance, "waveform": _told(rays, self._plan, chains)},
         )
+
+
+def preferred(chains: Sequence[WaveChain]) -> bool:
+    """Whether held-out emitters are predicted clearly better by what waves made, over all slices.
+
+    A band begins with the image that the one before left, so that what bands gain multiplies.
+    """
+    gains = [
+        math.prod(end.held / end.history[0].held for end in chain.ends if end.history) for chain in chains
+    ]
+    return sum(gains) / len(gains) < CLEARLY
 
 
 def _slices(rays: Reconstruction, values: NDArray[np.float64]) -> list[Image]:

@@ -20,6 +20,9 @@ from .wavelet import matched
 # Water shots that the wavelet is read from.
 SHOTS = 4
 
+# Relative error of the water's phase speed beyond which a fit is not believed: its traces have no such waves.
+FARTHEST = 0.05
+
 # What runs calls, in order of its argument: ``map``, or that of a pool of threads.
 Mapping = Callable[[Callable[..., Any], Iterable[Any]], Iterable[Any]]
 
@@ -43,7 +46,7 @@ class WaterShots:
 
 def sounded(problem: WaveProblem, shots: WaterShots, run: Mapping) -> WaveProblem:
     """The problem with the wavelet, the sampler and the water in which its water shots are simulated best."""
-    best = _matched(problem, shots, problem.water, run)
+    band, best = problem.band, _matched(problem, shots, problem.water, run)
     shot = int(problem.used[0])
     distance = np.linalg.norm(problem.receivers - problem.emitters[shot], axis=1)
     heard = problem.heard(shot)
@@ -54,6 +57,8 @@ def sounded(problem: WaveProblem, shots: WaterShots, run: Mapping) -> WaveProble
     model = simulate(medium, problem.emitters[shot], problem.receivers[heard], best.wavelet)
     recorded = shots.traces[shot][heard] @ best.sampler
     water = fitted(problem.water, distance[heard], model, recorded, problem.clock.step_s)
+    if max(abs(water.lead + water.bend * f**2) for f in (band.low_hz, band.high_hz)) > FARTHEST:
+        return best
     other = _matched(problem, shots, water, run)
     return other if other.likeness > best.likeness else best
 

@@ -1,0 +1,50 @@
+"""What a refinement takes, and whether it is worth that: known before it begins."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..acquisition import Dataset
+from ..tomography.result import Trial
+from .extent import Extent
+from .settings import WaveSettings
+
+# Seconds a node and time step of a look, there and back, with all that belongs to it; a core of 2020.
+NODE_STEP_S = 4e-9
+
+# What rays miss by so many times the noise is not noise: waves do not travel along them.
+MUCH = 1.5
+
+
+def core_seconds(dataset: Dataset, plan: WaveSettings, samples: int) -> float:
+    """About how long a core works on one slice, s.
+
+    Args:
+        dataset: its traces may still lie in its file.
+        plan: how it is refined.
+        samples: of each trace.
+    """
+    assert dataset.sampling_rate_hz is not None
+    reach = 0.5 * float(np.ptp(dataset.element_position_m, axis=0).max())
+    record_s = (samples - 1) / dataset.sampling_rate_hz
+    found = 0.0
+    for band in plan.bands:
+        extent = Extent.of(band, reach, record_s, plan.speed_bounds_mps[1])
+        found += NODE_STEP_S * extent.padded**2 * extent.steps * band.looks(plan.held_out)
+    return found
+
+
+def worth(rays: Trial, noise_s: float, minutes: float) -> str:
+    """One sentence: whether waves are advised after rays, and what they take.
+
+    Args:
+        rays: the trial with the best ones.
+        noise_s: standard deviation of the travel times, s.
+        minutes: that a core would work on waves.
+    """
+    held_out = rays.held_out_rms_s
+    found = f"rays miss held-out times by {1e9 * held_out:.0f} ns, whose noise is {1e9 * noise_s:.0f} ns"
+    takes = f"it takes about {max(minutes, 1.0):.0f} minutes of a core"
+    if held_out > MUCH * noise_s:
+        return f"method waveform is advised, for {found}; {takes}"
+    return f"method waveform would gain little, for {found}; {takes}"
