@@ -13,6 +13,7 @@ from bentray_workers.field_view import FieldView
 from bentray_workers.isosurface_mesh import mesh_volume
 from bentray_workers.lanes import RENDER
 from bentray_workers.offers import prepared_offers
+from bentray_workers.quality import quality_page, quality_report
 from bentray_workers.refraction_view import RefractionView
 
 from .refusals import Busy
@@ -86,6 +87,14 @@ class Compute:
     def field_map_png(self, folder: Path, what: str) -> bytes:
         """The geometry image of a field, as ``bentray_workers.field_picture.map_png``."""
         return self._drawn(field_picture.map_png, folder, {"what": what})
+
+    def quality(self, path: Path, picker: str) -> dict[str, Any]:
+        """The examination of a dataset file, see ``bentray_workers.quality``; raises as ``slice_png``."""
+        return dict(self._done(self._begun(quality_report, path, {"picker": picker})))
+
+    def quality_png(self, path: Path, picker: str) -> bytes:
+        """The page about it."""
+        return self._drawn(quality_page, path, {"picker": picker})
 
     def mesh_volume(self, path: Path, iso: float | None, step: int, target: Path) -> dict[str, Any]:
         """The iso-surface of a volume as a mesh file; as ``bentray_workers.isosurface_mesh.mesh_volume``."""

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.quality import examine
+from bentray_kernels.errors import InvalidInput
 
-from .dataset_file import read_dataset
+from .dataset_file import Limits, read_dataset
+from .dataset_reading import NUMERIC, TRACES
+from .hdf5_reading import opened
 from .images.quality_page import quality_png
 
 
@@ -28,12 +32,23 @@ class Quality:
     picked: Dataset | None
 
 
-def examine_file(path: Path, picker: str = "aic") -> Quality:
+# Traces that a task examines while somebody waits, bytes; corrections make copies of them.
+LARGEST_BYTES = 2**30
+
+
+def examine_file(path: Path, picker: str = "aic", largest_bytes: int | None = None) -> Quality:
     """Examine a dataset file.
 
+    Args:
+        path: of the file.
+        picker: what reads times that are not there.
+        largest_bytes: of traces; None: as many as there are.
+
     Raises:
-        InvalidInput: from the file, or for an unknown picker.
+        InvalidInput: from the file, for an unknown picker, or for more traces than allowed.
     """
+    if largest_bytes is not None:
+        _check_size(path, largest_bytes)
     dataset = read_dataset(path)
     examined = examine(dataset, picker)
     of_slices = [f.slice for f in examined.report.findings]
@@ -43,9 +58,19 @@ def examine_file(path: Path, picker: str = "aic") -> Quality:
 
 def quality_report(path: Path, picker: str) -> dict[str, Any]:
     """Task: the report alone."""
-    return examine_file(path, picker).report
+    return examine_file(path, picker, LARGEST_BYTES).report
 
 
 def quality_page(path: Path, picker: str) -> bytes:
     """Task: the page alone."""
-    return examine_file(path, picker).page
+    return examine_file(path, picker, LARGEST_BYTES).page
+
+
+def _check_size(path: Path, largest_bytes: int) -> None:
+    with opened(path, Limits()) as reader:
+        found = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
+        size = sum(math.prod(one.shape) * one.dtype.itemsize for one in found if one is not None)
+    if size > largest_bytes:
+        raise InvalidInput(
+            "dataset", f"{size} bytes of traces", f"at most {largest_bytes}; bentray quality takes more"
+        )

@@ -10,6 +10,7 @@ from ..errors import described
 from ..storage.deletion import Stored
 from ..storage.ids import new_id
 from ..wiring import CallerTenant, Service
+from . import quality
 from .bodies import only
 from .records import DatasetList, DatasetRecord, dataset_record
 from .uploads import body_of, take_in
@@ -17,6 +18,7 @@ from .uploads import body_of, take_in
 MEDIA_TYPES = ("application/x-hdf5", "application/octet-stream")
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
+router.include_router(quality.router)
 
 
 @router.post(

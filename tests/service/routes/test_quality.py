@@ -1,0 +1,80 @@
+"""/v1/datasets/{id}/quality: the report and the page, by a worker; and every way of being refused."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import PICKERS
+from bentray_service.routes.quality import Picker
+from bentray_workers.dataset_file import write_dataset
+
+from ...kernels.acquisition.traces import blob_delay, scan
+
+HDF5 = {"Content-Type": "application/x-hdf5"}
+
+
+@pytest.fixture
+def faulty(tmp_path):
+    """A scan whose element 5 does not receive."""
+    made = scan(blob_delay(16), elements=16, noise=0.01)
+    made.waveform.object[:, 5] = made.waveform.water[:, 5] = 0.0
+    write_dataset(tmp_path / "faulty.h5", made)
+    return (tmp_path / "faulty.h5").read_bytes()
+
+
+def test_report_and_page(start, cluster, faulty):
+    http = start()
+    here = http.post("/v1/datasets", content=faulty, headers=HDF5).json()["links"]["self"]
+    body = http.get(f"{here}/quality").json()
+    assert body["verdict"] == "usable"
+    assert body["picker"] == "aic"
+    (dead,) = (f for f in body["findings"] if f["check"] == "dead elements")
+    assert (dead["elements"], dead["role"], dead["action"]) == ([5], "reception", "left out")
+    assert dead["pair_count"] == 16
+    assert cluster.submitted[-1]["resources"] == {"render": 1}
+    page = http.get(f"{here}/quality.png?picker=correlation")
+    assert page.headers["content-type"] == "image/png"
+    assert page.content.startswith(b"\x89PNG")
+    again = http.get(
+        f"{here}/quality.png?picker=correlation", headers={"If-None-Match": page.headers["etag"]}
+    )
+    assert again.status_code == 304
+    assert http.get(f"{here}/quality.png").headers["etag"] != page.headers["etag"]
+    assert http.head(f"{here}/quality.png").status_code == 200
+
+
+def test_a_scan_with_times_alone(start, uploaded):
+    http = start()
+    body = http.get(f"/v1/datasets/{uploaded(http)}/quality").json()
+    assert "sampling rate" not in body["checked"]
+    assert "outliers" in body["checked"]
+
+
+def test_a_refused_scan_has_its_report_too(start, tmp_path):
+    made = scan(elements=12)
+    np.asarray(made.waveform.water)[:] = 0.0
+    write_dataset(tmp_path / "silent.h5", made)
+    http = start()
+    content = (tmp_path / "silent.h5").read_bytes()
+    here = http.post("/v1/datasets", content=content, headers=HDF5).json()["links"]["self"]
+    body = http.get(f"{here}/quality").json()
+    assert (body["verdict"], body["usable_pairs"]) == ("refused", 0)
+    assert "refused" in {finding["action"] for finding in body["findings"]}
+    assert http.get(f"{here}/quality.png").status_code == 200
+
+
+@pytest.mark.parametrize("name", ["quality", "quality.png"])
+def test_what_is_refused(start, uploaded, name):
+    http = start()
+    assert http.get(f"/v1/datasets/ds-00000000000000000000/{name}").status_code == 404
+    answer = http.get(f"/v1/datasets/{uploaded(http)}/{name}?picker=eye")
+    assert answer.status_code == 422
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.json()["field"] == "picker"
+
+
+def test_every_picker_can_be_asked_for():
+    assert get_args(get_args(Picker)[0]) == tuple(PICKERS)
