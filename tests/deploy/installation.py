@@ -39,6 +39,7 @@ class Installation:
         owner = self.services["database"]["environment"]
         self.database = postgresql.Server(owner["POSTGRES_USER"], password.read_text(), owner["POSTGRES_DB"])
         self.ports = {"scheduler": postgresql.free_port(), "service": postgresql.free_port()}
+        self.key = (folder / "first-key").read_text()
         self.url = f"http://127.0.0.1:{self.ports['service']}"
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
         (folder / "data").mkdir()
@@ -49,6 +50,7 @@ class Installation:
             "127.0.0.1:8786": f"127.0.0.1:{self.ports['scheduler']}",
             "database:5432": f"127.0.0.1:{self.database.port}",
             "/run/secrets/database-password": str(password),
+            "/run/secrets/first-key": str(folder / "first-key"),
             "0.0.0.0": "127.0.0.1",
         }
         self._whole = {

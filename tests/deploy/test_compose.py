@@ -13,6 +13,7 @@ import pytest
 import typer
 import yaml
 
+from bentray_service.access.token import Token
 from bentray_service.cli import app
 from bentray_service.settings import ServiceSettings
 from bentray_workers.dask_settings import SETTINGS
@@ -102,10 +103,12 @@ def test_no_password_is_in_the_file_and_git_ignores_where_it_is(file: dict[str, 
     text = compose.FILE.read_text()
     assert not re.search(r"postgresql\+psycopg://\w+:", text)
     assert "POSTGRES_PASSWORD:" not in text
-    secret = file["secrets"]["database-password"]["file"].removeprefix("./")
-    ignored = subprocess.run(["git", "check-ignore", "-q", secret], cwd=compose.ROOT, check=False)
-    if (compose.ROOT / ".git").exists():
-        assert ignored.returncode == 0
+    assert set(file["secrets"]) == {"database-password", "first-key"}
+    for secret in file["secrets"].values():
+        path = secret["file"].removeprefix("./")
+        ignored = subprocess.run(["git", "check-ignore", "-q", path], cwd=compose.ROOT, check=False)
+        if (compose.ROOT / ".git").exists():
+            assert ignored.returncode == 0
 
 
 def test_every_variable_and_setting_is_known(file: dict[str, Any]) -> None:
@@ -134,15 +137,17 @@ def test_commands_of_ours_parse(file: dict[str, Any], part: str) -> None:
     typer.main.get_command(app).commands[command].make_context(command, words)  # type: ignore[attr-defined]
 
 
-def test_the_password_is_made_once_and_closed_to_others(tmp_path: Path) -> None:
+def test_password_and_key_are_made_once_and_closed_to_others(tmp_path: Path) -> None:
     folder = tmp_path / "secrets"
     for _ in range(2):
         subprocess.run([str(DEPLOY / "secrets.sh"), str(folder)], check=True, capture_output=True)
-    found = (folder / "database-password").read_text()
-    assert re.fullmatch("[0-9a-f]{64}", found)
+    found = [(folder / name).read_text() for name in ("database-password", "first-key")]
+    assert re.fullmatch("[0-9a-f]{64}", found[0])
+    assert Token.of(found[1]) is not None
     assert folder.stat().st_mode & 0o777 == 0o700
     subprocess.run([str(DEPLOY / "secrets.sh"), str(tmp_path / "more")], check=True)
-    assert (tmp_path / "more" / "database-password").read_text() != found
+    for name, before in zip(("database-password", "first-key"), found, strict=True):
+        assert (tmp_path / "more" / name).read_text() != before
 
 
 def test_the_compiled_kernels_are_laid_where_numba_looks_once(tmp_path: Path) -> None:

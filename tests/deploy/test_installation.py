@@ -51,7 +51,7 @@ def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_scan_is_uploaded_and_reconstructed(installation: Installation, scan: Path, tmp_path: Path) -> None:
-    with Client(installation.url) as client:
+    with Client(installation.url, key=installation.key) as client:
         job = client.submit(client.upload(scan)["id"], QUICK.to_dict())
         job = client.wait(job["id"])
         client.download(job["volume"], "hdf5", tmp_path / "result.h5")
@@ -77,7 +77,7 @@ def test_no_page_of_dask_is_shown(installation: Installation, part: str) -> None
 
 @pytest.mark.parametrize("part", ["worker", "scheduler", "service", "database"])
 def test_it_works_again_after_a_part_was_killed(installation: Installation, scan: Path, part: str) -> None:
-    with Client(installation.url) as client:
+    with Client(installation.url, key=installation.key) as client:
         job = client.submit(client.upload(scan)["id"], LONG.to_dict())
         wait_until(lambda: client.job(job["id"])["progress"]["done"] > 0)
         assert client.job(job["id"])["state"] == "running", "it must be in the middle of it"
@@ -86,7 +86,7 @@ def test_it_works_again_after_a_part_was_killed(installation: Installation, scan
     installation.start(part)
     for each in PARTS:
         installation.wait_for(each)
-    with Client(installation.url) as client:
+    with Client(installation.url, key=installation.key) as client:
         # What was under way when the part died is finished too.
         assert client.wait(job["id"])["state"] == "succeeded", installation.log("service")
         again = client.submit(client.upload(scan)["id"], QUICK.to_dict())

@@ -6,6 +6,7 @@ A flow yields steps and is sent their answers; a step that fails is thrown into 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -70,7 +71,7 @@ Step = Ask | Fetch | Listen | Pause
 
 
 def settings_of(url: str, key: str | None, timeout_s: float) -> dict[str, Any]:
-    """What both kinds of ``httpx`` clients are made with.
+    """What both kinds of ``httpx`` clients are made with; without a key ``BENTRAY_KEY`` is taken, if set.
 
     Raises:
         InvalidInput: for a ``url`` that is no web address.
@@ -81,9 +82,10 @@ def settings_of(url: str, key: str | None, timeout_s: float) -> dict[str, Any]:
         parsed = httpx.URL()
     if parsed.scheme not in ("http", "https") or not parsed.host:
         raise InvalidInput("url", repr(url), "a web address, such as http://127.0.0.1:8000")
+    key = key or os.environ.get("BENTRAY_KEY")
     return {
         "base_url": url.rstrip("/"),
-        "headers": {} if key is None else {"Authorization": f"Bearer {key}"},
+        "headers": {"Authorization": f"Bearer {key}"} if key else {},
         # The answer to an upload comes after the service has read the whole file.
         "timeout": httpx.Timeout(timeout_s, connect=CONNECT_S),
     }

@@ -19,6 +19,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from bentray_workers.slices import Cancelled
 
 from ..compute import Compute
+from ..logs import about
 from ..storage.files import Files
 from ..storage.queue import LEASE_S, Queue
 from ..storage.schema import ENDED
@@ -133,6 +134,10 @@ class Runner:
         return shutil.disk_usage(self._files.root).free >= self._min_free_bytes
 
     def _run(self, job: dict[str, Any]) -> None:
+        with about(job=job["id"]):
+            self._run_known(job)
+
+    def _run_known(self, job: dict[str, Any]) -> None:
         job_id, files = job["id"], self._files.of(Tenant(job["tenant"]))
         reporter = Reporter(self._queue, job_id, self._leaving.is_set)
         kind = KINDS[job["kind"]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from functools import partial
 from typing import Annotated, Literal
 from urllib.parse import urlencode
@@ -13,6 +14,7 @@ from bentray_kernels.tomography.settings import Settings
 from bentray_workers.field_settings import FieldSettings, check_faces
 from bentray_workers.turntable import Turntable
 
+from ..access.quota import check_room
 from ..asked_settings import known_only
 from ..errors import described
 from ..refusals import NoAnimation
@@ -22,6 +24,8 @@ from .bodies import SmallBody, only
 from .downloads import download, download_of
 from .pictures import check_renderable
 from .records import JobKind, JobList, JobRecord, State, job_record
+
+log = logging.getLogger("bentray.jobs")
 
 # Media type of each format of a turntable.
 ANIMATIONS = {"zip": "application/zip", "apng": "image/apng"}
@@ -74,7 +78,7 @@ JobRequest = Annotated[
     "",
     status_code=status.HTTP_202_ACCEPTED,
     dependencies=[Depends(only("application/json"))],
-    responses=described(404, 409, 413, 415, 422, 429),
+    responses=described(404, 409, 413, 415, 422, 429, 507),
 )
 def start_job(
     asked: JobRequest,
@@ -91,6 +95,7 @@ def start_job(
     ] = None,
 ) -> JobRecord:
     """Queue a job. It is stored before this answers, and survives a restart of the service."""
+    check_room(service.files.of(tenant), service.settings.max_tenant_bytes)
     plan = None
     if isinstance(asked, ReconstructionRequest):
         dataset = service.datasets.get(tenant, asked.dataset)
@@ -114,6 +119,7 @@ def start_job(
             tenant, asked.kind, settings, **read, plan=plan, most_queued=most, key=idempotency_key
         )
     )
+    log.info("%s waits, of kind %s", job.id, job.kind, extra={"figures": {"job": job.id}})
     service.runner.notify()
     response.headers["Location"] = job.links["self"]
     return job

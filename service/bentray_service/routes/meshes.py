@@ -11,10 +11,11 @@ from fastapi import APIRouter, Depends, Query, Request, Response, status
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.isosurface_mesh import MOST_STEP, check_nodes
 
+from ..access.quota import check_room
 from ..errors import described
 from ..storage.deletion import Stored
 from ..storage.ids import new_id
-from ..wiring import CallerTenant, Service
+from ..wiring import Asking, CallerTenant, Service
 from .bodies import only
 from .pictures import check_renderable
 from .surface_records import MeshList, MeshRecord, mesh_record
@@ -79,13 +80,14 @@ def delete_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> None:
 @router.post(
     "/volumes/{volume_id}/mesh",
     status_code=status.HTTP_201_CREATED,
-    responses=described(404, 422, 503),
+    responses=described(404, 422, 429, 503, 507),
 )
 def mesh_of_volume(
     volume_id: str,
     response: Response,
     service: Service,
     tenant: CallerTenant,
+    caller: Asking,
     iso: Annotated[
         float | None, Query(description="In the unit of the volume; without it the middle of its range.")
     ] = None,
@@ -100,6 +102,8 @@ def mesh_of_volume(
     if iso is not None and not (math.isfinite(iso) and low <= iso < high):
         raise InvalidInput("iso", iso, f"{low:g} to less than {high:g}, the range of the volume")
     mesh_id, files = new_id("mesh"), service.files.of(tenant)
+    check_room(files, service.settings.max_tenant_bytes)
+    service.door.check_render(caller)
     try:
         made = files.candidate(mesh_id)
         summary = service.compute.mesh_volume(files.volume(volume["id"]), iso, step, made)

@@ -15,6 +15,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Header, Request, Response, status
 from starlette.concurrency import run_in_threadpool
 
+from ..access.quota import check_room
 from ..errors import described
 from ..ingest.append import ALGORITHMS, Checksum, append, size_of
 from ..refusals import StorageFull, TooLarge, WrongOffset, WrongProtocol
@@ -90,6 +91,7 @@ def begin_upload(
     free = shutil.disk_usage(service.files.root).free
     if upload_length > free:
         raise StorageFull("Upload-Length", f"{upload_length} bytes", f"at most {free} bytes, which are free")
+    check_room(service.files.of(tenant), service.settings.max_tenant_bytes, upload_length)
     keep_s = service.settings.upload_keep_s
     row = service.uploads.add(tenant, what, upload_length, given, upload_metadata, keep_s)
     record = upload_record(row, 0)

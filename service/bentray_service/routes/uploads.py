@@ -9,6 +9,7 @@ import anyio
 from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 
+from ..access.quota import check_room
 from ..ingest.canonical import Limits, make_canonical
 from ..ingest.child import ACCEPTED
 from ..ingest.receive import Received, receive
@@ -52,18 +53,23 @@ async def take_in(
     files = service.files.of(tenant)
     path = files.incoming(upload_id)
 
+    settings, most = service.settings, service.settings.max_tenant_bytes
+
     def check_and_store(received: Received) -> Row:
-        settings = service.settings
+        # What came without its length being announced, or beside others, lies there by now.
+        check_room(files, most, 0)
         limits = Limits(settings.ingest_memory_bytes, settings.ingest_seconds, service.files.scratch)
         summary = make_canonical(what, path, upload_id, files, limits, given)
         return store(received.size, received.sha256, summary)
 
+    wanted = int(announced) if announced else None
+    await run_in_threadpool(check_room, files, most, wanted or 1)
     try:
         received = await receive(
             request.stream(),
-            int(announced) if announced else None,
+            wanted,
             path,
-            service.settings.max_upload_bytes,
+            settings.max_upload_bytes,
             ACCEPTED[what],
         )
         limiter: anyio.CapacityLimiter = request.app.state.ingest_limiter

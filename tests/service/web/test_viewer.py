@@ -14,6 +14,7 @@ from playwright.sync_api import expect, sync_playwright
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.phantoms.surfaces import torus
 from bentray_kernels.tomography.settings import Settings
+from bentray_service.access.token import Token
 from bentray_service.jobs import kinds
 from bentray_workers.render_tasks import ThreadTasks
 
@@ -272,3 +273,36 @@ def test_by_keyboard_alone(page, serve, scan, work):
             break
     page.keyboard.press("Enter")
     page.locator(".job").wait_for()
+
+
+def test_where_a_key_is_needed_the_page_asks_for_it_and_sends_it(page, serve, scan, work, tmp_path):
+    key = Token.new()
+    (tmp_path / "key").write_text(key.shown())
+    address = serve(first_key_file=tmp_path / "key")
+    page.goto(address)
+    page.locator("#access").get_by_text("A key is needed").wait_for()
+    page.get_by_label("API key").fill(Token.new().shown())
+    page.get_by_role("button", name="Use it").click()
+    page.locator("#key-error").get_by_text("unknown, revoked or expired").wait_for()
+    page.get_by_label("API key").fill(key.shown())
+    page.get_by_role("button", name="Use it").click()
+    page.get_by_text("Tenant local (metrics, read, write)").wait_for()
+    expect(page.locator("#key")).to_be_hidden()
+    page.set_input_files("#scan-file", scan())
+    page.get_by_text("scan.h5 is stored").wait_for()
+    page.get_by_label("Nodes a side").fill("32")
+    page.get_by_role("button", name="Start").click()
+    job = page.locator(".job")
+    job.get_by_text("succeeded").wait_for()
+    image = job.locator("img")
+    image.scroll_into_view_if_needed()
+    expect(image).to_have_attribute("src", re.compile("^blob:"), timeout=COMPILING_MS)
+    expect(image).not_to_have_js_property("naturalWidth", 0)
+    with page.expect_download() as saved:
+        job.get_by_role("link", name="NumPy").click()
+    assert np.load(saved.value.path()).shape == (32, 32)
+    assert key.shown() not in page.url + page.content()
+    assert page.evaluate("document.cookie + JSON.stringify(localStorage)") == "{}"
+    page.get_by_role("button", name="Forget the key").click()
+    page.get_by_label("API key").wait_for()
+    assert httpx.get(f"{address}/v1/datasets").status_code == 401

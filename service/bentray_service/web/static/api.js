@@ -1,5 +1,7 @@
 // Requests to the service; every failure is an Error whose message can be shown as it is.
 
+import { authorization } from "./key.js";
+
 function inWords(problem) {
   if (problem.errors && problem.errors.length > 1) {
     return problem.errors.map((one) => `${one.field}: found ${one.found}; accepted: ${one.accepted}`).join(" · ");
@@ -15,11 +17,12 @@ export { inWords };
 export async function request(path, options = {}) {
   let response;
   try {
-    response = await fetch(path, options);
+    response = await fetch(path, { ...options, headers: { ...options.headers, ...authorization() } });
   } catch {
     throw new Error("The service does not answer.");
   }
   const body = await response.json().catch(() => ({ title: "The service failed", detail: `status ${response.status}` }));
+  if (response.status === 401) document.dispatchEvent(new CustomEvent("locked", { detail: inWords(body) }));
   if (!response.ok) throw new Error(inWords(body));
   return body;
 }
@@ -30,6 +33,7 @@ export function upload(address, mediaType, file, onProgress) {
     const sender = new XMLHttpRequest();
     sender.open("POST", address);
     sender.setRequestHeader("Content-Type", mediaType);
+    for (const [name, value] of Object.entries(authorization())) sender.setRequestHeader(name, value);
     sender.responseType = "json";
     sender.upload.onprogress = (event) => event.lengthComputable && onProgress(event.loaded / event.total);
     sender.onerror = () => reject(new Error("The upload broke off: the service did not take it or does not answer."));

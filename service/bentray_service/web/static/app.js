@@ -2,6 +2,7 @@
 import { request } from "./api.js";
 import { loadVolumes, volumeTitle, watchGlass } from "./glass.js";
 import { showJobs } from "./jobs.js";
+import { admitted } from "./key.js";
 import { loadMeshes, meshTitle, showFields, watchMeshes } from "./mesh.js";
 import { uploads } from "./uploads.js";
 
@@ -132,8 +133,10 @@ at("run").addEventListener("submit", start);
 at("run").addEventListener("change", showMethod);
 showMethod();
 fillDefaults().catch((error) => say("run-error", error));
-loadDatasets().catch((error) => say("jobs-error", error));
-loadVolumes().catch((error) => say("jobs-error", error));
-loadMeshes().catch((error) => say("jobs-error", error));
-refresh();
 health();
+if (await admitted(request)) {
+  loadDatasets().catch((error) => say("jobs-error", error));
+  loadVolumes().catch((error) => say("jobs-error", error));
+  loadMeshes().catch((error) => say("jobs-error", error));
+  refresh();
+}

@@ -1,5 +1,6 @@
 // Volumes as glass: upload one, look at it, and start a turntable.
 import { request } from "./api.js";
+import { show as showPicture } from "./key.js";
 import { uploads } from "./uploads.js";
 import { glassOf, queryOf } from "./views.js";
 
@@ -53,7 +54,7 @@ function show() {
     // The service says why in the body, which an image does not tell.
     request(address).catch(say);
   };
-  image.src = address;
+  showPicture(image, address);
 }
 
 export async function loadVolumes(chosen) {

@@ -1,5 +1,6 @@
 // The list of jobs: one card a job, kept and updated in place so that the focus and the pictures stay.
 import { inWords, request } from "./api.js";
+import { showOnceNear, withKey } from "./key.js";
 import { glassOf, queryOf } from "./views.js";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -18,7 +19,7 @@ function link(text, address, saveAs) {
   const node = make("a", "", text);
   node.href = address;
   if (saveAs) node.download = "";
-  return node;
+  return withKey(node, address);
 }
 
 function duration(seconds) {
@@ -71,10 +72,9 @@ function sparkline({ values, begins }) {
 function drawn(address, words) {
   const frame = make("div", "picture");
   const image = make("img");
-  image.src = address;
   image.alt = words;
-  image.loading = "lazy";
   image.onerror = () => frame.replaceChildren("The picture could not be drawn.");
+  showOnceNear(image, address);
   const anchor = link("", address);
   anchor.append(image);
   frame.append(anchor);

@@ -1,5 +1,6 @@
 // Meshes: upload one, make its geometry field, and look at it as mirror or glass.
 import { request } from "./api.js";
+import { show as showPicture } from "./key.js";
 import { uploads } from "./uploads.js";
 import { queryOf } from "./views.js";
 
@@ -56,7 +57,7 @@ function show() {
     // The service says why in the body, which an image does not tell.
     request(address).catch(say);
   };
-  image.src = address;
+  showPicture(image, address);
 }
 
 export async function loadMeshes(chosen) {

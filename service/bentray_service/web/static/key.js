@@ -1,0 +1,110 @@
+// The API key of this tab: asked for where the service wants one, kept until the tab is closed, in no address.
+
+const STORED = "bentray-key";
+const at = (id) => document.getElementById(id);
+
+export function authorization() {
+  const key = sessionStorage.getItem(STORED);
+  return key ? { Authorization: `Bearer ${key}` } : {};
+}
+
+function hasKey() {
+  return sessionStorage.getItem(STORED) !== null;
+}
+
+async function blobOf(address) {
+  const response = await fetch(address, { headers: authorization() });
+  if (!response.ok) throw new Error(`status ${response.status}`);
+  return response.blob();
+}
+
+// An element that shows a picture cannot send a key, so that the picture is fetched for it.
+export function show(image, address) {
+  if (!hasKey()) {
+    image.src = address;
+    return;
+  }
+  image.addEventListener("load", () => URL.revokeObjectURL(image.src), { once: true });
+  blobOf(address).then(
+    (blob) => {
+      image.src = URL.createObjectURL(blob);
+    },
+    () => image.dispatchEvent(new Event("error")),
+  );
+}
+
+const near = new IntersectionObserver(
+  (entries) => {
+    for (const { isIntersecting, target } of entries) {
+      if (!isIntersecting) continue;
+      near.unobserve(target);
+      show(target, target.dataset.address);
+    }
+  },
+  { rootMargin: "300px" },
+);
+
+// The same once the reader comes near it.
+export function showOnceNear(image, address) {
+  image.loading = "lazy";
+  if (!hasKey()) {
+    image.src = address;
+    return;
+  }
+  image.dataset.address = address;
+  near.observe(image);
+}
+
+// A link cannot send a key either: what it leads to is fetched, and saved.
+export function withKey(anchor, address) {
+  anchor.addEventListener("click", async (event) => {
+    if (!hasKey()) return;
+    event.preventDefault();
+    const saving = document.createElement("a");
+    try {
+      const blob = await blobOf(address);
+      const path = address.split("?")[0].split("/");
+      const kinds = { "image/png": ".png", "image/apng": ".png", "application/zip": ".zip", "application/x-hdf5": ".h5" };
+      const format = new URLSearchParams(address.split("?")[1]).get("format");
+      const ending = path.at(-1).includes(".") ? "" : kinds[blob.type] || (format ? `.${format}` : ".json");
+      saving.href = URL.createObjectURL(blob);
+      saving.download = `${path.slice(-2).join("-")}${ending}`;
+      saving.click();
+      setTimeout(() => URL.revokeObjectURL(saving.href), 60000);
+    } catch (error) {
+      anchor.title = error.message;
+    }
+  });
+  return anchor;
+}
+
+function ask(why) {
+  at("key").hidden = false;
+  at("key-error").textContent = hasKey() ? why : "";
+  at("key-error").hidden = !hasKey();
+}
+
+// Tell who the reader is for the service; whether it lets him in.
+export async function admitted(request) {
+  document.addEventListener("locked", (event) => ask(event.detail));
+  at("key").addEventListener("submit", (event) => {
+    event.preventDefault();
+    sessionStorage.setItem(STORED, new FormData(event.target).get("key").trim());
+    location.reload();
+  });
+  at("forget").addEventListener("click", () => {
+    sessionStorage.removeItem(STORED);
+    location.reload();
+  });
+  at("forget").hidden = !hasKey();
+  try {
+    const { tenant, how, scopes } = await request("/v1/access");
+    at("access").textContent =
+      how === "open" ? "Open to this machine: no key is asked for" : `Tenant ${tenant} (${scopes.join(", ")})`;
+    return true;
+  } catch (error) {
+    // Where no key helps, the reason stands here.
+    at("access").textContent = at("key").hidden ? error.message : "A key is needed";
+    return false;
+  }
+}
