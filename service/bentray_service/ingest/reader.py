@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import logging
 import os
+import secrets
 import signal
 import threading
 from collections.abc import Mapping
@@ -16,7 +17,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.errors import InvalidInput
 
-from ..errors import from_exception
+from ..errors import INTERNAL, Problem, from_exception, make
 from ..refusals import StorageFull, UnknownId
 from ..storage.files import Files
 from ..storage.tenants import Tenant
@@ -109,32 +110,41 @@ class UploadReader:
 
     def _read(self, row: Row) -> None:
         tenant, store = Tenant(row["tenant"]), self._stores[row["what"]]
-        files = self._files.of(tenant)
-        path = files.upload(row["id"])
+        path = self._files.of(tenant).upload(row["id"])
         if not self._known(store, tenant, row["result_id"]):
             if not path.exists():
                 # It lies with another service that uses this database.
                 return
-            try:
-                summary = make_canonical(
-                    row["what"], path, row["result_id"], files, self._limits, row["given"], self._started
-                )
-                store.add(
-                    tenant, row["result_id"], size=row["length"], sha256=digest_of(path), summary=summary
-                )
-            except StorageFull:
-                raise
-            except InvalidInput as error:
-                if self._leaving.is_set():
-                    return
-                problem = from_exception(error, f"/v1/uploads/{row['id']}").model_dump(exclude_none=True)
-                self._uploads.refuse(row["id"], problem, self._keep_s)
-                path.unlink(missing_ok=True)
+            problem = self._refusal(row, tenant, store, path)
+            if problem is not None:
+                if not self._leaving.is_set():
+                    self._uploads.refuse(row["id"], problem.model_dump(exclude_none=True), self._keep_s)
+                    path.unlink(missing_ok=True)
                 return
-            finally:
-                self._child_id = None
         self._uploads.done(row["id"], self._keep_s)
         path.unlink(missing_ok=True)
+
+    def _refusal(self, row: Row, tenant: Tenant, store: Store, path: Path) -> Problem | None:
+        """Read and store an upload; why it cannot be, or None."""
+        instance, files = f"/v1/uploads/{row['id']}", self._files.of(tenant)
+        try:
+            summary = make_canonical(
+                row["what"], path, row["result_id"], files, self._limits, row["given"], self._started
+            )
+            store.add(tenant, row["result_id"], size=row["length"], sha256=digest_of(path), summary=summary)
+        except (StorageFull, SQLAlchemyError):
+            raise
+        except InvalidInput as error:
+            return from_exception(error, instance)
+        except Exception:
+            # The thread must outlive what nobody foresaw, and the next upload may be a better one.
+            number = secrets.token_hex(8)
+            log.exception("%s could not be read [%s]", row["id"], number)
+            words = f"an error of the service, not of the file; it is in the log under {number}"
+            return make(INTERNAL, words, instance=instance, correlation_id=number)
+        finally:
+            self._child_id = None
+        return None
 
     def _known(self, store: Store, tenant: Tenant, name: str) -> bool:
         """Whether a service died after it had stored the result."""

@@ -56,6 +56,8 @@ def ready(service: Service) -> Ready:
         faults.append(("workers", "0 connected", "at least one Dask worker"))
     if not service.runner.alive():
         faults.append(("runner", "a thread has ended", "every thread that runs jobs; start the service anew"))
+    if not service.reader.alive():
+        faults.append(("reader", "the thread has ended", "one that reads uploads; start the service anew"))
     if faults:
         raise NotReady(faults)
     return Ready(workers=workers, free_bytes=free)

@@ -34,6 +34,12 @@ def test_database_that_cannot_be_written(start):
     assert http.get("/health/live").status_code == 200
 
 
+def test_uploads_that_nobody_reads(start):
+    http = start()
+    http.app.state.parts.reader.stop()
+    assert faults(http.get("/health/ready")) == ["reader"]
+
+
 def test_several_faults_are_all_named(start, cluster):
     cluster.workers = 0
     assert faults(start(min_free_bytes=2**62).get("/health/ready")) == ["disk", "workers"]

@@ -1,0 +1,129 @@
+"""Reading uploads that came in pieces: in turn, over a full disk, and over whatever goes wrong."""
+
+import threading
+import time
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.ingest import reader as reading
+from bentray_service.ingest.canonical import Limits
+from bentray_service.ingest.reader import UploadReader
+from bentray_service.refusals import StorageFull, UnknownId
+from bentray_service.storage.database import open_database
+from bentray_service.storage.files import Files
+from bentray_service.storage.tenants import LOCAL
+from bentray_service.storage.uploads import Uploads
+
+PATIENCE_S = 20.0
+
+
+class Store(dict):
+    """In place of the rows of datasets."""
+
+    def add(self, tenant, name, *, size, sha256, summary):
+        self[name] = size, sha256, summary
+        return {}
+
+    def get(self, tenant, name):
+        if name not in self:
+            raise UnknownId("dataset", name)
+        return {}
+
+
+@pytest.fixture
+def bench(tmp_path, monkeypatch):
+    """Uploads, a reader of them, and ``answers``: what it meets, one after the other."""
+    monkeypatch.setattr(reading, "IDLE_SECONDS", 0.02)
+    monkeypatch.setattr(reading, "PATIENCE_SECONDS", 0.02)
+    database = open_database(f"sqlite:///{tmp_path / 'b.sqlite'}")
+    made = Bench(database, tmp_path / "data")
+    monkeypatch.setattr(reading, "make_canonical", made.meet)
+    yield made
+    made.reader.stop()
+    database.close()
+
+
+class Bench:
+    def __init__(self, database, folder):
+        self.uploads, self.files, self.store = Uploads(database), Files(folder), Store()
+        self.files.prepare()
+        self.answers, self.read = [], []
+        limits = Limits(2**30, 10.0, folder)
+        self.reader = UploadReader(self.uploads, self.files, {"dataset": self.store}, limits, 60.0)
+
+    def meet(self, what, source, result_id, files, limits, given, started):
+        self.read.append(result_id)
+        answer = self.answers.pop(0) if self.answers else {"title": "a scan"}
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    def whole(self):
+        row = self.uploads.add(LOCAL, "dataset", 3, {}, "", 60.0)
+        self.files.of(LOCAL).upload(row["id"]).write_bytes(b"abc")
+        self.uploads.arrived(row["id"])
+        return row
+
+    def settled(self, row):
+        deadline = time.monotonic() + PATIENCE_S
+        while time.monotonic() < deadline:
+            now = self.uploads.get(LOCAL, row["id"])
+            if now["state"] in ("done", "refused"):
+                return now
+            time.sleep(0.01)
+        raise AssertionError(now)
+
+
+def test_the_oldest_is_read_first(bench):
+    rows = [bench.whole() for _ in range(3)]
+    bench.reader.start()
+    assert [bench.settled(row)["state"] for row in rows] == ["done"] * 3
+    assert bench.read == [row["result_id"] for row in rows]
+    assert bench.store[rows[0]["result_id"]][0] == 3
+    assert not list(bench.files.root.glob("tenants/*/uploads/*"))
+
+
+def test_a_full_disk_is_waited_for(bench):
+    row = bench.whole()
+    bench.answers = [StorageFull("body", "no space", "some")] * 3
+    bench.reader.start()
+    assert bench.settled(row)["state"] == "done"
+    assert bench.read == [row["result_id"]] * 4
+
+
+def test_what_is_refused_and_what_nobody_foresaw_do_not_stop_the_next(bench):
+    bad, odd, good = (bench.whole() for _ in range(3))
+    bench.answers = [InvalidInput("file", "nothing", "a scan"), RuntimeError("odd")]
+    bench.reader.start()
+    assert bench.settled(good)["state"] == "done"
+    bad, odd = bench.settled(bad), bench.settled(odd)
+    assert (bad["state"], bad["problem"]["field"]) == ("refused", "file")
+    assert (odd["state"], odd["problem"]["status"]) == ("refused", 500)
+    assert odd["problem"]["correlation_id"] in odd["problem"]["detail"]
+    assert not list(bench.files.root.glob("tenants/*/uploads/*"))
+    assert bench.reader.alive()
+
+
+def test_what_lies_elsewhere_is_left_to_others(bench):
+    row, here = bench.whole(), bench.whole()
+    bench.files.of(LOCAL).upload(row["id"]).unlink()
+    bench.reader.start()
+    bench.settled(here)
+    assert bench.uploads.get(LOCAL, row["id"])["state"] == "reading"
+
+
+def test_a_reader_that_leaves_refuses_nothing(bench, monkeypatch):
+    row, begun = bench.whole(), threading.Event()
+
+    def killed(*given):
+        begun.set()
+        bench.reader._leaving.wait(PATIENCE_S)
+        raise InvalidInput("file", "a file that crashed its reader (SIGKILL)", "a scan")
+
+    monkeypatch.setattr(reading, "make_canonical", killed)
+    bench.reader.start()
+    assert begun.wait(PATIENCE_S)
+    bench.reader.stop()
+    assert bench.uploads.get(LOCAL, row["id"])["state"] == "reading"
+    assert bench.files.of(LOCAL).upload(row["id"]).exists()
