@@ -1,4 +1,4 @@
-"""Scans in the formats of others: MATLAB 5 and 7.3, and NumPy archives, told apart by their content."""
+"""Scans in the formats of others: MATLAB 5 and 7.3, NumPy archives, k-Wave; told apart by their content."""
 
 from .conversion import convert_dataset
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 
 from bentray_kernels.acquisition import Dataset
 
+from ..bounded_reading import refusing
 from ..dataset_copying import copy_dataset
 from ..dataset_reading import trace_type
 from ..dataset_writing import Piece, write_dataset
 from ..hdf5_reading import SIGNATURE, Limits, opened
 from . import matlab5, npz
 from .arrays import Arrays
+from .kwave import KWave, is_kwave
 from .layouts import layout_of
 from .matlab73 import Matlab73
 
@@ -25,8 +27,8 @@ MATLAB73 = b"MATLAB 7.3 MAT-file"
 def convert_dataset(source: Path, target: Path, limits: Limits | None = None) -> Dataset:
     """Check a scan and write it as a canonical file, with no more than one emission in memory.
 
-    Taken are the upload format itself, MATLAB 5 and 7.3 and NumPy archives; the name of the file says
-    nothing. What is neither is treated as the upload format, and refused as such.
+    Taken are the upload format itself, MATLAB 5 and 7.3, NumPy archives, and zips of k-Wave outputs; the name
+    of the file says nothing. What is neither is treated as the upload format, and refused as such.
 
     Args:
         source: of the scan.
@@ -45,8 +47,11 @@ def convert_dataset(source: Path, target: Path, limits: Limits | None = None) ->
     if start.startswith(matlab5.START):
         return _converted(matlab5.Matlab5(source), target)
     if start.startswith(npz.START):
-        with closing(npz.Npz(source)) as archive:
-            return _converted(archive, target)
+        with refusing("file", npz.WHOLE):
+            archive = zipfile.ZipFile(source)
+        with archive:
+            many = is_kwave(archive.namelist())
+            return _converted(KWave(archive, target.parent) if many else npz.Npz(archive), target)
     if start.startswith(MATLAB73) and start[USER_BLOCK:] == SIGNATURE:
         with opened(source, limits or Limits()) as reader:
             return _converted(Matlab73(reader), target)

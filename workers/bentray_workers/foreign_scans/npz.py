@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import zipfile
 from collections.abc import Iterator
-from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
@@ -30,6 +29,9 @@ WHOLE = "a whole .npz of plain arrays"
 class Npz:
     """The arrays of one archive; see ``Arrays``.
 
+    Args:
+        archive: open, or a file that holds one.
+
     Raises:
         InvalidInput: for an archive that is damaged.
     """
@@ -37,9 +39,9 @@ class Npz:
     kind = "a NumPy archive"
     reversed_axes = False
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, archive: zipfile.ZipFile | IO[bytes]) -> None:
         with refusing("file", WHOLE):
-            self._zip = zipfile.ZipFile(path)
+            self._zip = archive if isinstance(archive, zipfile.ZipFile) else zipfile.ZipFile(archive)
         found = self._zip.infolist()
         if len(found) > MOST_MEMBERS:
             raise InvalidInput("file", f"{len(found)} members", f"at most {MOST_MEMBERS}")
@@ -51,9 +53,6 @@ class Npz:
 
     def names(self) -> tuple[str, ...]:
         return tuple(self._members)
-
-    def close(self) -> None:
-        self._zip.close()
 
     def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
         if name not in self._members:

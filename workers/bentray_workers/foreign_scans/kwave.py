@@ -1,0 +1,153 @@
+"""A scan simulated with k-Wave: a zip of its output files, one an emission, and of the geometry beside them.
+
+In the zip lie ``geometry.npz``, with positions, emitters and receivers under the names of the upload format,
+``object/*.h5`` and, where there was a second run without the object, ``water/*.h5``: outputs in the order of
+``tx`` by name, each with the pressure ``p`` of a sensor mask (1, Nt, receivers) and the time step ``dt``.
+k-Wave records in the order of its grid; ``rx`` says which element each receiver is.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.errors import InvalidInput
+
+from ..bounded_reading import refusing as refusing_zip
+from ..hdf5_reading import Limits, Reader, opened, refusing
+from .arrays import LARGEST_ROW, LARGEST_TOTAL, LARGEST_WHOLE
+from .npz import Npz
+
+GEOMETRY = "geometry.npz"
+OUTPUT = re.compile(r"(object|water)/[^/]+\.(h5|hdf5)")
+MOST_OUTPUTS = 8192
+PRESSURE = "(1, Nt, receivers) pressures of a sensor mask"
+RATE = "acquisition/sampling_rate_hz"
+
+# Time steps of all outputs agree within this part.
+SAME_STEP = 1e-6
+
+
+def is_kwave(names: list[str]) -> bool:
+    """Whether a zip with these members holds outputs of k-Wave."""
+    return any(OUTPUT.fullmatch(name) for name in names)
+
+
+class KWave:
+    """The arrays of one zip; see ``Arrays``: those of its geometry, and the traces from its outputs.
+
+    Args:
+        archive: open.
+        scratch: folder for one output at a time.
+
+    Raises:
+        InvalidInput: for a zip without geometry, or outputs that are not alike.
+    """
+
+    kind = "outputs of k-Wave"
+    reversed_axes = False
+
+    def __init__(self, archive: zipfile.ZipFile, scratch: Path) -> None:
+        self._zip = archive
+        self._scratch = scratch
+        names = [member.filename for member in archive.infolist()]
+        if len(names) > MOST_OUTPUTS:
+            raise InvalidInput("file", f"{len(names)} members", f"at most {MOST_OUTPUTS}")
+        if GEOMETRY not in names:
+            raise InvalidInput(GEOMETRY, "nothing", "positions, tx and rx beside the outputs of k-Wave")
+        self._outputs = {
+            f"waveform/{which}": sorted(n for n in names if OUTPUT.fullmatch(n) and n.startswith(which))
+            for which in ("object", "water")
+        }
+        self._geometry = Npz(io.BytesIO(self._bytes(GEOMETRY, LARGEST_WHOLE)))
+        first = self._outputs["waveform/object"] or self._outputs["waveform/water"]
+        with self._output(first[0]) as reader:
+            self._shape = self._pressure(first[0], reader).shape[::-1]
+            self._step = self._time_step(first[0], reader)
+
+    def names(self) -> tuple[str, ...]:
+        there = [name for name, outputs in self._outputs.items() if outputs]
+        return (*self._geometry.names(), *there, RATE)
+
+    def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
+        if name == RATE:
+            return (), np.dtype(np.float64)
+        outputs = self._outputs.get(name)
+        if not outputs:
+            return self._geometry.declared(name)
+        shape = (len(outputs), *self._shape)
+        size = 4 * int(np.prod(shape, dtype=np.float64))
+        if size > LARGEST_TOTAL:
+            raise InvalidInput(name, f"{size} bytes", f"at most {LARGEST_TOTAL} bytes")
+        return shape, np.dtype(np.float32)
+
+    def whole(self, name: str) -> NDArray[Any]:
+        return np.array(1.0 / self._step) if name == RATE else self._geometry.whole(name)
+
+    def rows(self, name: str) -> Iterator[NDArray[Any]]:
+        for output in self._outputs[name]:
+            with self._output(output) as reader:
+                found = self._pressure(output, reader)
+                step = self._time_step(output, reader)
+                if found.shape[::-1] != self._shape or abs(step - self._step) > SAME_STEP * self._step:
+                    raise InvalidInput(
+                        output,
+                        f"shape {found.shape}, steps of {step:g} s",
+                        f"shape {self._shape[::-1]}, steps of {self._step:g} s, as the first output",
+                    )
+            with np.errstate(over="ignore", invalid="ignore"):
+                yield np.ascontiguousarray(found.T, dtype=np.float32)
+
+    def _pressure(self, output: str, reader: Reader) -> NDArray[Any]:
+        """(Nt, receivers)."""
+        with _of(output):
+            found = reader.array("p", "f", PRESSURE)
+            if found is None or found.ndim != 3 or found.shape[0] != 1 or 0 in found.shape:
+                shown = "nothing" if found is None else f"shape {found.shape}"
+                raise InvalidInput("p", shown, PRESSURE)
+        return np.asarray(found[0])
+
+    def _time_step(self, output: str, reader: Reader) -> float:
+        with _of(output):
+            found = reader.array("dt", "f", "the time step in s")
+            if found is None or found.size != 1 or not 0.0 < float(found.ravel()[0]) < 1.0:
+                shown = "nothing" if found is None else f"{found.ravel()[:3]}"
+                raise InvalidInput("dt", shown, "the time step in s")
+            return float(found.ravel()[0])
+
+    @contextmanager
+    def _output(self, name: str) -> Iterator[Reader]:
+        with NamedTemporaryFile(dir=self._scratch, suffix=".h5") as file:
+            file.write(self._bytes(name, LARGEST_ROW))
+            file.flush()
+            with _of(name), opened(Path(file.name), Limits()) as reader:
+                yield reader
+
+    def _bytes(self, name: str, most: int) -> bytes:
+        """A member unpacked, read no further than ``most``."""
+        with refusing_zip(name, "a whole zip"), self._zip.open(name) as file:
+            data = file.read(most + 1)
+        if len(data) > most:
+            raise InvalidInput(name, f"more than {most} bytes unpacked", f"at most {most}")
+        return data
+
+
+@contextmanager
+def _of(output: str) -> Iterator[None]:
+    """Say in which output a field was wrong."""
+    try:
+        with refusing(output, "an output of k-Wave"):
+            yield
+    except InvalidInput as error:
+        if error.field.startswith(output):
+            raise
+        raise InvalidInput(f"{output}: {error.field}", error.value, error.accepted) from None
