@@ -14,7 +14,7 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.routing import Match, Mount
@@ -46,6 +46,23 @@ class Fault(BaseModel):
 
 class Problem(BaseModel):
     """An error in the form of RFC 9457."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "type": "/problems/invalid-input",
+                    "title": "A value cannot be used",
+                    "status": 422,
+                    "detail": "index: found 99; accepted: 0 to 29",
+                    "instance": "/v1/volumes/vol-0123456789abcdef0123/slice.png",
+                    "field": "index",
+                    "found": "99",
+                    "accepted": "0 to 29",
+                }
+            ]
+        }
+    )
 
     type: str = Field(description="Relative address that names the kind of problem.")
     title: str
@@ -120,9 +137,11 @@ def from_exception(error: InvalidInput, instance: str | None = None) -> Problem:
 def described(*statuses: int | str) -> dict[int | str, dict[str, Any]]:
     """The problems of a route, for its OpenAPI description."""
     content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
-    titles: dict[int | str, str] = {kind.status: kind.title for kind in PROBLEMS.values()}
-    titles |= {422: INVALID_REQUEST.title, "default": "A problem"}
-    return {status: {"description": titles[status], "content": content} for status in statuses}
+    titles: dict[int | str, list[str]] = {"default": ["A problem"]}
+    for kind in (*PROBLEMS.values(), INVALID_REQUEST, UNREADABLE):
+        titles.setdefault(kind.status, []).append(kind.title)
+    words = {status: "; or: ".join(dict.fromkeys(said)) for status, said in titles.items()}
+    return {status: {"description": words[status], "content": content} for status in statuses}
 
 
 def fault_of(error: Mapping[str, Any]) -> Fault:

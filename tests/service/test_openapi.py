@@ -3,7 +3,10 @@
 import json
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from bentray_service.openapi import description
+from bentray_service.routes.jobs import JobRequest
 
 COMMITTED = Path(__file__).parents[2] / "openapi.json"
 
@@ -38,6 +41,53 @@ def test_every_address_of_the_plan_is_there():
         "/health/ready",
     ):
         assert path in paths
+
+
+def operations():
+    """(name, description) of each."""
+    for path, methods in json.loads(description())["paths"].items():
+        for method, operation in methods.items():
+            yield f"{method.upper()} {path}", operation
+
+
+def test_every_operation_says_what_it_does():
+    named = dict(operations())
+    assert all(one["summary"] and one["description"] and one["tags"] for one in named.values())
+    assert len({one["operationId"] for one in named.values()}) == len(named)
+
+
+def test_every_parameter_but_ids_is_explained():
+    for name, operation in operations():
+        for parameter in operation.get("parameters", []):
+            assert parameter["in"] == "path" or parameter.get("description"), (name, parameter)
+
+
+def test_whatever_can_be_wrong_has_an_answer_described():
+    for name, operation in operations():
+        said = operation["responses"]
+        where = {parameter["in"] for parameter in operation.get("parameters", [])}
+        if where & {"query", "header"} or "requestBody" in operation:
+            assert "422" in said, name
+        if "path" in where:
+            assert "404" in said, name
+        if "requestBody" in operation:
+            assert {"413", "415"} <= set(said), name
+        for status, answer in said.items():
+            assert answer["description"], (name, status)
+            if status >= "4":
+                assert list(answer["content"]) == ["application/problem+json"], (name, status)
+
+
+def test_every_json_body_has_examples_that_are_taken():
+    taken = TypeAdapter(JobRequest)
+    found = 0
+    for _, operation in operations():
+        content = operation.get("requestBody", {}).get("content", {}).get("application/json")
+        if content is not None:
+            for example in content["examples"].values():
+                taken.validate_python(example["value"])
+                found += 1
+    assert found >= 3
 
 
 def test_settings_of_a_job_are_described():

@@ -42,9 +42,11 @@ async def upload_dataset(
     return record
 
 
-@router.get("")
+@router.get("", responses=described(422))
 def list_datasets(
-    service: Service, tenant: CallerTenant, limit: Annotated[int, Query(ge=1, le=1000)] = 100
+    service: Service,
+    tenant: CallerTenant,
+    limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.")] = 100,
 ) -> DatasetList:
     """Datasets, newest first."""
     return DatasetList(datasets=[dataset_record(row) for row in service.datasets.newest(tenant, limit)])

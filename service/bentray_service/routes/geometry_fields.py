@@ -16,9 +16,11 @@ from .surface_records import FieldList, FieldRecord, field_record
 router = APIRouter(prefix="/v1/geometry-fields", tags=["geometry-fields"])
 
 
-@router.get("")
+@router.get("", responses=described(422))
 def list_fields(
-    service: Service, tenant: CallerTenant, limit: Annotated[int, Query(ge=1, le=1000)] = 100
+    service: Service,
+    tenant: CallerTenant,
+    limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.")] = 100,
 ) -> FieldList:
     """Geometry fields, newest first."""
     rows = service.geometry_fields.newest(tenant, limit)

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, status
+from fastapi.openapi.models import Example
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from bentray_kernels.tomography.settings import Settings
@@ -69,8 +70,28 @@ class GeometryFieldRequest(BaseModel):
     )
 
 
+EXAMPLES: dict[str, Example] = {
+    "reconstruction": {
+        "summary": "Sound speed from a scan",
+        "value": {
+            "kind": "reconstruction",
+            "dataset": "ds-0123456789abcdef0123",
+            "settings": {"nodes": 128, "sweeps": 8, "rays": "curved"},
+        },
+    },
+    "refraction": {
+        "summary": "A volume as glass from all sides",
+        "value": {"kind": "refraction", "volume": "vol-0123456789abcdef0123", "settings": {"format": "zip"}},
+    },
+    "geometry-field": {
+        "summary": "The geometry field of a mesh",
+        "value": {"kind": "geometry-field", "mesh": "mesh-0123456789abcdef0123"},
+    },
+}
+
 JobRequest = Annotated[
-    ReconstructionRequest | RefractionRequest | GeometryFieldRequest, Body(discriminator="kind")
+    ReconstructionRequest | RefractionRequest | GeometryFieldRequest,
+    Body(discriminator="kind", openapi_examples=EXAMPLES),
 ]
 
 
@@ -78,7 +99,7 @@ JobRequest = Annotated[
     "",
     status_code=status.HTTP_202_ACCEPTED,
     dependencies=[Depends(only("application/json"))],
-    responses=described(404, 409, 413, 415, 422, 429, 507),
+    responses=described(400, 404, 409, 413, 415, 422, 429, 507),
 )
 def start_job(
     asked: JobRequest,
@@ -129,7 +150,7 @@ def start_job(
 def list_jobs(
     service: Service,
     tenant: CallerTenant,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.")] = 100,
     state: Annotated[State | None, Query(description="Only these.")] = None,
     kind: Annotated[JobKind | None, Query(description="Only these.")] = None,
     before: Annotated[str | None, Query(description="Only jobs older than the one of this id.")] = None,

@@ -57,9 +57,11 @@ async def upload_mesh(
     return record
 
 
-@router.get("/meshes")
+@router.get("/meshes", responses=described(422))
 def list_meshes(
-    service: Service, tenant: CallerTenant, limit: Annotated[int, Query(ge=1, le=1000)] = 100
+    service: Service,
+    tenant: CallerTenant,
+    limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.")] = 100,
 ) -> MeshList:
     """Meshes, newest first."""
     return MeshList(meshes=[mesh_record(row) for row in service.meshes.newest(tenant, limit)])

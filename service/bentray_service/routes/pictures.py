@@ -19,7 +19,7 @@ from ..wiring import caller_of, parts_of
 PICTURE: dict[int | str, dict[str, Any]] = {
     200: {"content": {"image/png": {}}, "description": "The picture."},
     304: {"description": "The picture that the client has is still right."},
-    **described(404, 429, 503),
+    **described(404, 422, 429, 503),
 }
 
 

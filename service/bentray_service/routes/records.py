@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
@@ -19,6 +19,8 @@ from .surface_records import field_links
 State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
 JobKind = Literal["reconstruction", "refraction", "geometry-field"]
 Row = dict[str, Any]
+# A list in the description, and no tuple: some generators of clients know none.
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 # What the rows of reconstructed and of uploaded volumes have in common.
 SHARED = ("id", "title", "axes", "shape", "spacing_m", "origin_m", "value_range", "unit", "bytes")
@@ -70,7 +72,7 @@ class SweepRecord(BaseModel):
     emitters: int = Field(description="Emitters that had data.")
     stage: int = Field(0, description="From 0: coarser grids and straight rays that come first.")
     given: bool = Field(True, description="Whether the misfit is that of the image which the stage gave.")
-    band_hz: tuple[float, float] | None = Field(
+    band_hz: Pair | None = Field(
         None, description="Of an image refined by waveforms; its residual is the shift that its misfit means."
     )
     misfit: float | None = Field(None, description="Of these waveforms: 0 where they agree.")
@@ -138,9 +140,9 @@ class VolumeRecord(BaseModel):
     shape: list[int] = Field(description="Nodes along each axis.")
     spacing_m: list[float | None] = Field(description="Node spacing; null where it is not even.")
     origin_m: list[float | None] = Field(description="Position of node 0.")
-    value_range: tuple[float, float] = Field(description="Least and greatest value.")
+    value_range: Pair = Field(description="Least and greatest value.")
     unit: str = Field(description="Of the values: m/s of a reconstruction; empty where it is not known.")
-    speed_range_mps: tuple[float, float] | None = Field(description="The range of a reconstruction.")
+    speed_range_mps: Pair | None = Field(description="The range of a reconstruction.")
     water_speed_mps: float | None
     provenance: dict[str, str]
     bytes: int = Field(description="Size of the file of a reconstruction, or of what was uploaded.")

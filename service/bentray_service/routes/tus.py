@@ -130,7 +130,7 @@ def show_upload(upload_id: str, service: Service, tenant: CallerTenant) -> Uploa
     status_code=status.HTTP_204_NO_CONTENT,
     dependencies=[Spoken, Depends(only(MEDIA_TYPE))],
     openapi_extra=BODY,
-    responses=described(400, 404, 408, 409, 412, 413, 415, 423, 460, 507),
+    responses=described(400, 404, 408, 409, 412, 413, 415, 422, 423, 460, 507),
 )
 async def send_piece(
     upload_id: str,
@@ -178,7 +178,7 @@ async def send_piece(
     "/{upload_id}",
     status_code=status.HTTP_204_NO_CONTENT,
     dependencies=[Spoken],
-    responses=described(404, 409, 412, 423),
+    responses=described(404, 409, 412, 422, 423),
 )
 def end_upload(upload_id: str, service: Service, tenant: CallerTenant) -> None:
     """Forget an upload and what came of it; what it has become stays."""

@@ -62,9 +62,11 @@ async def upload_volume(
     return record
 
 
-@router.get("")
+@router.get("", responses=described(422))
 def list_volumes(
-    service: Service, tenant: CallerTenant, limit: Annotated[int, Query(ge=1, le=1000)] = 100
+    service: Service,
+    tenant: CallerTenant,
+    limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.")] = 100,
 ) -> VolumeList:
     """Volumes, reconstructed and uploaded, newest first."""
     return VolumeList(volumes=[volume_record(row) for row in service.volumes.newest(tenant, limit)])
