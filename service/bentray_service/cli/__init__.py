@@ -9,6 +9,7 @@ import typer
 from . import (
     audit,
     bench,
+    convert,
     demo,
     devices,
     geometry_field,
@@ -42,6 +43,7 @@ for command in (
     submit.submit,
     reconstruct.reconstruct,
     quality.quality,
+    convert.convert,
     simulate.simulate,
     bench.bench,
     geometry_field.geometry_field,

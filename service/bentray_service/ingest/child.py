@@ -26,7 +26,7 @@ PACKING = 2
 
 # What may be ingested, and how the user is told of it.
 ACCEPTED = {
-    "dataset": "a scan as uct-transmission (HDF5), MATLAB 5 or 7.3, .npz of plain arrays, or zip of k-Wave outputs",
+    "dataset": "a scan as uct-transmission (HDF5), MATLAB 5 or 7.3, .npz of arrays, or zip of k-Wave outputs",
     "volume": "a volume as NumPy (.npy), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype",
     "mesh": "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB",
 }

@@ -1,0 +1,52 @@
+"""`bentray convert`: a scan in the format of another program into a dataset file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .paths import check_apart, input_file, output_file
+from .terminal import AsJson, print_json, print_lines
+
+ACCEPTED = "the path of a scan in MATLAB 5 or 7.3, .npz, a zip of k-Wave outputs, or HDF5"
+
+
+def convert(
+    file: Annotated[Path, typer.Argument(help="Scan; its content tells the format, not its name.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Dataset file to write (.h5).")],
+    force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Convert a scan of another program into a dataset file, with one emission in memory.
+
+    Taken are MATLAB files with delta_tof and element_positions, or with time, transducerPositionsXY and
+    full_dataset; .npz of plain arrays under the names of the dataset format; and zips of k-Wave outputs with
+    geometry.npz beside object/*.h5 and water/*.h5. The service takes the same as they are.
+
+    Example:  bentray convert scan.mat -o scan.h5
+    """
+    source, target = input_file(file, ACCEPTED), output_file(output, force=force, suffix=".h5")
+    check_apart({"output": target}, {"file": source})
+
+    from bentray_workers.foreign_scans import convert_dataset
+
+    dataset = convert_dataset(source, target)
+    told: dict[str, Any] = {
+        "file": str(source),
+        "output": str(target),
+        "source": dataset.source,
+        "elements": len(dataset.element_position_m),
+        "emissions": len(dataset.tx),
+        "receptions": len(dataset.rx),
+        "slices": dataset.slices,
+        "traces": dataset.waveform is not None,
+        "travel_times": dataset.picked,
+        "water_speed_mps": dataset.water_speed_mps,
+    }
+    if as_json:
+        print_json(told)
+        return
+    print_lines([f"{name}: {value}" for name, value in told.items() if value not in (str(target), "")])
+    print_lines([str(target)])
