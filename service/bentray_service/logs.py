@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import re
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -73,6 +74,17 @@ class Lines(logging.Formatter):
         return without_secrets(json.dumps(line, default=str))
 
 
+class _Stderr(logging.Handler):
+    """Writes to whatever stderr is by then."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        try:
+            sys.stderr.write(self.format(record) + "\n")
+            sys.stderr.flush()
+        except Exception:
+            self.handleError(record)
+
+
 @contextmanager
 def configured(form: Literal["text", "json"]) -> Iterator[None]:
     """In the block every logger of this process writes to stderr, in one form.
@@ -80,7 +92,7 @@ def configured(form: Literal["text", "json"]) -> Iterator[None]:
     As words, what a person should know of; as JSON also a line for each request. Enter it once all that has
     handlers of its own, as Dask does, is imported.
     """
-    handler = logging.StreamHandler()
+    handler = _Stderr()
     handler.setFormatter(Words() if form == "text" else Lines())
     root, own = logging.getLogger(), logging.getLogger("bentray")
     known = [logging.getLogger(name) for name in list(logging.Logger.manager.loggerDict)]

@@ -1,0 +1,94 @@
+"""The log: one object a line, with request and job, without keys, passwords or forged lines."""
+
+import json
+import logging
+
+import pytest
+
+from bentray_service import logs
+from bentray_service.access.token import Token
+from bentray_service.logs import Lines, Words, about
+from bentray_service.storage.keys import Keys
+from bentray_service.storage.tenants import Tenant
+
+log = logging.getLogger("bentray.test")
+
+
+@pytest.fixture
+def lines(capsys):
+    """What was logged, as objects."""
+
+    def read():
+        return [json.loads(line) for line in capsys.readouterr().err.splitlines()]
+
+    with logs.configured("json"):
+        yield read
+
+
+def record(words, *given, **more):
+    return logging.LogRecord("bentray.x", logging.WARNING, "x.py", 1, words, given, None, **more)
+
+
+def test_a_line_says_what_it_is_about(lines):
+    with about(request="r1"), about(job="job-1"):
+        log.info("in %s", "it")
+    log.warning("out")
+    inside, outside = lines()
+    assert (inside["message"], inside["level"], inside["logger"]) == ("in it", "info", "bentray.test")
+    assert (inside["request"], inside["job"]) == ("r1", "job-1")
+    assert "request" not in outside
+
+
+@pytest.mark.parametrize("formatter", [Words(), Lines()])
+def test_no_secret_in_any_line(formatter):
+    token = Token.new()
+    secret = token.shown().rpartition("_")[2]
+    words = f"{token.shown()} at postgresql+psycopg://bentray:p%40ss@db/x"
+    try:
+        raise RuntimeError(words)
+    except RuntimeError as error:
+        shown = formatter.format(
+            logging.LogRecord("x", 40, "x", 1, "%s", (words,), (type(error), error, error.__traceback__))
+        )
+    assert secret not in shown
+    assert "p%40ss" not in shown
+    assert token.id in shown
+    assert "db/x" in shown
+
+
+def test_nobody_forges_a_line():
+    shown = Words().format(record("GET %s", "/x\nWARNING all is well\x1b[2K"))
+    assert len(shown.splitlines()) == 1
+    assert "\x1b" not in shown
+    assert len(Lines().format(record("GET %s", "/x\n{}")).splitlines()) == 1
+
+
+def test_afterwards_all_is_as_before():
+    before = [logging.getLogger(name).handlers[:] for name in (None, "distributed")]
+    with logs.configured("json"):
+        assert [logging.getLogger(name).handlers[:] for name in (None, "distributed")] != before
+    assert [logging.getLogger(name).handlers[:] for name in (None, "distributed")] == before
+
+
+def test_requests_and_jobs_can_be_followed_and_no_key_is_told(
+    start, uploaded, submitted, until, work, lines
+):
+    http, token = start(), Token.new()
+    Keys(http.app.state.parts.database).add(token, Tenant("local"), "one", ("read", "write"))
+    http.app.state.parts.door._no_keys_until = 0.0
+    http.headers["Authorization"] = f"Bearer {token.shown()}"
+    dataset = uploaded(http)
+    work.error = RuntimeError("a fault")
+    job = submitted(http, dataset)
+    until(http, job["id"], "failed")
+    http.get(f"/v1/datasets/{token.shown()}?key={token.shown()}")
+    http.get("/v1/datasets", headers={"X-Request-ID": "bad\tid", "Authorization": "Bearer " + "bentray_x"})
+    told = lines()
+    assert token.shown().rpartition("_")[2] not in json.dumps(told)
+    started = next(one for one in told if one["message"].startswith(f"{job['id']} waits"))
+    answered = next(one for one in told if one.get("route") == "/v1/jobs" and one["method"] == "POST")
+    assert started["request"] == answered["request"]
+    assert (started["job"], answered["status"], answered["who"]) == (job["id"], 202, token.id)
+    failed = next(one for one in told if "a fault" in one.get("error", ""))
+    assert failed["job"] == job["id"]
+    assert all("bad" not in one.get("request", "") for one in told)
