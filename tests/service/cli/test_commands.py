@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 import typer
@@ -12,7 +13,17 @@ from typer.testing import Result
 
 from bentray_service.cli import app
 
-COMMANDS = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+
+def named() -> dict[str, Any]:
+    """Every command by its words, those of groups too, as ``keys create``."""
+    found = {}
+    for name, command in typer.main.get_command(app).commands.items():  # type: ignore[attr-defined]
+        inner = getattr(command, "commands", None)
+        found |= {name: command} if inner is None else {f"{name} {one}": own for one, own in inner.items()}
+    return found
+
+
+COMMANDS = sorted(named())
 
 
 def test_the_commands_of_the_design_are_there() -> None:
@@ -21,17 +32,17 @@ def test_the_commands_of_the_design_are_there() -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_gives_an_example_that_parses(bentray: Callable[..., Result], command: str) -> None:
-    said = bentray(command, "--help")
+    words = command.split()
+    said = bentray(*words, "--help")
     assert said.exit_code == 0
     example = said.stdout.split("Example:")[1].split("\n\n")[0].split("╭")[0].split()
-    assert example[:2] == ["bentray", command]
-    group = typer.main.get_command(app)
-    group.commands[command].make_context(command, list(example[2:]))  # type: ignore[attr-defined]
+    assert example[: len(words) + 1] == ["bentray", *words]
+    named()[command].make_context(command, list(example[len(words) + 1 :]))
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_option_is_explained(command: str) -> None:
-    params = typer.main.get_command(app).commands[command].params  # type: ignore[attr-defined]
+    params = named()[command].params
     assert [param.name for param in params if not param.help] == []
     assert "--json" in [option for param in params for option in param.opts]
 

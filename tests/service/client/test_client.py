@@ -5,6 +5,7 @@ import pytest
 
 from bentray_kernels.eikonal import methods
 from bentray_kernels.errors import InvalidInput
+from bentray_service.access.token import Token
 from bentray_service.client import Client, ClientError
 
 
@@ -101,3 +102,19 @@ def test_nobody_there():
 def test_what_is_no_web_address_is_refused(url):
     with pytest.raises(InvalidInput, match="url: found"):
         Client(url)
+
+
+def test_a_key_is_given_or_in_the_environment(serve, tmp_path, monkeypatch):
+    key = Token.new().shown()
+    (tmp_path / "key").write_text(key)
+    address = serve(first_key_file=tmp_path / "key")
+    with Client(address) as nobody, pytest.raises(ClientError, match="A key is needed") as refusal:
+        nobody.job("job-" + "0" * 20)
+    assert refusal.value.status == 401
+    monkeypatch.setenv("BENTRAY_KEY", key)
+    with Client(address) as client, pytest.raises(ClientError, match="nothing with this id") as unknown:
+        client.job("job-" + "0" * 20)
+    assert key not in str(unknown.value)
+    monkeypatch.delenv("BENTRAY_KEY")
+    with Client(address, key=key) as client, pytest.raises(ClientError, match="nothing with this id"):
+        client.job("job-" + "0" * 20)

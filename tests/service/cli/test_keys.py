@@ -1,0 +1,92 @@
+"""`bentray keys`: a key is shown once, works in a service that runs, and ends when it is revoked."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import Result
+
+from bentray_service.access.token import Token
+
+Run = Callable[..., Result]
+
+
+def made(bentray: Run, data: Path, *words: object) -> dict[str, Any]:
+    result = bentray("keys", "create", "--name", "one", "--data", data, "--json", *words)
+    assert result.exit_code == 0, result.stderr
+    found: dict[str, Any] = json.loads(result.stdout)
+    return found
+
+
+def test_made_listed_and_revoked(bentray: Run, tmp_path: Path) -> None:
+    key = made(bentray, tmp_path, "--tenant", "clinic", "--expires", "90d", "--scopes", "read")
+    assert Token.of(key["key"]) is not None
+    assert (key["tenant"], key["scopes"], key["state"]) == ("clinic", ["read"], "valid")
+    made(bentray, tmp_path)
+    listed = bentray("keys", "list", "--data", tmp_path, "--tenant", "clinic", "--json")
+    assert [one["id"] for one in json.loads(listed.stdout)] == [key["id"]]
+    assert key["key"].rpartition("_")[2] not in listed.stdout
+    table = bentray("keys", "list", "--data", tmp_path).stdout
+    assert "clinic" in table
+    assert "never" in table
+    revoked = bentray("keys", "revoke", key["id"], "--data", tmp_path)
+    assert (revoked.exit_code, revoked.stdout) == (0, f"{key['id']} of clinic is revoked\n")
+    listed = bentray("keys", "list", "--data", tmp_path, "--tenant", "clinic", "--json")
+    assert json.loads(listed.stdout)[0]["state"] == "revoked"
+
+
+def test_only_the_key_is_on_stdout(bentray: Run, tmp_path: Path) -> None:
+    result = bentray("keys", "create", "--name", "one", "--data", tmp_path)
+    assert Token.of(result.stdout.removesuffix("\n")) is not None
+    assert "not shown again" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "field"),
+    [
+        (["create", "--name", "a", "--tenant", "../x"], "tenant"),
+        (["create", "--name", "a", "--scopes", "read,admin"], "scopes"),
+        (["create", "--name", "a", "--expires", "soon"], "expires"),
+        (["create", "--name", "a\nb"], "name"),
+        (["create", "--name", ""], "name"),
+        (["revoke", "0" * 12], "key"),
+    ],
+)
+def test_what_is_wrong_is_named(bentray: Run, tmp_path: Path, words: list[str], field: str) -> None:
+    result = bentray("keys", *words, "--data", tmp_path)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"bentray: {field}: found ")
+
+
+def test_a_service_that_runs_knows_it(
+    bentray: Run, start: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bentray_service.access.door.NO_KEYS_S", 0.0)
+    http, data = start(), tmp_path / "data"
+    assert http.get("/v1/access").json()["how"] == "open"
+    key = made(bentray, data, "--tenant", "clinic")
+    auth = {"Authorization": f"Bearer {key['key']}"}
+    assert http.get("/v1/access").status_code == 401
+    seen = http.get("/v1/access", headers=auth).json()
+    assert (seen["tenant"], seen["who"], seen["bytes_stored"]) == ("clinic", key["id"], 0)
+    assert seen["requests_per_minute"] == 1200
+    assert http.get("/v1/datasets", headers=auth).status_code == 200
+    bentray("keys", "revoke", key["id"], "--data", data)
+    assert http.get("/v1/datasets", headers=auth).status_code == 401
+    told = bentray("audit", "--data", data, "--tenant", "clinic", "--json")
+    assert [(one["route"], one["who"]) for one in json.loads(told.stdout)] == [("/v1/datasets", key["id"])]
+    assert json.loads(bentray("audit", "--data", data, "--since", "2999-01-01", "--json").stdout) == []
+    assert "/v1/datasets" in bentray("audit", "--data", data, "--last", 1).stdout
+
+
+def test_an_audit_of_nothing(bentray: Run, tmp_path: Path) -> None:
+    assert bentray("audit", "--data", tmp_path / "gone").stderr.startswith("bentray: data_dir: found ")
+    made(bentray, tmp_path)
+    assert bentray("audit", "--data", tmp_path, "--since", "today").stderr.startswith(
+        "bentray: since: found "
+    )
+    assert json.loads(bentray("audit", "--data", tmp_path, "--json").stdout) == []
