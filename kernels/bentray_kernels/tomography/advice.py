@@ -17,7 +17,7 @@ from . import pairs
 from .chains import Chain, Gathering, Scan, cut
 from .gauss_newton import look
 from .linearisation import Rows
-from .result import Trial
+from .result import Reconstruction, Trial
 from .settings import Settings
 from .stages import stages
 
@@ -228,6 +228,11 @@ def reason(trials: Sequence[Trial]) -> str:
     if trials[0].held_out_rms_s > best:
         why += f"; bent rays must be {100.0 * (1.0 - CLEARLY):.0f} % better"
     return f"auto chose {told[0]} ({why}); the others: {', '.join(told[1:])}"
+
+
+def told(result: Reconstruction) -> str:
+    """What ``reason`` says of a result, and what waves gave or would; empty where nothing was tried."""
+    return "; ".join(part for part in (reason(result.trials), result.provenance.get("waveform", "")) if part)
 
 
 def _named(changes: dict[str, Any]) -> str:

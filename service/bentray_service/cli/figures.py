@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.acquisition.dataset import Dataset, Truth
 from bentray_kernels.tomography import Reconstruction
-from bentray_kernels.tomography.advice import reason
+from bentray_kernels.tomography.advice import told
 from bentray_workers.comparison import NotComparable, compare
 from bentray_workers.images.residuals import within
 
@@ -48,7 +48,7 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         ),
         "history": [asdict(sweep) for sweep in result.history],
         "recovery_mean": _recovery_mean(result),
-        "reason": reason(result.trials),
+        "reason": told(result),
         "trials": [asdict(trial) for trial in result.trials],
         "truth": None if dataset.truth is None else errors(result, dataset.truth, dataset.roi),
         "settings": result.settings.to_dict(),

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from pydantic import TypeAdapter
 
-from bentray_kernels.tomography.advice import reason
+from bentray_kernels.tomography.advice import told
 from bentray_kernels.tomography.result import Progress, Reconstruction
 from bentray_kernels.tomography.settings import Settings
 from bentray_workers import geometry_field, slices
@@ -179,7 +179,7 @@ def _describe(result: Reconstruction) -> Row:
         "origin_m": [finite(value) for value in result.origin_m],
         "speed_range_mps": [float(result.speed.min()), float(result.speed.max())],
         "water_speed_mps": float(result.water_speed_mps),
-        "provenance": {**result.provenance, **({"advice": reason(result.trials)} if result.trials else {})},
+        "provenance": {**result.provenance, **({"advice": told(result)} if result.trials else {})},
     }
 
 

@@ -103,7 +103,7 @@ def _to_3(connection: Connection) -> None:
         "lease_owner VARCHAR(64)",
         "lease_until FLOAT",
         "plan JSON",
-        "advice VARCHAR(1000)",
+        "advice VARCHAR(2000)",
         "mesh_id VARCHAR(32)",
         "field_id VARCHAR(32)",
     ):

@@ -85,7 +85,7 @@ jobs = Table(
     Column("error", JSON(none_as_null=True)),
     # How a reconstruction was to be cut into tasks, and what ``auto`` chose once it has.
     Column("plan", JSON(none_as_null=True)),
-    Column("advice", String(1000)),
+    Column("advice", String(2000)),
     Column("created", Float, nullable=False),
     Column("started", Float),
     Column("finished", Float),

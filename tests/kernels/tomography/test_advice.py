@@ -10,7 +10,16 @@ from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings, Trial, reconstruct
-from bentray_kernels.tomography.advice import CANDIDATES, choose, noise_of, part_of, reason, stopped, tried
+from bentray_kernels.tomography.advice import (
+    CANDIDATES,
+    choose,
+    noise_of,
+    part_of,
+    reason,
+    stopped,
+    told,
+    tried,
+)
 from bentray_kernels.tomography.gauss_newton import look
 from bentray_kernels.tomography.reconstruction import Here
 
@@ -128,6 +137,15 @@ def test_trials_are_coarser_and_speed_alone():
         assert not plan.attenuation
         assert plan.method == changes["method"]
     assert {plan.nodes for plan in tried(PLAN)} == {48}
+
+
+def test_what_is_told_of_a_result_are_rays_and_waves(scan):
+    result = reconstruct(scan, replace(PLAN, method="sart", sweeps=1))
+    assert told(result) == ""
+    chosen = replace(result, trials=(trial("straight", 1e-7), trial("curved", 2e-7)))
+    assert told(chosen) == reason(chosen.trials)
+    both = replace(chosen, provenance={**result.provenance, "waveform": "method waveform is advised"})
+    assert told(both) == f"{reason(chosen.trials)}; method waveform is advised"
 
 
 def test_the_reason_names_what_differs():

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction
-from bentray_kernels.tomography.advice import reason
+from bentray_kernels.tomography.advice import told
 
 from ..comparison import Comparison, NotComparable, compare
 from .canvas import drawing, new_figure, to_png
@@ -155,8 +155,8 @@ def _sheet(result: Reconstruction, k: int, own: int) -> tuple[Figure, Iterator[A
     rows, columns = next(grid for most, grid in GRIDS.items() if count <= most)
     figure = new_figure(PANEL_IN[0] * columns, PANEL_IN[1] * rows + 0.6)
     figure.suptitle(f"Sound speed{which_slice(result, k)}")
-    told = textwrap.wrap(reason(result.trials), int(CHARACTERS_AN_INCH * figure.get_figwidth()))
-    figure.supxlabel("\n".join([facts(result), *told]), fontsize=8, color="#666666")
+    words = textwrap.wrap(told(result), int(CHARACTERS_AN_INCH * figure.get_figwidth()))
+    figure.supxlabel("\n".join([facts(result), *words]), fontsize=8, color="#666666")
     panels = figure.subplots(rows, columns).ravel()
     for blank in panels[count:]:
         blank.remove()
