@@ -17,7 +17,10 @@ curl -H 'Content-Type: application/json' http://127.0.0.1:8000/v1/jobs \\
 
 curl http://127.0.0.1:8000/v1/jobs/job-…
 
-curl -o slice.png http://127.0.0.1:8000/v1/volumes/vol-…/slice.png"""
+curl -o slice.png http://127.0.0.1:8000/v1/volumes/vol-…/slice.png
+
+# Where a key is asked for, every request but those of /health brings it:
+curl -H "Authorization: Bearer $BENTRAY_KEY" http://127.0.0.1:8000/v1/access"""
 
 
 # What FastAPI writes where a route says nothing.
