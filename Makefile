@@ -10,7 +10,7 @@ PORT ?= 8000
 NAME ?= reconstruction
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help install install-dev demo test serve lint bench lock clean
+.PHONY: help install install-dev demo test serve lint docs bench lock clean
 
 help: ## list the targets
 	@echo "Bentray: make TARGET"
@@ -34,6 +34,10 @@ lint: install-dev ## check style, types and the import rules
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 
+docs: .venv/.installed-docs ## build the pages of docs/ into build/docs; a warning is an error
+	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+	@echo "The documentation: build/docs/index.html"
+
 bench: install ## run benchmarks/NAME.py; NAME=reconstruction ARGS=--quick
 	@mkdir -p build/bench
 	@$(BIN)/bentray bench $(NAME) $(ARGS) --json build/bench/$(NAME).json
@@ -42,6 +46,7 @@ lock: ## compile the lock files anew (needs uv on the PATH)
 	@command -v uv >/dev/null || { echo "make lock needs uv: pip install uv" >&2; exit 1; }
 	$(call compile,requirements.lock,--extra build --extra postgres pyproject.toml)
 	$(call compile,requirements-dev.lock,--extra build --extra postgres --extra test --extra lint -c requirements.lock pyproject.toml)
+	$(call compile,requirements-docs.lock,--extra build --extra postgres --extra docs -c requirements-dev.lock pyproject.toml)
 	$(call compile,requirements-generator.lock,--group generator)
 
 clean: ## remove what was built or written here, .venv too
@@ -73,4 +78,9 @@ endef
 .venv/.installed-dev: requirements-dev.lock .venv/.installed
 	@echo "Installing the tools for tests and checks"
 	@$(BIN)/pip install -qq --require-hashes -r requirements-dev.lock
+	@touch $@
+
+.venv/.installed-docs: requirements-docs.lock .venv/.installed
+	@echo "Installing what builds the documentation"
+	@$(BIN)/pip install -qq --require-hashes -r requirements-docs.lock
 	@touch $@

@@ -1,0 +1,188 @@
+"""Make the pictures of the documentation anew: `.venv/bin/python docs/pictures.py [NAME …]`, a few minutes.
+
+`demo.png` is that of `make demo`. That of the page needs Debian's Chromium.
+"""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import trimesh
+from matplotlib.figure import Figure
+from PIL import Image
+
+from bentray_kernels import eikonal, rays
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.tomography import Settings, reconstruct
+from bentray_service.cli.service_process import running_service
+from bentray_service.client import Client
+from bentray_workers.dataset_file import write_dataset
+from bentray_workers.simulation import SimulationSettings, simulate
+
+FOLDER = Path(__file__).parent / "pictures"
+CHROMIUM = Path("/usr/bin/chromium")
+BENTRAY = [sys.executable, "-m", "bentray_service.cli"]
+MM = 1e3
+# Bytes; the repository takes no file of more than 300,000.
+LARGE = 250_000
+
+
+def fronts() -> Image.Image:
+    """The speed of the phantom with wave fronts and rays: in its fat's water, and in a faster one."""
+    figure, axes = plt.subplots(1, 2, figsize=(10, 4.9), layout="constrained")
+    nodes, half = 256, TABLE6_SIDE_M / 2
+    spacing = TABLE6_SIDE_M / (nodes - 1)
+    angle = np.radians(np.linspace(110, 250, 29))
+    receivers = half + 0.092 * np.column_stack((np.cos(angle), np.sin(angle)))
+    source = np.array([half + 0.092, half])
+    for ax, coupling in zip(axes, (1375.0, 1500.0), strict=True):
+        speed = table6(coupling).speed(nodes, TABLE6_SIDE_M)
+        time = eikonal.solve(speed, spacing, source)
+        extent = (-half * MM, half * MM, -half * MM, half * MM)
+        shown = ax.imshow(speed.T, origin="lower", extent=extent, cmap="Blues_r", vmin=1350, vmax=1570)
+        ax.contour(time.T * 1e6, levels=np.arange(5, 150, 5), extent=extent, colors="white", linewidths=0.6)
+        for path in rays.trace(time, spacing, receivers, source):
+            ax.plot(*((path - half) * MM).T, color="#d1495b", linewidth=0.9)
+        ax.plot(0.092 * MM, 0, "o", color="black", markersize=5)
+        ax.set(title=f"water of {coupling:g} m/s", xlabel="x (mm)", ylabel="y (mm)")
+    figure.colorbar(shown, ax=axes, label="speed of sound (m/s)", shrink=0.85)
+    return _drawn(figure)
+
+
+def coupling() -> Image.Image:
+    """The phantom in water of four speeds, and its images by straight and by bent rays."""
+    waters = (1375.0, 1425.0, 1475.0, 1500.0)
+    figure, axes = plt.subplots(3, 4, figsize=(10, 7.8), layout="constrained")
+    ways = {"straight rays": Settings(rays="straight", nodes=96), "bent rays": Settings(nodes=96)}
+    for column, water in zip(axes.T, waters, strict=True):
+        scan = simulate(None, SimulationSettings(nodes=96, elements=128, coupling_mps=water), lambda _: None)
+        assert scan.truth is not None
+        images = {"truth": scan.truth.sound_speed_mps}
+        images |= {name: reconstruct(scan, settings).speed for name, settings in ways.items()}
+        column[0].set_title(f"water {water:g} m/s")
+        for ax, (name, image) in zip(column, images.items(), strict=True):
+            shown = ax.imshow(image.T, origin="lower", vmin=1350, vmax=1570)
+            ax.set(xticks=[], yticks=[])
+            if water == waters[0]:
+                ax.set_ylabel(name)
+    figure.colorbar(shown, ax=axes, label="speed of sound (m/s)", shrink=0.6)
+    return _drawn(figure)
+
+
+def fresnel() -> Image.Image:
+    """Width of the first Fresnel zone over the frequency."""
+    figure, ax = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
+    frequency = np.geomspace(0.2e6, 5e6, 200)
+    for length, colour in ((0.2, "#1d6996"), (0.1, "#73a5c6")):
+        width = np.sqrt(1500.0 / frequency * length)
+        ax.plot(frequency / 1e6, width * MM, color=colour, label=f"path of {length * MM:g} mm")
+    ax.set_xscale("log", base=10)
+    ax.set_xticks([0.2, 0.5, 1, 2, 5], ["0.2", "0.5", "1", "2", "5"])
+    ax.minorticks_off()
+    ax.set(xlabel="frequency (MHz)", ylabel="width of the zone (mm)", ylim=(0, 40))
+    ax.grid(alpha=0.3)
+    ax.legend(frameon=False)
+    return _drawn(figure)
+
+
+def glass() -> Image.Image:
+    """Two phantoms as glass and one lit."""
+    views = (
+        ("--phantom", "sphere", "--index", "1.2"),
+        ("--phantom", "two-holes", "--index", "1.3", "--backdrop", "picture"),
+        ("--phantom", "two-holes", "--mode", "shaded"),
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        return _beside([_rendered(Path(folder) / f"{n}.png", *view) for n, view in enumerate(views)])
+
+
+def mesh() -> Image.Image:
+    """A torus as glass, as a mirror, and laid out on a square."""
+    with tempfile.TemporaryDirectory() as folder:
+        torus, made = Path(folder) / "torus.ply", Path(folder) / "made"
+        shape = trimesh.creation.torus(1.0, 0.4, major_sections=96, minor_sections=48)
+        shape.apply_transform(trimesh.transformations.rotation_matrix(0.6, (1, 0, 0)))
+        shape.export(torus)
+        pictures = []
+        for mode in ("refract", "reflect"):
+            line = ["geometry-field", torus, "-o", made, "--mode", mode, "--rays", 2]
+            _run(*line, "--width", 320, "--height", 320)
+            pictures.append(_opened(made / "image.png"))
+        return _beside([*pictures, _opened(made / "geometry-image.png").resize((320, 320))])
+
+
+def viewer() -> Image.Image:
+    """The page of a service with one job that is done."""
+    from playwright.sync_api import sync_playwright
+
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        scan = Path(folder) / "phantom.h5"
+        settings = SimulationSettings(nodes=96, elements=64, coupling_mps=1375.0)
+        write_dataset(scan, simulate(None, settings, lambda _: None))
+        with running_service(Path(folder) / "data", Path(folder) / "log") as url, Client(url) as client:
+            client.wait(client.submit(client.upload(scan)["id"], {"nodes": 96})["id"])
+            browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+            page = browser.new_page(viewport={"width": 1100, "height": 560})
+            page.goto(url)
+            page.get_by_text("succeeded").first.wait_for()
+            image = page.locator("#jobs img").first
+            image.scroll_into_view_if_needed()
+            page.wait_for_function("one => one.complete && one.naturalWidth > 0", arg=image.element_handle())
+            shot = page.screenshot()
+            browser.close()
+    return Image.open(io.BytesIO(shot))
+
+
+def _run(*words: object) -> None:
+    subprocess.run([*BENTRAY, *map(str, words)], check=True, stdout=subprocess.DEVNULL)  # noqa: S603
+
+
+def _rendered(path: Path, *words: str) -> Image.Image:
+    _run("render", "-o", path, "--width", 320, "--height", 320, *words)
+    return _opened(path)
+
+
+def _opened(path: Path) -> Image.Image:
+    with Image.open(path) as image:
+        return image.convert("RGB")
+
+
+def _beside(images: list[Image.Image]) -> Image.Image:
+    """Pictures of one size in a row."""
+    row = Image.new("RGB", (sum(one.width for one in images), images[0].height))
+    for n, one in enumerate(images):
+        row.paste(one, (n * one.width, 0))
+    return row
+
+
+def _drawn(figure: Figure) -> Image.Image:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, dpi=110)
+    plt.close(figure)
+    return Image.open(buffer)
+
+
+PICTURES: dict[str, Callable[[], Image.Image]] = {
+    one.__name__: one for one in (fronts, coupling, fresnel, glass, mesh, viewer)
+}
+
+
+def main(names: list[str]) -> None:
+    """Make those named, or all; of a large one fewer colours."""
+    FOLDER.mkdir(exist_ok=True)
+    for name in names or PICTURES:
+        picture, file = PICTURES[name]().convert("RGB"), FOLDER / f"{name}.png"
+        picture.save(file, optimize=True)
+        if file.stat().st_size > LARGE:
+            picture.quantize(256, dither=Image.Dither.NONE).save(file, optimize=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
