@@ -1,0 +1,37 @@
+"""Travel times that an ideal picker would read: of wave fronts through the truth itself."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates, zoom
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.eikonal import solve
+
+# Nodes along a side of the truth, at least; and water that is put around it for the ring.
+LEAST_NODES = 400
+
+
+def ideal(dataset: Dataset) -> NDArray[np.float64]:
+    """(ntx, nrx), s, object minus water; both by the same solver, so that most of its error cancels."""
+    assert dataset.truth is not None
+    speed, spacing = dataset.truth.sound_speed_mps, dataset.truth.spacing_m[0]
+    factor = max(1, -(-LEAST_NODES // len(speed)))
+    speed = zoom(speed, factor, order=1, grid_mode=False)
+    spacing *= (len(dataset.truth.sound_speed_mps) - 1) / (len(speed) - 1)
+    origin = np.array(dataset.truth.origin_m)
+    reach = np.abs(dataset.element_position_m).max()
+    room = max(0, int(np.ceil((reach - np.abs(origin).min()) / spacing))) + 4
+    speed = np.pad(speed, room, constant_values=dataset.water_speed_mps)
+    places = dataset.element_position_m - (origin - room * spacing)
+    water = np.full_like(speed, dataset.water_speed_mps)
+    heard = places[dataset.rx].T / spacing
+    found = np.empty((len(dataset.tx), len(dataset.rx)))
+    for k, emitter in enumerate(dataset.tx):
+        times = [
+            map_coordinates(solve(medium, spacing, places[emitter]), heard, order=1)
+            for medium in (speed, water)
+        ]
+        found[k] = times[0] - times[1]
+    return found

@@ -1,0 +1,23 @@
+"""From raw traces to images: the rows of the targets that begin with what an array recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import _acquisition_picking
+import _acquisition_waveform
+
+from bentray_service.cli.row import Row
+from bentray_service.cli.terminal import Step
+
+# Each gives the rows of one part.
+MAKERS: tuple[Callable[[bool, Step], Iterable[Row]], ...] = (
+    _acquisition_picking.rows,
+    _acquisition_waveform.rows,
+)
+
+
+def rows(quick: bool, progress: Step) -> Iterable[Row]:
+    """All parts, one after the other."""
+    for maker in MAKERS:
+        yield from maker(quick, progress)

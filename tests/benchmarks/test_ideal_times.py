@@ -1,0 +1,31 @@
+"""Ideal times: those of an independent, finer solver of the same phantom, on truths coarse and fine."""
+
+import numpy as np
+import pytest
+from _ideal_times import ideal
+
+from bentray_kernels.acquisition import Dataset, Truth
+from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+
+ELEMENTS = 12
+
+
+@pytest.mark.parametrize(("nodes", "radius_m"), [(160, 0.09), (160, 0.102)])
+def test_they_are_those_of_the_phantom(nodes, radius_m):
+    """The wider ring lies beyond the truth, in water that is put around it."""
+    phantom, everyone = table6(1450.0), np.arange(ELEMENTS)
+    ring = Ring(ELEMENTS, radius_m)
+    side = max(TABLE6_SIDE_M, 2.05 * radius_m)
+    expected = TravelTimeScan(phantom, ring, side, nodes=nodes).delta_tof(everyone)
+    spacing = TABLE6_SIDE_M / (nodes - 1)
+    truth = Truth(
+        phantom.speed(nodes, TABLE6_SIDE_M), (spacing, spacing), (-0.5 * TABLE6_SIDE_M, -0.5 * TABLE6_SIDE_M)
+    )
+    dataset = Dataset(ring.positions(), everyone, everyone, 1450.0, delta_tof_s=expected, truth=truth)
+    found = ideal(dataset)
+    far = dataset.distance_m() > 0.05
+    wrong = (found - expected)[far]
+    assert np.sqrt((wrong**2).mean()) < 0.2 * np.sqrt((expected[far] ** 2).mean())
+    assert np.abs(wrong).max() < 3e-7
+    assert np.abs(expected[far]).max() > 1e-6
