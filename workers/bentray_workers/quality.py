@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.quality import examine
+from bentray_kernels.acquisition.calibration import Calibration, calibrate, water_times
+from bentray_kernels.acquisition.quality import Report, corrected, examine
 from bentray_kernels.errors import InvalidInput
 
 from .dataset_file import Limits, read_dataset
@@ -25,15 +26,41 @@ class Quality:
         report: plain values for JSON, see ``acquisition.quality.Report``.
         page: PNG about the slice with the most findings.
         picked: what goes on, with travel times; None for a refused scan.
+        examined: the report as it was made.
     """
 
     report: dict[str, Any]
     page: bytes
     picked: Dataset | None
+    examined: Report
 
 
 # Traces that a task examines while somebody waits, bytes; corrections make copies of them.
 LARGEST_BYTES = 2**30
+
+
+def calibrate_file(path: Path, picker: str, *, fit_speed: bool) -> tuple[Quality, Calibration | None]:
+    """Examine a dataset file, and calibrate its array from the water shot of its first slice.
+
+    Args:
+        path: of the file.
+        picker: what reads times that are not there.
+        fit_speed: whether the size of the array is trusted more than the speed of the water.
+
+    Returns:
+        The examination, ``picked`` with the elements and the water of the calibration; and this, None for a
+        refused scan.
+
+    Raises:
+        InvalidInput: as ``examine_file``, and for a scan without a water shot.
+    """
+    dataset = read_dataset(path)
+    quality = _examined(dataset, picker)
+    if quality.picked is None:
+        return quality, None
+    right = corrected(dataset, quality.examined).slice(0)
+    found = calibrate(right, water_times(right), fit_speed=fit_speed)
+    return replace(quality, picked=found.applied(quality.picked)), found
 
 
 def examine_file(path: Path, picker: str = "aic", largest_bytes: int | None = None) -> Quality:
@@ -49,11 +76,15 @@ def examine_file(path: Path, picker: str = "aic", largest_bytes: int | None = No
     """
     if largest_bytes is not None:
         _check_size(path, largest_bytes)
-    dataset = read_dataset(path)
+    return _examined(read_dataset(path), picker)
+
+
+def _examined(dataset: Dataset, picker: str) -> Quality:
     examined = examine(dataset, picker)
     of_slices = [f.slice for f in examined.report.findings]
     worst = max(set(of_slices), key=of_slices.count, default=0)
-    return Quality(examined.report.to_dict(), quality_png(dataset, examined, worst), examined.picked)
+    page = quality_png(dataset, examined, worst)
+    return Quality(examined.report.to_dict(), page, examined.picked, examined.report)
 
 
 def quality_report(path: Path, picker: str) -> dict[str, Any]:

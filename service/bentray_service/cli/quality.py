@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,16 +14,32 @@ from .paths import input_file, output_folder
 from .terminal import AsJson, print_json, print_lines, print_table
 
 
+class Water(StrEnum):
+    """What a calibration does with the speed of the water."""
+
+    stated = "stated"
+    fitted = "fitted"
+
+
 def quality(
     file: Annotated[Path, typer.Argument(help="Dataset file (HDF5, format uct-transmission).")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the report; made if absent.")],
     picker: Annotated[str, typer.Option(help="How times are read from raw traces.")] = "aic",
+    calibrate: Annotated[
+        Water | None,
+        typer.Option(
+            help="Fit positions and delays to the water shot: with the water's speed as stated, or fitted, "
+            "the size of the array as drawn.",
+            show_default="no calibration",
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Examine a scan: OUTPUT/quality.json and .png say what was found, picked.h5 is what goes on.
 
     Dead elements, swapped and inverted channels, wrong time zeros, cycle jumps, outliers and the like are
     named, and left out or corrected in picked.h5. A scan that must not be used ends with exit code 1.
+    With --calibrate there is calibration.json as well, and picked.h5 has the fitted positions and water.
 
     Example:  bentray quality scan.h5 -o report
     """
@@ -30,13 +47,21 @@ def quality(
 
     from bentray_workers.atomic import write_bytes
     from bentray_workers.dataset_file import write_dataset
-    from bentray_workers.quality import examine_file
+    from bentray_workers.quality import calibrate_file, examine_file
 
-    found = examine_file(source, picker)
+    calibration = None
+    if calibrate is None:
+        found = examine_file(source, picker)
+    else:
+        found, calibration = calibrate_file(source, picker, fit_speed=calibrate is Water.fitted)
     paths = {kind: folder / f"quality.{kind}" for kind in ("json", "png")}
     if found.picked is not None:
         paths["h5"] = folder / "picked.h5"
         write_dataset(paths["h5"], found.picked)
+    if calibration is not None:
+        paths["calibration"] = folder / "calibration.json"
+        fitted = json.dumps(calibration.to_dict(), indent=2, allow_nan=False) + "\n"
+        write_bytes(paths["calibration"], fitted.encode())
     told: dict[str, Any] = {
         "file": str(source),
         **found.report,

@@ -55,3 +55,33 @@ def test_an_unknown_picker_is_bad_input(bentray: Callable[..., Result], tmp_path
     result = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out", "--picker", "eye")
     assert result.exit_code == 2
     assert "one of aic, threshold" in " ".join(result.stderr.split())
+
+
+def test_a_calibration_puts_the_elements_where_the_water_shot_has_them(
+    bentray: Callable[..., Result], tmp_path: Path
+) -> None:
+    drawn = scan(blob_delay(24), elements=24, noise=0.01)
+    # The drawing is wrong, the traces are right.
+    wrong = 3e-4 * np.random.default_rng(2).standard_normal((24, 2))
+    wrong -= wrong.mean(axis=0)
+    write_dataset(tmp_path / "scan.h5", replace(drawn, element_position_m=drawn.element_position_m + wrong))
+    result = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out", "--calibrate", "stated")
+    assert result.exit_code == 0
+    told = json.loads((tmp_path / "out" / "calibration.json").read_text())
+    assert told["water_speed_mps"] == drawn.water_speed_mps
+    assert 0.0 < np.median(told["position_sigma_m"]) < 3e-5
+    found = read_dataset(tmp_path / "out" / "picked.h5").element_position_m
+    np.testing.assert_array_equal(found, told["element_position_m"])
+    off = found - drawn.element_position_m
+    turn = np.column_stack((-drawn.element_position_m[:, 1], drawn.element_position_m[:, 0]))
+    off -= off.mean(axis=0)
+    off -= turn * (off * turn).sum() / (turn * turn).sum()
+    assert np.sqrt((off**2).mean()) < 0.2 * np.sqrt((wrong**2).mean())
+
+
+def test_a_calibration_needs_a_water_shot(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    times = replace(scan(elements=16), waveform=None, delta_tof_s=blob_delay(16))
+    write_dataset(tmp_path / "scan.h5", times)
+    result = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out", "--calibrate", "fitted")
+    assert result.exit_code == 2
+    assert "waveform/object: found no traces" in result.stderr

@@ -136,9 +136,18 @@ def _of_traces(dataset: Dataset) -> tuple[list[Finding], Dataset, Floats | None]
         findings += broken(dataset, measures, which, left_out)
         findings += clipped(dataset, measures, which)
     dataset = apply(dataset, findings)
-    if strongest is not None and dataset.valid is not None:
-        strongest = np.where(dataset.valid, strongest, np.nan)
-    return findings, dataset, strongest
+    return findings, dataset, None if strongest is None else _masked(dataset, strongest)
+
+
+def _crests(dataset: Dataset) -> Floats:
+    """(ntx, nrx), s: crests of the water's pulses; NaN where a pair is left out."""
+    assert dataset.waveform is not None
+    assert dataset.waveform.water is not None
+    return _masked(dataset, Measures.of(dataset.waveform.water, dataset).strongest_s)
+
+
+def _masked(dataset: Dataset, times: Floats) -> Floats:
+    return times if dataset.valid is None else np.where(dataset.valid, times, np.nan)
 
 
 def _of_water(dataset: Dataset, strongest: Floats) -> tuple[list[Finding], Dataset]:
@@ -153,7 +162,10 @@ def _of_water(dataset: Dataset, strongest: Floats) -> tuple[list[Finding], Datas
         return findings, dataset
     exchanged = swapped(dataset, strongest, line)
     dataset = apply(dataset, exchanged)
-    inverted = polarity(dataset, line)
+    if exchanged:
+        # Of the channels in their places.
+        strongest = _crests(dataset)
+    inverted = polarity(dataset, strongest)
     started = recording(dataset, line)
     return exchanged + inverted + started, apply(dataset, inverted + started)
 

@@ -9,26 +9,25 @@ import numpy as np
 from ...arrays import Floats
 from ..dataset import Dataset
 from .finding import Finding, Role
-from .water_line import WaterLine
 
-# Periods before and after the strongest swing's time that are compared.
+# Periods before and after the crest of the envelope that are compared.
 REACH = 1.0
 
 # Part of an element's pulses that must be upside down.
 MOST = 0.6
 
 
-def polarity(dataset: Dataset, line: WaterLine) -> list[Finding]:
+def polarity(dataset: Dataset, strongest_s: Floats) -> list[Finding]:
     """Elements to turn over, in emission and in reception.
 
-    Pulses are compared at the straight time and the common delay, where another cycle does not pass for an
-    inverted one.
+    Pulses are compared about the crests of their envelopes: these do not turn over with the pulse, and move
+    with an element that stands elsewhere than drawn.
 
     Args:
         dataset: of one slice, with water traces, channels in their places, and a centre frequency.
-        line: through its water times.
+        strongest_s: (ntx, nrx), times of the crests; NaN where there is none.
     """
-    sign = _signs(dataset, line)
+    sign = _signs(dataset, strongest_s)
     findings = []
     # An inverted receiver must not turn the emitters over, so both are found in turn.
     emission, reception = np.ones(len(dataset.tx)), np.ones(len(dataset.rx))
@@ -57,7 +56,7 @@ def polarity(dataset: Dataset, line: WaterLine) -> list[Finding]:
     return findings
 
 
-def _signs(dataset: Dataset, line: WaterLine) -> Floats:
+def _signs(dataset: Dataset, strongest_s: Floats) -> Floats:
     """(ntx, nrx): likeness with the median pulse, from -1 to 1; NaN where there is no pulse to compare."""
     assert dataset.waveform is not None
     assert dataset.waveform.water is not None
@@ -65,14 +64,15 @@ def _signs(dataset: Dataset, line: WaterLine) -> Floats:
     assert dataset.center_frequency_hz is not None
     period = dataset.sampling_rate_hz / dataset.center_frequency_hz
     reach = math.ceil(REACH * period)
-    place = dataset.distance_m() / dataset.water_speed_mps + line.intercept_s - dataset.t0_s
+    # Traces without a crest are not compared; any place will do.
+    place = np.where(np.isfinite(strongest_s), strongest_s, dataset.t0_s) - dataset.t0_s
     place *= dataset.sampling_rate_hz
     nt = dataset.waveform.water.shape[-1]
     pieces = np.full((*place.shape, 2 * reach + 1), np.nan)
     steps = np.arange(-reach, reach + 1)
     for e in range(len(place)):
         at = place[e][:, None] + steps
-        inside = (at[:, 0] >= 0.0) & (at[:, -1] <= nt - 2) & np.isfinite(line.residual_s[e])
+        inside = (at[:, 0] >= 0.0) & (at[:, -1] <= nt - 2) & np.isfinite(strongest_s[e])
         low = np.clip(np.floor(at).astype(np.int64), 0, nt - 2)
         trace = np.array(dataset.waveform.water[e], dtype=np.float64)
         trace[~np.isfinite(trace).all(axis=1)] = 0.0

@@ -229,6 +229,12 @@ def test_an_eccentricity_of_a_millimetre_is_no_false_fault():
     assert examined.picked is not None
 
 
+def test_random_errors_of_the_drawing_are_no_false_fault():
+    off = 3e-4 * np.random.default_rng(2).standard_normal((ELEMENTS, 2))
+    examined = examine(replace(clean(), element_position_m=clean().element_position_m + off))
+    assert not set(names(examined)) & {"dead elements", "swapped channels", "polarity", "sampling rate"}
+
+
 def test_slices_are_examined_one_by_one():
     damaged = with_traces(lambda o, w: (o, np.where(np.arange(ELEMENTS)[:, None, None] == 5, -w, w)))
     broken = replace(
