@@ -56,9 +56,9 @@ def test_units(tmp_path, more, spacing):
 def test_each_axis_has_its_own_unit(tmp_path):
     fields = PLAIN + 'spacings: 1 2 3\nunits: "mm" "m" "cm"\n'
     np.testing.assert_allclose(import_volume(write(tmp_path / "v", fields)).spacing_m, (1e-3, 2.0, 3e-2))
-    turned = "space dimension: 3\nspace directions: (0,2,0) (3,0,0) (3,0,4)\nspace origin: (1,1,1)\n"
+    turned = "space dimension: 3\nspace directions: (0,2,0) (3,0,0) (0,0,4)\nspace origin: (1,1,1)\n"
     volume = import_volume(write(tmp_path / "v", PLAIN + turned + 'space units: "mm" "m" "mm"\n'))
-    np.testing.assert_allclose(volume.spacing_m, (2.0, 3e-3, 5e-3))
+    np.testing.assert_allclose(volume.spacing_m, (3e-3, 2.0, 4e-3))
     np.testing.assert_allclose(volume.origin_m, (1e-3, 1.0, 1e-3))
 
 
@@ -123,3 +123,26 @@ def test_a_damaged_header_is_read_or_refused_and_nothing_else(tmp_path, text, pl
     fields = PLAIN[:place] + text + PLAIN[place:]
     with suppress(InvalidInput):
         assert import_volume(write(tmp_path / "v", fields)).values.ndim == 3
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1), (1, 0, 2)])
+@pytest.mark.parametrize("sense", [(1, 1, 1), (-1, 1, 1), (-1, -1, 1), (1, -1, -1)])
+def test_axes_in_any_order_and_sense_are_the_same_volume(tmp_path, order, sense):
+    plain = ramp()
+    steps, origin = np.array([0.5, 1.0, 2.0]), np.array([1.0, 2.0, 3.0])
+    last = (np.array(plain.shape) - 1) * steps
+    directions = np.diag(np.array(sense) * steps)[list(order)]
+    start = origin + np.where(np.array(sense) < 0, last, 0.0)
+    stored = plain[tuple(slice(None, None, one) for one in sense)].transpose(order)
+    own = {"space directions": directions, "space origin": start, "space": "left-posterior-superior"}
+    path = tmp_path / "turned.nrrd"
+    nrrd.write(str(path), np.ascontiguousarray(stored), own)
+    volume = import_volume(path)
+    np.testing.assert_array_equal(volume.values, plain)
+    np.testing.assert_allclose(volume.spacing_m, 1e-3 * steps)
+    np.testing.assert_allclose(volume.origin_m, 1e-3 * origin)
+
+
+def test_sheared_axes_are_refused(tmp_path):
+    path = write(tmp_path / "v.nrrd", PLAIN + "space: RAS\nspace directions: (1,0,0) (0.3,1,0) (0,0,1)\n")
+    assert refused(path).field == "space directions"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,8 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 
 from .bounded_reading import LONGEST_HEADER, UNITS_M, ShapeCheck, any_shape, declared, refusing, whole
+from .volume_axes import turned
 from .volume_file import Volume
-
-# Cosine between two axes; rounding of headers leaves far less.
-MOST_SHEAR = 1e-3
 
 # Takes what nibabel says of a header while it checks it: the refusal says the same in one line.
 _unheard = logging.Logger("nibabel's checks, unheard", logging.CRITICAL + 1)
@@ -64,7 +61,7 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
         if (slope or 1.0, intercept or 0.0) != (1.0, 0.0):
             with np.errstate(over="ignore", invalid="ignore"):
                 values = values * np.float32(slope) + np.float32(intercept)
-        values, affine = _turned(values, affine)
+        values, affine = turned(values, affine, "affine")
         scale = UNITS_M["mm" if unit == "unknown" else unit]
         spacing = scale * np.linalg.norm(affine[:3, :3], axis=0)
         return Volume.of(values, spacing.tolist(), (scale * affine[:3, 3]).tolist(), _text(header["descrip"]))
@@ -76,23 +73,6 @@ def _affine(header: Any) -> Floats:
         # Nibabel would mirror x, as another format has it.
         return np.diag([*np.asarray(header["pixdim"][1:4], dtype=np.float64), 1.0])
     return np.asarray(header.get_best_affine(), dtype=np.float64)
-
-
-def _turned(values: NDArray[Any], affine: Floats) -> tuple[NDArray[Any], Floats]:
-    """The same with axes in the order of space; one without directions stays, for ``Volume`` to refuse."""
-    from nibabel.orientations import apply_orientation, inv_ornt_aff, io_orientation
-
-    lengths = np.linalg.norm(affine[:3, :3], axis=0)
-    if values.ndim != 3 or not (np.isfinite(affine).all() and lengths.all()):
-        return values, affine
-    axes = affine[:3, :3] / lengths
-    cosine = float(np.abs(axes.T @ axes - np.eye(3)).max())
-    if cosine > MOST_SHEAR:
-        angle = math.degrees(math.acos(min(cosine, 1.0)))
-        accepted = "axes at right angles; resample the volume on such a grid"
-        raise InvalidInput("affine", f"a sheared grid: axes {angle:.2f} degrees apart", accepted)
-    order = io_orientation(affine)
-    return apply_orientation(values, order), affine @ inv_ornt_aff(order, values.shape)
 
 
 def _text(field: NDArray[Any]) -> str:

@@ -9,9 +9,11 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 
 from .bounded_reading import LONGEST_HEADER, UNITS_M, ShapeCheck, any_shape, declared, refusing, whole
+from .volume_axes import turned
 from .volume_file import Volume
 
 NRRD_TYPES = {
@@ -30,6 +32,8 @@ NRRD_TYPES = {
 
 def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
     """The volume in an NRRD file with its values after the header; raises InvalidInput for anything else.
+
+    Its axes come in the order and the sense of the file's own space.
 
     ``check`` is called with the shape before the values are read.
     """
@@ -68,21 +72,24 @@ def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
         else:
             raise InvalidInput("encoding", repr(encoding), "raw or gzip")
         values = np.frombuffer(data, dtype).reshape(shape, order="F")
-        return Volume.of(values, *_nrrd_grid(header), str(header.get("content", "")))
+        values, affine = turned(values, _affine(header), "space directions")
+        steps = np.linalg.norm(affine[:3, :3], axis=0)
+        return Volume.of(values, steps.tolist(), affine[:3, 3].tolist(), str(header.get("content", "")))
 
 
-def _nrrd_grid(header: Any) -> tuple[list[float], list[float]]:
-    """Spacing and origin, m."""
+def _affine(header: Any) -> Floats:
+    """(4, 4) from nodes to places in the space of the file, m."""
     # Spacings are told in the units of the array's axes, directions and origin in those of space.
     own, space = header.get("units"), header.get("space units")
     around = _metres(space or own)
+    affine = np.eye(4)
     directions = header.get("space directions")
     if directions is None:
-        steps = np.multiply(header.get("spacings", [1.0] * 3), _metres(own or space))
+        affine[:3, :3] = np.diag(np.multiply(header.get("spacings", [1.0] * 3), _metres(own or space)))
     else:
-        steps = np.linalg.norm(directions * around, axis=1)
-    origin = np.multiply(header.get("space origin", [0.0] * 3), around)
-    return steps.tolist(), origin.tolist()
+        affine[:3, :3] = (directions * around).T
+    affine[:3, 3] = np.multiply(header.get("space origin", [0.0] * 3), around)
+    return affine
 
 
 def _metres(names: Sequence[str] | None) -> NDArray[np.float64]:
