@@ -13,8 +13,8 @@ ELEMENTS = 12
 
 @pytest.mark.parametrize(("nodes", "radius_m"), [(160, 0.09), (160, 0.102)])
 def test_they_are_those_of_the_phantom(nodes, radius_m):
-    """The wider ring lies beyond the truth, in water that is put around it."""
-    phantom, everyone = table6(1450.0), np.arange(ELEMENTS)
+    """In water as fast as fat, for steps of edges shape shadows; the wider ring lies beyond the truth."""
+    phantom, everyone = table6(1375.0), np.arange(ELEMENTS)
     ring = Ring(ELEMENTS, radius_m)
     side = max(TABLE6_SIDE_M, 2.05 * radius_m)
     expected = TravelTimeScan(phantom, ring, side, nodes=nodes).delta_tof(everyone)
@@ -22,10 +22,8 @@ def test_they_are_those_of_the_phantom(nodes, radius_m):
     truth = Truth(
         phantom.speed(nodes, TABLE6_SIDE_M), (spacing, spacing), (-0.5 * TABLE6_SIDE_M, -0.5 * TABLE6_SIDE_M)
     )
-    dataset = Dataset(ring.positions(), everyone, everyone, 1450.0, delta_tof_s=expected, truth=truth)
+    dataset = Dataset(ring.positions(), everyone, everyone, 1375.0, delta_tof_s=expected, truth=truth)
     found = ideal(dataset)
     far = dataset.distance_m() > 0.05
-    wrong = (found - expected)[far]
-    assert np.sqrt((wrong**2).mean()) < 0.2 * np.sqrt((expected[far] ** 2).mean())
-    assert np.abs(wrong).max() < 3e-7
+    assert np.abs(found - expected)[far].max() < 1e-7
     assert np.abs(expected[far]).max() > 1e-6
