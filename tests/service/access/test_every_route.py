@@ -201,15 +201,17 @@ def stored(place: Place, beside: str = "") -> dict[str, Any]:
     return {name: value for name, value in found.items() if not beside or not name.startswith(beside)}
 
 
+def single(routes: list[Any]) -> Iterator[Any]:
+    """Every route, also of routers that are in others."""
+    for route in routes:
+        inner = getattr(route, "original_router", None)
+        yield from [route] if inner is None else single(inner.routes)
+
+
 def test_everything_is_described(place: Place) -> None:
     """Guards these tests: what the application routes and does not describe is a page or a HEAD."""
     known = {asked.path for asked in operations(place)}
-    routes = [
-        one
-        for route in place.http.app.routes
-        for one in getattr(getattr(route, "original_router", None), "routes", [route])
-    ]
-    hidden = {route.path for route in routes if route.path not in known}
+    hidden = {route.path for route in single(place.http.app.routes) if route.path not in known}
     assert hidden <= {"/", "/docs", "/openapi.json", "/static", "/problems/{slug}"}
     assert len(known) > 20
 
