@@ -63,9 +63,7 @@ def scaling(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
         "Gauss-Newton slices": (2 if quick else 8, newton),
         "Gauss-Newton emitters": (1, newton),
     }
-    scans = {
-        slices: made_up_scan(folder / f"{slices}.h5", elements, slices) for slices, _ in ways.values()
-    }
+    scans = {slices: made_up_scan(folder / f"{slices}.h5", elements, slices) for slices, _ in ways.values()}
     taken: dict[str, dict[int, float]] = {name: {} for name in ways}
     for workers in (1, 2):
         with open_cluster(workers=workers, local_directory=folder) as cluster:

@@ -70,9 +70,7 @@ def test_afterwards_all_is_as_before():
     assert [logging.getLogger(name).handlers[:] for name in (None, "distributed")] == before
 
 
-def test_requests_and_jobs_can_be_followed_and_no_key_is_told(
-    start, uploaded, submitted, until, work, lines
-):
+def test_requests_and_jobs_can_be_followed_and_no_key_is_told(start, uploaded, submitted, until, work, lines):
     http, token = start(), Token.new()
     Keys(http.app.state.parts.database).add(token, Tenant("local"), "one", ("read", "write"))
     http.app.state.parts.door._no_keys_until = 0.0

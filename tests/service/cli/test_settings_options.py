@@ -118,7 +118,7 @@ def test_any_text_gives_settings_or_names_the_setting(name: str, text: str) -> N
         (["--nodes", "4"], "nodes: found 4; accepted: a number from 16 to 2048"),
         (["--sweeps", "0"], "sweeps: found 0; accepted: a number from 1 to 1000"),
         (["--smoothing", "nan"], "smoothing_nodes: found nan; accepted: a number from 0 to 32"),
-        (["--picker", "eye"], "picker: found 'eye'; accepted: 'aic', 'threshold', 'energy-ratio', 'sta-lta', "),
+        (["--picker", "eye"], "picker: found 'eye'; accepted: 'aic', 'threshold', 'energy-ratio', "),
         (["--side", "-1"], "side_m: found -1.0; accepted: a number from 0.0001 to 100"),
         (["--seed", "-1"], "seed: found -1; accepted: a number from 0"),
         (["--set", "subset=0"], "subset: found 0; accepted: a number from 1 to 4096"),
