@@ -14,7 +14,7 @@ from bentray_kernels.wave.extent import Extent
 from bentray_kernels.wave.sounding import SHOTS
 
 # Python's own part of any call.
-FLOOR_BYTES = 7 * 2**20 // 2
+FLOOR_BYTES = 11 * 2**20 // 2
 
 # Bytes a sample: of the simulated water shots with recorded ones, spectra and windows; of one emitter's
 # traces, window and residuals; of an entry of the resampler while it is made.
