@@ -31,7 +31,7 @@ CHECKS = [
     content_type_conformance,
     response_schema_conformance,
 ]
-EXAMPLES = 12
+EXAMPLES = 6
 # Each of these starts a process that reads what it was sent.
 UPLOADS = ("POST /v1/datasets", "POST /v1/volumes", "POST /v1/meshes")
 UPLOAD_EXAMPLES = 2
