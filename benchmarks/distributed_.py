@@ -100,14 +100,14 @@ def empty_calls(cluster: Cluster, folder: Path, count: int) -> float:
             left -= 1
         for future in finished(cluster.client, running):
             running.remove(future)
-            attempts.again(future)
+            attempts.ended(future)
     return time.perf_counter() - begun
 
 
 def rendering(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Row:
     """95th percentile of a slice's picture while a reconstruction fills the same workers."""
     nodes, elements, slices = (64, 64, 8) if quick else (128, 256, 16)
-    path = folder / "several.h5"
+    path = made_up_scan(folder / "beside.h5", elements, slices)
     picture = folder / "picture.h5"
     write_reconstruction(picture, reconstruct(cluster.client, path, Settings(nodes=nodes, sweeps=1)))
     compute = Compute(cluster)
@@ -141,7 +141,8 @@ def rendering(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Ro
 def resuming(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Row:
     """Seconds of a run whose driver was torn away half-way and begun anew, over those of a whole one."""
     nodes = 64 if quick else 128
-    path, settings = folder / "several.h5", Settings(nodes=nodes, sweeps=3 if quick else 6)
+    path = made_up_scan(folder / "torn.h5", 64 if quick else 256, 8 if quick else 16)
+    settings = Settings(nodes=nodes, sweeps=3 if quick else 6)
     progress(0, 1, "resuming")
     whole = seconds(lambda: reconstruct(cluster.client, path, settings, work_dir=folder / "whole"))
 
