@@ -1,20 +1,20 @@
 """Peak memory of the calls of a reconstruction, in processes of their own: prints bytes by call as JSON.
 
-Called as ``call_memory.py SETTINGS ELEMENTS HEIGHTS``, the settings as JSON; 0 heights for one slice. As in
-``benchmarks/_peak_memory.py`` each call runs in a fork of a warm process, less a fork that does nothing; the
-bytes of what was there before are added: dataset, problem and arguments.
+Called as ``call_memory.py SETTINGS ELEMENTS HEIGHTS``, the settings as JSON, with the repository on the
+path; 0 heights for one slice. As in ``benchmarks/_peak_memory.py`` each call runs in a fork of a warm
+process, less a fork that does nothing; the bytes of what was there before are added: dataset, problem and
+arguments.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import sys
-from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
+from benchmarks._peak_memory import peak
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation import Ring
@@ -40,21 +40,6 @@ def scan(elements: int, heights: int) -> Dataset:
         water_attenuation_np_m=0.1,
         slice_z_m=0.004 * np.arange(heights) if heights else None,
     )
-
-
-def peak(run: Callable[[], object]) -> int:
-    """Peak resident bytes of a fork that runs ``run``."""
-    process = os.fork()
-    if process == 0:
-        try:
-            run()
-        except BaseException:
-            os._exit(1)
-        os._exit(0)
-    _, status, usage = os.wait4(process, 0)
-    if status != 0:
-        raise ChildProcessError(f"the measured process ended with status {status}")
-    return usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
 def held(*things: Any) -> int:

@@ -19,6 +19,7 @@ from bentray_workers.task_memory import MIB, Summary, field_bytes
 from bentray_workers.wave_memory import Traces
 
 PROGRAM = Path(__file__).with_name("call_memory.py")
+ROOT = Path(__file__).parents[2]
 RING = Summary(256, 256, 256 * 256, 1, False, 0.0, 0.16, 0, True)
 BOTH = ("recon", "render")
 LARGE, SMALL = Offer(8 * 1024 * MIB, BOTH), Offer(560 * MIB, BOTH)
@@ -46,7 +47,12 @@ def ring(elements, heights):
 def test_calls_take_what_the_plan_says(asked, elements, heights):
     settings = {**asked, "sweeps": 2}
     # Freed arrays go back at once, so that a fork's peak is that of its own.
-    environment = {**os.environ, "MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "65536"}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(ROOT),
+        "MALLOC_MMAP_THRESHOLD_": "65536",
+        "MALLOC_TRIM_THRESHOLD_": "65536",
+    }
     command = [sys.executable, str(PROGRAM), json.dumps(settings), str(elements), str(heights)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     measured = json.loads(done.stdout)

@@ -20,6 +20,7 @@ from bentray_workers.wave_memory import Traces, wave_call_bytes
 from ..kernels.wave.scans import CENTRE_HZ, ELEMENTS, RATE_HZ, WATER, scan
 
 PROGRAM = Path(__file__).with_name("wave_call_memory.py")
+ROOT = Path(__file__).parents[2]
 SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
 
 
@@ -29,7 +30,12 @@ SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
 )
 def test_calls_take_what_the_plan_says(asked, elements, samples):
     # Freed arrays go back at once, so that a fork's peak is that of its own.
-    environment = {**os.environ, "MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "65536"}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(ROOT),
+        "MALLOC_MMAP_THRESHOLD_": "65536",
+        "MALLOC_TRIM_THRESHOLD_": "65536",
+    }
     command = [sys.executable, str(PROGRAM), json.dumps(asked), str(elements), str(samples)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     measured = json.loads(done.stdout)

@@ -12,7 +12,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from call_memory import held, peak
+from benchmarks._peak_memory import peak
+from call_memory import held
 
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.simulation import Ring
