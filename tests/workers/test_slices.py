@@ -3,6 +3,7 @@
 import threading
 import time
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 import pytest
@@ -78,6 +79,26 @@ def test_stop_ends_within_a_task(cluster, path, embedded, plan):
     with pytest.raises(Cancelled):
         slices.reconstruct(cluster.client if embedded else None, path, replace(plan, sweeps=500), stop=stop)
     assert len(calls) == 3
+
+
+def test_a_folder_goes_under_the_hands_of_a_call_at_work():
+    """A call that was told to stop goes on to its end, and may write what it always wrote."""
+
+    def write(folder):
+        for number in count():
+            try:
+                (folder / f"call-{number}").touch()
+            except FileNotFoundError:
+                return
+
+    for _ in range(20):
+        with slices._temporary_folder() as folder:
+            writer = threading.Thread(target=write, args=[folder])
+            writer.start()
+            while not any(folder.iterdir()):
+                pass
+        writer.join()
+        assert not folder.exists()
 
 
 def test_stop_does_not_wait_for_the_picker(cluster, path, monkeypatch):

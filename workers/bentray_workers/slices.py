@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import tempfile
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -69,9 +69,9 @@ def reconstruct(
     if client is None:
         return _reconstruct_here(dataset_path, settings, on_progress, stop)
     with _folder(work_dir) as folder:
-        attempts = Attempts(client, Path(folder), resources_for(client, settings))
-        path = _prepared(client, attempts, dataset_path, settings, Path(folder), stop)
-        checkpoints = Checkpoints(Path(folder) / "checkpoints", on_saved)
+        attempts = Attempts(client, folder, resources_for(client, settings))
+        path = _prepared(client, attempts, dataset_path, settings, folder, stop)
+        checkpoints = Checkpoints(folder / "checkpoints", on_saved)
         return _carried_out(client, attempts, path, dataset_path, settings, checkpoints, on_progress, stop)
 
 
@@ -216,5 +216,18 @@ def _reconstruct_here(
     return reconstruct_here(dataset, settings, report)
 
 
-def _folder(work_dir: Path | None):  # type: ignore[no-untyped-def]
-    return tempfile.TemporaryDirectory() if work_dir is None else nullcontext(work_dir)
+def _folder(work_dir: Path | None) -> AbstractContextManager[Path]:
+    return _temporary_folder() if work_dir is None else nullcontext(work_dir)
+
+
+@contextmanager
+def _temporary_folder() -> Iterator[Path]:
+    """A folder that goes at the end, under the hands of calls that were told to stop and still run."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as outer:
+        folder = Path(outer) / "work"
+        folder.mkdir()
+        try:
+            yield folder
+        finally:
+            # What such a call still wants to write under the old name finds no folder.
+            folder.rename(folder.with_name("ended"))
