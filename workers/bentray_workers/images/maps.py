@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -91,8 +92,11 @@ def draw_map(
     return shown
 
 
-def draw_bar(maps: Sequence[AxesImage], label: str) -> None:
-    """One colour bar for maps of the same limits, beside the last; pointed where values lie beyond it."""
+def draw_bar(maps: Sequence[AxesImage], label: str, place: Axes | None = None) -> None:
+    """One colour bar for maps of the same limits; pointed where values lie beyond it.
+
+    It goes where it is told, else beside the last map and takes room from all.
+    """
     low, high = maps[0].get_clim()
     values: list[Floats] = [
         np.ma.masked_invalid(np.ma.asarray(shown.get_array())).compressed() for shown in maps
@@ -103,6 +107,9 @@ def draw_bar(maps: Sequence[AxesImage], label: str) -> None:
         (below, above), "both"
     )
     axes = [shown.axes for shown in maps]
-    bar = axes[0].figure.colorbar(maps[0], ax=axes, fraction=0.046, pad=0.015, aspect=26, extend=extend)
+    room: dict[str, Any] = (
+        {"ax": axes, "fraction": 0.046, "pad": 0.015, "aspect": 26} if place is None else {"cax": place}
+    )
+    bar = axes[0].figure.colorbar(maps[0], extend=extend, **room)
     bar.set_label(label)
     bar.outline.set_linewidth(0.4)
