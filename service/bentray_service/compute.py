@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from bentray_kernels.tomography.settings import Settings
-from bentray_workers import field_picture, images, planning, refraction
+from bentray_workers import field_picture, picture_tasks, planning, refraction
 from bentray_workers.dataset_summary import summary_of
 from bentray_workers.field_view import FieldView
 from bentray_workers.isosurface_mesh import mesh_volume
@@ -64,17 +64,17 @@ class Compute:
         return planning.plan(summary_of(path, settings), settings, offers).to_dict()
 
     def slice_png(self, path: Path, **how: Any) -> bytes:
-        """One slice of a reconstruction file as PNG; ``how`` as in ``bentray_workers.images.slice_png``.
+        """One slice of a reconstruction file as PNG; ``how`` as in ``bentray_workers.images.slice``.
 
         Raises:
             InvalidInput: from the renderer.
             Busy: when no worker delivered it in time.
         """
-        return self._drawn(images.slice_png, path, how)
+        return self._drawn(picture_tasks.slice_png, path, how)
 
     def volume_slice_png(self, path: Path, **how: Any) -> bytes:
-        """The same of an uploaded volume; ``how`` as in ``bentray_workers.images.volume_slice_png``."""
-        return self._drawn(images.volume_slice_png, path, how)
+        """The same of an uploaded volume; ``how`` as in ``bentray_workers.images.volume_slice``."""
+        return self._drawn(picture_tasks.volume_slice_png, path, how)
 
     def refraction_png(self, path: Path, view: RefractionView) -> bytes:
         """A volume or reconstruction file as glass; raises as ``slice_png`` does."""

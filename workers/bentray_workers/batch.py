@@ -18,7 +18,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Progress
 
 from .dataset_file import read_dataset
-from .images import report_png
+from .images.report import report_png
 from .reconstruction_file import read_reconstruction
 
 POLL_S = 0.25

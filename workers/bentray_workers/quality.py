@@ -15,7 +15,6 @@ from bentray_kernels.errors import InvalidInput
 from .dataset_file import Limits, read_dataset
 from .dataset_reading import NUMERIC, TRACES
 from .hdf5_reading import opened
-from .images.quality_page import quality_png
 
 
 @dataclass(frozen=True)
@@ -80,6 +79,9 @@ def examine_file(path: Path, picker: str = "aic", largest_bytes: int | None = No
 
 
 def _examined(dataset: Dataset, picker: str) -> Quality:
+    # Matplotlib comes with it, which the service, that only hands the task out, need not hold.
+    from .images.quality_page import quality_png
+
     examined = examine(dataset, picker)
     of_slices = [f.slice for f in examined.report.findings]
     worst = max(set(of_slices), key=of_slices.count, default=0)

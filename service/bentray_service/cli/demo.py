@@ -44,7 +44,7 @@ def demo(
     folder = output_folder(output)
 
     from bentray_workers.dataset_file import write_dataset
-    from bentray_workers.images import comparison_png
+    from bentray_workers.images.comparison import comparison_png
     from bentray_workers.simulation import SimulationSettings, simulate
 
     from ..client import Client

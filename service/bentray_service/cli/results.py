@@ -28,7 +28,7 @@ def write_results(
 
     The picture is drawn here, unless ``draw`` gives it once the ``.h5`` is there; the ``.json`` comes last.
     """
-    from bentray_workers.images import report_png
+    from bentray_workers.images.report import report_png
     from bentray_workers.reconstruction_file import write_reconstruction
 
     from .figures import figures

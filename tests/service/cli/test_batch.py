@@ -30,7 +30,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 @pytest.fixture(autouse=True)
 def quick_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """The pictures have tests of their own, and take longer than all the rest here."""
-    for module in ("bentray_workers.batch", "bentray_workers.images"):
+    for module in ("bentray_workers.batch", "bentray_workers.images.report"):
         monkeypatch.setattr(
             f"{module}.report_png", lambda result, truth, roi: b"\x89PNG of " + bytes(truth.axes, "ascii")
         )

@@ -14,7 +14,8 @@ from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.tomography import Reconstruction, Settings, Sweep, Trial
 from bentray_kernels.tomography.result import residual_counts
 from bentray_service.cli.figures import errors, figures, summary
-from bentray_workers.images import comparison_png, report_png
+from bentray_workers.images.comparison import comparison_png
+from bentray_workers.images.report import report_png
 
 WATER = 1500.0
 STEP = 1e-3

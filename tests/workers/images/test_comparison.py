@@ -8,7 +8,7 @@ from matplotlib.contour import ContourSet
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.comparison import compare
-from bentray_workers.images import comparison_png
+from bentray_workers.images.comparison import comparison_png
 
 from ..reconstructions import made, truth
 from .pixels import pixels

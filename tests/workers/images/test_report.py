@@ -11,7 +11,7 @@ from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction, Sweep, Trial
 from bentray_kernels.tomography.advice import reason
 from bentray_workers.comparison import compare
-from bentray_workers.images import report_png
+from bentray_workers.images.report import report_png
 
 from ..reconstructions import SPACING_M, made, truth
 from .pixels import pixels

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.images import COLORMAPS, slice_png
+from bentray_workers.images.look import COLORMAPS
+from bentray_workers.images.slice import slice_png
 from bentray_workers.reconstruction_file import write_reconstruction
 
 from ..reconstructions import made

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
-
-from .maps import Floats
 
 AXES = "xyz"
 UPRIGHT = "z"
