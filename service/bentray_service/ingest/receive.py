@@ -15,7 +15,8 @@ from starlette.concurrency import run_in_threadpool
 
 from ..refusals import EmptyBody, StorageFull, TooLarge
 
-BATCH_BYTES = 4 * 1024 * 1024
+# Chunks wait as they came, which saves copying them together; a client may send tiny ones.
+BATCH_BYTES, BATCH_CHUNKS = 4 * 1024 * 1024, 1024
 # What a power cut may cost of a body, and how much of it waits for the disk at most.
 SYNC_BYTES = 64 * 1024 * 1024
 
@@ -79,21 +80,22 @@ async def pour(
     Raises:
         TooLarge, StorageFull: as their names say.
     """
-    size, batch, behind = 0, bytearray(), _Behind(file, digest)
+    size, batch, held, behind = 0, [], 0, _Behind(file, digest)
     try:
         try:
             async for chunk in stream:
                 if size + len(chunk) > limit:
                     raise TooLarge("body", f"more than {limit} bytes", accepted)
                 size += len(chunk)
-                batch += chunk
-                if len(batch) >= BATCH_BYTES:
-                    await behind.write(bytes(batch))
-                    batch.clear()
+                batch.append(chunk)
+                held += len(chunk)
+                if held >= BATCH_BYTES or len(batch) >= BATCH_CHUNKS:
+                    await behind.write(batch)
+                    batch, held = [], 0
         finally:
             # After a write that failed, what follows would stand in the wrong place.
             if not behind.failed:
-                await behind.write(bytes(batch))
+                await behind.write(batch)
                 await behind.end()
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
@@ -118,7 +120,7 @@ class _Behind:
         self._unsynced = 0
         self.failed = False
 
-    async def write(self, batch: bytes) -> None:
+    async def write(self, batch: list[bytes]) -> None:
         """Begin to write, once the batch before is written."""
         await self._settle()
         self._running = asyncio.create_task(run_in_threadpool(self._write, batch))
@@ -137,13 +139,15 @@ class _Behind:
                 self.failed = True
                 raise
 
-    def _write(self, batch: bytes) -> None:
+    def _write(self, batch: list[bytes]) -> None:
         if self._digest is not None:
-            self._digest.update(batch)
-        left = memoryview(batch)
-        while left:
-            left = left[self._file.write(left) :]
-        self._unsynced += len(batch)
+            for chunk in batch:
+                self._digest.update(chunk)
+        for chunk in batch:
+            left = memoryview(chunk)
+            while left:
+                left = left[self._file.write(left) :]
+            self._unsynced += len(chunk)
         if self._unsynced >= SYNC_BYTES:
             os.fdatasync(self._file.fileno())
             self._unsynced = 0
