@@ -44,6 +44,16 @@ def test_what_is_sent_is_on_the_disk(tmp_path_factory, chunks, batch):
     assert (received.size, received.sha256) == (len(body), hashlib.sha256(body).hexdigest())
 
 
+def test_tiny_chunks_do_not_wait_by_the_million(tmp_path, monkeypatch):
+    waiting = []
+    write = receiving._Behind._write
+    monkeypatch.setattr(
+        receiving._Behind, "_write", lambda self, batch: (waiting.append(len(batch)), write(self, batch))
+    )
+    assert run(tmp_path / "body", [b"x"] * 5000).size == 5000
+    assert max(waiting) <= receiving.BATCH_CHUNKS < 5000
+
+
 def test_too_much_is_refused(tmp_path):
     with pytest.raises(TooLarge, match="at most 10 bytes"):
         run(tmp_path / "announced", [b"x" * 11], announced=11, limit=10)
