@@ -72,6 +72,16 @@ class SimulationSettings:
         ring = Ring(self.elements, ring_radius(TABLE6_SIDE_M, self.nodes))
         return TravelTimeScan(table6(self.coupling_mps), ring, TABLE6_SIDE_M, self.nodes, self.refinement)
 
+    @property
+    def scans(self) -> int:
+        """How many are simulated one by one."""
+        return 1
+
+    @property
+    def emitters(self) -> int:
+        """Of each of them."""
+        return self.elements
+
     def medium_number(self, scan: int) -> int:
         """As ``Scans``: there is one scan and one medium."""
         return scan
@@ -104,7 +114,6 @@ def simulate(
         A dataset with ``delta_tof_s``, ``truth`` and the object's outline as ``roi``; with ``log_ratio_np``
         where ``settings.attenuation`` asks for it.
     """
-    scan = settings.scan()
     delta = np.empty((settings.elements, settings.elements))
     ratio = np.empty_like(delta) if settings.attenuation else None
     done = 0
@@ -115,6 +124,18 @@ def simulate(
         done += len(batch)
         if on_progress is not None:
             on_progress(Progress(done, settings.elements))
+    return scan_of(settings, delta, ratio)
+
+
+def scan_of(settings: SimulationSettings, delta: Floats, ratio: Floats | None) -> Dataset:
+    """The dataset of what every element received, with its noise.
+
+    Args:
+        settings: of the scan.
+        delta: (elements, elements), s; taken over.
+        ratio: as ``delta``, Np, or None without attenuation.
+    """
+    scan = settings.scan()
     random = np.random.default_rng(settings.seed)
     sigma_s = settings.noise_s
     pairs = ~np.eye(settings.elements, dtype=bool)

@@ -86,6 +86,16 @@ class VolumeSimulationSettings:
             self.three_d,
         )
 
+    @property
+    def scans(self) -> int:
+        """How many are simulated one by one."""
+        return 1 if self.array == "rings" else self.slices
+
+    @property
+    def emitters(self) -> int:
+        """Of each of them."""
+        return self.slices * self.elements if self.array == "rings" else self.elements
+
     def medium_number(self, scan: int) -> int:
         """As ``Scans``: a slice in two dimensions is a medium of its own."""
         return 0 if self.three_d else scan
@@ -124,10 +134,7 @@ def simulate_volume(
         with positions (slices · elements, 3), ring by ring, and arrays over all pairs of them. Both have
         ``truth`` and ``roi`` of shape (nodes, nodes, slices).
     """
-    scan = settings.scan()
-    rings = settings.array == "rings"
-    scans = 1 if rings else settings.slices
-    count = settings.slices * settings.elements if rings else settings.elements
+    scans, count = settings.scans, settings.emitters
     delta = np.empty((scans, count, count))
     ratio = np.empty_like(delta) if settings.attenuation else None
     done = 0
@@ -138,6 +145,19 @@ def simulate_volume(
         done += len(batch)
         if on_progress is not None:
             on_progress(Progress(done, scans * count))
+    return scan_of(settings, delta, ratio)
+
+
+def scan_of(settings: VolumeSimulationSettings, delta: Floats, ratio: Floats | None) -> Dataset:
+    """The dataset of what every element received, with its noise.
+
+    Args:
+        settings: of the scan.
+        delta: (scans, emitters, emitters), s.
+        ratio: as ``delta``, Np, or None without attenuation.
+    """
+    scan, count = settings.scan(), settings.emitters
+    rings = settings.array == "rings"
     sigma_s = 0.0
     if settings.snr is not None:
         random = np.random.default_rng(settings.seed)

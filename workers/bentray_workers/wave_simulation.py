@@ -159,10 +159,34 @@ def simulate_waves(
         if on_progress is not None:
             on_progress(Progress(done, settings.emissions))
     if settings.snr is not None:
-        random = np.random.default_rng(settings.seed)
-        sigma = float(np.median(np.abs(water).max(axis=-1))) / settings.snr
+        noise = Noise(settings, np.abs(water).max(axis=-1))
         for traces in (received, water):
-            traces += (sigma * random.standard_normal(shape)).astype(np.float32)
+            for emission in traces:
+                emission += noise.drawn()
+    return scan_of(settings, Waveform(received, water))
+
+
+class Noise:
+    """Noise on traces, drawn an emission at a time: of the object all, then of the water.
+
+    Args:
+        settings: with an ``snr``.
+        heights: highest sample of each water trace, (emissions, elements).
+    """
+
+    def __init__(self, settings: WaveSimulationSettings, heights: NDArray[np.float32]) -> None:
+        assert settings.snr is not None
+        self._random = np.random.default_rng(settings.seed)
+        self._sigma = float(np.median(heights)) / settings.snr
+        self._shape = settings.elements, settings.samples
+
+    def drawn(self) -> NDArray[np.float32]:
+        """Of the next emission, (elements, samples)."""
+        return (self._sigma * self._random.standard_normal(self._shape)).astype(np.float32)
+
+
+def scan_of(settings: WaveSimulationSettings, waveform: Waveform) -> Dataset:
+    """The dataset of traces, or of stand-ins for them."""
     phantom = table6(settings.coupling_mps)
     spacing = settings.side_m / (settings.nodes - 1)
     low, high = settings.dispersion
@@ -171,7 +195,7 @@ def simulate_waves(
         tx=settings.senders(),
         rx=np.arange(settings.elements),
         water_speed_mps=settings.coupling_mps,
-        waveform=Waveform(received, water),
+        waveform=waveform,
         roi=phantom.inside(settings.nodes, TABLE6_SIDE_M),
         truth=Truth(
             sound_speed_mps=phantom.speed(settings.nodes, TABLE6_SIDE_M),

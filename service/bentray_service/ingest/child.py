@@ -15,11 +15,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bentray_workers.dataset_record import record_of, text
+
 if TYPE_CHECKING:
-    from bentray_kernels.acquisition.dataset import Dataset
     from bentray_workers.volume_file import Volume
 
-LONGEST_TEXT = 200
 OPEN_FILES = 64
 # How much larger the canonical file of a large upload may be: it is packed quickly, not well.
 PACKING = 2
@@ -87,7 +87,7 @@ def convert(what: str, source: Path, target: Path, given: dict[str, Any]) -> dic
 def _dataset(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
     from bentray_workers.foreign_scans import convert_dataset
 
-    return summary(convert_dataset(source, target))
+    return record_of(convert_dataset(source, target))
 
 
 def _volume(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
@@ -118,26 +118,8 @@ READERS = {
 }
 
 
-def summary(dataset: Dataset) -> dict[str, Any]:
-    """What the service remembers of a dataset, in plain values."""
-    return {
-        "title": text(dataset.title),
-        "source": text(dataset.source),
-        "license": text(dataset.license),
-        "dimension": int(dataset.element_position_m.shape[1]),
-        "elements": len(dataset.element_position_m),
-        "ntx": len(dataset.tx),
-        "nrx": len(dataset.rx),
-        "slices": dataset.slices,
-        "has_traces": dataset.waveform is not None,
-        "has_travel_times": dataset.picked,
-        "has_truth": dataset.truth is not None,
-        "water_speed_mps": float(dataset.water_speed_mps),
-    }
-
-
 def volume_summary(volume: Volume) -> dict[str, Any]:
-    """The same of a volume."""
+    """What the service remembers of a volume, in plain values."""
     return {
         "title": text(volume.title),
         "shape": list(volume.values.shape),
@@ -145,11 +127,6 @@ def volume_summary(volume: Volume) -> dict[str, Any]:
         "origin_m": list(volume.origin_m),
         "value_range": list(volume.range()),
     }
-
-
-def text(value: str) -> str:
-    """A string from the file, printable and short."""
-    return "".join(c for c in value if c.isprintable())[:LONGEST_TEXT]
 
 
 def _error(field: str, found: str, accepted: str) -> dict[str, Any]:

@@ -1,0 +1,98 @@
+"""What a simulated scan takes: bytes of its tasks, seconds of its workers, bytes of its file."""
+
+from __future__ import annotations
+
+from bentray_kernels.acquisition.volume_simulation import AXIAL_MARGIN_NODES
+from bentray_kernels.wave.stencil import HALO
+
+from .simulation import SimulationSettings
+from .task_memory import MIB, REAL
+from .volume_simulation import VolumeSimulationSettings
+from .wave_simulation import EDGE_NODES, WaveSimulationSettings
+
+Timed = SimulationSettings | VolumeSimulationSettings
+
+# Python's own part of any task.
+FLOOR_BYTES = 18 * MIB
+
+# Bytes a node of the fine grid: its media, one of them while it is sampled, and a marching front; of a wave's
+# padded grid: both media while they are made, and two fields.
+PLANE_BYTES, SPACE_BYTES, WAVE_BYTES = 96, 96, 88
+
+# Bytes a pair while the file is written: times, losses, and the noise on them.
+PAIR_BYTES, LOSS_BYTES, NOISE_BYTES = 20, 12, 16
+
+# Seconds on a core of 2020: a node of a medium while it is sampled, without and with attenuation; a node that
+# a front crosses; a padded node of a wave's media, and one that a step moves; a byte of a file.
+MEDIUM_S, LOSSY_MEDIUM_S, FRONT_S, WAVE_MEDIUM_S, STEP_S, BYTE_S = 3e-6, 1.4e-5, 4e-7, 1.5e-5, 1e-9, 2e-8
+
+# Of a task that has several emitters.
+TASK_S = 1.0
+MOST_EMITTERS = 64
+
+
+def fine_nodes(settings: Timed) -> int:
+    """Of the grid that one wave front crosses."""
+    side = settings.refinement * (settings.nodes - 1) + 1
+    if isinstance(settings, VolumeSimulationSettings) and settings.three_d:
+        return side**2 * ((settings.slices - 1 + 2 * AXIAL_MARGIN_NODES) * settings.refinement + 1)
+    return side**2
+
+
+def emitters_a_task(settings: Timed) -> int:
+    """As many as take about ``TASK_S``."""
+    return max(1, min(MOST_EMITTERS, int(TASK_S / (FRONT_S * fine_nodes(settings)))))
+
+
+def task_bytes(settings: Timed | WaveSimulationSettings) -> dict[str, int]:
+    """Bytes that each kind of task takes beyond what a warm worker holds.
+
+    Returns:
+        By name: ``make_part``, and ``finish``, which writes the file.
+    """
+    if isinstance(settings, WaveSimulationSettings):
+        traces = settings.elements * settings.samples
+        part = WAVE_BYTES * _padded(settings) + (2 * REAL * settings.skip + 8) * traces
+        finish = 6 * REAL * traces + 8 * settings.emissions * settings.elements
+        truth = PLANE_BYTES * settings.nodes**2
+    else:
+        in_space = isinstance(settings, VolumeSimulationSettings)
+        marched = isinstance(settings, VolumeSimulationSettings) and settings.three_d
+        part = (SPACE_BYTES if marched else PLANE_BYTES) * fine_nodes(settings)
+        each = PAIR_BYTES + LOSS_BYTES * settings.attenuation + NOISE_BYTES * _noisy(settings)
+        finish = each * pairs(settings)
+        heights = settings.slices if isinstance(settings, VolumeSimulationSettings) else 1
+        truth = (SPACE_BYTES if in_space else PLANE_BYTES) * settings.nodes**2 * heights
+    return {"make_part": FLOOR_BYTES + part, "finish": FLOOR_BYTES + finish + truth}
+
+
+def result_bytes(settings: Timed | WaveSimulationSettings) -> int:
+    """Of the arrays in the file, before they are packed."""
+    if isinstance(settings, WaveSimulationSettings):
+        return 2 * 4 * settings.emissions * settings.elements * settings.samples
+    return REAL * pairs(settings) * (1 + settings.attenuation + _noisy(settings))
+
+
+def cpu_seconds(settings: Timed | WaveSimulationSettings) -> tuple[float, float]:
+    """Of all tasks together but for media, and of the media that each worker makes for itself."""
+    packing = BYTE_S * result_bytes(settings)
+    if isinstance(settings, WaveSimulationSettings):
+        steps = settings.samples * settings.skip * settings.emissions
+        return 2 * STEP_S * _padded(settings) * steps + packing, WAVE_MEDIUM_S * _padded(settings)
+    nodes, media = fine_nodes(settings), len({settings.medium_number(k) for k in range(settings.scans)})
+    sampled = LOSSY_MEDIUM_S if settings.attenuation else MEDIUM_S
+    fronts = FRONT_S * nodes * settings.scans * settings.emitters
+    return fronts + packing, sampled * nodes * media
+
+
+def pairs(settings: Timed) -> int:
+    """Of all scans."""
+    return settings.scans * settings.emitters**2
+
+
+def _noisy(settings: Timed) -> bool:
+    return settings.snr is not None or (isinstance(settings, SimulationSettings) and settings.noise_s > 0.0)
+
+
+def _padded(settings: WaveSimulationSettings) -> int:
+    return (settings.fine_nodes + 2 * (EDGE_NODES + HALO)) ** 2
