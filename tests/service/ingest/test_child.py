@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_service.ingest import child
+from bentray_workers.dataset_record import LONGEST_TEXT
 
 
 def test_summary_of_a_good_file(scan, tmp_path):
@@ -87,6 +88,6 @@ def test_a_bad_volume_is_named(tmp_path):
 @given(st.text())
 def test_text_from_a_file_is_printable_and_short(value):
     clean = child.text(value)
-    assert len(clean) <= child.LONGEST_TEXT
+    assert len(clean) <= LONGEST_TEXT
     assert clean.isprintable()
     clean.encode()
