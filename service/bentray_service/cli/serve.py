@@ -106,6 +106,7 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
 
     from .. import logs
     from ..app import create_app
+    from ..web.heads import HeadInTime
 
     host, port = listening.getsockname()[:2]
     url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
@@ -128,7 +129,13 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
     app = _Starting(made)
     # Whether a proxy is believed is for the door to say, by who really called.
     config = uvicorn.Config(
-        app, log_config=None, log_level="warning", access_log=False, proxy_headers=False, lifespan="on"
+        app,
+        http=HeadInTime,
+        log_config=None,
+        log_level="warning",
+        access_log=False,
+        proxy_headers=False,
+        lifespan="on",
     )
     server = Announcing(config)
     # Uvicorn ends the process when the application cannot start; here the reason has the last word.
