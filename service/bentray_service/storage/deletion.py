@@ -88,7 +88,8 @@ class Deletion:
 
 def _has(connection: Connection, table: Table, tenant: Tenant, name: str) -> bool:
     mine = select(table.c.id).where(table.c.tenant == tenant, table.c.id == name)
-    return connection.execute(mine).first() is not None
+    # Jobs that are submitted now wait, and find it gone; SQLite lets one write at a time anyway.
+    return connection.execute(mine.with_for_update()).first() is not None
 
 
 def _of(connection: Connection, tenant: Tenant, condition: ColumnElement[bool]) -> set[str]:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from sqlalchemy import Connection, func, insert, select
+from sqlalchemy.exc import IntegrityError
 
 from ..refusals import Finished, KeyReused, QueueFull, UnknownId
 from . import schema
@@ -47,11 +50,12 @@ class Jobs:
         Raises:
             KeyReused: when something else was asked under this key.
             QueueFull: when ``most_queued`` jobs of this tenant wait already.
+            UnknownId: when the dataset has been deleted meanwhile.
         """
         job_id = new_id("job")
         asked = json.dumps([kind, settings, dataset_id, volume_id, mesh_id], sort_keys=True)
         digest = hashlib.sha256(asked.encode()).hexdigest()
-        with self._database.write() as connection:
+        with _still_there(dataset_id), self._database.write() as connection:
             if key is not None and connection.dialect.name != "sqlite":
                 # SQLite's writers wait for each other from the start; elsewhere this makes them.
                 lock = int.from_bytes(hashlib.sha256(f"{tenant}/{key}".encode()).digest()[:8], signed=True)
@@ -168,3 +172,14 @@ def _of_key(connection: Connection, tenant: Tenant, key: str) -> Row | None:
     mine = select(jobs).where(jobs.c.tenant == tenant, jobs.c.idempotency_key == key)
     found = connection.execute(mine).mappings().one_or_none()
     return None if found is None else dict(found)
+
+
+@contextmanager
+def _still_there(dataset_id: str | None) -> Iterator[None]:
+    """Tell of a dataset that was deleted after the request had been checked, as of one that never was."""
+    try:
+        yield
+    except IntegrityError:
+        if dataset_id is None:
+            raise
+        raise UnknownId("dataset", dataset_id) from None

@@ -6,7 +6,9 @@ from threading import Barrier
 
 import pytest
 
-from bentray_service.refusals import Finished, KeyReused
+from bentray_service.refusals import Finished, InUse, KeyReused, UnknownId
+from bentray_service.storage.deletion import Deletion, Stored
+from bentray_service.storage.files import Files
 from bentray_service.storage.tenants import LOCAL
 
 AT_ONCE = 50
@@ -20,7 +22,7 @@ def at_once(ask):
         begin.wait()
         try:
             return ask(number)
-        except (Finished, KeyReused) as refusal:
+        except (Finished, InUse, KeyReused, UnknownId) as refusal:
             return refusal
 
     with ThreadPoolExecutor(AT_ONCE) as pool:
@@ -48,6 +50,22 @@ def test_a_key_for_several_requests_is_the_firsts(jobs, dataset):
 def test_without_keys_each_makes_its_own(jobs, dataset):
     made = at_once(lambda _: jobs.add(LOCAL, "reconstruction", {}, dataset))
     assert len({job["id"] for job in made}) == AT_ONCE
+
+
+def test_a_scan_is_deleted_or_has_jobs(jobs, database, dataset, tmp_path):
+    files = Files(tmp_path / "data")
+    files.prepare()
+    deletion = Deletion(database, files)
+
+    def ask(number):
+        if number == AT_ONCE // 2:
+            return deletion.delete(Stored(LOCAL, "dataset", dataset))
+        return jobs.add(LOCAL, "reconstruction", {}, dataset)
+
+    told = at_once(ask)
+    deleted = told.pop(AT_ONCE // 2) is None
+    assert {type(one) for one in told} == ({UnknownId} if deleted else {dict})
+    assert len(jobs.newest(LOCAL, AT_ONCE)) == (0 if deleted else AT_ONCE - 1)
 
 
 def test_a_queued_job_is_cancelled_once(jobs, dataset):
