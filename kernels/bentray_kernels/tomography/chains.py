@@ -22,7 +22,8 @@ from .stages import start
 
 # Long enough that scheduling costs nothing, short enough to show progress and to stop soon.
 TASK_S = 0.5
-FIRST_BATCH = 8
+# Nodes that the wave fronts of a first batch pass, a tenth of a second or so; then the clock tells.
+FIRST_NODES = 2_000_000
 
 # Emitters whose rays are traced in one call of Gauss–Newton, and after the last image.
 BATCH = 16
@@ -304,11 +305,10 @@ class Stage(ABC):
 class SartStage(Stage):
     """Batches of emitters, each used on the image that the one before left."""
 
-    _batch = FIRST_BATCH
-
     def __init__(self, scan: Scan, index: int, number: int, image: Floats) -> None:
         super().__init__(scan, index, number)
         self.state: sart.State = sart.begin(image)
+        self._batch = max(1, FIRST_NODES // image.size)
 
     def first(self) -> list[Call]:
         return [Call(advance, (*self._at, self.state, self._batch))]
