@@ -52,7 +52,7 @@ def task_bytes(settings: Timed | WaveSimulationSettings) -> dict[str, int]:
     """
     if isinstance(settings, WaveSimulationSettings):
         traces = settings.elements * settings.samples
-        part = WAVE_BYTES * _padded(settings) + (2 * REAL * settings.skip + 8) * traces
+        part = _grid_bytes(settings) + _trace_bytes(settings)
         finish = 6 * REAL * traces + 8 * settings.emissions * settings.elements
         truth = PLANE_BYTES * settings.nodes**2
     else:
@@ -64,6 +64,15 @@ def task_bytes(settings: Timed | WaveSimulationSettings) -> dict[str, int]:
         heights = settings.slices if isinstance(settings, VolumeSimulationSettings) else 1
         truth = (SPACE_BYTES if in_space else PLANE_BYTES) * settings.nodes**2 * heights
     return {"make_part": FLOOR_BYTES + part, "finish": FLOOR_BYTES + finish + truth}
+
+
+def costly_setting(settings: Timed | WaveSimulationSettings, task: str) -> str:
+    """The setting that the bytes of a task hang on most."""
+    if task == "finish":
+        return "elements"
+    if isinstance(settings, WaveSimulationSettings):
+        return "elements" if _trace_bytes(settings) > _grid_bytes(settings) else "frequency_hz"
+    return "nodes"
 
 
 def result_bytes(settings: Timed | WaveSimulationSettings) -> int:
@@ -88,6 +97,15 @@ def cpu_seconds(settings: Timed | WaveSimulationSettings) -> tuple[float, float]
 def pairs(settings: Timed) -> int:
     """Of all scans."""
     return settings.scans * settings.emitters**2
+
+
+def _grid_bytes(settings: WaveSimulationSettings) -> int:
+    return WAVE_BYTES * _padded(settings)
+
+
+def _trace_bytes(settings: WaveSimulationSettings) -> int:
+    """Every time step of both media, and the samples that are kept."""
+    return (2 * REAL * settings.skip + 8) * settings.elements * settings.samples
 
 
 def _noisy(settings: Timed) -> bool:

@@ -12,10 +12,9 @@ from bentray_kernels.errors import InvalidInput
 from .asked_simulation import AskedSimulation
 from .hdf5_reading import Limits
 from .planning import Offer
-from .simulation_effort import cpu_seconds, result_bytes, task_bytes
+from .simulation_effort import costly_setting, cpu_seconds, result_bytes, task_bytes
 from .simulation_parts import parts_of
 from .task_memory import MIB
-from .wave_simulation import WaveSimulationSettings
 
 # A file of its own for each part, and each read again: more than this no disk is glad of.
 MOST_TASKS = 200_000
@@ -59,7 +58,6 @@ def plan_simulation(asked: AskedSimulation, offers: Sequence[Offer]) -> Simulati
             the setting that costs most.
     """
     settings = asked.chosen()
-    grid = "frequency_hz" if isinstance(settings, WaveSimulationSettings) else "nodes"
     calls, size = task_bytes(settings), result_bytes(settings)
     most = Limits().total_bytes
     if size > most:
@@ -69,7 +67,7 @@ def plan_simulation(asked: AskedSimulation, offers: Sequence[Offer]) -> Simulati
     room = max((offer.task_bytes for offer in fitting), default=math.inf)
     name, largest = max(calls.items(), key=lambda item: item[1])
     if largest > room:
-        field = "elements" if name == "finish" else grid
+        field = costly_setting(settings, name)
         found = f"{getattr(settings, field):g}, for which a task ({name}) takes {largest} bytes"
         raise InvalidInput(field, found, f"settings whose tasks take at most {room:.0f} bytes")
     tasks = len(parts_of(settings)) + 1
