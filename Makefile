@@ -44,9 +44,9 @@ bench: install ## run benchmarks/NAME.py; NAME=reconstruction ARGS=--quick
 
 lock: ## compile the lock files anew (needs uv on the PATH)
 	@command -v uv >/dev/null || { echo "make lock needs uv: pip install uv" >&2; exit 1; }
-	$(call compile,requirements.lock,--extra build --extra postgres pyproject.toml)
-	$(call compile,requirements-dev.lock,--extra build --extra postgres --extra test --extra lint -c requirements.lock pyproject.toml)
-	$(call compile,requirements-docs.lock,--extra build --extra postgres --extra docs -c requirements-dev.lock pyproject.toml)
+	$(call compile,requirements.lock,--extra build --extra postgres --extra s3 pyproject.toml)
+	$(call compile,requirements-dev.lock,--extra build --extra postgres --extra s3 --extra test --extra lint -c requirements.lock pyproject.toml)
+	$(call compile,requirements-docs.lock,--extra build --extra postgres --extra s3 --extra docs -c requirements-dev.lock pyproject.toml)
 	$(call compile,requirements-generator.lock,--group generator)
 
 clean: ## remove what was built or written here, .venv too

@@ -49,6 +49,7 @@ from .storage.geometry_fields import GeometryFields
 from .storage.jobs import Jobs
 from .storage.keys import Keys
 from .storage.meshes import Meshes
+from .storage.open_store import open_store
 from .storage.queue import Queue
 from .storage.uploads import Uploads
 from .storage.volumes import Volumes
@@ -127,6 +128,8 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
     files.drop_leftovers()
     database = open_database(settings.database)
     stack.callback(database.close)
+    store = open_store(settings.storage_url, files.root, database, settings.cache_bytes)
+    files = Files(settings.data_dir, store)
     door = Door(settings, Keys(database))
     if cluster is None:
         cluster = stack.enter_context(
@@ -139,7 +142,7 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
                 tls=settings.tls_dir,
             )
         )
-    queue, compute = Queue(database), Compute(cluster)
+    queue, compute = Queue(database), Compute(cluster, store.bring)
     runner = Runner(
         queue,
         files,

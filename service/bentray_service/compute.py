@@ -35,8 +35,13 @@ class Cluster(Protocol):
 class Compute:
     """The worker pool of this service."""
 
-    def __init__(self, cluster: Cluster) -> None:
+    def __init__(self, cluster: Cluster, bring: Callable[[Path], Path]) -> None:
+        """Args:
+        cluster: with the pool.
+        bring: lets what a task is to read lie at its path; see ``Store.bring``.
+        """
         self._cluster = cluster
+        self._bring = bring
 
     @property
     def client(self) -> Any:
@@ -61,7 +66,7 @@ class Compute:
         except (OSError, TimeoutError):
             # The scheduler is gone; the job waits until it is back, on workers of which nothing is known.
             offers = ()
-        return planning.plan(summary_of(path, settings), settings, offers).to_dict()
+        return planning.plan(summary_of(self._bring(path), settings), settings, offers).to_dict()
 
     def slice_png(self, path: Path, **how: Any) -> bytes:
         """One slice of a reconstruction file as PNG; ``how`` as in ``bentray_workers.images.slice``.
@@ -78,11 +83,11 @@ class Compute:
 
     def refraction_png(self, path: Path, view: RefractionView) -> bytes:
         """A volume or reconstruction file as glass; raises as ``slice_png`` does."""
-        return self._finished(refraction.submit(self.client, path, view, RENDER_PRIORITY))
+        return self._finished(refraction.submit(self.client, self._bring(path), view, RENDER_PRIORITY))
 
     def field_png(self, folder: Path, view: FieldView) -> bytes:
         """A scene with a geometry field; raises as ``slice_png`` does."""
-        return self._finished(field_picture.submit(self.client, folder, view, RENDER_PRIORITY))
+        return self._finished(field_picture.submit(self.client, self._bring(folder), view, RENDER_PRIORITY))
 
     def field_map_png(self, folder: Path, what: str) -> bytes:
         """The geometry image of a field, as ``bentray_workers.field_picture.map_png``."""
@@ -104,7 +109,8 @@ class Compute:
         return self._finished(self._begun(draw, path, how))
 
     def _begun(self, task: Callable[..., Any], path: Path, how: dict[str, Any]) -> Any:
-        return self.client.submit(task, path, **how, pure=False, resources=RENDER, priority=RENDER_PRIORITY)
+        place = {"resources": RENDER, "priority": RENDER_PRIORITY}
+        return self.client.submit(task, self._bring(path), **how, pure=False, **place)
 
     def _finished(self, future: Any) -> bytes:
         return bytes(self._done(future))

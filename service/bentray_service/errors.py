@@ -29,7 +29,7 @@ log = logging.getLogger("bentray.errors")
 
 MEDIA_TYPE = "application/problem+json"
 LONGEST_FOUND = 120
-# Seconds after which it is worth another try, where workers or the queue are full.
+# Seconds after which it is worth another try, where workers or the queue are full, or the storage is away.
 RETRY_AFTER = "10"
 METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
 
@@ -109,6 +109,7 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.NoSuchPart: Kind(416, "no-such-part", "The part of the file is not there"),
     refusals.NoAnimation: Kind(404, "no-animation", "The job has no animation"),
     refusals.StorageFull: Kind(507, "storage-full", "The disk of the service is full"),
+    refusals.StorageAway: Kind(503, "storage-away", "The storage of the service does not answer"),
     refusals.Busy: Kind(503, "busy", "No worker was free in time"),
     refusals.NotReady: Kind(503, "not-ready", "The service cannot work now"),
 }
@@ -197,7 +198,7 @@ def _refused(request: Request, error: Exception) -> Response:
 def refused(error: InvalidInput, path: str) -> Response:
     """The answer that says what an :class:`InvalidInput` (or a refusal) says."""
     headers: dict[str, str] = {}
-    if isinstance(error, refusals.Busy | refusals.QueueFull):
+    if isinstance(error, refusals.Busy | refusals.QueueFull | refusals.StorageAway):
         headers["Retry-After"] = RETRY_AFTER
     if isinstance(error, refusals.TooOften):
         headers["Retry-After"] = str(math.ceil(error.wait_s))

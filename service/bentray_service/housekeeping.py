@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy.exc import SQLAlchemyError
 
 from .ingest.append import Hold
-from .refusals import InUse, Locked, UnknownId
+from .refusals import InUse, Locked, StorageAway, UnknownId
 from .storage.deletion import Deletion
 from .storage.files import Files
 from .storage.tenants import Tenant
@@ -21,6 +21,10 @@ log = logging.getLogger("bentray.housekeeping")
 Row = dict[str, Any]
 
 INTERVAL_SECONDS = 60.0
+# The store is looked through less often, for it may hold much.
+TIDY_SECONDS = 3600.0
+# How long a large file may take to come to its end there.
+STOP_SECONDS = 30.0
 DAY_S = 86400.0
 
 
@@ -48,13 +52,17 @@ class Housekeeper:
 
     def stop(self) -> None:
         self._leaving.set()
-        self._thread.join()
+        self._thread.join(STOP_SECONDS)
 
     def _loop(self) -> None:
+        tidied = -TIDY_SECONDS
         while True:
             try:
                 self.sweep()
-            except (SQLAlchemyError, OSError):
+                if time.monotonic() - tidied >= TIDY_SECONDS:
+                    self._files.store.tidy(self._leaving.is_set)
+                    tidied = time.monotonic()
+            except (SQLAlchemyError, OSError, StorageAway):
                 log.exception("what is old could not be removed; trying again in %g s", INTERVAL_SECONDS)
             if self._leaving.wait(INTERVAL_SECONDS):
                 return

@@ -126,6 +126,8 @@ class _Parts(Collector):
             age = 0.0 if oldest is None else max(0.0, time.time() - oldest)
             yield _gauge("bentray_jobs_oldest_queued_seconds", "Age of the job that waits longest.", age)
         yield _gauge("bentray_workers", "Dask workers connected.", parts.compute.workers())
+        up = float(parts.files.store.fault() is None)
+        yield _gauge("bentray_storage_up", "Whether what keeps the files answers.", up)
         free = shutil.disk_usage(parts.files.root).free
         yield _gauge("bentray_disk_free_bytes", "Free space in the data folder.", free)
 

@@ -123,6 +123,13 @@ class StorageFull(InvalidInput):
     """The disk of the service is full."""
 
 
+class StorageAway(InvalidInput):
+    """The bucket that keeps the files does not answer, or refuses."""
+
+    def __init__(self, found: str) -> None:
+        super().__init__("storage", found, "another try, once it answers again")
+
+
 class Busy(InvalidInput):
     """No worker took the task in time."""
 

@@ -51,6 +51,14 @@ class ServiceSettings(BaseSettings):
     database_password_file: Path | None = Field(
         None, description="File whose first line is the password of database_url, which then holds none."
     )
+    storage_url: str | None = Field(
+        None,
+        pattern=r"^s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9!_.*'()-]+)*/?$",
+        description="s3://bucket/prefix to keep the files in; without it they stay in data_dir.",
+    )
+    cache_bytes: int = Field(
+        50 * GIB, ge=0, description="Bytes that data_dir may hold of what is kept in storage_url."
+    )
     jobs_at_once: int = Field(2, ge=1, le=64, description="Jobs that run at the same time; the others wait.")
     max_queued_jobs: int = Field(
         1000, ge=1, description="Jobs that may wait, of each tenant; a further one is refused with 429."

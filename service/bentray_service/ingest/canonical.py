@@ -50,6 +50,7 @@ def make_canonical(
 
     Raises:
         InvalidInput, StorageFull: as ``sandbox.ingest`` does; nothing is left then.
+        StorageAway: when the canonical file cannot be kept now; the same.
     """
     try:
         summary = ingest(

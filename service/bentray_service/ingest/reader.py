@@ -18,7 +18,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import INTERNAL, Problem, from_exception, make
-from ..refusals import StorageFull, UnknownId
+from ..refusals import StorageAway, StorageFull, UnknownId
 from ..storage.files import Files
 from ..storage.tenants import Tenant
 from ..storage.uploads import Uploads
@@ -32,7 +32,7 @@ Row = dict[str, Any]
 
 # How long it waits before it looks by itself, s; a whole upload wakes it at once.
 IDLE_SECONDS = 5.0
-# How long it waits when the disk is full or the database away, s.
+# How long it waits when the disk is full or the database or the storage away, s.
 PATIENCE_SECONDS = 30.0
 STOP_SECONDS = 30.0
 
@@ -103,7 +103,7 @@ class UploadReader:
                     if self._leaving.is_set():
                         return
                     self._read(row)
-            except (SQLAlchemyError, StorageFull) as error:
+            except (SQLAlchemyError, StorageAway, StorageFull) as error:
                 log.warning("uploads wait: %s", error)
                 pause = PATIENCE_SECONDS
             self._wake.wait(pause) if pause == IDLE_SECONDS else self._leaving.wait(pause)
@@ -132,7 +132,7 @@ class UploadReader:
                 row["what"], path, row["result_id"], files, self._limits, row["given"], self._started
             )
             store.add(tenant, row["result_id"], size=row["length"], sha256=digest_of(path), summary=summary)
-        except (StorageFull, SQLAlchemyError):
+        except (StorageAway, StorageFull, SQLAlchemyError):
             raise
         except InvalidInput as error:
             return from_exception(error, instance)

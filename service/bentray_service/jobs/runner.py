@@ -8,6 +8,7 @@ import shutil
 import threading
 from collections.abc import Callable
 from concurrent.futures import CancelledError
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from bentray_workers.slices import Cancelled
 
 from ..compute import Compute
 from ..logs import about
+from ..refusals import StorageAway
 from ..storage.files import Files
 from ..storage.queue import LEASE_S, Queue
 from ..storage.schema import ENDED
@@ -35,6 +37,8 @@ log = logging.getLogger("bentray.jobs")
 IDLE_SECONDS = 1.0
 # How long a job may take to notice that the service leaves.
 STOP_SECONDS = 30.0
+# How long a result waits for a store that is away, before it is tried again.
+STORE_SECONDS = 5.0
 # How often leases are renewed, and those of dead services looked for.
 LEASE_CHECK_SECONDS = LEASE_S / 6.0
 
@@ -54,7 +58,7 @@ class Runner:
     """Runs up to ``at_once`` jobs at the same time.
 
     A thread only drives its job: the work is done by the cluster. While the disk has less than
-    ``min_free_bytes`` free, jobs wait.
+    ``min_free_bytes`` free, or the store is away, jobs wait.
     """
 
     def __init__(
@@ -120,7 +124,7 @@ class Runner:
     def _loop(self) -> None:
         while not self._leaving.is_set():
             try:
-                job = self._queue.claim() if self._has_room() else None
+                job = self._queue.claim() if self._has_room() and self._files.store.fault() is None else None
                 if job is not None:
                     self._run(job)
                     continue
@@ -143,10 +147,14 @@ class Runner:
         kind = KINDS[job["kind"]]
         target = kind.target(files, job)
         try:
+            source = self._files.store.bring(kind.source(files, job))
+            with suppress(FileNotFoundError):
+                # Another job may have made the same, and a kind may then take it as it is.
+                self._files.store.bring(target)
             result = kind.run(
                 Task(
                     client=self._compute.client,
-                    source=kind.source(files, job),
+                    source=source,
                     settings=job["settings"],
                     target=target,
                     work_dir=files.work(job_id),
@@ -164,6 +172,11 @@ class Runner:
                 lambda: self._queue.release(job_id, "the workers were away; it goes on when they are back")
             )
             self._leaving.wait(IDLE_SECONDS)
+        except StorageAway as error:
+            log.warning("%s waits for the storage: %s", job_id, error)
+            self._settle(
+                lambda: self._queue.release(job_id, "the storage was away; it goes on when it is back")
+            )
         except Exception as error:
             if isinstance(error, OSError) and error.errno in FULL and not self._has_room():
                 log.warning("%s waits for room on the disk", job_id)
@@ -174,7 +187,11 @@ class Runner:
             problem = explain(job_id, error).model_dump(exclude_none=True)
             self._settle(lambda: self._failed(job_id, files, reporter, problem))
         else:
-            self._settle(lambda: self._succeeded(job_id, files, reporter, kind, result, target))
+            try:
+                self._settle(lambda: self._succeeded(job_id, files, reporter, kind, result, target))
+            except StorageAway:
+                # The last checkpoint is there: at the next start little is left to do.
+                self._settle(lambda: self._queue.release(job_id, "the service was stopped"))
 
     def _stopped(self, job_id: str, files: TenantFiles, reporter: Reporter) -> None:
         reporter.flush()
@@ -200,6 +217,8 @@ class Runner:
         target: Path,
     ) -> None:
         reporter.flush()
+        if self._queue.told(job_id) == "running":
+            self._files.store.publish(target)
         if not self._queue.succeed(job_id, result, kind.table):
             if self._queue.told(job_id) is None:
                 # Another service runs it by now, and writes the same file.
@@ -209,10 +228,18 @@ class Runner:
         files.drop_work(job_id)
 
     def _settle(self, write_the_end: Callable[[], None]) -> None:
-        """Write the end of a job, as often as it takes: it would count as running for ever otherwise."""
+        """Write the end of a job, as often as it takes: it would count as running for ever otherwise.
+
+        Raises:
+            StorageAway, SQLAlchemyError: when the service leaves before that could be done.
+        """
         while True:
             try:
                 return write_the_end()
+            except StorageAway as error:
+                log.warning("a result waits for the storage: %s", error)
+                if self._leaving.wait(STORE_SECONDS):
+                    raise
             except SQLAlchemyError:
                 log.exception("the end of a job could not be stored; trying again in %g s", IDLE_SECONDS)
                 if self._leaving.wait(IDLE_SECONDS):

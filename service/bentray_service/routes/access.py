@@ -7,6 +7,7 @@ from typing import Literal
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
+from ..errors import described
 from ..wiring import Asking, Service
 
 router = APIRouter(prefix="/v1/access", tags=["access"])
@@ -27,7 +28,7 @@ class AccessRecord(BaseModel):
     renders_per_minute: int = Field(description="Pictures among them that may be drawn; 0: any number.")
 
 
-@router.get("")
+@router.get("", responses=described(503))
 def show_access(service: Service, caller: Asking) -> AccessRecord:
     """Who the caller is, and what it may do and store."""
     settings, limited = service.settings, caller.how != "open"

@@ -26,7 +26,7 @@ router.include_router(quality.router)
     status_code=status.HTTP_201_CREATED,
     dependencies=[Depends(only(*MEDIA_TYPES))],
     openapi_extra=body_of("dataset", MEDIA_TYPES),
-    responses=described(413, 415, 422, 507),
+    responses=described(413, 415, 422, 503, 507),
 )
 async def upload_dataset(
     request: Request, response: Response, service: Service, tenant: CallerTenant
@@ -58,7 +58,7 @@ def show_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> Dat
     return dataset_record(service.datasets.get(tenant, dataset_id))
 
 
-@router.delete("/{dataset_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409))
+@router.delete("/{dataset_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409, 503))
 def delete_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> None:
     """Delete a scan, its jobs, and the volumes that they made; not while a job needs it."""
     service.deletion.delete(Stored(tenant, "dataset", dataset_id))

@@ -51,6 +51,8 @@ def ready(service: Service) -> Ready:
     needed = service.settings.min_free_bytes
     if free < needed:
         faults.append(("disk", f"{free} bytes free", f"at least {needed} bytes (BENTRAY_MIN_FREE_BYTES)"))
+    if fault := service.files.store.fault():
+        faults.append(("storage", fault, "a bucket that can be read (BENTRAY_STORAGE_URL)"))
     workers = service.compute.workers()
     if workers == 0:
         faults.append(("workers", "0 connected", "at least one Dask worker"))

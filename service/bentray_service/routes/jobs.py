@@ -99,7 +99,7 @@ JobRequest = Annotated[
     "",
     status_code=status.HTTP_202_ACCEPTED,
     dependencies=[Depends(only("application/json"))],
-    responses=described(400, 404, 409, 413, 415, 422, 429, 507),
+    responses=described(400, 404, 409, 413, 415, 422, 429, 503, 507),
 )
 def start_job(
     asked: JobRequest,
@@ -185,7 +185,7 @@ def cancel_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord
 @router.get(
     "/{job_id}/animation",
     response_class=Response,
-    responses={**download_of(*ANIMATIONS.values()), **described(404)},
+    responses={**download_of(*ANIMATIONS.values()), **described(404, 503)},
 )
 def animation(job_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
     """The pictures of a job of kind refraction, once it has succeeded.
@@ -196,5 +196,5 @@ def animation(job_id: str, request: Request, service: Service, tenant: CallerTen
     if job["kind"] != "refraction" or job["state"] != "succeeded":
         raise NoAnimation(job["id"], job["kind"], job["state"])
     extension = job["settings"]["format"]
-    path = service.files.of(tenant).animation(job["id"], extension)
+    path = service.files.store.bring(service.files.of(tenant).animation(job["id"], extension))
     return download(request, path, repr((job["id"], job["finished"])), ANIMATIONS[extension])

@@ -37,7 +37,7 @@ router = APIRouter(prefix="/v1", tags=["meshes"])
     status_code=status.HTTP_201_CREATED,
     dependencies=[Depends(only(*MEDIA_TYPES))],
     openapi_extra=body_of("mesh", MEDIA_TYPES),
-    responses=described(413, 415, 422, 507),
+    responses=described(413, 415, 422, 503, 507),
 )
 async def upload_mesh(
     request: Request,
@@ -73,7 +73,9 @@ def show_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> MeshRecor
     return mesh_record(service.meshes.get(tenant, mesh_id))
 
 
-@router.delete("/meshes/{mesh_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409))
+@router.delete(
+    "/meshes/{mesh_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409, 503)
+)
 def delete_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> None:
     """Delete a mesh, its geometry fields and the jobs that made them; not while a job needs it."""
     service.deletion.delete(Stored(tenant, "mesh", mesh_id))

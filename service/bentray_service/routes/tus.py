@@ -65,7 +65,7 @@ def what_is_possible(service: Service) -> Response:
     "",
     status_code=status.HTTP_201_CREATED,
     dependencies=[Spoken],
-    responses=described(412, 413, 422, 507),
+    responses=described(412, 413, 422, 503, 507),
 )
 def begin_upload(
     response: Response,

@@ -23,7 +23,7 @@ router = APIRouter()
     response_class=Response,
     responses={
         **download_of(HDF5, *sorted({one.media_type for one in FORMATS.values()})),
-        **described(404, 422),
+        **described(404, 422, 503),
     },
 )
 def volume_data(
@@ -46,7 +46,8 @@ def volume_data(
     """
     volume = service.volumes.get(tenant, volume_id)
     files = service.files.of(tenant)
-    path: Path = files.volume(volume["id"])
+    # For other formats too: what is made of a volume stays as long as it does.
+    path: Path = service.files.store.bring(files.volume(volume["id"]))
     seed = repr((volume["id"], volume["created"], format))
     if format == "hdf5":
         return download(request, path, seed, HDF5)

@@ -28,7 +28,7 @@ router.include_router(volume_data.router)
     status_code=status.HTTP_201_CREATED,
     dependencies=[Depends(only(*MEDIA_TYPES))],
     openapi_extra=body_of("volume", MEDIA_TYPES),
-    responses=described(413, 415, 422, 507),
+    responses=described(413, 415, 422, 503, 507),
 )
 async def upload_volume(
     request: Request,
@@ -78,7 +78,7 @@ def show_volume(volume_id: str, service: Service, tenant: CallerTenant) -> Volum
     return volume_record(service.volumes.get(tenant, volume_id))
 
 
-@router.delete("/{volume_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409))
+@router.delete("/{volume_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409, 503))
 def delete_volume(volume_id: str, service: Service, tenant: CallerTenant) -> None:
     """Delete a volume, the job that made it and its turntables; not while a job needs it."""
     service.deletion.delete(Stored(tenant, "volume", volume_id))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sqlalchemy import ColumnElement, Connection, Table, delete, or_, select, update
 
-from ..refusals import InUse, UnknownId
+from ..refusals import InUse, StorageAway, UnknownId
 from .database import Database
 from .files import Files
 from .ids import checked
@@ -52,8 +52,12 @@ class Deletion:
         Raises:
             UnknownId: when the tenant has no such one.
             InUse: when a job that needs it is not at its end; nothing is deleted then.
+            StorageAway: when the files cannot be removed now; the rows stay then.
         """
         name = checked(stored.what, stored.id)
+        if fault := self._files.store.fault():
+            # Said before the database is held.
+            raise StorageAway(fault)
         with self._database.write() as connection:
             if not any(_has(connection, table, stored.tenant, name) for table in _TABLES[stored.what]):
                 raise UnknownId(stored.what, stored.id)
@@ -64,9 +68,7 @@ class Deletion:
             gone |= _of(connection, stored.tenant, jobs.c.volume_id.in_(results))
             self._refuse_unfinished(connection, stored, gone)
             fields = _fields(connection, stored.tenant, name, gone)
-            files = self._files.of(stored.tenant)
-            for each in (name, *results, *fields, *gone):
-                files.remove(each)
+            self._files.of(stored.tenant).remove([name, *results, *fields, *gone])
             _forget(connection, stored.tenant, {name, *results}, fields, gone)
 
     def older_than(self, time: float) -> Iterator[Stored]:

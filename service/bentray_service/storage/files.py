@@ -11,7 +11,10 @@ from typing import IO
 
 from bentray_kernels.errors import InvalidInput
 
-from .tenant_files import KINDS, TenantFiles, sync_folder
+from .disk import sync_folder
+from .local_store import LocalStore
+from .store import Store
+from .tenant_files import KINDS, TenantFiles
 from .tenants import LOCAL, Tenant, checked_tenant
 
 log = logging.getLogger("bentray.storage")
@@ -22,10 +25,14 @@ class Files:
 
     ``tenants/`` holds a folder for each tenant (see :class:`TenantFiles`), ``scratch/`` what workers need
     while they work, ``audit/`` who read and changed what.
+
+    Attributes:
+        store: what keeps the files of tenants for good; the data folder itself, if nothing else is given.
     """
 
-    def __init__(self, data_dir: Path) -> None:
+    def __init__(self, data_dir: Path, store: Store | None = None) -> None:
         self.root = data_dir.resolve()
+        self.store = store or LocalStore()
         self._tenants = self.root / "tenants"
         self.scratch = self.root / "scratch"
         self.audit = self.root / "audit"
@@ -50,7 +57,7 @@ class Files:
         Raises:
             InvalidInput: for a name that no tenant can have.
         """
-        found = TenantFiles(self._tenants / checked_tenant(tenant))
+        found = TenantFiles(self._tenants / checked_tenant(tenant), self.store)
         found.prepare()
         return found
 

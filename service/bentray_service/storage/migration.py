@@ -117,7 +117,7 @@ def _to_3(connection: Connection) -> None:
         ("jobs_by_age", "jobs", "number"),
     ):
         connection.execute(text(f"CREATE INDEX {name} ON {table} (tenant, {order})"))
-    for new in (schema.meshes, schema.geometry_fields, schema.keys, schema.uploads):
+    for new in (schema.meshes, schema.geometry_fields, schema.keys, schema.uploads, schema.bucket_mark):
         new.create(connection)
 
 

@@ -234,3 +234,6 @@ keys = Table(
     Column("revoked", Float),
     Column("used", Float),
 )
+
+# What tells this database from all others, for the bucket that keeps its files; one row, made when asked for.
+bucket_mark = Table("bucket_mark", metadata, Column("database", String(32), primary_key=True))

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Collection
 from pathlib import Path
 
 from .ids import PREFIXES, checked
+from .store import Store
 
 # What a data folder of before there were tenants has at its top.
 KINDS = ("incoming", "uploads", "datasets", "volumes", "exports", "animations", "meshes", "fields", "work")
+# Those that a store keeps; the others can be made again, or are on their way.
+KEPT = ("datasets", "volumes", "animations", "meshes", "fields")
+# How the names of turntables end; those of bentray_workers.turntable, which takes long to import.
+ANIMATIONS = ("zip", "apng")
 
 
 class TenantFiles:
@@ -22,10 +26,13 @@ class TenantFiles:
     ``animations/`` turntables, ``meshes/`` the canonical files of meshes, ``fields/`` a folder for each
     geometry field, ``work/`` one for each job that is not at its end, with its checkpoints. An upload is a
     dataset, a volume or a mesh, as its id tells.
+
+    What is in ``KEPT`` may lie in a store only: ``Store.bring`` lets it lie at its path again.
     """
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, store: Store) -> None:
         self.root = root
+        self._store = store
         self._incoming, self._datasets, self._volumes = root / "incoming", root / "datasets", root / "volumes"
         self._uploads = root / "uploads"
         self._exports, self._animations = root / "exports", root / "animations"
@@ -104,50 +111,47 @@ class TenantFiles:
             left.unlink(missing_ok=True)
 
     def adopt(self, upload_id: str) -> Path:
-        """Move the checked canonical file to its place, durably."""
+        """Move the checked canonical file to its place, and keep it for good.
+
+        Raises:
+            StorageAway: when it cannot be kept now; nothing is left then.
+        """
         target = self._canonical(upload_id)
         self.candidate(upload_id).replace(target)
-        sync_folder(target.parent)
+        try:
+            self._store.publish(target)
+        except BaseException:
+            target.unlink(missing_ok=True)
+            raise
         return target
 
-    def remove(self, stored_id: str) -> None:
-        """Remove all files of a dataset, a volume, a mesh, a field or a job, in every format."""
-        what = {prefix: name for name, prefix in PREFIXES.items()}.get(stored_id.partition("-")[0], "dataset")
-        for folder in KINDS:
-            for path in (self.root / folder).glob(f"{checked(what, stored_id)}*"):
-                if path.is_dir():
-                    shutil.rmtree(path)
-                else:
-                    path.unlink(missing_ok=True)
+    def remove(self, stored_ids: Collection[str]) -> None:
+        """Remove all files of datasets, volumes, meshes, fields and jobs, in every format.
+
+        Raises:
+            StorageAway: when they cannot be removed now.
+        """
+        self._store.remove([path for one in stored_ids for path in self._kept(one)])
+        for one in stored_ids:
+            for folder in KINDS:
+                for path in (self.root / folder).glob(f"{one}*"):
+                    if path.is_dir():
+                        shutil.rmtree(path)
+                    else:
+                        path.unlink(missing_ok=True)
 
     def bytes_used(self) -> int:
-        """The size of all of it, bytes; what vanishes meanwhile is not counted."""
-        return _size(self.root)
+        """The size of all of it, bytes, wherever it is kept; raises StorageAway where that cannot be told."""
+        return self._store.bytes_used(self.root)
+
+    def _kept(self, stored_id: str) -> list[Path]:
+        """Where a store may have something of this id."""
+        place = {"vol": self.volume, "mesh": self.mesh, "field": self.field}
+        prefix = stored_id.partition("-")[0]
+        if prefix == PREFIXES["job"]:
+            return [self.animation(stored_id, extension) for extension in ANIMATIONS]
+        return [place.get(prefix, self.dataset)(stored_id)]
 
     def _canonical(self, upload_id: str) -> Path:
         place = {PREFIXES["volume"]: self.volume, PREFIXES["mesh"]: self.mesh}
         return place.get(upload_id.partition("-")[0], self.dataset)(upload_id)
-
-
-def _size(folder: Path) -> int:
-    total = 0
-    try:
-        with os.scandir(folder) as entries:
-            for entry in entries:
-                try:
-                    inside = entry.is_dir(follow_symlinks=False)
-                    total += _size(Path(entry)) if inside else entry.stat(follow_symlinks=False).st_size
-                except FileNotFoundError:
-                    continue
-    except FileNotFoundError:
-        return 0
-    return total
-
-
-def sync_folder(folder: Path) -> None:
-    """Make a rename in ``folder`` survive a power cut."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -1,4 +1,4 @@
-"""Every kind of database that the service can use, and what jobs need to be in one."""
+"""Every kind of database that the service can use, what jobs need to be in one, and buckets."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from pathlib import Path
 
 import pytest
 
+from bentray_service.storage import bucket_store
 from bentray_service.storage.database import Database, open_database
 from bentray_service.storage.datasets import Datasets
 from bentray_service.storage.ids import new_id
 from bentray_service.storage.jobs import Jobs
 from bentray_service.storage.queue import Queue
 from bentray_service.storage.tenants import LOCAL
+
+from ... import s3
 
 SUMMARY = {
     "title": "",
@@ -65,3 +68,18 @@ def dataset(database: Database) -> str:
     """The id of a dataset of the local tenant."""
     row = Datasets(database).add(LOCAL, new_id("dataset"), size=1, sha256="0" * 64, summary=SUMMARY)
     return str(row["id"])
+
+
+@pytest.fixture(scope="session")
+def s3_server() -> Iterator[s3.Server]:
+    """One server for all tests; each makes a bucket of its own."""
+    server = s3.Server()
+    yield server
+    server.close()
+
+
+@pytest.fixture
+def bucket_url(s3_server: s3.Server, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The address of an empty bucket, where what is said of it is believed for a moment only."""
+    monkeypatch.setattr(bucket_store, "FRESH_S", 0.0)
+    return s3_server.new_bucket(monkeypatch)

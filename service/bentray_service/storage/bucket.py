@@ -1,0 +1,133 @@
+"""Objects under one prefix of an S3 bucket, through s3fs; what goes wrong there is ``StorageAway``."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import math
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+from botocore.exceptions import BotoCoreError, ClientError
+from s3fs import S3FileSystem
+
+from ..refusals import StorageAway
+
+log = logging.getLogger("bentray.storage")
+
+# A few of them are in memory at a time; a larger file has larger ones, for there are at most MOST_PARTS.
+PART_BYTES = 16 * 2**20
+PARTS_AT_ONCE = 4
+MOST_PARTS = 10_000
+# What one call to S3 removes.
+MOST_REMOVED = 1000
+# Retries come on top, so that a bucket which does not answer is given up after some ten seconds.
+CONNECT_S = 3.0
+READ_S = 30.0
+TRIES = {"total_max_attempts": 2, "mode": "standard"}
+
+# Of the local disk: they are no fault of the bucket.
+OWN = (errno.ENOSPC, errno.EDQUOT)
+
+
+@dataclass(frozen=True)
+class Held:
+    """An object: its key below the prefix, its size and when it was last written, s since 1970."""
+
+    key: str
+    size: int
+    changed: float
+
+
+class Bucket:
+    """Keys are relative to the prefix. Credentials and endpoint come from the variables that AWS names."""
+
+    def __init__(self, url: str) -> None:
+        """Args:
+        url: ``s3://bucket`` or ``s3://bucket/prefix``.
+        """
+        self.url = url.rstrip("/")
+        self._name, _, prefix = self.url.removeprefix("s3://").partition("/")
+        self._prefix = f"{prefix}/" if prefix else ""
+        self._s3 = S3FileSystem(
+            config_kwargs={"connect_timeout": CONNECT_S, "read_timeout": READ_S, "retries": TRIES},
+            default_block_size=PART_BYTES,
+            max_concurrency=PARTS_AT_ONCE,
+            use_listings_cache=False,
+        )
+        self._s3.retries = 2
+
+    def put(self, path: Path, key: str, told: Mapping[str, str]) -> None:
+        """Write a file as an object, with ``told`` beside it; it is there whole or not at all."""
+        part = max(PART_BYTES, math.ceil(path.stat().st_size / MOST_PARTS))
+        with self._watched():
+            self._s3.put_file(str(path), self._place(key), chunksize=part, Metadata=dict(told))
+
+    def get(self, key: str, path: Path) -> None:
+        """Read an object into a file, of which something may be there after an error.
+
+        Raises:
+            FileNotFoundError: when there is none.
+        """
+        with self._watched(may_miss=True):
+            self._s3.get_file(self._place(key), str(path))
+
+    def note(self, key: str, told: Mapping[str, str]) -> None:
+        """Write an object that is nothing but what is ``told`` beside it."""
+        with self._watched():
+            self._call("put_object", Key=self._prefix + key, Body=b"", Metadata=dict(told))
+
+    def told(self, key: str) -> dict[str, str] | None:
+        """What was told beside an object, and its size as ``size``; None when there is none."""
+        try:
+            with self._watched(may_miss=True):
+                found = self._call("head_object", Key=self._prefix + key)
+        except FileNotFoundError:
+            return None
+        return {**found["Metadata"], "size": str(found["ContentLength"])}
+
+    def listed(self, under: str = "") -> Iterator[Held]:
+        """All objects whose keys begin so."""
+        more: dict[str, str] = {}
+        while True:
+            with self._watched():
+                page = self._call("list_objects_v2", Prefix=self._prefix + under, **more)
+            for one in page.get("Contents", ()):
+                key = str(one["Key"]).removeprefix(self._prefix)
+                yield Held(key, int(one["Size"]), one["LastModified"].timestamp())
+            if not page.get("IsTruncated"):
+                return
+            more = {"ContinuationToken": page["NextContinuationToken"]}
+
+    def remove(self, keys: Collection[str]) -> None:
+        """Remove objects; those that are not there are passed over."""
+        left = [{"Key": self._prefix + key} for key in keys]
+        while left:
+            batch, left = left[:MOST_REMOVED], left[MOST_REMOVED:]
+            with self._watched():
+                answer = self._call("delete_objects", Delete={"Objects": batch, "Quiet": True})
+                for failure in answer.get("Errors", ()):
+                    raise PermissionError(failure.get("Code"))
+
+    @contextmanager
+    def _watched(self, *, may_miss: bool = False) -> Iterator[None]:
+        """Turn what goes wrong into ``StorageAway``; that an object is not there, only where it has to be."""
+        try:
+            yield
+        except (OSError, BotoCoreError, ClientError, aiohttp.ClientError) as error:
+            own = isinstance(error, OSError) and error.errno in OWN
+            if own or (may_miss and isinstance(error, FileNotFoundError)):
+                raise
+            # Callers are told neither address nor key.
+            log.warning("%s: %s: %s", self.url, type(error).__name__, error)
+            raise StorageAway(f"the bucket does not do what it is asked ({type(error).__name__})") from error
+
+    def _call(self, method: str, **how: Any) -> Any:
+        return self._s3.call_s3(method, Bucket=self._name, **how)
+
+    def _place(self, key: str) -> str:
+        return f"{self._name}/{self._prefix}{key}"
