@@ -67,25 +67,25 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     assert entered is not None
     # As ``held`` counts the problem, which holds the traces of the object.
     problem = here.problem(number)
-    speed = entered.state.speed
+    image, model = entered.state.image, entered.model
 
     def look() -> waves.Look:
-        return waves.look_at_waves(here, number, speed, 0)
+        return waves.look_at_waves(here, number, model, 0)
 
     kept = held(problem)
-    found["look_at_waves"] = kept + held(speed) + peak(look) - nothing
+    found["look_at_waves"] = kept + held(model) + peak(look) - nothing
     looks = [look()] * entered.emitters
     random = np.random.default_rng(0)
-    pairs = random.normal(size=(plan.memory, *speed.shape))
+    pairs = random.normal(size=(plan.memory, *image.shape))
     state = replace(
         entered.state,
-        speed=speed + 1.0,
-        illumination=np.ones_like(speed),
+        image=image + 1.0,
+        illumination=np.ones_like(image),
         steps=pairs,
         changes=pairs.copy(),
         history=(WavePass(1.0, 1.0, taken=True),),
     )
-    copies = 2 * len(looks) * speed.nbytes
+    copies = 2 * len(looks) * image.nbytes
     found["step_by_waves"] = (
         kept + held(state) + copies + peak(lambda: waves.step_by_waves(here, number, state, looks)) - nothing
     )

@@ -30,7 +30,7 @@ HISTORY = {
 }
 
 # Columns of refinements by waveforms; NaN where there is none. Files of before them have none of these.
-WAVES = ("band_low_hz", "band_high_hz", "misfit", "held_out_misfit")
+WAVES = ("band_low_hz", "band_high_hz", "misfit", "held_out_misfit", "of_attenuation")
 IMAGES = {
     "speed": "speed_mps",
     "coverage": "coverage_m",
@@ -145,14 +145,20 @@ def _history(reader: Reader) -> tuple[Sweep, ...]:
     if not waves:
         return tuple(Sweep(**row) for row in rows)
     return tuple(
-        Sweep(**row, band_hz=(low, high) if low and high else None, misfit=misfit, held_out_misfit=held)
-        for row, low, high, misfit, held in zip(rows, *waves, strict=True)
+        Sweep(
+            **row,
+            band_hz=(low, high) if low and high else None,
+            misfit=misfit,
+            held_out_misfit=held,
+            of_attenuation=bool(loss),
+        )
+        for row, low, high, misfit, held, loss in zip(rows, *waves, strict=True)
     )
 
 
 def _waves(sweep: Sweep) -> tuple[float, ...]:
     """What is in ``WAVES`` of one sweep."""
-    found = (*(sweep.band_hz or (None, None)), sweep.misfit, sweep.held_out_misfit)
+    found = (*(sweep.band_hz or (None, None)), sweep.misfit, sweep.held_out_misfit, sweep.of_attenuation)
     return tuple(math.nan if value is None else value for value in found)
 
 

@@ -5,10 +5,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from bentray_kernels.tomography.settings import Settings
-from bentray_kernels.wave import Band, WaveSettings, bands
+from bentray_kernels.wave import Band, WaveSettings, asked
 from bentray_kernels.wave.asked import check_traces
 from bentray_kernels.wave.extent import Extent
 from bentray_kernels.wave.sounding import SHOTS
@@ -53,10 +53,7 @@ class Traces:
 
 def plan_of(traces: Traces, settings: Settings) -> tuple[Band, ...]:
     """The bands that are gone through."""
-    found = bands(traces.frequency_hz, traces.water_mps)[: settings.wave_bands]
-    if settings.wave_emitters:
-        found = tuple(replace(band, emitters=settings.wave_emitters) for band in found)
-    return found
+    return asked.plan_of(traces.frequency_hz, traces.water_mps, settings)
 
 
 def wave_tasks(traces: Traces | None, settings: Settings) -> int:

@@ -39,6 +39,7 @@ class Sweep:
             then the shift of a wave in the middle of the band that has the same misfit.
         misfit: of its waveforms, 0 where they agree and 1 where they have nothing in common.
         held_out_misfit: the same of emitters that only judge.
+        of_attenuation: whether waveforms refined that; the residual is then that of the speed, which stays.
     """
 
     slice: int
@@ -50,6 +51,7 @@ class Sweep:
     band_hz: tuple[float, float] | None = None
     misfit: float | None = None
     held_out_misfit: float | None = None
+    of_attenuation: bool = False
 
 
 @dataclass(frozen=True)

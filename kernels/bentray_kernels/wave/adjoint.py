@@ -1,4 +1,4 @@
-"""The adjoint of the simulator: how a misfit changes with the speed at every node, from one reverse run."""
+"""The adjoint of the simulator: how a misfit changes with speed or loss at every node, by one reverse run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from .medium import Medium
 from .points import Points
-from .simulation import forward, placed
+from .simulation import Unknown, forward, placed
 from .stencil import weights
 from .stepping import advance, inject
 
@@ -26,7 +26,7 @@ class Slope(NamedTuple):
 
     Attributes:
         misfit: its value.
-        gradient: (nx, ny), of the misfit by the speed, s/m.
+        gradient: (nx, ny), of the misfit by the speed, s/m, or by the attenuation, m/Np.
         illumination: (nx, ny), energy of what a change would radiate; large near the emitter.
     """
 
@@ -41,13 +41,19 @@ def stored_bytes(medium: Medium, samples: int, every: int = 1) -> int:
 
 
 def slope(
-    medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floats, misfit: Misfit, every: int = 1
+    medium: Medium,
+    emitter: Floats,
+    receivers: Floats,
+    wavelet: Floats,
+    misfit: Misfit,
+    every: int = 1,
+    by: Unknown = "speed",
 ) -> Slope:
     """Misfit of one emitter's traces and its gradient (Plessix, Geophys. J. Int. 167, 2006).
 
     The gradient is that of the discrete scheme: exact for ``every = 1``. A larger step keeps less of the wave
-    field, and is as good while it samples the highest frequency more than twice a period. The damping of
-    the medium is held fixed; so are the edges.
+    field, and is as good while it samples the highest frequency more than twice a period. The edges are
+    held fixed; by the speed, so is the damping of the medium.
 
     Args:
         emitter: (2,), m.
@@ -55,6 +61,7 @@ def slope(
         wavelet: (nt,), as for ``simulate``.
         misfit: of the traces.
         every: time steps from one stored field to the next.
+        by: of what the gradient is.
 
     Raises:
         InvalidInput: as ``simulate``; a step between fields below 1.
@@ -62,11 +69,12 @@ def slope(
     if every < 1:
         raise InvalidInput("every", every, "at least 1 step")
     source, heard = placed(medium, np.atleast_2d(emitter), wavelet), placed(medium, receivers)
-    traces, scattered = forward(medium, source, heard, wavelet, every)
+    traces, scattered = forward(medium, source, heard, wavelet, every, by=by)
     value, residual = misfit(traces)
     image, light = backward(medium, heard, residual, scattered, every)
-    c = medium.speed
-    return Slope(value, 2.0 * every * float(np.abs(wavelet).max()) * image / c, light)
+    # By (c dt / h)^2, which drives a step, and by sigma dt = c alpha dt; the adjoint field is driven too.
+    along = 2.0 if by == "speed" else -(medium.spacing**2) / medium.time_step_s
+    return Slope(value, along * every * float(np.abs(wavelet).max()) * image / medium.speed, light)
 
 
 def backward(

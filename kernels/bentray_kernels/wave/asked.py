@@ -9,7 +9,7 @@ import numpy as np
 from ..acquisition import Dataset
 from ..errors import InvalidInput
 from ..tomography.settings import Settings
-from .settings import WaveSettings, bands
+from .settings import Band, WaveSettings, bands, loss_band
 
 # Parts of the time that a wave takes across the array, and periods of the pulse, before and after the arrival
 # in water that traces are compared within: what is faster than water comes before, what is scattered after.
@@ -41,11 +41,8 @@ def wave_settings(dataset: Dataset, settings: Settings) -> WaveSettings:
         )
     width = float(np.ptp(dataset.element_position_m, axis=0).max())
     across, pulse = width / dataset.water_speed_mps, PERIODS / dataset.center_frequency_hz
-    plan = bands(dataset.center_frequency_hz, dataset.water_speed_mps)[: settings.wave_bands]
-    if settings.wave_emitters:
-        plan = tuple(replace(band, emitters=settings.wave_emitters) for band in plan)
     return WaveSettings(
-        plan,
+        plan_of(dataset.center_frequency_hz, dataset.water_speed_mps, settings),
         misfit=settings.wave_misfit,
         window_s=(BEFORE * across + pulse, AFTER * across + pulse),
         nearest_m=NEAREST * width,
@@ -53,6 +50,16 @@ def wave_settings(dataset: Dataset, settings: Settings) -> WaveSettings:
         seed=settings.seed,
         roi=settings.roi,
     )
+
+
+def plan_of(centre_hz: float, water_mps: float, settings: Settings) -> tuple[Band, ...]:
+    """The bands that are gone through; that of the attenuation comes last."""
+    found = bands(centre_hz, water_mps)[: settings.wave_bands]
+    if settings.attenuation:
+        found = (*found, loss_band(centre_hz, water_mps))
+    if settings.wave_emitters:
+        found = tuple(replace(band, emitters=settings.wave_emitters) for band in found)
+    return found
 
 
 def check_traces(samples: int) -> None:

@@ -15,7 +15,7 @@ from ..tomography.result import Sweep
 from . import refine
 from .passes import sweeps
 from .problem import WaveProblem
-from .refine import Look, WaveIterate, WavePass
+from .refine import Look, Model, WaveIterate, WavePass
 from .settings import WaveSettings
 
 # A band whose water shots are simulated with a lower correlation than this with the recorded ones is passed
@@ -25,17 +25,19 @@ LEAST_LIKENESS = 0.9
 
 @dataclass(frozen=True)
 class Image:
-    """A speed image.
+    """An image.
 
     Attributes:
         speed: (nx, ny), m/s.
         spacing: m.
         origin: position of node 0, m.
+        attenuation: (nx, ny), beyond the water's, Np/m; None where it was not refined.
     """
 
     speed: Floats
     spacing: float
     origin: tuple[float, float]
+    attenuation: Floats | None = None
 
 
 class WaveScan(Protocol):
@@ -54,8 +56,8 @@ class BandEnd:
 
     Attributes:
         image: the image.
-        skipped: whether held-out emitters ended the band.
-        history: a record for each image that was looked at; none of a band that was passed over.
+        skipped: whether held-out emitters ended the band, or one before it, so that it was left out.
+        history: a record for each image that was looked at; none of a band that was passed over or left out.
     """
 
     image: Image
@@ -67,7 +69,8 @@ class BandEnd:
         """Misfit of held-out emitters in that image; NaN where none was looked at."""
         if not self.history:
             return math.nan
-        return self.history[refine.given_by(self.history, skipped=self.skipped)].held
+        judged = self.skipped or self.image.attenuation is not None
+        return self.history[refine.given_by(self.history, judged=judged)].held
 
 
 @dataclass(frozen=True)
@@ -78,11 +81,20 @@ class Entered:
         state: where it stands.
         origin: of its grid, m.
         emitters: how many there are to look at in each iteration.
+        frozen: (nx, ny), the speed where the attenuation is refined, m/s; else None.
     """
 
     state: WaveIterate
     origin: tuple[float, float]
     emitters: int
+    frozen: Floats | None = None
+
+    @property
+    def model(self) -> Model:
+        """What is to be looked at next."""
+        if self.frozen is None:
+            return Model(self.state.image)
+        return Model(self.frozen, self.state.image)
 
 
 @dataclass(frozen=True)
@@ -146,8 +158,8 @@ class WaveChain:
 
     @property
     def over(self) -> bool:
-        """Whether nothing is left to do: all bands are gone through, or held-out emitters ended it."""
-        return self.number == len(self._sizes) or bool(self.ends and self.ends[-1].skipped)
+        """Whether nothing is left to do."""
+        return self.number == len(self._sizes)
 
     @property
     def done(self) -> int:
@@ -180,6 +192,7 @@ class WaveChain:
                 self._stage + number,
                 over=over,
                 skipped=skipped,
+                kept_s=next((s.residual_rms_s for s in reversed(found) if s.given), math.nan),
             )
         return tuple(found)
 
@@ -203,9 +216,9 @@ class WaveChain:
             return []
         if self._band is None:
             return [Call(enter, (self._scan, self.number, self.image))]
-        speed = self._band.state.speed
+        model = self._band.model
         return [
-            Call(look_at_waves, (self._scan, self.number, speed, place), keep=True)
+            Call(look_at_waves, (self._scan, self.number, model, place), keep=True)
             for place in range(self._band.emitters)
         ]
 
@@ -233,11 +246,26 @@ class WaveChain:
         self._band = replace(self._band, state=given)
         if given.done:
             spacing = self._scan.settings().bands[self.number].spacing_m
-            image = Image(given.speed, spacing, self._band.origin)
+            image = self._left(Image(given.image, spacing, self._band.origin))
             # The band is over, so that pairs of changes are not kept any longer.
             self.ends = (*self.ends, BandEnd(image, given.skipped, given.history))
+            if given.skipped:
+                self._leave_out()
             self._band = None
         return self.first()
+
+    def _leave_out(self) -> None:
+        """Go past further bands of the speed, which would skip more cycles or fit more noise."""
+        while not self.over and self._scan.settings().bands[self.number].of == "speed":
+            self.ends = (*self.ends, BandEnd(self.image, skipped=True, history=()))
+
+    def _left(self, found: Image) -> Image:
+        """The image after a band: the speed that it found, or the last one with the attenuation found."""
+        if self._scan.settings().bands[self.number].of == "speed":
+            return found
+        last = self.image
+        on_it = resampled(found, last.spacing, last.origin, last.speed.shape)
+        return replace(last, attenuation=on_it)
 
 
 def enter(scan: WaveScan, number: int, image: Image) -> Entered | None:
@@ -245,14 +273,16 @@ def enter(scan: WaveScan, number: int, image: Image) -> Entered | None:
     problem = scan.problem(number)
     if problem.likeness < LEAST_LIKENESS:
         return None
-    state = refine.begin(on_grid(image, problem))
-    return Entered(state, problem.origin, len(refine.emitters(problem)))
+    speed, count = on_grid(image, problem), len(refine.emitters(problem))
+    if problem.band.of == "speed":
+        return Entered(refine.begin(speed), problem.origin, count)
+    return Entered(refine.begin(np.zeros_like(speed)), problem.origin, count, speed)
 
 
-def look_at_waves(scan: WaveScan, number: int, speed: Floats, place: int) -> Look:
+def look_at_waves(scan: WaveScan, number: int, model: Model, place: int) -> Look:
     """Call: one emitter's look at an image, by its place among the band's emitters."""
     problem = scan.problem(number)
-    return refine.look(problem, scan.settings(), speed, refine.emitters(problem)[place : place + 1])
+    return refine.look(problem, scan.settings(), model, refine.emitters(problem)[place : place + 1])
 
 
 def step_by_waves(scan: WaveScan, number: int, state: WaveIterate, looks: list[Look]) -> WaveIterate:

@@ -25,8 +25,8 @@ class Refined(NamedTuple):
 
     Attributes:
         image: on the grid of the last band.
-        bands: where each band ended; fewer than asked for where held-out emitters stopped it.
-        skipped: whether they did.
+        bands: where each band ended.
+        skipped: whether held-out emitters stopped one of the speed.
     """
 
     image: Image
@@ -85,7 +85,8 @@ def refine(
         calls = [after for call, value in zip(done, given, strict=True) for after in chain.after(call, value)]
         if progress is not None and done[0].function is step_by_waves:
             progress(scan.problem(number), given[0])
-    return Refined(chain.image, chain.ends, chain.ends[-1].skipped)
+    skipped = any(end.skipped for end in chain.ends if end.image.attenuation is None)
+    return Refined(chain.image, chain.ends, skipped)
 
 
 def _made(call: Call) -> Any:

@@ -44,6 +44,7 @@ class Following:
     def __init__(self, dataset: Dataset, settings: Settings, samples: int, scan_of: WaveScanOf) -> None:
         check_traces(samples)
         self._settings, self._scan_of = settings, scan_of
+        self._water_np_m = dataset.water_attenuation_np_m or 0.0
         self._plan = wave_settings(dataset, settings)
         slices = pairs.count(dataset, settings)
         self.minutes = slices * core_seconds(dataset, self._plan, samples) / 60.0
@@ -82,20 +83,27 @@ class Following:
         finest = min((chain.image for chain in chains), key=lambda image: image.spacing)
 
         def laid(images: Sequence[Image]) -> NDArray[np.float64]:
-            grid = finest.spacing, finest.origin, finest.speed.shape
-            parts = [image.speed if image is finest else resampled(image, *grid) for image in images]
+            grid = _at(finest)
+            parts = [image.speed if _at(image) == grid else resampled(image, *grid) for image in images]
             return np.ascontiguousarray(np.stack(parts, axis=-1)) if rays.speed.ndim == 3 else parts[0]
 
         def of_rays(values: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
             return None if values is None else laid(_slices(rays, values))
 
+        def losses(image: Image) -> Image:
+            assert image.attenuation is not None
+            return replace(image, speed=image.attenuation + self._water_np_m)
+
+        refined = None
+        if all(chain.image.attenuation is not None for chain in chains):
+            refined = laid([losses(chain.image) for chain in chains])
         coverage = of_rays(rays.coverage)
         assert coverage is not None
         return replace(
             rays,
             speed=laid([chain.image for chain in chains]),
             coverage=coverage,
-            attenuation=of_rays(rays.attenuation),
+            attenuation=refined if refined is not None else of_rays(rays.attenuation),
             recovery=of_rays(rays.recovery),
             spacing_m=(finest.spacing, finest.spacing, *rays.spacing_m[2:]),
             origin_m=(*finest.origin, *rays.origin_m[2:]),
@@ -110,12 +118,22 @@ class Following:
 def preferred(chains: Sequence[WaveChain]) -> bool:
     """Whether held-out emitters are predicted clearly better by what waves made, over all slices.
 
-    A band begins with the image that the one before left, so that what bands gain multiplies.
+    A band begins with the image that the one before left, so that what bands of the speed gain multiplies.
     """
     gains = [
-        math.prod(end.held / end.history[0].held for end in chain.ends if end.history) for chain in chains
+        math.prod(
+            end.held / end.history[0].held
+            for end in chain.ends
+            if end.history and end.image.attenuation is None
+        )
+        for chain in chains
     ]
     return sum(gains) / len(gains) < CLEARLY
+
+
+def _at(image: Image) -> tuple[float, tuple[float, float], tuple[int, ...]]:
+    """The grid of an image."""
+    return image.spacing, image.origin, image.speed.shape
 
 
 def _slices(rays: Reconstruction, values: NDArray[np.float64]) -> list[Image]:
@@ -130,9 +148,11 @@ def _told(rays: Reconstruction, plan: WaveSettings, chains: Sequence[WaveChain])
     used = rays.settings
     text = f"begun from the image of {used.rays} rays ({used.method})"
     for number, band in enumerate(plan.bands):
-        ends = [chain.ends[number] for chain in chains if len(chain.ends) > number]
+        ends = [end for end in (chain.ends[number] for chain in chains) if end.history or not end.skipped]
         if ends:
-            text += f"; {1e-3 * band.low_hz:.0f} to {1e-3 * band.high_hz:.0f} kHz: {_band_told(ends)}"
+            what = "attenuation (experimental), " if band.of == "attenuation" else ""
+            corners = f"{1e-3 * band.low_hz:.0f} to {1e-3 * band.high_hz:.0f} kHz"
+            text += f"; {what}{corners}: {_band_told(ends)}"
     return text
 
 

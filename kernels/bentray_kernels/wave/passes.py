@@ -19,6 +19,7 @@ def sweeps(
     *,
     over: bool,
     skipped: bool,
+    kept_s: float = math.nan,
 ) -> list[Sweep]:
     """A record for each image that was looked at in a band.
 
@@ -29,21 +30,24 @@ def sweeps(
         index: of the slice.
         stage: number of the band among all stages.
         over: whether the band is.
-        skipped: whether held-out emitters ended it, so that it gave the image that they like best.
+        skipped: whether held-out emitters ended it.
+        kept_s: residual of the speed, s, which a band of the attenuation leaves as it is.
     """
     band = settings.bands[number]
-    given = given_by(history, skipped=skipped) if over and history else -1
+    loss = band.of == "attenuation"
+    given = given_by(history, judged=skipped or loss) if over and history else -1
     return [
         Sweep(
             index,
             k + 1,
-            shift_s(record.misfit, band),
+            kept_s if loss else shift_s(record.misfit, band),
             band.emitters,
             stage,
             given=k == given,
             band_hz=(band.low_hz, band.high_hz),
             misfit=record.misfit,
             held_out_misfit=None if math.isnan(record.held) else record.held,
+            of_attenuation=loss,
         )
         for k, record in enumerate(history)
     ]

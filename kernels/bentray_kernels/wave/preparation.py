@@ -13,7 +13,7 @@ from .points import REACH
 from .problem import WaveProblem
 from .sampling import Clock, Water
 from .settings import WaveSettings
-from .sounding import Mapping, WaterShots, sounded
+from .sounding import Mapping, WaterShots, levelled, sounded
 
 
 def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mapping = map) -> WaveProblem:
@@ -76,7 +76,9 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mappi
         held=held,
         every=extent.every,
     )
-    return sounded(problem, WaterShots(recorded.water, water_gain, samples, settings.window_s), run)
+    shots = WaterShots(recorded.water, water_gain, samples, settings.window_s)
+    found = sounded(problem, shots, run)
+    return found if band.of == "speed" else levelled(found, shots)
 
 
 def _weight(dataset: Dataset, settings: WaveSettings) -> Floats:

@@ -33,7 +33,8 @@ class WaveProblem:
         weight: (ntx, nrx), 1 for the pairs that are used, else 0.
         arrival_s: (ntx, nrx), predicted, s.
         traces: (ntx, nrx, nt), as recorded.
-        gain: (ntx, nrx), pressure per count of each trace.
+        gain: (ntx, nrx), pressure per count of each trace; for the attenuation such that the water shots of
+            each pair have the amplitude that is simulated.
         sampler: (nt, steps), see ``resampler``.
         used, held: emitters that make the image, and that only judge.
         every: time steps from one stored field to the next.
@@ -57,9 +58,9 @@ class WaveProblem:
     held: Ints
     every: int
 
-    def medium(self, speed: Floats) -> Medium:
-        """The medium of an image on this grid."""
-        return Medium.of(speed, self.band.spacing_m, self.clock.step_s)
+    def medium(self, speed: Floats, attenuation: Floats | None = None) -> Medium:
+        """The medium of images on this grid."""
+        return Medium.of(speed, self.band.spacing_m, self.clock.step_s, attenuation=attenuation)
 
     @property
     def look_bytes(self) -> int:

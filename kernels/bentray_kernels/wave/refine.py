@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,9 +14,8 @@ from scipy.ndimage import gaussian_filter
 from ..arrays import Floats, Ints
 from .adjoint import slope
 from .curvature import direction, remember
-from .misfits import measure
 from .problem import WaveProblem
-from .settings import WaveSettings
+from .settings import Steps, WaveSettings
 from .simulation import simulate
 
 # Illumination below this part of its mean counts as that part.
@@ -30,13 +30,25 @@ LEEWAY = 1.1
 PATIENCE = 2
 
 
+class Model(NamedTuple):
+    """What waves go through, on the grid of the problem.
+
+    Attributes:
+        speed: (nx, ny), m/s.
+        attenuation: (nx, ny), beyond the water's, Np/m; None: nowhere.
+    """
+
+    speed: Floats
+    attenuation: Floats | None = None
+
+
 class Look(NamedTuple):
     """What some emitters say of an image; a sum in their order.
 
     Attributes:
         misfit: of the emitters that make the image.
         held: of those that judge.
-        gradient: (nx, ny), s/m.
+        gradient: (nx, ny), by the band's unknown.
         illumination: (nx, ny).
     """
 
@@ -65,15 +77,17 @@ class WavePass:
 class WaveIterate:
     """Where a refinement stands in a band; all that is needed to go on, to the bit.
 
+    Images are of the band's unknown, m/s or Np/m.
+
     Attributes:
-        speed: (nx, ny), m/s, to be looked at next; at the end the last that was taken, or ``best`` where
-            skipped.
-        base: (nx, ny), m/s, the last image that was taken, with its ``gradient`` (nx, ny).
+        image: (nx, ny), to be looked at next; at the end the last that was taken, or ``best`` where skipped
+            and of the attenuation, in which noise and what the speed has wrong show first.
+        base: (nx, ny), the last image that was taken, with its ``gradient`` (nx, ny).
         misfit: of the base; infinite before the first look.
-        way: (nx, ny), m/s, what was added to the base.
+        way: (nx, ny), what was added to the base.
         illumination: (nx, ny), of the first image; it shapes all steps of the band.
         steps, changes: (pairs, nx, ny), of images and gradients.
-        best: (nx, ny), m/s, the image that held-out emitters like best; ``best_held`` their misfit.
+        best: (nx, ny), the image that held-out emitters like best; ``best_held`` their misfit.
         risen: images in turn that held-out emitters were predicted worse in.
         shortenings: of the step under way.
         skipped: whether held-out emitters ended it, so that cycles were skipped or noise was fitted.
@@ -81,7 +95,7 @@ class WaveIterate:
         history: a record for each image.
     """
 
-    speed: Floats
+    image: Floats
     base: Floats
     gradient: Floats
     misfit: float
@@ -98,10 +112,10 @@ class WaveIterate:
     history: tuple[WavePass, ...] = ()
 
 
-def begin(speed: Floats) -> WaveIterate:
-    """An image to begin with, (nx, ny), m/s, on the grid of the problem."""
-    nothing, none = np.zeros_like(speed), np.zeros((0, *speed.shape))
-    return WaveIterate(speed, speed, nothing, float("inf"), nothing, nothing, none, none, speed, float("inf"))
+def begin(image: Floats) -> WaveIterate:
+    """An image to begin with, (nx, ny), on the grid of the problem."""
+    nothing, none = np.zeros_like(image), np.zeros((0, *image.shape))
+    return WaveIterate(image, image, nothing, float("inf"), nothing, nothing, none, none, image, float("inf"))
 
 
 def emitters(problem: WaveProblem) -> Ints:
@@ -109,13 +123,13 @@ def emitters(problem: WaveProblem) -> Ints:
     return np.concatenate((problem.used, problem.held))
 
 
-def look(problem: WaveProblem, settings: WaveSettings, speed: Floats, some: Ints) -> Look:
-    """Misfit and gradient of some of ``emitters(problem)`` in an image."""
+def look(problem: WaveProblem, settings: WaveSettings, model: Model, some: Ints) -> Look:
+    """Misfit of some of ``emitters(problem)``, and its gradient by the band's unknown."""
     judging = set(problem.held.tolist())
-    medium = problem.medium(speed)
-    kind = measure(settings.misfit)
+    medium, by = problem.medium(*model), problem.band.of
+    kind = settings.measure(by)
     misfit, held = 0.0, 0.0
-    gradient, illumination = np.zeros_like(speed), np.zeros_like(speed)
+    gradient, illumination = np.zeros_like(model.speed), np.zeros_like(model.speed)
     for emitter in some.tolist():
         heard = problem.heard(emitter)
         recorded = problem.recorded(emitter, heard)
@@ -125,7 +139,7 @@ def look(problem: WaveProblem, settings: WaveSettings, speed: Floats, some: Ints
             held += kind(simulate(medium, at, receivers, problem.wavelet), recorded, window)[0]
             continue
         compare = partial(kind, recorded=recorded, weight=window)
-        found = slope(medium, at, receivers, problem.wavelet, compare, problem.every)
+        found = slope(medium, at, receivers, problem.wavelet, compare, problem.every, by)
         misfit += found.misfit
         gradient += found.gradient
         illumination += found.illumination
@@ -146,20 +160,20 @@ def step(
     history = (*state.history, WavePass(misfit, held, taken))
     state = replace(state, history=history)
     if not taken:
-        return _shortened(settings, state, misfit)
+        return _shortened(problem, settings.steps(problem.band.of), state, misfit)
     steps, changes = state.steps, state.changes
     if len(history) > 1:
         steps, changes = remember(
-            steps, changes, state.speed - state.base, gradient - state.gradient, settings.memory
+            steps, changes, state.image - state.base, gradient - state.gradient, settings.memory
         )
     risen = state.risen + 1 if held > LEEWAY * state.best_held else 0
     better = not problem.held.size or held < state.best_held
-    best, best_held = (state.speed, held) if better else (state.best, state.best_held)
+    best, best_held = (state.image, held) if better else (state.best, state.best_held)
     over = sum(record.taken for record in history) > problem.band.iterations
     skipped = risen >= PATIENCE
     state = replace(
         state,
-        base=state.speed,
+        base=state.image,
         gradient=gradient,
         misfit=misfit,
         steps=steps,
@@ -171,13 +185,14 @@ def step(
         skipped=skipped,
     )
     if over or skipped or not gradient.any():
-        return replace(state, speed=best if skipped else state.base, done=True)
-    way = _way(problem, settings, state)
-    return replace(state, way=way, speed=_moved(settings, state.base, way))
+        return _ended(problem, state)
+    limits = settings.steps(problem.band.of)
+    way = _way(problem, limits, state)
+    return replace(state, way=way, image=np.clip(state.base + way, *limits.bounds))
 
 
-def _way(problem: WaveProblem, settings: WaveSettings, state: WaveIterate) -> Floats:
-    """What to add to the base, (nx, ny), m/s."""
+def _way(problem: WaveProblem, limits: Steps, state: WaveIterate) -> Floats:
+    """What to add to the base, (nx, ny)."""
     light = state.illumination
     dim = 1.0 / np.sqrt(light + DARK * light[problem.region].mean())
     width = problem.band.smoothing_m / problem.band.spacing_m
@@ -190,32 +205,35 @@ def _way(problem: WaveProblem, settings: WaveSettings, state: WaveIterate) -> Fl
     way = -direction(state.gradient, state.steps, state.changes, prior)
     size = float(np.sqrt((way[problem.region] ** 2).mean()))
     if not len(state.steps):
-        return way * (settings.first_step_mps / size)
-    return way * min(1.0, settings.largest_step_mps / size)
+        return way * (limits.first / size)
+    return way * min(1.0, limits.largest / size)
 
 
-def _shortened(settings: WaveSettings, state: WaveIterate, misfit: float) -> WaveIterate:
+def _ended(problem: WaveProblem, state: WaveIterate) -> WaveIterate:
+    judged = state.skipped or problem.band.of == "attenuation"
+    return replace(state, image=state.best if judged else state.base, done=True)
+
+
+def _shortened(problem: WaveProblem, limits: Steps, state: WaveIterate, misfit: float) -> WaveIterate:
     """A shorter step along the same way, to the lowest point of the parabola through what is known."""
     if state.shortenings == MOST_SHORTENINGS:
-        return replace(state, speed=state.base, done=True)
+        return _ended(problem, state)
     fall = float((state.gradient * state.way).sum())
     bend = misfit - state.misfit - fall
     factor = min(max(-0.5 * fall / bend, 0.1), 0.5) if bend > 0.0 else 0.5
     way = factor * state.way
-    return replace(state, way=way, speed=_moved(settings, state.base, way), shortenings=state.shortenings + 1)
+    moved = np.clip(state.base + way, *limits.bounds)
+    return replace(state, way=way, image=moved, shortenings=state.shortenings + 1)
 
 
-def _moved(settings: WaveSettings, base: Floats, way: Floats) -> Floats:
-    return np.clip(base + way, *settings.speed_bounds_mps)
-
-
-def given_by(history: Sequence[WavePass], *, skipped: bool) -> int:
+def given_by(history: Sequence[WavePass], *, judged: bool) -> int:
     """Which of the images that were looked at a finished band gave, from 0.
 
     Args:
         history: of the band.
-        skipped: whether held-out emitters ended it, so that it gave the image that they like best.
+        judged: whether it gave the image that held-out emitters like best, and not the last.
     """
-    if skipped:
-        return min((record.held, k) for k, record in enumerate(history) if record.taken)[1]
-    return max(k for k, record in enumerate(history) if record.taken)
+    taken = [k for k, record in enumerate(history) if record.taken]
+    if judged and not math.isnan(history[0].held):
+        return min(taken, key=lambda k: history[k].held)
+    return taken[-1]

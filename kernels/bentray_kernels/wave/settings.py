@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from ..acquisition.dataset import PLAUSIBLE_SPEED_MPS
 from ..errors import InvalidInput
-from .misfits import measure
+from .misfits import Measure, measure
+from .simulation import Unknown
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class Band:
         iterations: at most.
         emitters: how many are used, drawn at random; all where there are no more.
         smoothing_m: standard deviation of the Gaussian on gradients, m; it should shrink with the frequency.
+        of: what is refined; the other stays as it is.
     """
 
     low_hz: float
@@ -28,6 +30,7 @@ class Band:
     iterations: int = 10
     emitters: int = 32
     smoothing_m: float = 2e-3
+    of: Unknown = "speed"
 
     def __post_init__(self) -> None:
         if not 0.0 < self.low_hz < self.high_hz < float("inf"):
@@ -62,13 +65,44 @@ def bands(centre_hz: float, water_mps: float = 1500.0) -> tuple[Band, ...]:
     )
 
 
+def loss_band(centre_hz: float, water_mps: float = 1500.0) -> Band:
+    """The band in which the attenuation is refined once the speed is: that of the pulse about its centre.
+
+    It ends early, for what the speed has wrong is soon taken for loss (``benchmarks/results/tried.md``).
+
+    Args:
+        centre_hz: of the pulse, Hz.
+        water_mps: speed of the water, m/s.
+    """
+    wave = water_mps / centre_hz
+    return Band(0.75 * centre_hz, 1.125 * centre_hz, wave / 5.0, 4, 20, 0.5 * wave, "attenuation")
+
+
+class Steps(NamedTuple):
+    """How far an image may go, in its unit.
+
+    Attributes:
+        bounds: lowest and highest value of a node.
+        first: rms of the first change of a band, before anything is known of the curvature.
+        largest: highest rms change in one iteration.
+    """
+
+    bounds: tuple[float, float]
+    first: float
+    largest: float
+
+
+# Of the attenuation beyond the water's, Np/m: tissue has 3 to 10 at 500 kHz, bone ten times as much.
+LOSS_STEPS = Steps((0.0, 100.0), 0.5, 4.0)
+
+
 @dataclass(frozen=True)
 class WaveSettings:
     """How to refine.
 
     Attributes:
         bands: gone through in order, each from the image of the one before.
-        misfit: a name of ``misfits.MEASURES``.
+        misfit: of the speed, a name of ``misfits.MEASURES``; the attenuation has ``least-squares``.
         window_s: (before, after) the arrival in water that traces are compared within, s.
         nearest_m: pairs nearer than this are left out, m.
         speed_bounds_mps: (lowest, highest) speed that a node may take, m/s.
@@ -114,3 +148,13 @@ class WaveSettings:
             )
         if self.memory < 1 or self.held_out < 0:
             raise InvalidInput("memory, held_out", (self.memory, self.held_out), "memory >= 1, held_out >= 0")
+
+    def steps(self, of: Unknown) -> Steps:
+        """How far an image of speed or attenuation may go."""
+        if of == "attenuation":
+            return LOSS_STEPS
+        return Steps(self.speed_bounds_mps, self.first_step_mps, self.largest_step_mps)
+
+    def measure(self, of: Unknown) -> Measure:
+        """What is made small to find speed or attenuation."""
+        return measure(self.misfit if of == "speed" else "least-squares")

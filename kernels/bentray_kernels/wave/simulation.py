@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,10 @@ from ..errors import InvalidInput
 from .medium import Medium
 from .points import Points, place
 from .stencil import HALO, weights
-from .stepping import advance, curvature, inject, read, spread
+from .stepping import advance, braked, curvature, inject, read, released, spread
+
+# What a gradient may be by.
+Unknown = Literal["speed", "attenuation"]
 
 # Nodes that the shortest wave of a source must have. Of the phase, space alone takes 6.3 % at 2.5 nodes,
 # 2.2 % at 3, 0.34 % at 4, 0.07 % at 5 (``stencil.phase_error``, which a test measures); ``sampling`` takes
@@ -74,7 +77,13 @@ def points_per_wavelength(medium: Medium, wavelet: Floats) -> float:
 
 
 def forward(
-    medium: Medium, source: Points, heard: Points, wavelet: Floats, every: int, order: int = 2 * HALO
+    medium: Medium,
+    source: Points,
+    heard: Points,
+    wavelet: Floats,
+    every: int,
+    order: int = 2 * HALO,
+    by: Unknown = "speed",
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Traces, and the source of scattered waves in the image at every ``every``-th step.
 
@@ -82,11 +91,12 @@ def forward(
         source, heard: as ``placed`` gives them.
         every: 0: keep nothing.
         order: in space.
+        by: the change that scatters.
 
     Returns:
         traces: (nrx, nt).
-        scattered: (ceil(nt / every), nx, ny), h^2 (laplacian p + s) over the wavelet's highest value: what
-            a change of 1/c^2 would radiate.
+        scattered: (ceil(nt / every), nx, ny), over the wavelet's highest value: h^2 (laplacian p + s), what
+            a change of 1/c^2 would radiate; or next - before + 2 sigma dt now, what one of sigma dt takes.
     """
     kind = medium.keep.dtype
     nt = wavelet.size
@@ -95,6 +105,9 @@ def forward(
     scattered = np.empty((kept, *medium.speed.shape), kind)
     fields = np.zeros((2, *medium.keep.shape), kind)
     scale = float(np.abs(wavelet).max())
+    inner = slice(medium.margin, -medium.margin)
+    fade = medium.fade[inner, inner]
+    turn = (1 - fade) / (1 + fade)
     _forward(
         fields[0],
         fields[1],
@@ -109,6 +122,8 @@ def forward(
         (wavelet / scale).astype(kind),
         medium.margin,
         every,
+        by == "attenuation",
+        turn,
         traces,
         scattered,
     )
@@ -131,15 +146,22 @@ def _forward(
     wavelet: Any,
     margin: int,
     every: int,
+    by_loss: bool,
+    turn: Any,
     traces: Any,
     scattered: Any,
 ) -> None:
     for n in range(wavelet.size):
         for r in range(traces.shape[0]):
             traces[r, n] = read(now, heard_first[r], heard_along[r])
-        if every > 0 and n % every == 0:
+        kept = every > 0 and n % every == 0
+        if kept and by_loss:
+            braked(now, old, turn, margin, scattered[n // every])
+        elif kept:
             curvature(now, weights, margin, scattered[n // every])
             spread(scattered[n // every], margin, first, along, wavelet[n])
         advance(now, old, keep, fade, drive, weights)
         inject(old, drive, first, along, wavelet[n])
+        if kept and by_loss:
+            released(old, margin, scattered[n // every])
         now, old = old, now

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from .misfits import correlation
 from .problem import WaveProblem
 from .sampling import Water, resampler
@@ -19,6 +19,9 @@ from .wavelet import matched
 
 # Water shots that the wavelet is read from.
 SHOTS = 4
+
+# Degree of the polynomial of the logarithm of the water's amplitude over that of the distance.
+LEVEL_DEGREE = 3
 
 # Relative error of the water's phase speed beyond which a fit is not believed: its traces have no such waves.
 FARTHEST = 0.05
@@ -63,6 +66,47 @@ def sounded(problem: WaveProblem, shots: WaterShots, run: Mapping) -> WaveProble
     return other if other.likeness > best.likeness else best
 
 
+def levelled(problem: WaveProblem, shots: WaterShots) -> WaveProblem:
+    """The problem with such a gain of each pair that its water shot has the amplitude that is simulated.
+
+    In water that is a smooth function of the distance, drawn through a few simulated shots. What elements
+    send and hear more or less of, which depends on the pair, is so taken off its traces of the object.
+    """
+    medium = problem.medium(np.full(problem.region.shape, problem.water.speed))
+    distance = np.linalg.norm(problem.emitters[:, None] - problem.receivers[None], axis=-1)
+    apart, size = [], []
+    for emitter in _sounding(problem):
+        heard = problem.heard(emitter)
+        model = simulate(medium, problem.emitters[emitter], problem.receivers[heard], problem.wavelet)
+        apart.append(distance[emitter][heard])
+        size.append(_energy(problem, shots, emitter, heard, model))
+    curve = np.polynomial.Polynomial.fit(
+        np.log(np.concatenate(apart)), 0.5 * np.log(np.concatenate(size)), LEVEL_DEGREE
+    )
+    gain = problem.gain.copy()
+    weight = problem.weight.copy()
+    for emitter in np.concatenate((problem.used, problem.held)).tolist():
+        heard = problem.heard(emitter)
+        traces = shots.gain[emitter][heard][:, None] * (shots.traces[emitter][heard] @ problem.sampler)
+        energy = _energy(problem, shots, emitter, heard, traces)
+        alive = energy > 0.0
+        wanted = np.exp(curve(np.log(distance[emitter][heard])))
+        gain[emitter, heard] *= wanted / np.sqrt(np.where(alive, energy, 1.0))
+        weight[emitter, heard] *= alive
+    return replace(problem, gain=gain, weight=weight)
+
+
+def _energy(problem: WaveProblem, shots: WaterShots, emitter: int, heard: Ints, traces: Floats) -> Floats:
+    """Of each trace in its window, (heard,)."""
+    window = problem.window(emitter, heard, shots.reach_s)
+    return np.asarray((window * traces.astype(np.float64) ** 2).sum(axis=1))
+
+
+def _sounding(problem: WaveProblem) -> Ints:
+    """The emitters whose water shots are simulated."""
+    return problem.used[:: max(1, problem.used.size // SHOTS)][:SHOTS]
+
+
 def _matched(problem: WaveProblem, shots: WaterShots, water: Water, run: Mapping) -> WaveProblem:
     """With the wavelet that fits in this water."""
     band, samples = problem.band, shots.samples_s
@@ -73,7 +117,7 @@ def _matched(problem: WaveProblem, shots: WaterShots, water: Water, run: Mapping
     impulse[min(samples.size // 2, max(ahead, 0))] = 1.0
     pulse = impulse @ sampler.astype(np.float64)
     medium = problem.medium(np.full(problem.region.shape, water.speed))
-    emitters = problem.used[:: max(1, problem.used.size // SHOTS)][:SHOTS]
+    emitters = _sounding(problem)
 
     def one(emitter: int) -> tuple[Floats, Floats]:
         heard = problem.heard(emitter)

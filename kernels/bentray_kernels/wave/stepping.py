@@ -82,6 +82,31 @@ def curvature(now: Any, weights: Any, margin: int, into: Any) -> None:
 
 
 @kernel(inline="always")
+def braked(now: Any, old: Any, turn: Any, margin: int, into: Any) -> None:
+    """The part of what a change of the damping radiates, sign reversed, that is known before a step.
+
+    Args:
+        now, old: padded fields.
+        turn: (nx, ny), damping times time step.
+        margin: nodes of padding.
+        into: of the image's shape; filled. The next field is added to it after the step, see ``released``.
+    """
+    for i in range(into.shape[0]):
+        here, before, turned, out = now[i + margin, margin:], old[i + margin, margin:], turn[i], into[i]
+        for j in range(out.shape[0]):
+            out[j] = (turned[j] + turned[j]) * here[j] - before[j]
+
+
+@kernel(inline="always")
+def released(new: Any, margin: int, into: Any) -> None:
+    """The other part of ``braked``, from the field after the step."""
+    for i in range(into.shape[0]):
+        after, out = new[i + margin, margin:], into[i]
+        for j in range(out.shape[0]):
+            out[j] += after[j]
+
+
+@kernel(inline="always")
 def inject(field: Any, drive: Any, first: Any, along: Any, value: Any) -> None:
     """Add a source of one element, as the scheme drives it."""
     for i in range(TAPS):

@@ -77,6 +77,7 @@ class SweepRecord(BaseModel):
     )
     misfit: float | None = Field(None, description="Of these waveforms: 0 where they agree.")
     held_out_misfit: float | None = Field(None, description="The same of emitters that only judge.")
+    of_attenuation: bool = Field(False, description="Whether waveforms refined that, not the speed.")
 
 
 class PlanRecord(BaseModel):

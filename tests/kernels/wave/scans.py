@@ -25,13 +25,18 @@ def blob(x, y):
     )
 
 
-def _traces(speed, positions, emitter, wavelet, step):
-    medium = Medium.of(speed, SPACING, step, edge_nodes=40)
+def lossy(x, y):
+    """Attenuation of ``scan(loss=True)`` there, Np/m."""
+    return 40.0 * np.exp(-((x**2 + (y - 0.005) ** 2) / 0.006**2))
+
+
+def _traces(speed, loss, positions, emitter, wavelet, step):
+    medium = Medium.of(speed, SPACING, step, attenuation=loss, edge_nodes=40)
     return simulate(medium, positions[emitter], positions, wavelet)[:, ::FINER]
 
 
 @functools.cache
-def scan(seed=0, noise=0.0):
+def scan(seed=0, noise=0.0, loss=False):
     """The dataset; every second element emits."""
     angle = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS + 0.1
     ring = RADIUS * np.column_stack((np.cos(angle), np.sin(angle)))
@@ -45,8 +50,8 @@ def scan(seed=0, noise=0.0):
     emitters = np.arange(0, ELEMENTS, 2)
     positions = ring + SPACING * half
     both = [
-        np.stack([_traces(speed, positions, e, wavelet, step) for e in emitters])
-        for speed in (blob(x, y), np.full_like(x, WATER))
+        np.stack([_traces(speed, absorbed, positions, e, wavelet, step) for e in emitters])
+        for speed, absorbed in ((blob(x, y), lossy(x, y) if loss else None), (np.full_like(x, WATER), None))
     ]
     rng = np.random.default_rng(seed)
     noisy = [
@@ -71,11 +76,12 @@ def error(image):
     return float(np.sqrt(((image.speed - blob(x, y))[np.hypot(x, y) < 0.015] ** 2).mean()))
 
 
-# Two bands that find the blob from water in a second or two.
+# Two bands that find the blob from water in a second or two, and one that finds no loss.
 SETTINGS = WaveSettings(
     (
         Band(8e4, 1.7e5, 2.0e-3, iterations=3, emitters=8, smoothing_m=3e-3),
         Band(8e4, 2.8e5, 1.3e-3, iterations=4, emitters=8, smoothing_m=2e-3),
+        Band(1.8e5, 2.8e5, 1.3e-3, iterations=2, emitters=8, smoothing_m=3e-3, of="attenuation"),
     ),
     nearest_m=0.012,
     held_out=2,

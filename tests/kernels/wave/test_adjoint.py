@@ -75,6 +75,26 @@ def test_gradient_holds_with_loss():
     assert (found.gradient * way).sum() == pytest.approx((values[0] - values[1]) / 2e-2, rel=1e-6)
 
 
+@pytest.mark.parametrize("name", sorted(misfits.MEASURES))
+def test_gradient_by_the_attenuation_is_that_of_finite_differences(name):
+    recorded = simulate(medium(speeds(1)), EMITTER, RECEIVERS, WAVELET)
+    kind, weight = misfits.measure(name), windows()
+    speed, loss, way = speeds(0), 20.0 + 5.0 * speeds(3, (40, 42)) / 1500.0, change(2)
+
+    def misfit(traces):
+        return kind(traces, recorded, weight)
+
+    def value(alpha):
+        return misfit(simulate(medium(speed, loss=alpha), EMITTER, RECEIVERS, WAVELET))[0]
+
+    found = slope(medium(speed, loss=loss), EMITTER, RECEIVERS, WAVELET, misfit, by="attenuation")
+    small = 0.1
+    near = (value(loss + small * way) - value(loss - small * way)) / (2.0 * small)
+    far = (value(loss + 2.0 * small * way) - value(loss - 2.0 * small * way)) / (4.0 * small)
+    assert (found.gradient * way).sum() == pytest.approx((4.0 * near - far) / 3.0, rel=1e-6)
+    assert found.misfit == value(loss) > 0.0
+
+
 def test_source_to_traces_and_back_are_transposes():
     rng = np.random.default_rng(6)
     host = medium(speeds(5))
@@ -107,15 +127,35 @@ def test_born_modelling_and_the_gradient_are_transposes():
     assert (born * residual).sum() == pytest.approx((gradient * way).sum(), rel=1e-7)
 
 
-def test_fewer_stored_fields_and_single_precision_change_the_gradient_little():
+def test_born_modelling_of_loss_and_its_gradient_are_transposes():
+    rng = np.random.default_rng(8)
+    speed, loss, way = speeds(7), np.full((40, 42), 12.0), change(9)
+    residual = rng.standard_normal((3, STEPS))
+
+    def lost(traces):
+        return float((traces * residual).sum()), residual
+
+    found = slope(medium(speed, loss=loss), EMITTER, RECEIVERS, WAVELET, lost, by="attenuation")
+    small = 0.5
+
+    def traces(factor):
+        host = medium(speed, loss=loss + factor * small * way)
+        return simulate(host, EMITTER, RECEIVERS, WAVELET)
+
+    born = (8.0 * (traces(1) - traces(-1)) - (traces(2) - traces(-2))) / (12.0 * small)
+    assert (born * residual).sum() == pytest.approx((found.gradient * way).sum(), rel=1e-7)
+
+
+@pytest.mark.parametrize("by", ["speed", "attenuation"])
+def test_fewer_stored_fields_and_single_precision_change_the_gradient_little(by):
     recorded = simulate(medium(speeds(1)), EMITTER, RECEIVERS, WAVELET)
 
     def misfit(traces):
         return misfits.least_squares(traces, recorded, np.ones((3, 1)))
 
     smooth = np.full((40, 42), 1500.0)
-    exact = slope(medium(smooth), EMITTER, RECEIVERS, WAVELET, misfit).gradient
-    cheap = slope(medium(smooth, np.float32), EMITTER, RECEIVERS, WAVELET, misfit, 4).gradient
+    exact = slope(medium(smooth), EMITTER, RECEIVERS, WAVELET, misfit, 1, by).gradient
+    cheap = slope(medium(smooth, np.float32), EMITTER, RECEIVERS, WAVELET, misfit, 4, by).gradient
     assert np.sqrt(((cheap - exact) ** 2).sum() / (exact**2).sum()) < 2e-2
 
 

@@ -6,8 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from bentray_kernels.tomography import Sweep
-from bentray_kernels.wave.chain import WaveChain, on_grid
+from bentray_kernels.tomography.chains import Call
+from bentray_kernels.wave.chain import WaveChain, on_grid, step_by_waves
 from bentray_kernels.wave.continuation import Here
+from bentray_kernels.wave.refine import WavePass
 
 from .scans import SETTINGS, refined, scan, water
 
@@ -26,18 +28,20 @@ def test_calls_may_finish_in_any_order():
     found = carried_out(WaveChain(Here(scan(), SETTINGS), water()), random.Random(3))
     assert found.over
     assert np.array_equal(found.image.speed, refined().image.speed)
+    assert np.array_equal(found.image.attenuation, refined().image.attenuation)
 
 
 def test_a_chain_that_was_kept_goes_on_to_the_bit():
     expected = refined()
-    # In the first band, and in the second; looks that had been made are lost and made again.
-    for stop in (25, 60):
+    # In the first band, in the second and in that of the loss; looks that wait are lost and made again.
+    for stop in (25, 60, 115):
         broken = carried_out(WaveChain(Here(scan(), SETTINGS), water()), random.Random(4), stop)
         assert not broken.over
         other = WaveChain(Here(scan(), SETTINGS), water())
         other.restore(broken.standing)
         carried_out(other, random.Random(5))
         assert np.array_equal(other.image.speed, expected.image.speed)
+        assert np.array_equal(other.image.attenuation, expected.image.attenuation)
         assert other.ends[0].history == expected.bands[0].history
 
 
@@ -71,7 +75,13 @@ def test_progress_rises_to_its_end_and_history_tells_the_bands():
             (record.misfit, record.held) for record in chain.ends[number].history
         ]
         given = [sweep for sweep in told if sweep.given]
-        assert [sweep.misfit for sweep in given] == [min(sweep.misfit for sweep in told)]
+        measured = "held_out_misfit" if band.of == "attenuation" else "misfit"
+        assert [getattr(s, measured) for s in given] == [min(getattr(s, measured) for s in told)]
+        assert {sweep.of_attenuation for sweep in told} == {band.of == "attenuation"}
+    # The loss leaves the residual of the speed as it was.
+    assert {s.residual_rms_s for s in told} == {
+        s.residual_rms_s for s in chain.history if s.stage == 3 and s.given
+    }
 
 
 def test_the_state_that_comes_back_from_a_step_makes_no_problem_where_the_chain_is():
@@ -91,6 +101,17 @@ def test_the_state_that_comes_back_from_a_step_makes_no_problem_where_the_chain_
         scan_.called = False
         calls = chain.after(call, given) + calls
     assert np.array_equal(chain.image.speed, refined().image.speed)
+
+
+def test_after_a_stop_bands_of_the_speed_are_left_out_and_the_loss_is_not():
+    chain = WaveChain(Here(scan(), SETTINGS), water())
+    (call,) = chain.first()
+    chain.after(call, call.function(*call.arguments))
+    state = replace(chain.standing.state, skipped=True, done=True, history=(WavePass(1.0, 1.0, taken=True),))
+    (call,) = chain.after(Call(step_by_waves, ()), state)
+    assert call.arguments[1] == 2
+    assert [(end.skipped, len(end.history)) for end in chain.ends] == [(True, 1), (True, 0)]
+    assert chain.done == sum((band.iterations + 1) * 10 for band in SETTINGS.bands[:2])
 
 
 def test_nodes_outside_the_array_are_water():

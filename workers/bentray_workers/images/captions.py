@@ -63,8 +63,12 @@ def stage_names(result: Reconstruction) -> tuple[str, ...]:
     names = [f"{nodes} nodes" for nodes in grids]
     if settings.straight_sweeps and settings.rays != "straight":
         names.insert(0, "straight")
-    bands = {sweep.stage: sweep.band_hz for sweep in result.history if sweep.band_hz}
-    names += [f"{1e-3 * band[1]:.0f} kHz" for _, band in sorted(bands.items())]
+    bands = {
+        sweep.stage: "attenuation" if sweep.of_attenuation else f"{1e-3 * sweep.band_hz[1]:.0f} kHz"
+        for sweep in result.history
+        if sweep.band_hz
+    }
+    names += [name for _, name in sorted(bands.items())]
     return tuple(names) if len(names) > 1 else ()
 
 
