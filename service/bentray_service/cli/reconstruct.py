@@ -52,14 +52,15 @@ def reconstruct(
             rms = progress.history[-1].residual_rms_s if progress.history else None
             step(progress.done, progress.total, residual_note(rms))
 
-        result = _run(source, dataset, settings, workers, show)
+        result = run(source, dataset, settings, workers, show)
     found = write_results(folder, result, dataset, time.perf_counter() - started, file=str(source))
     show_results(f"Reconstruction of {source.name}", found, as_json=as_json)
 
 
-def _run(
+def run(
     file: Path, dataset: Dataset, settings: Settings, workers: int | None, show: Callable[[Progress], None]
 ) -> Reconstruction:
+    """The reconstruction of a file, by so many processes of its own; None: by as many as are of use."""
     from bentray_workers.slices import reconstruct as reconstruct_slices
 
     count = workers or useful_workers(dataset, settings)

@@ -1,0 +1,106 @@
+"""`bentray reproduce`: a result made again from its own record, and compared bit for bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .endings import WorkFailed
+from .paths import input_file
+from .reconstruct import run
+from .terminal import AsJson, print_json, print_lines, print_table, progress_bar, residual_note
+
+if TYPE_CHECKING:
+    from bentray_kernels.tomography import Progress, Reconstruction
+
+
+def reproduce(
+    result: Annotated[Path, typer.Argument(help="A reconstruction.h5, of this machine or another.")],
+    scan: Annotated[Path, typer.Argument(help="The dataset file that it was made of.")],
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            show_default="what works side by side, at most one a core",
+            help="Worker processes; 1 uses none. The bits do not depend on it.",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make a result again with the settings and the seed that it holds, and compare every array of it.
+
+    It ends with 0 where all are the same to the bit, and with 1 where they are not; other versions of
+    Python, NumPy or Numba, or another processor, may round differently.
+
+    Example:  bentray reproduce result/reconstruction.h5 scan.h5
+    """
+    from bentray_kernels.tomography.reconstruction import provenance
+    from bentray_workers.dataset_file import read_dataset
+    from bentray_workers.reconstruction_file import read_reconstruction
+
+    record, source = input_file(result), input_file(scan)
+    before, dataset = read_reconstruction(record), read_dataset(source, traces=False)
+    with progress_bar("Reproducing") as step:
+
+        def show(progress: Progress) -> None:
+            rms = progress.history[-1].residual_rms_s if progress.history else None
+            step(progress.done, progress.total, residual_note(rms))
+
+        after = run(source, dataset, before.settings, workers, show)
+    found = compared(before, after)
+    here = provenance()
+    other = {
+        name: {"then": then, "now": here[name]}
+        for name, then in before.provenance.items()
+        if name in here and then != here[name]
+    }
+    if as_json:
+        print_json({"result": str(record), "scan": str(source), "differences": found, "versions": other})
+    else:
+        print_table(
+            f"{record.name}, made again", ("array", "difference"), [(k, told(v)) for k, v in found.items()]
+        )
+        print_lines(f"{name}: {was['then']} then, {was['now']} now" for name, was in other.items())
+    if any(found.values()):
+        raise WorkFailed(f"{record.name} was not reproduced" + _reason(found, bool(other)))
+
+
+def compared(before: Reconstruction, after: Reconstruction) -> dict[str, Any]:
+    """For each array, None where both are the same to the bit, else the largest difference, or words."""
+    import numpy as np
+
+    from bentray_workers.reconstruction_file import IMAGES
+
+    found: dict[str, Any] = {}
+    for name, place in {**IMAGES, "residuals": "residuals"}.items():
+        old, new = getattr(before, name), getattr(after, name)
+        if old is None and new is None:
+            continue
+        if old is None or new is None:
+            found[place] = "only then" if new is None else "only now"
+        elif old.shape != new.shape:
+            found[place] = f"shape {old.shape} then, {new.shape} now"
+        elif np.array_equal(old, new, equal_nan=True):
+            found[place] = None
+        else:
+            found[place] = float(np.nanmax(np.abs(old - new), initial=0.0)) or "values that are no numbers"
+    old_rms, new_rms = ([sweep.residual_rms_s for sweep in one.history] for one in (before, after))
+    found["history"] = None if old_rms == new_rms else "residuals of other sizes"
+    return found
+
+
+def told(difference: float | str | None) -> str:
+    """In words."""
+    if difference is None:
+        return "the same, bit for bit"
+    return difference if isinstance(difference, str) else f"at most {difference:.3g}"
+
+
+def _reason(found: dict[str, Any], other_versions: bool) -> str:
+    if other_versions:
+        return ": other versions made it"
+    if found["speed_mps"] and found["history"]:
+        return ": is it of this scan?"
+    return ""

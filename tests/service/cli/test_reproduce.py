@@ -1,0 +1,67 @@
+"""`bentray reproduce`: the same bits from a result's own record, and a difference told by its place."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from typer.testing import Result
+
+from bentray_kernels.tomography import Settings
+from bentray_workers.dataset_file import read_dataset, write_dataset
+from bentray_workers.reconstruction_file import read_reconstruction, write_reconstruction
+from bentray_workers.slices import reconstruct
+
+
+@pytest.fixture(params=["gauss-newton", "auto"])
+def made(request: pytest.FixtureRequest, scan_file: Path, tmp_path: Path) -> Path:
+    """A result of each way to choose what is done."""
+    path = tmp_path / "reconstruction.h5"
+    settings = Settings(nodes=24, sweeps=2, method=request.param, seed=7)
+    write_reconstruction(path, reconstruct(None, scan_file, settings))
+    return path
+
+
+def test_a_result_is_made_again(bentray: Callable[..., Result], made: Path, scan_file: Path) -> None:
+    ended = bentray("reproduce", made, scan_file)
+    assert ended.exit_code == 0, ended.stderr
+    assert ended.stdout.count("the same, bit for bit") >= 4
+
+
+def test_a_single_bit_is_seen(bentray: Callable[..., Result], made: Path, scan_file: Path) -> None:
+    with h5py.File(made, "r+") as file:
+        file["speed_mps"][3, 4] = np.nextafter(file["speed_mps"][3, 4], 0.0)
+    ended = bentray("reproduce", made, scan_file, "--json")
+    assert ended.exit_code == 1
+    found = json.loads(ended.stdout)["differences"]
+    assert 0.0 < found.pop("speed_mps") < 1e-9
+    assert set(found.values()) == {None}
+    assert "was not reproduced" in ended.stderr
+
+
+def test_another_scan_and_another_version_are_told(
+    bentray: Callable[..., Result], made: Path, scan_file: Path, tmp_path: Path
+) -> None:
+    scan = read_dataset(scan_file)
+    write_dataset(tmp_path / "other.h5", replace(scan, delta_tof_s=0.5 * scan.delta_tof_s))
+    assert "is it of this scan?" in bentray("reproduce", made, tmp_path / "other.h5").stderr
+    with h5py.File(made, "r+") as file:
+        told = json.loads(file.attrs["provenance"]) | {"numpy": "1.0.0"}
+        file.attrs["provenance"] = json.dumps(told)
+    ended = bentray("reproduce", made, scan_file)
+    assert (ended.exit_code, "numpy: 1.0.0 then, " in ended.stdout) == (0, True)
+
+
+def test_a_result_without_an_array_is_told(
+    bentray: Callable[..., Result], made: Path, scan_file: Path
+) -> None:
+    with h5py.File(made, "r+") as file:
+        del file["residuals"]
+    ended = bentray("reproduce", made, scan_file)
+    assert (ended.exit_code, "only now" in ended.stdout) == (1, True)
+    assert read_reconstruction(made).residuals is None
