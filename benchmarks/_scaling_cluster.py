@@ -20,8 +20,8 @@ from _scaling_work import Work
 
 from bentray_workers.cluster import Cluster, open_cluster
 from bentray_workers.dask_settings import NO_DASHBOARD, SETTINGS
+from bentray_workers.driving import IN_FLIGHT, finished
 from bentray_workers.lanes import RECONSTRUCTION, THREADS
-from bentray_workers.slices import IN_FLIGHT, finished
 
 SETTLE_S = 2.0
 

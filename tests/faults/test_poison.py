@@ -16,6 +16,7 @@ from bentray_workers import slices
 from bentray_workers.attempts import Attempts, ResultsLostError
 from bentray_workers.checkpoints import Checkpoints
 from bentray_workers.dask_settings import NO_DASHBOARD, SETTINGS
+from bentray_workers.driving import run_on_cluster
 from bentray_workers.lanes import OFFERED, THREADS
 
 pytestmark = pytest.mark.slow
@@ -45,7 +46,7 @@ def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):
             kept = Checkpoints(tmp_path / "checkpoints")
             attempts = Attempts(client, tmp_path)
             try:
-                slices._drive(client, attempts, {"0": chain}, 0, 0, kept, None, None)
+                slices._drive(run_on_cluster(client, attempts, None), {"0": chain}, 0, 0, kept, None)
             except KilledWorker as error:
                 ends["poisoned"] = error
 

@@ -118,9 +118,17 @@ def test_the_choice_is_told_in_a_sentence(changes, decomposition, words):
 
 
 def test_traces_are_planned_for():
-    found = plan(replace(RING, traces_bytes=3 * 2**30), Settings(nodes=64), [])
-    assert found.largest[0] == "prepare"
-    assert found.largest[1] > 3 * 2**30
+    heard = Traces(256, 256, 12_000, 2, 5e7, 2.5e6, 1500.0)
+    scan = replace(RING, traces=heard, traces_bytes=2 * heard.object_bytes)
+    found = plan(scan, Settings(nodes=64), [])
+    assert {"measure", "judge", "read", "settle", "join"} < set(found.call_bytes)
+    assert found.tasks > plan(RING, Settings(nodes=64), []).tasks + 2 * 64
+    # No call holds more than an emission of what is 3 GiB.
+    assert found.largest[1] < scan.traces_bytes / 8
+    unseen = plan(scan, Settings(nodes=64, examine=False), [])
+    assert "measure" not in unseen.call_bytes
+    assert "settle" in plan(replace(RING, period=True), Settings(), []).call_bytes
+    assert "settle" not in plan(replace(RING, period=True), Settings(examine=False), []).call_bytes
 
 
 def test_waves_are_planned_for():

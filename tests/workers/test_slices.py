@@ -11,7 +11,7 @@ import pytest
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
-from bentray_workers import slices
+from bentray_workers import first_arrivals, slices
 from bentray_workers.dataset_file import write_dataset
 from bentray_workers.slices import Cancelled
 
@@ -104,7 +104,7 @@ def test_a_folder_goes_under_the_hands_of_a_call_at_work():
 def test_stop_does_not_wait_for_the_picker(cluster, path, monkeypatch):
     done = threading.Event()
     # The workers are threads of this process, so they meet what is put in place here.
-    monkeypatch.setattr(slices, "read_dataset", lambda path: done.wait(30.0))
+    monkeypatch.setattr(first_arrivals, "apply", lambda *arguments: done.wait(30.0))
     with pytest.raises(Cancelled):
         slices.reconstruct(cluster.client, path, PLAN, stop=lambda: True)
     assert not done.is_set()

@@ -35,6 +35,7 @@ def summary_of(path: Path, settings: Settings) -> Summary:
         traces = sum(_bytes(reader, f"waveform/{name}") for name in ("object", "water"))
         amplitudes = _bytes(reader, "amplitude/log_ratio_np") > 0
         waves = _traces(reader, len(tx), len(rx))
+        frequency = reader.number("acquisition", "center_frequency_hz", "Hz")
     slices = 1 if z is None else len(z)
     heights = position[:, 2] if position.shape[1] == 3 else np.zeros(1) if z is None else z
     elements = len(np.union1d(tx, rx))
@@ -50,6 +51,7 @@ def summary_of(path: Path, settings: Settings) -> Summary:
         traces_bytes=0 if times else traces,
         amplitudes=amplitudes,
         traces=waves,
+        period=frequency is not None,
     )
 
 

@@ -11,11 +11,11 @@ from typing import Any
 
 from bentray_kernels.tomography import Progress
 
+from .driving import Cancelled
 from .field_files import FieldFiles, read_json
 from .field_settings import FieldSettings
 from .field_tasks import TASK_RAYS, finish, inner_rows, lay_out, outer_rows
 from .render_tasks import Tasks
-from .slices import Cancelled
 
 Work = tuple[Callable[..., Any], tuple[Any, ...]]
 

@@ -13,6 +13,7 @@ from bentray_kernels.tomography.advice import CANDIDATES
 from bentray_kernels.tomography.chains import BATCH
 from bentray_kernels.tomography.settings import DEVIATION, LEAST_NODES, Settings
 
+from .arrival_memory import arrival_tasks
 from .task_memory import (
     MIB,
     REAL,
@@ -134,6 +135,8 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[Offer]) -> Plan:
     shape = shape_of(scan, settings)
     decomposition = _decomposition(settings)
     tasks = sum(_tasks(scan, way, shape) for way in ways) + scan.slices * wave_tasks(scan.traces, settings)
+    if scan.traces_bytes:
+        tasks += arrival_tasks(scan.traces, scan.slices, settings)
     return Plan(
         decomposition,
         lane,

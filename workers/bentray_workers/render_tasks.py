@@ -9,8 +9,8 @@ from typing import Any, Protocol
 
 from distributed import Client
 
+from .driving import IN_FLIGHT, POLL_S, finished
 from .lanes import RENDER
-from .slices import IN_FLIGHT, POLL_S, finished
 
 
 class Tasks(Protocol):

@@ -7,13 +7,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.quality.recording import OF_TRACES, OF_WATER
 from bentray_kernels.tomography import Problem, Settings
-from bentray_kernels.tomography.advice import Part, part_of
+from bentray_kernels.tomography.holding_out import Part, part_of
 from bentray_kernels.tomography.reconstruction import problem_of
 from bentray_kernels.tomography.stages import stages
 from bentray_kernels.wave import WaveProblem, WaveSettings, prepare
 
 from .dataset_file import read_dataset
+from .findings_file import read_findings
 from .trace_reading import read_slice
 
 
@@ -33,12 +35,17 @@ class FileScan(NamedTuple):
 
 
 class FileWaveScan(NamedTuple):
-    """See ``bentray_kernels.wave.WaveScan``; ``path`` is that of a file with traces."""
+    """See ``bentray_kernels.wave.WaveScan``; ``path`` is that of a file with traces.
+
+    Attributes:
+        findings: the file of what was found in the scan; faults of its traces are corrected or left out.
+    """
 
     path: Path
     stamp: int
     plan: WaveSettings
     slice: int
+    findings: Path
 
     def settings(self) -> WaveSettings:
         return self.plan
@@ -49,22 +56,26 @@ class FileWaveScan(NamedTuple):
 
 @lru_cache(maxsize=16)
 def _stages(scan: FileScan) -> tuple[Settings, ...]:
-    return stages(_dataset(scan.path, scan.stamp), scan.settings)
+    return stages(read_once(scan.path, scan.stamp), scan.settings)
 
 
 @lru_cache(maxsize=8)
 def _problem(scan: FileScan, index: int, stage: int) -> Problem:
-    dataset = part_of(_dataset(scan.path, scan.stamp), scan.part)
+    dataset = part_of(read_once(scan.path, scan.stamp), scan.part)
     return problem_of(dataset, scan.stages()[stage], index)
 
 
 @lru_cache(maxsize=2)
-def _dataset(path: Path, stamp: int) -> Dataset:
+def read_once(path: Path, stamp: int) -> Dataset:
+    """A dataset without its traces; ``stamp`` tells a rewritten file from the old one."""
     return read_dataset(path, traces=False)
 
 
 # Two jobs may take turns; more would cost memory, for a problem holds the traces of the object.
 @lru_cache(maxsize=2)
 def _wave_problem(scan: FileWaveScan, number: int) -> WaveProblem:
-    # Not by way of what is cached, for the traces of the water are not needed any longer.
-    return prepare(read_slice(scan.path, scan.slice), scan.plan, number)
+    found = read_findings(scan.findings).findings
+    faults = [one for one in found if one.slice == scan.slice and one.check in OF_TRACES + OF_WATER]
+    return prepare(
+        read_slice(scan.path, read_once(scan.path, scan.stamp), scan.slice, faults), scan.plan, number
+    )

@@ -15,6 +15,7 @@ from bentray_kernels.tomography.chains import BATCH
 from bentray_kernels.tomography.problem import MARGIN_NODES
 from bentray_kernels.tomography.settings import DEVIATION, Settings
 
+from .arrival_memory import arrival_call_bytes, settle_bytes
 from .wave_memory import Traces
 
 REAL = 8
@@ -48,6 +49,7 @@ class Summary:
         traces_bytes: of the waveforms, 0 where there are travel times.
         amplitudes: whether there are any.
         traces: of object and water, which waves may refine from; None where one of them is not there.
+        period: whether a centre frequency is known, so that times are examined.
     """
 
     emitters: int
@@ -60,6 +62,7 @@ class Summary:
     traces_bytes: int
     amplitudes: bool
     traces: Traces | None = None
+    period: bool = False
 
 
 def field_bytes(shape: tuple[int, ...], method: str) -> int:
@@ -121,8 +124,8 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         settings: of one way; never ``method`` auto.
 
     Returns:
-        By the call's name in ``tomography.chains``, and ``prepare`` where traces must be picked: working
-        arrays, arguments and result, and what the process keeps of the dataset.
+        By the call's name in ``tomography.chains``, and in ``first_arrivals`` where traces must be picked:
+        working arrays, arguments and result, and what the process keeps of the dataset.
     """
     shape, rays = shape_of(scan, settings), rays_of(scan, settings)
     image = REAL * math.prod(shape)
@@ -149,8 +152,9 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
 
     found: dict[str, int] = {}
     if scan.traces_bytes:
-        # What is read, and one emission's traces in float64 for the picker.
-        found["prepare"] = FLOOR_BYTES + scan.traces_bytes + scan.traces_bytes // 8 + 6 * REAL * scan.pairs
+        found |= arrival_call_bytes(scan.traces, scan.pairs, settings)
+    elif scan.period and settings.examine:
+        found["settle"] = settle_bytes(scan.pairs // scan.slices)
     if settings.method == "gauss-newton":
         found["look"] = look(rays)
         found["step"] = step(rays)

@@ -1,8 +1,12 @@
-"""The traces of one slice of a dataset file, and how many samples they have."""
+"""The traces of one slice of a dataset file, whole or an emission at a time; how many samples they have."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.acquisition.emissions import Emissions
+from bentray_kernels.acquisition.quality import Finding
+from bentray_kernels.acquisition.quality.correction import apply
 
-from .dataset_reading import NUMERIC, TRACES, dataset_of
-from .hdf5_reading import Limits, Reader, opened
+from .dataset_reading import NUMERIC, TRACES, trace_type
+from .hdf5_reading import Limits, Reader, opened, refusing
+
+# Of emissions that lie in the same chunks, at most.
+BLOCK_BYTES = 32 * 2**20
 
 
 def trace_samples(path: Path) -> int:
@@ -27,39 +37,81 @@ def samples_in(reader: Reader) -> int:
     return 0 if None in found or found[0] is None else int(found[0].shape[-1])
 
 
-def read_slice(path: Path, index: int) -> Dataset:
-    """One slice of a dataset that has been read before, with the traces of that slice alone.
+@contextmanager
+def slice_opened(path: Path, whole: Dataset, index: int) -> Iterator[Dataset]:
+    """One slice with its traces as ``Emissions``: what is asked for is read, as long as the context lasts.
 
     Args:
         path: of the HDF5 file.
+        whole: the dataset as it was read without its traces.
         index: of the slice, from 0.
 
     Raises:
-        InvalidInput: as ``read_dataset``.
+        InvalidInput: as ``read_dataset``; while traces are read for those that are damaged.
     """
     with opened(path, Limits()) as reader:
-        whole = dataset_of(reader, None)
-        received, water = (_traces(reader, f"waveform/{name}", whole, index) for name in ("object", "water"))
-        factors = [
-            reader.array(f"waveform/{name}", NUMERIC, "numbers over (ntx, nrx)")
-            for name in ("object_scale", "water_scale")
-        ]
-        scale = reader.number("waveform", "scale", "the unit of the traces a count")
-    one = whole.slice(index)
+        stacked = whole.slice_z_m is not None
+        kept = partial(_emissions, reader, index=index if stacked else None)
+        waveform = _waveform(reader, whole, index, kept)
+        yield replace(whole.slice(index), waveform=waveform)
+
+
+def read_slice(path: Path, whole: Dataset, index: int, faults: Iterable[Finding]) -> Dataset:
+    """One slice with its traces in memory, and their faults corrected.
+
+    Args:
+        path, whole, index: as ``slice_opened`` takes them.
+        faults: what ``acquisition.quality`` found in the traces of the slice.
+
+    Raises:
+        InvalidInput: as ``slice_opened``.
+    """
+    with slice_opened(path, whole, index) as opened_slice:
+        one = apply(opened_slice, faults)
+        if one.waveform is None:
+            return one
+        whole_traces = {
+            name: np.asarray(getattr(one.waveform, name))
+            for name in ("object", "water")
+            if getattr(one.waveform, name) is not None
+        }
+        return replace(one, waveform=replace(one.waveform, **whole_traces))  # type: ignore[arg-type]
+
+
+def _waveform(reader: Reader, whole: Dataset, index: int, read: Callable[[str], Any]) -> Waveform | None:
+    """The traces of a slice; ``read`` gives those of a path."""
+    received, water = (read(f"waveform/{name}") for name in ("object", "water"))
     if received is None:
-        return one
+        return None
+    factors = [
+        reader.array(f"waveform/{name}", NUMERIC, "numbers over (ntx, nrx)")
+        for name in ("object_scale", "water_scale")
+    ]
+    scale = reader.number("waveform", "scale", "the unit of the traces a count")
     of_slice = [
         None
         if factor is None
         else np.asarray(factor if whole.slice_z_m is None else factor[index], np.float64)
         for factor in factors
     ]
-    return replace(one, waveform=Waveform(received, water, 1.0 if scale is None else scale, *of_slice))
+    return Waveform(received, water, 1.0 if scale is None else scale, *of_slice)
 
 
-def _traces(reader: Reader, path: str, whole: Dataset, index: int) -> NDArray[Any] | None:
+def _emissions(reader: Reader, path: str, *, index: int | None) -> Emissions | None:
+    """The traces of a path, of one slice unless ``index`` is None."""
     stored = reader.checked(path, NUMERIC, TRACES)
     if stored is None:
         return None
-    found = stored[()] if whole.slice_z_m is None else stored[index]
-    return np.ascontiguousarray(found, np.float32 if found.dtype.kind == "f" else np.int16)
+    chunks = stored.chunks or (1,) * stored.ndim
+    block = max(1, min(chunks[-3], BLOCK_BYTES // (math.prod(stored.shape[-2:]) * stored.dtype.itemsize)))
+
+    # Emissions that share chunks are unpacked together, for they are asked for one after the other.
+    @lru_cache(maxsize=1)
+    def rows(number: int) -> NDArray[Any]:
+        some = slice(number * block, (number + 1) * block)
+        with refusing(path, TRACES):
+            found = stored[some] if index is None else stored[index, some]
+        return trace_type(path, found)
+
+    dtype = trace_type(path, np.zeros(1, dtype=stored.dtype)).dtype
+    return Emissions.of(lambda e: rows(e // block)[e % block], stored.shape[-3:], dtype)

@@ -17,10 +17,10 @@ from bentray_kernels.tomography import Progress
 
 from .asked_fields import asked
 from .atomic import replacing, write_bytes
+from .driving import IN_FLIGHT, Cancelled, finished
 from .lanes import RENDER
 from .refraction import submit
 from .refraction_view import RefractionView
-from .slices import IN_FLIGHT, Cancelled, finished
 
 FORMATS = ("zip", "apng")
 MOST_FRAMES = 720

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -60,32 +60,90 @@ def pick(
     Raises:
         InvalidInput: for an unknown picker, or a dataset that lacks one of the above.
     """
-    chosen = picker_named(picker)
-    require_traces(dataset)
-    assert dataset.center_frequency_hz is not None
-    ntx, nz = len(dataset.tx), dataset.slices
-    delta = np.empty((nz, ntx, len(dataset.rx)))
-    sigma = np.empty_like(delta)
+    reach = reach_of(dataset, picker, reach_s)
+    nz, every = dataset.slices, range(len(dataset.tx))
     predicted = _predictions(dataset, predicted_s)
-    reach = 1.0 / dataset.center_frequency_hz if reach_s is None else reach_s
-    if not 0.0 < reach < math.inf:
-        raise InvalidInput("reach_s", reach_s, "a finite time > 0 s")
+    parts = []
     for k in range(nz):
         one = dataset.slice(k)
-        inverse = Inverse.of(one) if chosen.filtered else None
-        for e in range(ntx):
-            _pick_emission(one, e, chosen, inverse, predicted[k, e], reach, delta[k, e], sigma[k, e])
+
+        def done(e: int, k: int = k) -> None:
             if progress is not None:
-                progress(k * ntx + e + 1, nz * ntx)
-        if one.valid is not None:
-            delta[k][~one.valid] = np.nan
-        delta[k][dataset.tx[:, None] == dataset.rx[None, :]] = np.nan
-        if screened:
-            delta[k] = consistent(one, delta[k], 0.5 / dataset.center_frequency_hz)
-    sigma = np.where(np.isfinite(delta), sigma, np.nan)
+                progress(k * len(every) + e + 1, nz * len(every))
+
+        times = read_times(one, every, picker, predicted[k], reach, done)
+        parts.append(settled(one, *times, screened=screened))
+    delta, sigma = (np.stack(both) for both in zip(*parts, strict=True))
     if dataset.slice_z_m is None:
         delta, sigma = delta[0], sigma[0]
     return replace(dataset, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=picker, waveform=None)
+
+
+def reach_of(dataset: Dataset, picker: str, reach_s: float | None = None) -> float:
+    """How far from a prediction a pick may lie, s, of a scan that can be picked.
+
+    Raises:
+        InvalidInput: as ``pick``.
+    """
+    picker_named(picker)
+    require_traces(dataset)
+    assert dataset.center_frequency_hz is not None
+    reach = 1.0 / dataset.center_frequency_hz if reach_s is None else reach_s
+    if not 0.0 < reach < math.inf:
+        raise InvalidInput("reach_s", reach_s, "a finite time > 0 s")
+    return reach
+
+
+def read_times(
+    dataset: Dataset,
+    emissions: Sequence[int],
+    picker: str,
+    predicted_s: Floats,
+    reach_s: float,
+    done: Callable[[int], None] = lambda e: None,
+) -> tuple[Floats, Floats]:
+    """The times of some emissions by themselves, before anything else is asked of them.
+
+    Args:
+        dataset: of one slice, see ``pick``; its traces may be ``Emissions``.
+        emissions: which, counted from 0.
+        picker: one of ``PICKERS``.
+        predicted_s: (ntx, nrx), s; NaN where nothing is predicted.
+        reach_s: see ``reach_of``.
+        done: called after each.
+
+    Returns:
+        Object minus water and its standard deviation, (emissions, nrx), s; NaN where nothing was found.
+    """
+    chosen = picker_named(picker)
+    inverse = Inverse.of(dataset) if chosen.filtered else None
+    delta = np.empty((len(emissions), len(dataset.rx)))
+    sigma = np.empty_like(delta)
+    for row, e in enumerate(emissions):
+        _pick_emission(dataset, e, chosen, inverse, predicted_s[e], reach_s, delta[row], sigma[row])
+        done(e)
+    return delta, sigma
+
+
+def settled(dataset: Dataset, delta: Floats, sigma: Floats, *, screened: bool) -> tuple[Floats, Floats]:
+    """The times of a slice without those of pairs that may not be used, or that others contradict.
+
+    Args:
+        dataset: of one slice.
+        delta, sigma: (ntx, nrx), s, as ``read_times`` gives them.
+        screened: see ``pick``.
+
+    Returns:
+        The same, NaN where there is none.
+    """
+    assert dataset.center_frequency_hz is not None
+    delta = delta.copy()
+    if dataset.valid is not None:
+        delta[~dataset.valid] = np.nan
+    delta[dataset.tx[:, None] == dataset.rx[None, :]] = np.nan
+    if screened:
+        delta = consistent(dataset, delta, 0.5 / dataset.center_frequency_hz)
+    return delta, np.where(np.isfinite(delta), sigma, np.nan)
 
 
 def require_traces(dataset: Dataset) -> None:

@@ -75,6 +75,9 @@ class Settings:
         roi: let only the dataset's region of interest change (``mask/roi``).
         reciprocity: use a missing pair's reverse (emitter and receiver exchanged) in its place.
         picker: how travel times are read where only traces were uploaded.
+        examine: before that, put swapped channels, inverted ones and a wrong time zero right, leave dead
+            elements and broken traces out, and after it times that others contradict; see
+            ``acquisition.quality``. A scan that must not be used is refused. It says what it found.
         attenuation: reconstruct it too, where amplitudes were recorded.
         focusing: take off the amplitudes what refraction does to them, by the spreading of ray tubes in the
             speed image; needs its frequency (``amplitude@frequency_hz``). Experimental.
@@ -123,6 +126,7 @@ class Settings:
     roi: bool = False
     reciprocity: bool = True
     picker: Literal["aic", "threshold", "energy-ratio", "sta-lta", "correlation", "matched"] = "aic"
+    examine: bool = True
     attenuation: bool = True
     focusing: bool = False
     resolution_check: bool = False

@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...arrays import Flags, Ints
 from ...errors import InvalidInput
 from ..dataset import Dataset
+from ..emissions import moved, turned
 from ..waveform import Waveform
 from .finding import Finding, Report
 from .time_zero import OBJECT, RECORDING
@@ -99,43 +101,39 @@ def _turned(dataset: Dataset, finding: Finding) -> Waveform | None:
     if traces is None:
         return None
     where = _places(dataset, finding)
-
-    def turned(array: np.ndarray) -> np.ndarray:
-        array = array.copy()
-        # The lowest whole number has no opposite.
-        if array.dtype.kind == "i":
-            array[where] = -np.maximum(array[where], np.iinfo(array.dtype).min + 1)
-        else:
-            array[where] = -array[where]
-        return array
-
-    water = None if traces.water is None else turned(traces.water)
-    return replace(traces, object=turned(traces.object), water=water)
+    water = None if traces.water is None else turned(traces.water, where)
+    return replace(traces, object=turned(traces.object, where), water=water)
 
 
 def _put_back(dataset: Dataset, finding: Finding) -> Dataset:
     """Two channels exchanged in everything that was recorded."""
-    axis = 0 if finding.role == "emission" else 1
-    element = dataset.tx if finding.role == "emission" else dataset.rx
-    order = np.arange(len(element))
-    a, b = (np.flatnonzero(element == k) for k in finding.elements)
-    order[a], order[b] = b, a
+    order, axis = exchange(dataset, finding)
 
-    def moved(array: np.ndarray | None) -> np.ndarray | None:
-        return None if array is None else np.take(array, order, axis=axis)
+    def other(array: np.ndarray | None) -> np.ndarray | None:
+        return None if array is None else moved(array, order, axis)
 
     pairs = {
-        name: moved(getattr(dataset, name))
+        name: other(getattr(dataset, name))
         for name in ("tof_s", "delta_tof_s", "sigma_s", "log_ratio_np", "valid")
     }
     traces = dataset.waveform
     if traces is not None:
         names = ("object", "water", "object_scale", "water_scale")
-        traces = replace(traces, **{name: moved(getattr(traces, name)) for name in names})  # type: ignore[arg-type]
+        traces = replace(traces, **{name: other(getattr(traces, name)) for name in names})  # type: ignore[arg-type]
     return replace(dataset, waveform=traces, **pairs)  # type: ignore[arg-type]
 
 
-def _places(dataset: Dataset, finding: Finding) -> tuple[np.ndarray, ...] | np.ndarray:
+def exchange(dataset: Dataset, finding: Finding) -> tuple[Ints, int]:
+    """The order that puts two swapped channels back, and along which axis of (ntx, nrx)."""
+    axis = 0 if finding.role == "emission" else 1
+    element = dataset.tx if finding.role == "emission" else dataset.rx
+    order = np.arange(len(element))
+    a, b = (np.flatnonzero(element == k) for k in finding.elements)
+    order[a], order[b] = b, a
+    return order, axis
+
+
+def _places(dataset: Dataset, finding: Finding) -> Flags:
     element = dataset.tx if finding.role == "emission" else dataset.rx
     wrong = np.isin(element, finding.elements)
     pairs = np.zeros((len(dataset.tx), len(dataset.rx)), dtype=bool)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -15,6 +16,9 @@ Role = Literal["emission", "reception", ""]
 
 # Pairs that a report names one by one; of the others it gives the number.
 MOST_NAMED = 20
+
+# Findings that a line tells, and elements of each.
+MOST_TOLD = 8
 
 
 @dataclass(frozen=True)
@@ -104,3 +108,22 @@ class Report:
         if self.refusal is not None:
             return "refused"
         return "usable" if self.findings else "clean"
+
+
+def words(findings: Sequence[Finding], *, stacked: bool = False) -> str:
+    """Findings in one line: what, of which elements, and what was done.
+
+    Args:
+        findings: none gives a line too.
+        stacked: whether to say of which slice each is.
+    """
+    if not findings:
+        return "nothing found"
+    lines = []
+    for finding in findings[:MOST_TOLD]:
+        where = f"slice {finding.slice}: " if stacked else ""
+        more = ", …" if len(finding.elements) > MOST_TOLD else ""
+        of = f" ({', '.join(map(str, finding.elements[:MOST_TOLD]))}{more})" if finding.elements else ""
+        lines.append(f"{where}{finding.check}: {finding.found}{of}, {finding.action}")
+    others = len(findings) - len(lines)
+    return "; ".join(lines) + (f"; and {others} more" if others else "")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -40,13 +41,19 @@ class Measures:
     strongest_s: Floats
 
     @classmethod
-    def of(cls, traces: NDArray[Any], dataset: Dataset) -> Measures:
-        """The figures of (ntx, nrx, nt) traces; only one emission is in memory as floating point."""
+    def of(cls, traces: Iterable[NDArray[Any]], dataset: Dataset) -> Measures:
+        """The figures of the traces of emissions, (nrx, nt) each; only one is in memory as floating point."""
         assert dataset.sampling_rate_hz is not None
         found = [_emission(np.asarray(emission)) for emission in traces]
         broken, constant, heard, clipped, strongest = (np.stack(part) for part in zip(*found, strict=True))
         time = np.where(heard, dataset.t0_s + strongest / dataset.sampling_rate_hz, np.nan)
         return cls(broken, constant, heard, clipped, time)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Measures]) -> Measures:
+        """The figures of all emissions from those of some each, in their order."""
+        names = [field.name for field in fields(cls)]
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def _emission(traces: NDArray[Any]) -> tuple[Flags, Flags, Flags, Flags, Floats]:

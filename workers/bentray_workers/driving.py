@@ -1,0 +1,104 @@
+"""Chains of calls run to their end: one call after the other in this process, or several on a cluster."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from distributed import Client, Future, wait
+
+from bentray_kernels.tomography.chains import Call
+
+from .attempts import Attempts
+
+# Tasks in flight for each worker: one at work and one ready.
+IN_FLIGHT = 2
+
+POLL_S = 0.2
+
+
+class Cancelled(Exception):  # noqa: N818 - the word that users and states have for it
+    """The caller asked to stop; what was done is dropped."""
+
+
+class Follows(Protocol):
+    """What says which calls follow one that has finished, see ``tomography.chains.Calls``."""
+
+    def after(self, call: Call, given: Any) -> list[Call]: ...
+
+
+# Runs calls, and those that follow them, to the last. Each has its chain's name beside it; told is which
+# chain has moved, after each call.
+Run = Callable[[list[tuple[str, Call]], Mapping[str, Follows], Callable[[str], None]], None]
+
+
+def run_here(stop: Callable[[], bool] | None) -> Run:
+    """Runs calls in this process, chain by chain.
+
+    Args:
+        stop: polled after each call; true ends with ``Cancelled``.
+    """
+
+    def run(
+        first: list[tuple[str, Call]], chains: Mapping[str, Follows], moved: Callable[[str], None]
+    ) -> None:
+        ready = deque(first)
+        while ready:
+            name, call = ready.popleft()
+            later = chains[name].after(call, call.function(*call.arguments))
+            ready.extendleft((name, one) for one in reversed(later))
+            moved(name)
+            if stop is not None and stop():
+                raise Cancelled
+
+    return run
+
+
+def run_on_cluster(client: Client, attempts: Attempts, stop: Callable[[], bool] | None) -> Run:
+    """Runs calls on a cluster, a few at a time for each worker.
+
+    Args:
+        client: of the cluster.
+        attempts: of the job.
+        stop: polled several times a second; true ends with ``Cancelled``.
+    """
+    window = IN_FLIGHT * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+
+    def run(
+        first: list[tuple[str, Call]], chains: Mapping[str, Follows], moved: Callable[[str], None]
+    ) -> None:
+        ready = deque(first)
+        running: dict[Future, tuple[str, Call]] = {}
+        try:
+            while ready or running:
+                while ready and len(running) < window:
+                    name, call = ready.popleft()
+                    running[attempts.submit(call.function, *call.arguments)] = name, call
+                for future in finished(client, list(running)):
+                    name, call = running.pop(future)
+                    again, given = attempts.ended(future, keep=call.keep)
+                    if again is not None:
+                        running[again] = name, call
+                        continue
+                    # Before other slices begin: what an iteration keeps is freed by its end.
+                    later = chains[name].after(call, given)
+                    ready.extendleft((name, one) for one in reversed(later))
+                    moved(name)
+                if stop is not None and stop():
+                    raise Cancelled
+        finally:
+            for future in running:
+                future.cancel()
+
+    return run
+
+
+def finished(client: Client, running: list[Future]) -> list[Future]:
+    """Those that have ended; waits for the first one, ``POLL_S`` at most."""
+    # The client is nobody's default, so ``wait`` must be told which it is.
+    with client.as_current():
+        try:
+            return list(wait(running, timeout=POLL_S, return_when="FIRST_COMPLETED").done)
+        except TimeoutError:
+            return []

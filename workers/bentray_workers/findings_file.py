@@ -1,0 +1,85 @@
+"""What the examination of a job's scan found, as a JSON file beside its other working files."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bentray_kernels.acquisition.quality import Finding
+from bentray_kernels.acquisition.quality.finding import words
+from bentray_kernels.arrays import Flags
+
+from .atomic import write_bytes
+
+
+class Found(NamedTuple):
+    """What was found.
+
+    Attributes:
+        findings: of all slices.
+        examined: whether it was sought.
+        changed: whether what goes on differs from the dataset's own file.
+    """
+
+    findings: tuple[Finding, ...]
+    examined: bool
+    changed: bool
+
+    def words(self, *, stacked: bool) -> str:
+        """All of it in one line; see ``finding.words``."""
+        if not self.examined:
+            return "not examined, for the scan brought its times and no centre frequency"
+        return words(self.findings, stacked=stacked)
+
+
+def write_findings(path: Path, found: Found) -> None:
+    """Write them; ``path`` is replaced whole or not touched.
+
+    Raises:
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    content = {**found._asdict(), "findings": [_plain(finding) for finding in found.findings]}
+    write_bytes(path, json.dumps(content, allow_nan=False).encode())
+
+
+def read_findings(path: Path) -> Found:
+    """What ``write_findings`` wrote.
+
+    Raises:
+        OSError, ValueError, KeyError: for a file that is absent or damaged.
+    """
+    content = json.loads(path.read_bytes())
+    findings = tuple(_finding(plain) for plain in content["findings"])
+    return Found(findings, bool(content["examined"]), bool(content["changed"]))
+
+
+def _plain(finding: Finding) -> dict[str, Any]:
+    """A bit a pair, for there may be a million of them."""
+    pairs = None
+    if finding.pairs is not None:
+        packed = base64.b64encode(np.packbits(finding.pairs).tobytes()).decode()
+        pairs = {"shape": finding.pairs.shape, "bits": packed}
+    value = finding.value if math.isfinite(finding.value) else None
+    return {**{name: getattr(finding, name) for name in _NAMES}, "value": value, "pairs": pairs}
+
+
+def _finding(plain: dict[str, Any]) -> Finding:
+    value = math.nan if plain["value"] is None else plain["value"]
+    told = {name: plain[name] for name in _NAMES}
+    return Finding(**{**told, "elements": tuple(told["elements"])}, value=value, pairs=_pairs(plain["pairs"]))
+
+
+_NAMES = ("check", "found", "accepted", "action", "elements", "role", "unit", "slice")
+
+
+def _pairs(plain: dict[str, Any] | None) -> Flags | None:
+    if plain is None:
+        return None
+    shape = tuple(plain["shape"])
+    bits = np.frombuffer(base64.b64decode(plain["bits"]), dtype=np.uint8)
+    return np.unpackbits(bits, count=math.prod(shape)).reshape(shape).astype(np.bool_)

@@ -1,0 +1,190 @@
+"""What a reconstruction begins with: a scan examined, corrected and picked, a batch of emissions a call."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.picking import reach_of, read_times, require_traces, settled
+from bentray_kernels.acquisition.quality import Finding
+from bentray_kernels.acquisition.quality.correction import apply, stacked
+from bentray_kernels.acquisition.quality.examination import times_judged
+from bentray_kernels.acquisition.quality.recording import Measured, judged
+from bentray_kernels.arrays import Floats
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography.chains import Call
+
+from .arrival_memory import parts_of
+from .dataset_writing import write_dataset
+from .findings_file import Found, write_findings
+from .scan import read_once
+from .trace_reading import slice_opened, trace_samples
+
+PICKED, FINDINGS = "picked.h5", "findings.json"
+
+
+class Source(NamedTuple):
+    """The scan as calls know it; ``stamp`` tells a rewritten file from the old one.
+
+    Attributes:
+        picker: what reads the times of a scan without them.
+        examine: whether the scan is examined first.
+    """
+
+    path: Path
+    stamp: int
+    picker: str
+    examine: bool
+
+    @property
+    def dataset(self) -> Dataset:
+        """Without its traces."""
+        return read_once(self.path, self.stamp)
+
+    @property
+    def examines(self) -> bool:
+        """Whether times are examined: nothing but the period tells how far two neighbours may differ."""
+        return self.examine and self.dataset.center_frequency_hz is not None
+
+    @contextmanager
+    def slice(self, index: int, findings: Sequence[Finding] = ()) -> Iterator[Dataset]:
+        """One slice with traces that are read as they are asked for, and what was found corrected."""
+        with slice_opened(self.path, self.dataset, index) as one:
+            yield apply(one, findings)
+
+
+class Arrivals:
+    """The calls that make ``PICKED`` and ``FINDINGS`` in a folder, in this process or on a cluster.
+
+    Of a scan with times of its own these alone are examined, see ``Source.examines``.
+
+    Args:
+        source: the scan.
+        folder: where the two are written; every worker can.
+
+    Raises:
+        InvalidInput: for a scan without times from which none can be read.
+    """
+
+    def __init__(self, source: Source, folder: Path) -> None:
+        self._source, self._folder = source, folder
+        dataset = source.dataset
+        self._slices = range(dataset.slices)
+        self._parts: list[range] = []
+        if not dataset.picked:
+            with source.slice(0) as one:
+                require_traces(one)
+            self._parts = parts_of(len(dataset.tx), trace_samples(source.path) * len(dataset.rx))
+        self._found: dict[int, Any] = dict.fromkeys(self._slices, ())
+        self._given: dict[tuple[Any, int], dict[int, Any]] = defaultdict(dict)
+
+    def first(self) -> list[Call]:
+        """Calls to begin with."""
+        if not self._parts:
+            return [Call(settle, (self._source, k, (), []), keep=True) for k in self._slices]
+        if not self._source.examine:
+            return [call for k in self._slices for call in self._reading(k)]
+        return [
+            Call(measure, (self._source, k, part), keep=True) for k in self._slices for part in self._parts
+        ]
+
+    def after(self, call: Call, given: Any) -> list[Call]:
+        """Calls that may follow one that has finished; see ``chains.Calls``."""
+        if call.function is join:
+            return []
+        index = call.arguments[1]
+        if call.function is judge:
+            self._found[index] = given
+            return self._reading(index)
+        if call.function is settle:
+            settled_slices = self._given[settle, 0]
+            settled_slices[index] = given
+            if len(settled_slices) < len(self._slices):
+                return []
+            return [Call(join, (self._source, self._folder, self._taken(settle, 0)))]
+        self._given[call.function, index][call.arguments[-1].start] = given
+        if len(self._given[call.function, index]) < len(self._parts):
+            return []
+        parts = self._taken(call.function, index)
+        if call.function is measure:
+            return [Call(judge, (self._source, index, parts), keep=True)]
+        return [Call(settle, (self._source, index, self._found[index], parts), keep=True)]
+
+    def _reading(self, index: int) -> list[Call]:
+        found = self._found[index]
+        return [Call(read, (self._source, index, found, part), keep=True) for part in self._parts]
+
+    def _taken(self, function: Any, index: int) -> list[Any]:
+        """What the calls of a kind gave, in order; it is let go of here."""
+        return [given for _, given in sorted(self._given.pop((function, index)).items())]
+
+
+def measure(source: Source, index: int, part: range) -> Measured:
+    """Call: the figures of the traces of some emissions."""
+    with source.slice(index) as one:
+        return Measured.of(one, part)
+
+
+def judge(source: Source, index: int, parts: list[Measured]) -> tuple[Finding, ...]:
+    """Call: what the traces of a slice show; a scan that must not be used is refused."""
+    with source.slice(index) as one:
+        findings, _ = judged(one, Measured.joined(parts))
+    return _accepted(source, index, findings)
+
+
+def read(source: Source, index: int, findings: tuple[Finding, ...], part: range) -> tuple[Floats, Floats]:
+    """Call: the times of some emissions with their deviations."""
+    with source.slice(index, findings) as one:
+        nothing = np.full((len(one.tx), len(one.rx)), np.nan)
+        return read_times(one, part, source.picker, nothing, reach_of(one, source.picker))
+
+
+def settle(
+    source: Source, index: int, findings: tuple[Finding, ...], parts: list[tuple[Floats, Floats]]
+) -> tuple[Dataset, tuple[Finding, ...]]:
+    """Call: one slice as it goes on, without traces, and all that was found in it."""
+    one = apply(source.dataset.slice(index), findings)
+    if parts:
+        delta, sigma = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+        delta, sigma = settled(one, delta, sigma, screened=not source.examine)
+        one = replace(one, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=source.picker)
+    if source.examines:
+        later = _accepted(source, index, times_judged(one))
+        one, findings = apply(one, later), (*findings, *later)
+    return one, findings
+
+
+def join(source: Source, folder: Path, slices: list[tuple[Dataset, tuple[Finding, ...]]]) -> None:
+    """Call: write what goes on, unless it is what the file has anyway, and then all findings."""
+    whole = source.dataset
+    findings = tuple(replace(finding, slice=k) for k, (_, found) in enumerate(slices) for finding in found)
+    changed = not whole.picked or any(finding.action != "reported" for finding in findings)
+    if changed:
+        parts = [one for one, _ in slices]
+        shown = parts[0] if whole.slice_z_m is None else stacked(whole, parts)
+        write_dataset(folder / PICKED, replace(shown, truth=whole.truth))
+    write_findings(folder / FINDINGS, Found(findings, source.examines, changed))
+
+
+def _accepted(source: Source, index: int, findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """The findings.
+
+    Raises:
+        InvalidInput: where one of them refuses the scan.
+    """
+    for finding in findings:
+        if finding.action == "refused":
+            where = f" (slice {index})" if source.dataset.slice_z_m is not None else ""
+            raise InvalidInput(
+                finding.check,
+                finding.found + where,
+                f"{finding.accepted}; with examine false the scan is taken as it is",
+            )
+    return tuple(findings)
