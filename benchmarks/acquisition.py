@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
+import _acquisition_attenuation
 import _acquisition_picking
 import _acquisition_waveform
 
@@ -14,6 +15,7 @@ from bentray_service.cli.terminal import Step
 MAKERS: tuple[Callable[[bool, Step], Iterable[Row]], ...] = (
     _acquisition_picking.rows,
     _acquisition_waveform.rows,
+    _acquisition_attenuation.rows,
 )
 
 
