@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from bentray_kernels.tomography.settings import Settings
-from bentray_workers import field_picture, picture_tasks, planning, refraction
+from bentray_workers import field_picture, picture_tasks, planning, refraction, simulation_planning
+from bentray_workers.asked_simulation import AskedSimulation
 from bentray_workers.dataset_summary import summary_of
 from bentray_workers.field_view import FieldView
 from bentray_workers.isosurface_mesh import mesh_volume
 from bentray_workers.lanes import RENDER
-from bentray_workers.offers import prepared_offers
+from bentray_workers.offers import offers_of, prepared_offers
 from bentray_workers.quality import quality_page, quality_report
 from bentray_workers.refraction_view import RefractionView
 
@@ -67,6 +68,14 @@ class Compute:
             # The scheduler is gone; the job waits until it is back, on workers of which nothing is known.
             offers = ()
         return planning.plan(summary_of(self._bring(path), settings), settings, offers).to_dict()
+
+    def plan_simulation(self, asked: AskedSimulation) -> dict[str, Any]:
+        """The same of a simulation."""
+        try:
+            offers = offers_of(self.client)
+        except (OSError, TimeoutError):
+            offers = ()
+        return simulation_planning.plan_simulation(asked, offers).to_dict()
 
     def slice_png(self, path: Path, **how: Any) -> bytes:
         """One slice of a reconstruction file as PNG; ``how`` as in ``bentray_workers.images.slice``.

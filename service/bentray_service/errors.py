@@ -33,7 +33,7 @@ LONGEST_FOUND = 120
 RETRY_AFTER = "10"
 METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
 
-JOB_KINDS = ("reconstruction", "refraction", "geometry-field")
+JOB_KINDS = ("reconstruction", "simulation", "refraction", "geometry-field")
 
 
 class Fault(BaseModel):

@@ -15,13 +15,15 @@ from bentray_kernels.tomography.advice import told
 from bentray_kernels.tomography.result import Progress, Reconstruction
 from bentray_kernels.tomography.settings import Settings
 from bentray_workers import geometry_field, slices
+from bentray_workers.asked_simulation import AskedSimulation
 from bentray_workers.field_settings import FieldSettings
 from bentray_workers.reconstruction_file import write_reconstruction
 from bentray_workers.render_tasks import ClusterTasks
+from bentray_workers.simulation_run import simulate_scan
 from bentray_workers.turntable import PRIORITY, Turntable, turn
 
 from ..storage import schema
-from ..storage.ids import volume_of
+from ..storage.ids import dataset_of, volume_of
 from ..storage.tenant_files import TenantFiles
 
 Row = dict[str, Any]
@@ -33,7 +35,7 @@ class Task:
 
     Attributes:
         client: the ``distributed.Client`` of the worker pool.
-        source: the file that it reads, as ``Kind.source`` says.
+        source: what it reads, as ``Kind.source`` says.
         settings: as stored with the job.
         target: the file to write, atomically, as ``Kind.target`` says.
         work_dir: a folder of its own, which every worker can read and write. What an unfinished run left in
@@ -64,7 +66,7 @@ class Kind(Protocol):
     def table(self) -> str: ...
 
     def source(self, files: TenantFiles, job: Row) -> Path:
-        """The file that the job reads."""
+        """The file that the job reads; one that reads nothing has its own folder."""
 
     def target(self, files: TenantFiles, job: Row) -> Path:
         """The file that it writes; fixed, so that a job which is run again writes the same one."""
@@ -95,6 +97,28 @@ class ReconstructionKind:
         )
         write_reconstruction(task.target, result)
         return {"id": task.target.stem, **_describe(result), "bytes": task.target.stat().st_size}
+
+    def discard(self, target: Path) -> None:
+        target.unlink(missing_ok=True)
+
+
+class SimulationKind:
+    """The scan of a phantom, as a dataset."""
+
+    table = schema.datasets.name
+    settings: TypeAdapter[AskedSimulation] = TypeAdapter(AskedSimulation)
+
+    def source(self, files: TenantFiles, job: Row) -> Path:
+        return files.work(job["id"])
+
+    def target(self, files: TenantFiles, job: Row) -> Path:
+        return files.dataset(dataset_of(job["id"]))
+
+    def run(self, task: Task) -> Row | None:
+        asked = self.settings.validate_python(task.settings)
+        progress = task.on_progress, task.on_saved, task.stop
+        found = simulate_scan(task.client, asked, task.target, task.work_dir, *progress)
+        return {"id": task.target.stem, **found}
 
     def discard(self, target: Path) -> None:
         target.unlink(missing_ok=True)
@@ -165,6 +189,7 @@ class GeometryFieldKind:
 KINDS: Mapping[str, Kind] = MappingProxyType(
     {
         "reconstruction": ReconstructionKind(),
+        "simulation": SimulationKind(),
         "refraction": RefractionKind(),
         "geometry-field": GeometryFieldKind(),
     }

@@ -12,6 +12,7 @@ from fastapi.openapi.models import Example
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from bentray_kernels.tomography.settings import Settings
+from bentray_workers.asked_simulation import AskedSimulation
 from bentray_workers.field_settings import FieldSettings, check_faces
 from bentray_workers.turntable import Turntable
 
@@ -43,6 +44,17 @@ class ReconstructionRequest(BaseModel):
     dataset: str = Field(description="Id of an uploaded dataset.")
     settings: Annotated[Settings, BeforeValidator(known_only)] = Field(
         default_factory=Settings, description="What is left out takes its default."
+    )
+
+
+class SimulationRequest(BaseModel):
+    """Simulate the scan of a phantom; it becomes a dataset, with the truth in it."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    kind: Literal["simulation"]
+    settings: Annotated[AskedSimulation, BeforeValidator(partial(known_only, of=AskedSimulation))] = Field(
+        default_factory=AskedSimulation, description="What is left out takes its default."
     )
 
 
@@ -79,6 +91,10 @@ EXAMPLES: dict[str, Example] = {
             "settings": {"nodes": 128, "sweeps": 8, "rays": "curved"},
         },
     },
+    "simulation": {
+        "summary": "A scan of a phantom, with noise on its travel times",
+        "value": {"kind": "simulation", "settings": {"nodes": 64, "elements": 64, "noise_s": 2e-8}},
+    },
     "refraction": {
         "summary": "A volume as glass from all sides",
         "value": {"kind": "refraction", "volume": "vol-0123456789abcdef0123", "settings": {"format": "zip"}},
@@ -90,7 +106,7 @@ EXAMPLES: dict[str, Example] = {
 }
 
 JobRequest = Annotated[
-    ReconstructionRequest | RefractionRequest | GeometryFieldRequest,
+    ReconstructionRequest | SimulationRequest | RefractionRequest | GeometryFieldRequest,
     Body(discriminator="kind", openapi_examples=EXAMPLES),
 ]
 
@@ -124,6 +140,12 @@ def start_job(
         settings = asked.settings.to_dict()
         path = service.files.of(tenant).dataset(dataset["id"])
         plan = service.compute.plan(path, asked.settings)
+    elif isinstance(asked, SimulationRequest):
+        read, settings = {}, asked.settings.plain()
+        plan = service.compute.plan_simulation(asked.settings)
+        # Its parts, and the file that is made of them.
+        wanted = 2 * plan["result_bytes"]
+        check_room(service.files.of(tenant), service.settings.max_tenant_bytes, wanted)
     elif isinstance(asked, GeometryFieldRequest):
         mesh = service.meshes.get(tenant, asked.mesh)
         check_faces(mesh["faces"])

@@ -13,11 +13,11 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.refraction_view import check_even
 
 from ..errors import Problem
-from ..storage.ids import volume_of
+from ..storage.ids import dataset_of, volume_of
 from .surface_records import field_links
 
 State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
-JobKind = Literal["reconstruction", "refraction", "geometry-field"]
+JobKind = Literal["reconstruction", "simulation", "refraction", "geometry-field"]
 Row = dict[str, Any]
 # A list in the description, and no tuple: some generators of clients know none.
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -27,7 +27,7 @@ SHARED = ("id", "title", "axes", "shape", "spacing_m", "origin_m", "value_range"
 
 
 class DatasetRecord(BaseModel):
-    """One uploaded scan."""
+    """One scan: an upload, or what a simulation made."""
 
     id: str
     title: str
@@ -44,8 +44,9 @@ class DatasetRecord(BaseModel):
         description="Whether the file tells what the object really is, as a phantom does."
     )
     water_speed_mps: float
-    bytes: int = Field(description="Size of the uploaded file.")
-    sha256: str = Field(description="SHA-256 of the uploaded file.")
+    job: str | None = Field(description="The simulation that made it.")
+    bytes: int = Field(description="Size of the file that was uploaded, or made.")
+    sha256: str = Field(description="SHA-256 of that.")
     created: datetime
     links: dict[str, str]
 
@@ -81,7 +82,7 @@ class SweepRecord(BaseModel):
 
 
 class PlanRecord(BaseModel):
-    """How a reconstruction was to be cut into tasks when it was asked for."""
+    """How a job was to be cut into tasks when it was asked for."""
 
     decomposition: str = Field(description="slices or emitters side by side, or a volume.")
     lane: str = Field(description="Which workers take the tasks: recon, or opencl for those with a device.")
@@ -89,9 +90,15 @@ class PlanRecord(BaseModel):
     workers: int = Field(description="Workers that could hold each of them.")
     call_bytes: dict[str, int] = Field(description="Memory of each kind of task.")
     largest_bytes: int = Field(description="The most of these.")
-    field_bytes: int = Field(description="Of a travel time while it is made.")
-    rows_bytes: int = Field(description="Of the rays of all emitters.")
-    state_bytes: int = Field(description="Of what comes back from a task.")
+    field_bytes: int | None = Field(
+        None, description="Of a travel time while it is made, in a reconstruction."
+    )
+    rows_bytes: int | None = Field(None, description="Of the rays of all emitters, in a reconstruction.")
+    state_bytes: int | None = Field(None, description="Of what comes back from a task of it.")
+    result_bytes: int | None = Field(None, description="The most that the file of a simulation takes.")
+    minutes: float | None = Field(
+        None, description="About how long a simulation takes these workers, with nothing else to do."
+    )
     why: str = Field(description="All of it in a sentence.")
 
 
@@ -101,10 +108,12 @@ class JobRecord(BaseModel):
     id: str
     kind: str
     state: State
-    dataset: str | None = Field(description="Id of the scan that a reconstruction reads.")
+    dataset: str | None = Field(
+        description="Id of the scan that a reconstruction reads, or that a simulation has made."
+    )
     settings: dict[str, Any]
     plan: PlanRecord | None = Field(
-        description="Of a reconstruction; none of one from before plans were made."
+        description="Of a reconstruction or a simulation; none of one from before plans were made."
     )
     advice: str | None = Field(description="What method auto chose and why, once it has.")
     progress: ProgressRecord
@@ -159,16 +168,20 @@ class VolumeList(BaseModel):
 
 
 def dataset_record(row: Row) -> DatasetRecord:
-    return DatasetRecord(
-        **{**row, "created": _time(row["created"])}, links={"self": f"/v1/datasets/{row['id']}"}
-    )
+    links, job = {"self": f"/v1/datasets/{row['id']}"}, row["job_id"]
+    if job is not None:
+        links["job"] = f"/v1/jobs/{job}"
+    return DatasetRecord(**{**row, "created": _time(row["created"])}, job=job, links=links)
 
 
 def job_record(row: Row) -> JobRecord:
     here = f"/v1/jobs/{row['id']}"
     links, volume, done = {"self": here}, row["volume_id"], row["state"] == "succeeded"
-    if row["dataset_id"] is not None:
-        links["dataset"] = f"/v1/datasets/{row['dataset_id']}"
+    dataset, simulated = row["dataset_id"], row["kind"] == "simulation"
+    if simulated and done:
+        dataset = dataset_of(row["id"])
+    if dataset is not None:
+        links["dataset"] = f"/v1/datasets/{dataset}"
     if volume is not None:
         links["volume"] = f"/v1/volumes/{volume}"
         if done:
@@ -176,7 +189,7 @@ def job_record(row: Row) -> JobRecord:
     elif row["mesh_id"] is not None:
         links["mesh"] = f"/v1/meshes/{row['mesh_id']}"
         links |= field_links(row["field_id"]) if done else {}
-    elif done:
+    elif done and not simulated:
         volume = volume_of(row["id"])
         links["volume"] = f"/v1/volumes/{volume}"
         links["image"] = f"/v1/volumes/{volume}/slice.png"
@@ -188,7 +201,7 @@ def job_record(row: Row) -> JobRecord:
         id=row["id"],
         kind=row["kind"],
         state=row["state"],
-        dataset=row["dataset_id"],
+        dataset=dataset,
         settings=row["settings"],
         plan=row["plan"],
         advice=row["advice"],

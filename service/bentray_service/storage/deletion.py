@@ -36,8 +36,9 @@ class Stored(NamedTuple):
 class Deletion:
     """Deletes datasets, volumes and meshes of a tenant.
 
-    A dataset goes with its jobs and their volumes, a volume with the job that made it, its turntables and its
-    exports, a mesh with its jobs and their fields. A mesh made of a volume stays.
+    A dataset goes with the simulation that made it, its jobs and their volumes, a volume with the job that
+    made it, its turntables and its exports, a mesh with its jobs and their fields. A mesh made of a volume
+    stays.
 
     A death on the way leaves rows whose files are gone, and deleting once more finishes it.
     """
@@ -99,6 +100,11 @@ def _of(connection: Connection, tenant: Tenant, condition: ColumnElement[bool]) 
     return set(connection.execute(select(jobs.c.id).where(jobs.c.tenant == tenant, condition)).scalars())
 
 
+def _of_dataset(connection: Connection, tenant: Tenant, name: str) -> set[str]:
+    made_it = select(datasets.c.job_id).where(datasets.c.id == name)
+    return _of(connection, tenant, or_(jobs.c.dataset_id == name, jobs.c.id.in_(made_it)))
+
+
 def _of_volume(connection: Connection, tenant: Tenant, name: str) -> set[str]:
     made_it = select(volumes.c.job_id).where(volumes.c.id == name)
     return _of(connection, tenant, or_(jobs.c.volume_id == name, jobs.c.id.in_(made_it)))
@@ -147,7 +153,7 @@ def _forget(
 
 _TABLES = {"dataset": (datasets,), "volume": (volumes, uploaded_volumes), "mesh": (meshes,)}
 _JOBS: dict[str, Callable[[Connection, Tenant, str], set[str]]] = {
-    "dataset": lambda connection, tenant, name: _of(connection, tenant, jobs.c.dataset_id == name),
+    "dataset": _of_dataset,
     "volume": _of_volume,
     "mesh": lambda connection, tenant, name: _of(connection, tenant, jobs.c.mesh_id == name),
 }

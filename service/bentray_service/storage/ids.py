@@ -33,6 +33,11 @@ def volume_of(job_id: str) -> str:
     return PREFIXES["volume"] + checked("job", job_id).removeprefix(PREFIXES["job"])
 
 
+def dataset_of(job_id: str) -> str:
+    """The dataset id of a simulation, fixed for the same reason."""
+    return PREFIXES["dataset"] + checked("job", job_id).removeprefix(PREFIXES["job"])
+
+
 def field_of(content: str) -> str:
     """The geometry field id of a SHA-256 in hexadecimal: the same content has the same id."""
     return f"{PREFIXES['field']}-{content[:20]}"

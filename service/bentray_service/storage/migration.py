@@ -108,6 +108,7 @@ def _to_3(connection: Connection) -> None:
         "field_id VARCHAR(32)",
     ):
         connection.execute(text(f"ALTER TABLE jobs ADD COLUMN {column}"))
+    connection.execute(text("ALTER TABLE datasets ADD COLUMN job_id VARCHAR(32)"))
     connection.execute(text("CREATE INDEX jobs_by_tenant ON jobs (tenant, state)"))
     connection.execute(text("CREATE UNIQUE INDEX jobs_by_key ON jobs (tenant, idempotency_key)"))
     for name, table, order in (

@@ -59,6 +59,8 @@ datasets = Table(
     Column("has_travel_times", Boolean, nullable=False),
     Column("has_truth", Boolean, nullable=False),
     Column("water_speed_mps", Float, nullable=False),
+    # The simulation that made it; no key, for jobs point at datasets already.
+    Column("job_id", String(32)),
     _tenant(),
     Index("datasets_by_tenant", "tenant", "number"),
 )

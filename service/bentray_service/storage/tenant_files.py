@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Collection
+from contextlib import suppress
 from pathlib import Path
 
 from .ids import PREFIXES, checked
@@ -49,7 +50,7 @@ class TenantFiles:
         """Remove what a dead process left half done."""
         for left in self._incoming.iterdir():
             left.unlink()
-        for folder in (self._volumes, self._exports, self._animations, self._meshes):
+        for folder in (self._datasets, self._volumes, self._exports, self._animations, self._meshes):
             for left in folder.glob("*.partial"):
                 left.unlink()
 
@@ -96,8 +97,12 @@ class TenantFiles:
         return folder
 
     def drop_work(self, job_id: str) -> None:
-        """Remove the folder of a job at its end."""
-        shutil.rmtree(self._work / checked("job", job_id), ignore_errors=True)
+        """Remove the folder of a job at its end, under the hands of tasks that still run."""
+        ended = self._work / f"{checked('job', job_id)}.ended"
+        with suppress(FileNotFoundError):
+            # What they still want to write under the old name finds no folder.
+            (self._work / job_id).rename(ended)
+        shutil.rmtree(ended, ignore_errors=True)
 
     def keep_work(self, job_ids: Collection[str]) -> None:
         """Remove the folders of all jobs but these."""

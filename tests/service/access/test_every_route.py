@@ -374,8 +374,8 @@ def strings(place: Place, asked: Asked) -> Iterator[tuple[str, str, str]]:
 def within(names: list[str], value: str, ids: Mapping[str, str]) -> dict[str, Any]:
     """A job request of a kind with a value somewhere in it."""
     kind, *rest = names
-    read = {"reconstruction": "dataset", "refraction": "volume", "geometry-field": "mesh"}[kind]
-    asked: dict[str, Any] = {"kind": kind, read: ids[f"{read}_id"]}
+    read = {"reconstruction": "dataset", "refraction": "volume", "geometry-field": "mesh"}.get(kind)
+    asked: dict[str, Any] = {"kind": kind} | ({read: ids[f"{read}_id"]} if read else {})
     if len(rest) == 1:
         return {**asked, rest[0]: value}
     return {**asked, rest[0]: {rest[1]: value}}

@@ -208,6 +208,7 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
         "ALTER TABLE jobs ADD COLUMN advice VARCHAR(2000)",
         "ALTER TABLE jobs ADD COLUMN mesh_id VARCHAR(32)",
         "ALTER TABLE jobs ADD COLUMN field_id VARCHAR(32)",
+        "ALTER TABLE datasets ADD COLUMN job_id VARCHAR(32)",
         "CREATE INDEX jobs_by_tenant ON jobs (tenant, state)",
         "CREATE UNIQUE INDEX jobs_by_key ON jobs (tenant, idempotency_key)",
         "CREATE INDEX datasets_by_tenant ON datasets (tenant, number)",
