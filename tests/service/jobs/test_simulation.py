@@ -1,0 +1,218 @@
+"""Jobs of kind simulation: from settings to an image, to the bits of the command line; ended and refused."""
+
+import threading
+import time
+from contextlib import contextmanager
+
+import pytest
+from fastapi.testclient import TestClient
+from typer.testing import CliRunner
+
+from bentray_service.access.token import Token
+from bentray_service.app import create_app
+from bentray_service.cli import app as command_line
+from bentray_service.settings import ServiceSettings
+from bentray_service.storage.keys import Keys
+from bentray_service.storage.tenants import LOCAL, Tenant
+from bentray_workers import simulation_parts
+from bentray_workers.cluster import open_cluster
+
+from ..conftest import PATIENCE_S
+
+SMALL = {"nodes": 16, "elements": 16, "noise_s": 2e-8, "seed": 7}
+WAVES = {"waveform": True, "nodes": 32, "elements": 16, "frequency_hz": 2e5, "side_m": 0.03, "emissions": 4}
+
+
+@pytest.fixture(scope="module")
+def workers():
+    with open_cluster(workers=1, processes=False) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def serving(tmp_path, workers):
+    """Start the service on the real cluster; again on the same folder when it is called again."""
+
+    @contextmanager
+    def go(**settings):
+        app = create_app(ServiceSettings(data_dir=tmp_path / "data", **settings), workers)
+        with TestClient(app, base_url="http://localhost", raise_server_exceptions=False) as http:
+            yield http
+
+    return go
+
+
+def ask(http, **settings):
+    return http.post("/v1/jobs", json={"kind": "simulation", "settings": settings})
+
+
+@pytest.fixture
+def held(monkeypatch):
+    """Emissions after the first wait until this event is set."""
+    go_on, begun = threading.Event(), []
+    real = simulation_parts.simulate_emission
+
+    def slow(settings, emission):
+        begun.append(emission)
+        if len(begun) > 1:
+            go_on.wait()
+        return real(settings, emission)
+
+    monkeypatch.setattr(simulation_parts, "simulate_emission", slow)
+    go_on.begun = begun
+    yield go_on
+    go_on.set()
+
+
+def wait_until(so):
+    deadline = time.monotonic() + PATIENCE_S
+    while not so():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_from_settings_to_an_image(serving, until, tmp_path):
+    with serving() as http:
+        answer = ask(http, **SMALL)
+        job = answer.json()
+        assert answer.status_code == 202, job
+        assert (job["kind"], job["dataset"], job["volume"]) == ("simulation", None, None)
+        assert job["settings"] == {
+            "phantom": "table6",
+            "waveform": False,
+            "refinement": 4,
+            "coupling_mps": 1500.0,
+            "attenuation": False,
+            **SMALL,
+        }
+        plan = job["plan"]
+        assert (plan["tasks"], plan["workers"], plan["lane"]) == (2, 1, "recon")
+        assert set(plan["call_bytes"]) == {"make_part", "finish"}
+        assert plan["minutes"] > 0.0
+        assert plan["field_bytes"] is None
+        done = until(http, job["id"])
+        assert (done["state"], done["progress"]) == ("succeeded", {"done": 2, "total": 2}), done["error"]
+        assert "volume" not in done["links"]
+        made = http.get(done["links"]["dataset"]).json()
+        assert (made["id"], made["job"], made["elements"]) == (done["dataset"], job["id"], 16)
+        assert (made["has_truth"], made["has_travel_times"], made["has_traces"]) == (True, True, False)
+        assert http.get("/v1/datasets").json() == {"datasets": [made]}
+        assert [one["id"] for one in http.get("/v1/jobs?kind=simulation").json()["jobs"]] == [job["id"]]
+        # The command line makes the same file, and an upload of it is kept as the same file.
+        path = tmp_path / "scan.h5"
+        words = ["--nodes", "16", "--elements", "16", "--noise-ns", "20", "--seed", "7", "-o", str(path)]
+        assert CliRunner().invoke(command_line, ["simulate", *words]).exit_code == 0
+        files = http.app.state.parts.files.of(LOCAL)
+        assert files.dataset(made["id"]).read_bytes() == path.read_bytes()
+        sent = {"content": path.read_bytes(), "headers": {"Content-Type": "application/x-hdf5"}}
+        again = http.post("/v1/datasets", **sent).json()
+        assert {**again, "id": made["id"], "job": job["id"]} == {
+            **made,
+            "created": again["created"],
+            "links": again["links"],
+        }
+        # And it is reconstructed as any scan.
+        settings = {"nodes": 16, "sweeps": 1, "attenuation": False}
+        asked = {"kind": "reconstruction", "dataset": made["id"], "settings": settings}
+        image = until(http, http.post("/v1/jobs", json=asked).json()["id"])
+        assert (image["state"], image["dataset"]) == ("succeeded", made["id"]), image["error"]
+        assert http.get(image["links"]["image"]).status_code == 200
+        assert not list((files.root / "work").iterdir())
+
+
+def test_waves_too_and_what_is_deleted_goes_with_its_job(serving, until):
+    with serving() as http:
+        done = until(http, ask(http, **WAVES).json()["id"])
+        assert (done["state"], done["progress"]["total"]) == ("succeeded", 5), done["error"]
+        made = http.get(done["links"]["dataset"]).json()
+        assert (made["has_traces"], made["has_travel_times"], made["ntx"]) == (True, False, 4)
+        assert http.delete(done["links"]["dataset"]).status_code == 204
+        assert http.get(done["links"]["self"]).status_code == 404
+        assert http.get("/v1/datasets").json() == {"datasets": []}
+        assert not list((http.app.state.parts.files.of(LOCAL).root / "datasets").iterdir())
+
+
+def test_cancel_while_a_task_is_at_work(serving, until, held):
+    with serving() as http:
+        job = ask(http, **WAVES).json()
+        until(http, job["id"], "running")
+        wait_until(lambda: len(held.begun) == 2)
+        assert http.post(job["links"]["cancel"]).status_code == 202
+        done = until(http, job["id"])
+        assert (done["state"], done["dataset"], done["progress"]["total"]) == ("cancelled", None, 5)
+        assert done["progress"]["done"] <= 1
+        held.set()
+        files = http.app.state.parts.files.of(LOCAL)
+        assert not list((files.root / "datasets").iterdir())
+    # What was still at work has found no folder to leave anything in.
+    with serving() as http:
+        assert not list((files.root / "work").iterdir())
+
+
+def test_a_stopped_service_goes_on_where_it_was(serving, until, held):
+    with serving() as http:
+        job = ask(http, **WAVES).json()["id"]
+        until(http, job, "running")
+        work = http.app.state.parts.files.of(LOCAL).work(job)
+        wait_until(lambda: list(work.rglob("*.npz")))
+    held.set()
+    with serving() as http:
+        done = until(http, job)
+        assert (done["state"], done["progress"]) == ("succeeded", {"done": 5, "total": 5}), done["error"]
+        events = [event["state"] for event in http.app.state.parts.jobs.events(LOCAL, job)]
+        assert events == ["queued", "running", "queued", "running", "succeeded"]
+        fresh = until(http, ask(http, **WAVES).json()["id"])
+        both = [http.get(one["links"]["dataset"]).json()["sha256"] for one in (done, fresh)]
+        assert both[0] == both[1]
+    assert held.begun.count(0) == 2, "the first emission of either job is made once"
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        ({"phantom": "table9"}, "settings.phantom"),
+        ({"nodes": 4}, "settings.nodes"),
+        ({"nodes": "many"}, "settings.nodes"),
+        ({"waveform": True, "refinement": 4}, "settings.refinement"),
+        ({"phantom": "table7", "waveform": True}, "settings.waveform"),
+        ({"wavform": True}, "settings.wavform"),
+        ({"refinement": 64}, "nodes"),
+        ({"elements": 4096, "attenuation": True}, "elements"),
+    ],
+)
+def test_what_is_refused(start, cluster, settings, field):
+    cluster.memory_bytes = 2**30
+    http = start()
+    answer = ask(http, **settings)
+    assert answer.status_code == 422, answer.text
+    assert answer.json()["field"] == field
+    assert answer.json()["accepted"]
+    assert http.get("/v1/jobs").json()["jobs"] == []
+    more = http.post("/v1/jobs", json={"kind": "simulation", "dataset": "ds-1", "settings": {}})
+    assert (more.status_code, more.json()["field"]) == (422, "dataset")
+
+
+def test_a_file_that_the_tenant_has_no_room_for_is_not_begun(start):
+    http = start(max_tenant_bytes=100_000)
+    answer = ask(http, nodes=16, elements=200)
+    assert (answer.status_code, answer.json()["field"]) == (507, "storage"), answer.text
+    assert ask(http, **SMALL).status_code == 202
+
+
+def test_another_tenant_finds_neither_job_nor_dataset(serving, until):
+    with serving() as http:
+        auth = {}
+        for name in ("acme", "other"):
+            token = Token.new()
+            Keys(http.app.state.parts.database).add(token, Tenant(name), name, ("read", "write"))
+            auth[name] = {"Authorization": f"Bearer {token.shown()}"}
+        http.headers.update(auth["acme"])
+        done = until(http, ask(http, **SMALL).json()["id"])
+        links = {done["links"]["self"], done["links"]["dataset"], done["links"]["self"] + "/events"}
+        for link in links:
+            assert http.get(link, headers=auth["other"]).status_code == 404, link
+        asked = {"kind": "reconstruction", "dataset": done["dataset"]}
+        answer = http.post("/v1/jobs", json=asked, headers=auth["other"])
+        assert (answer.status_code, answer.json()["field"]) == (404, "dataset")
+        assert http.get("/v1/datasets", headers=auth["other"]).json() == {"datasets": []}
+        assert len(http.get("/v1/datasets").json()["datasets"]) == 1
