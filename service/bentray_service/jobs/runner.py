@@ -163,6 +163,7 @@ class Runner:
                     stop=reporter.stop,
                 )
             )
+            self._keep(target, reporter)
         except Cancelled:
             if not reporter.lost:
                 self._settle(lambda: self._stopped(job_id, files, reporter))
@@ -187,11 +188,21 @@ class Runner:
             problem = explain(job_id, error).model_dump(exclude_none=True)
             self._settle(lambda: self._failed(job_id, files, reporter, problem))
         else:
+            self._settle(lambda: self._succeeded(job_id, files, reporter, kind, result, target))
+
+    def _keep(self, target: Path, reporter: Reporter) -> None:
+        """Keep a result for good before a row tells of it, however long the store is away.
+
+        Raises:
+            Cancelled: when the job was to stop meanwhile.
+        """
+        while True:
             try:
-                self._settle(lambda: self._succeeded(job_id, files, reporter, kind, result, target))
-            except StorageAway:
-                # The last checkpoint is there: at the next start little is left to do.
-                self._settle(lambda: self._queue.release(job_id, "the service was stopped"))
+                return self._files.store.publish(target)
+            except StorageAway as error:
+                log.warning("%s waits for the storage: %s", target.name, error)
+                if self._leaving.wait(STORE_SECONDS) or reporter.stop():
+                    raise Cancelled from error
 
     def _stopped(self, job_id: str, files: TenantFiles, reporter: Reporter) -> None:
         reporter.flush()
@@ -217,8 +228,6 @@ class Runner:
         target: Path,
     ) -> None:
         reporter.flush()
-        if self._queue.told(job_id) == "running":
-            self._files.store.publish(target)
         if not self._queue.succeed(job_id, result, kind.table):
             if self._queue.told(job_id) is None:
                 # Another service runs it by now, and writes the same file.
@@ -228,18 +237,10 @@ class Runner:
         files.drop_work(job_id)
 
     def _settle(self, write_the_end: Callable[[], None]) -> None:
-        """Write the end of a job, as often as it takes: it would count as running for ever otherwise.
-
-        Raises:
-            StorageAway, SQLAlchemyError: when the service leaves before that could be done.
-        """
+        """Write the end of a job, as often as it takes: it would count as running for ever otherwise."""
         while True:
             try:
                 return write_the_end()
-            except StorageAway as error:
-                log.warning("a result waits for the storage: %s", error)
-                if self._leaving.wait(STORE_SECONDS):
-                    raise
             except SQLAlchemyError:
                 log.exception("the end of a job could not be stored; trying again in %g s", IDLE_SECONDS)
                 if self._leaving.wait(IDLE_SECONDS):

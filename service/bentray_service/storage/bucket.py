@@ -118,7 +118,7 @@ class Bucket:
         """Turn what goes wrong into ``StorageAway``; that an object is not there, only where it has to be."""
         try:
             yield
-        except (OSError, BotoCoreError, ClientError, aiohttp.ClientError) as error:
+        except (OSError, ValueError, BotoCoreError, ClientError, aiohttp.ClientError) as error:
             own = isinstance(error, OSError) and error.errno in OWN
             if own or (may_miss and isinstance(error, FileNotFoundError)):
                 raise

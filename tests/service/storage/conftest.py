@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bentray_service.storage import bucket_store
+from bentray_service.storage import bucket, bucket_store
 from bentray_service.storage.database import Database, open_database
 from bentray_service.storage.datasets import Datasets
 from bentray_service.storage.ids import new_id
@@ -80,6 +80,7 @@ def s3_server() -> Iterator[s3.Server]:
 
 @pytest.fixture
 def bucket_url(s3_server: s3.Server, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The address of an empty bucket, where what is said of it is believed for a moment only."""
+    """The address of an empty bucket; it is asked once each time, and always anew whether it is there."""
+    monkeypatch.setattr(bucket, "TRIES", {"total_max_attempts": 1})
     monkeypatch.setattr(bucket_store, "FRESH_S", 0.0)
     return s3_server.new_bucket(monkeypatch)

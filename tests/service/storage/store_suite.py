@@ -6,7 +6,7 @@ from bentray_service.storage.files import Files
 from bentray_service.storage.ids import new_id
 from bentray_service.storage.tenants import LOCAL, Tenant
 
-OTHER = Tenant("other")
+OTHER = Tenant("other.one+2@clinic")
 
 
 class StoreSuite:

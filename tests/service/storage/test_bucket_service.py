@@ -110,6 +110,18 @@ def test_a_result_waits_for_the_bucket_and_is_not_lost(service, work, uploaded, 
     assert http.get(f"{done['links']['volume']}/data").status_code == 200
 
 
+def test_a_job_can_be_cancelled_while_its_result_waits(service, work, uploaded, begun, until, s3_server):
+    http = service("one")
+    job = begun(http, uploaded(http))
+    s3_server.away.set()
+    s3_server.asked.clear()
+    work.hold.set()
+    wait(lambda: any("/volumes/" in path for _, path in list(s3_server.asked)))
+    assert http.post(f"/v1/jobs/{job}/cancel").status_code == 202
+    assert until(http, job)["state"] == "cancelled"
+    assert http.get("/v1/volumes").json()["volumes"] == []
+
+
 def test_a_service_that_leaves_meanwhile_goes_on_at_the_next_start(
     service, work, uploaded, begun, until, s3_server
 ):
