@@ -78,7 +78,8 @@ class Settings:
         examine: before that, put swapped channels, inverted ones and a wrong time zero right, leave dead
             elements and broken traces out, and after it times that others contradict; see
             ``acquisition.quality``. A scan that must not be used is refused. It says what it found.
-        attenuation: reconstruct it too, where amplitudes were recorded.
+        attenuation: reconstruct it too, where amplitudes were recorded; with ``waveform`` from the traces,
+            once the speed is refined. Experimental there.
         focusing: take off the amplitudes what refraction does to them, by the spreading of ray tubes in the
             speed image; needs its frequency (``amplitude@frequency_hz``). Experimental.
         resolution_check: also tell how much of a checkerboard the rays recover, node by node.
