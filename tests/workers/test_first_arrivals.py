@@ -20,6 +20,7 @@ from bentray_workers.findings_file import read_findings
 from bentray_workers.first_arrivals import FINDINGS, PICKED, Arrivals, Source
 
 from ..kernels.acquisition.traces import RATE_HZ, blob_delay, scan
+from ..kernels.wave.scans import scan as wave_scan
 
 ELEMENTS = 16
 PLAN = Settings(nodes=24, sweeps=1)
@@ -163,3 +164,13 @@ def test_what_was_picked_before_a_death_is_not_picked_again(cluster, tmp_path, m
     again = slices.reconstruct(cluster.client, tmp_path / "scan.h5", PLAN, work_dir=tmp_path / "work")
     np.testing.assert_array_equal(again.speed, expected.speed)
     assert again.provenance == expected.provenance
+
+
+def test_waves_are_refined_from_channels_put_back(tmp_path):
+    plan = Settings(method="waveform", nodes=24, sweeps=1, wave_bands=1, wave_emitters=4, attenuation=False)
+    images = []
+    for name, by in (("clean.h5", np.array), ("wrong.h5", disordered)):
+        write_dataset(tmp_path / name, spoilt(wave_scan(), by))
+        images.append(slices.reconstruct(None, tmp_path / name, plan))
+    np.testing.assert_array_equal(images[1].speed, images[0].speed)
+    assert "inverted in reception (3), corrected" in images[1].provenance["quality"]

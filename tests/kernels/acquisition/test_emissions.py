@@ -1,0 +1,52 @@
+"""Traces read an emission at a time give, after any exchanges and turns, what arrays of them give."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from bentray_kernels.acquisition.emissions import Emissions, moved, turned
+
+SHAPE = (4, 5, 3)
+
+steps = st.one_of(
+    st.tuples(st.just(0), st.permutations(range(SHAPE[0]))),
+    st.tuples(st.just(1), st.permutations(range(SHAPE[1]))),
+    st.tuples(st.just(2), arrays(bool, SHAPE[:2])),
+)
+
+
+@given(
+    traces=st.one_of(
+        arrays(np.int16, SHAPE),
+        arrays(np.float32, SHAPE, elements=st.floats(width=32, allow_nan=True)),
+    ),
+    done=st.lists(steps, max_size=5),
+)
+def test_they_read_as_the_array_that_went_through_the_same(traces, done):
+    asked = []
+
+    def read(e):
+        asked.append(e)
+        return traces[e]
+
+    whole, lazily = traces, Emissions.of(read, traces.shape, traces.dtype)
+    for axis, how in done:
+        if axis == 2:
+            whole, lazily = turned(whole, how), turned(lazily, how)
+        else:
+            order = np.array(how)
+            whole, lazily = moved(whole, order, axis), moved(lazily, order, axis)
+    assert asked == []
+    assert (lazily.shape, lazily.ndim, lazily.dtype, len(lazily)) == (SHAPE, 3, traces.dtype, SHAPE[0])
+    np.testing.assert_array_equal(np.asarray(lazily), whole)
+    np.testing.assert_array_equal(lazily[2], whole[2])
+    for mine, theirs in zip(lazily, whole, strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+
+
+def test_the_lowest_whole_number_turns_into_the_highest():
+    lowest = np.full((1, 1, 2), -(2**15), np.int16)
+    np.testing.assert_array_equal(turned(lowest, np.ones((1, 1), bool)), np.full((1, 1, 2), 2**15 - 1))

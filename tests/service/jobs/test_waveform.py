@@ -1,0 +1,86 @@
+"""A job with ``method`` waveform over HTTP: to the bits of one process, gone on from after it was torn."""
+
+from __future__ import annotations
+
+import io
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from distributed.comm import CommClosedError
+from fastapi.testclient import TestClient
+
+from bentray_kernels.acquisition import pick
+from bentray_kernels.tomography import Settings, reconstruct
+from bentray_service.app import create_app
+from bentray_service.settings import ServiceSettings
+from bentray_service.storage.tenants import LOCAL
+from bentray_workers import slices
+from bentray_workers.cluster import open_cluster
+from bentray_workers.dataset_file import write_dataset
+
+from ...kernels.wave.scans import scan
+from ..conftest import ENDED, HDF5
+
+PATIENCE_S = 300.0
+ASKED = {"method": "waveform", "nodes": 24, "sweeps": 1, "wave_bands": 2, "wave_emitters": 4}
+
+
+@pytest.fixture
+def http(tmp_path):
+    settings = ServiceSettings(data_dir=tmp_path / "data")
+    with (
+        open_cluster(workers=2, local_directory=tmp_path, processes=False) as cluster,
+        TestClient(create_app(settings, cluster), base_url="http://localhost") as client,
+    ):
+        yield client
+
+
+@pytest.fixture
+def torn(monkeypatch):
+    """The scheduler goes once the waves have kept something; what was restored after it, by name."""
+    restored, real_keep, real_last = [], slices.Checkpoints.keep, slices.Checkpoints.last
+    gone = []
+
+    def keep(self, name, standing):
+        real_keep(self, name, standing)
+        if not gone and type(standing).__module__.startswith("bentray_kernels.wave"):
+            gone.append(name)
+            raise CommClosedError("gone")
+
+    def last(self, name):
+        found = real_last(self, name)
+        if found is not None:
+            restored.append(name)
+        return found
+
+    monkeypatch.setattr(slices.Checkpoints, "keep", keep)
+    monkeypatch.setattr(slices.Checkpoints, "last", last)
+    return gone, restored
+
+
+def test_a_torn_job_gives_the_image_of_one_process(http, torn, tmp_path):
+    write_dataset(tmp_path / "scan.h5", scan())
+    sent = http.post("/v1/datasets", content=(tmp_path / "scan.h5").read_bytes(), headers=HDF5)
+    asked = {"kind": "reconstruction", "dataset": sent.json()["id"], "settings": ASKED}
+    job = http.post("/v1/jobs", json=asked).json()
+    assert {"measure", "judge", "read", "settle", "join", "enter"} < set(job["plan"]["call_bytes"])
+    deadline = time.monotonic() + PATIENCE_S
+    while job["state"] not in ENDED:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+        job = http.get(f"/v1/jobs/{job['id']}").json()
+    assert job["state"] == "succeeded", job["error"]
+    gone, restored = torn
+    assert set(gone) < set(restored), "rays and waves were gone on from"
+    events = http.app.state.parts.jobs.events(LOCAL, job["id"])
+    assert "the workers were away; it goes on when they are back" in {event["note"] for event in events}
+
+    expected = reconstruct(replace(pick(scan()), waveform=scan().waveform), Settings(**ASKED))
+    answer = http.get(f"/v1/volumes/{job['volume']}/data", params={"format": "npy"})
+    np.testing.assert_array_equal(np.load(io.BytesIO(answer.content)).squeeze(), expected.speed)
+    record = http.get(f"/v1/volumes/{job['volume']}").json()
+    assert record["provenance"]["quality"] == "nothing found"
+    assert record["provenance"]["waveform"] == expected.provenance["waveform"]
+    assert any(sweep["band_hz"] for sweep in job["history"])
