@@ -191,7 +191,12 @@ def _trials(reader: Reader) -> tuple[Trial, ...]:
     try:
         found = json.loads(reader.text("", "trials") or "[]")
         return tuple(
-            Trial(dict(one["settings"]), float(one["held_out_rms_s"]), float(one["shown_rms_s"]))
+            Trial(
+                dict(one["settings"]),
+                float(one["held_out_rms_s"]),
+                float(one["shown_rms_s"]),
+                None if one.get("held_out_mean_s") is None else float(one["held_out_mean_s"]),
+            )
             for one in found
         )
     except (ValueError, TypeError, KeyError, RecursionError):

@@ -5,29 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from ..acquisition import Dataset
-from ..acquisition.noise import noise_level
-from ..arrays import Floats
 from ..errors import InvalidInput
 from . import pairs
-from .chains import Chain, Gathering, Scan, cut
-from .gauss_newton import look
-from .linearisation import Rows
+from .chains import Chain, Scan
+from .holding_out import Part
 from .result import Reconstruction, Trial
 from .settings import Settings
 from .stages import stages
+from .stopping import noise_of, stopped
+from .trials import TrialChain
 
-Part = Literal["all", "shown", "held-out"]
-PARTS: tuple[Part, ...] = ("shown", "held-out")
+PAIRS: tuple[Part, Part] = ("shown", "held-out")
+VIEWS: tuple[Part, Part] = ("shown-views", "held-out-views")
 
-# One pair in so many is held out, both directions together.
-HELD_OUT = 10
-
-# What is tried: bent rays lose where the picked times are not those of the Eikonal equation.
+# What is tried with thin rays: bent ones lose where the picked times are not those of the Eikonal equation.
 CANDIDATES: tuple[dict[str, Any], ...] = (
     {"rays": "straight", "method": "sart"},
     {"rays": "straight", "method": "gauss-newton"},
@@ -37,6 +33,31 @@ CANDIDATES: tuple[dict[str, Any], ...] = (
     {"rays": "curved", "method": "gauss-newton", "edge_mps": 7.0},
 )
 
+# What is tried where the frequency tells how wide a wave is: rays of that width, straight and bent ones by
+# the same method, so that nothing but the bends tells them apart; and thin bent ones, in case of times that
+# no wave was asked for.
+WIDE: tuple[dict[str, Any], ...] = (
+    {"rays": "straight", "method": "gauss-newton"},
+    {"rays": "curved", "method": "gauss-newton"},
+)
+THIN: tuple[dict[str, Any], ...] = CANDIDATES[4:]
+
+# Standard deviation of the Gaussian across a wide ray, wavelengths, and its penalty over the settings'. No
+# misfit tells the width: the thinner the rays, the more they explain, wrong picks too.
+WIDTH_WAVES = 1.0
+STIFFER = 2.0
+
+# So thin rays are believed once they miss by less than this part: on times of the Eikonal equation, said to
+# be of 400 kHz, it was 0.4 to 0.5, on picks from waves 0.8 to 1.
+EXACT = 0.6
+
+# Where rays miss held-out views by less than this part of the times themselves, both kinds explain the scan
+# and their difference says little: straight ones fit nearly any smooth times by a wrong image, so they must
+# miss by less than the second part of what bent ones do. Rules of thumb, from scans in
+# benchmarks/results/tried.md.
+EXPLAINED_PART = 0.1
+STRAIGHT = 0.8
+
 # Trials use half the nodes, but not fewer than this.
 TRIAL_NODES = 64
 
@@ -45,82 +66,34 @@ TRIAL_NODES = 64
 # from 0.9 (water faster than a fat ring) down to 0.35.
 CLEARLY = 0.92
 
-# A misfit of this many times the noise explains the times (the factor of Morozov's principle).
-EXPLAINED = 1.1
+
+def wide(dataset: Dataset, settings: Settings) -> list[dict[str, Any]]:
+    """Candidates where the scan's frequency is known; none elsewhere, and none in space."""
+    if dataset.center_frequency_hz is None or settings.decomposition == "volume":
+        return []
+    more = {
+        "ray_width_m": WIDTH_WAVES * dataset.water_speed_mps / dataset.center_frequency_hz,
+        "penalty_strength": STIFFER * settings.penalty_strength,
+    }
+    return [*({**changes, **more} for changes in WIDE), *THIN]
 
 
-def part_of(dataset: Dataset, part: Part) -> Dataset:
-    """The dataset with the pairs of one part only, the others invalid.
-
-    A pair and its reverse belong to the same part, in all slices.
-    """
-    if part == "all":
-        return dataset
-    first = np.minimum(dataset.tx[:, None], dataset.rx[None, :]).astype(np.uint64)
-    second = np.maximum(dataset.tx[:, None], dataset.rx[None, :]).astype(np.uint64)
-    # A mix of both numbers, so that no direction or ring is held out as a whole.
-    mixed = (first * np.uint64(0x9E3779B1) + second * np.uint64(0x85EBCA77)) >> np.uint64(11)
-    held = (mixed % np.uint64(HELD_OUT)) == 0
-    kept = held if part == "held-out" else ~held
-    shape = kept.shape if dataset.slice_z_m is None else (dataset.slices, *kept.shape)
-    valid = np.broadcast_to(kept, shape)
-    return replace(dataset, valid=valid.copy() if dataset.valid is None else valid & dataset.valid)
-
-
-def tried(settings: Settings) -> list[Settings]:
+def tried(settings: Settings, candidates: Sequence[dict[str, Any]] = CANDIDATES) -> list[Settings]:
     """The settings of each trial: those of the candidates on a coarser grid."""
     nodes = min(settings.nodes, max(TRIAL_NODES, -(-settings.nodes // 2)))
+    coarser = nodes / settings.nodes
     found = []
-    for changes in CANDIDATES:
+    for changes in candidates:
         plan = replace(settings, **changes, attenuation=False, resolution_check=False)
-        front = plan.front_smoothing_nodes * nodes / settings.nodes
-        found.append(replace(plan, nodes=nodes, coarser_grids=0, front_smoothing_nodes=front))
+        front = plan.front_smoothing_nodes * coarser
+        # An image of half the nodes has half the edge nodes for the same rays.
+        strength = plan.penalty_strength * (coarser if plan.ray_width_m > 0.0 else 1.0)
+        found.append(
+            replace(
+                plan, nodes=nodes, coarser_grids=0, front_smoothing_nodes=front, penalty_strength=strength
+            )
+        )
     return found
-
-
-class TrialChain(Chain):
-    """A chain on the pairs that are shown, which ends with the misfit of those held out.
-
-    Args:
-        scan: of the shown pairs.
-        index: of the slice.
-        held_out: of the held-out pairs.
-    """
-
-    def __init__(self, scan: Scan, index: int, held_out: Scan) -> None:
-        self._held_out = held_out
-        super().__init__(scan, index)
-
-    def _gatherings(self) -> list[Gathering]:
-        return [HeldOut(self._held_out, self._index)]
-
-    @property
-    def held_out_rms_s(self) -> float:
-        """Misfit of the pairs that were held out, s."""
-        return float(self.found(misfit))
-
-
-class HeldOut(Gathering):
-    """The rays of the pairs that were held out."""
-
-    def __init__(self, scan: Scan, index: int) -> None:
-        self._scan = scan
-        super().__init__(look_held_out, misfit, scan.problem(index).sounding)
-
-    def first(self, scan: Scan, index: int, image: Floats) -> list[Any]:
-        return super().first(self._scan, index, image)
-
-
-def look_held_out(scan: Scan, index: int, slowness: Floats, part: int) -> Rows:
-    """Call: the rays of some held-out pairs through the finished image."""
-    problem = scan.problem(index)
-    return look(problem, scan.stages()[-1], slowness, cut(problem.sounding)[part])
-
-
-def misfit(_scan: Scan, _index: int, rows: Sequence[Rows]) -> float:
-    """Call: root mean square of the residuals, s."""
-    residual = np.concatenate([part.residual for part in rows])
-    return math.sqrt(float((residual**2).mean()))
 
 
 def advise(
@@ -133,12 +106,13 @@ def advise(
 ) -> tuple[Settings, tuple[Trial, ...], int]:
     """The settings that explain one slice best, and how all that were tried did.
 
-    What predicts held-out pairs best is chosen. The reconstruction is told to stop at the noise of the times
-    (Morozov's discrepancy principle), for a closer fit would draw it, unless the trial shows that there is
-    less of it.
+    What predicts held-out pairs best is chosen, see ``choose``; where the frequency is known, of rays that
+    are as wide as waves, the straight or the bent ones, whichever predict held-out views better, see
+    ``choose_wide``. The reconstruction is told to stop at the noise of the times (Morozov's discrepancy
+    principle), for a closer fit would draw it, unless the trial shows that there is less of it.
 
     Args:
-        dataset: for the noise of its times.
+        dataset: for its frequency and the noise of its times.
         settings: that leave rays and method to the trials.
         index: the slice to try.
         scan_of: makes a scan of a part of the pairs.
@@ -152,16 +126,19 @@ def advise(
     Raises:
         InvalidInput: for a slice without pairs, or with too few to hold some out.
     """
-    _check_parts(settings, index, scan_of)
-    chains = [
-        TrialChain(scan_of(plan, "shown"), index, scan_of(plan, "held-out")) for plan in tried(settings)
-    ]
+    candidates = wide(dataset, settings)
+    parts = VIEWS
+    if not candidates or _lacking(VIEWS, settings, index, scan_of):
+        candidates, parts = list(CANDIDATES), PAIRS
+        _check_parts(settings, index, scan_of)
+    plans = tried(settings, candidates)
+    chains = [TrialChain(scan_of(plan, parts[0]), index, scan_of(plan, parts[1])) for plan in plans]
     drive(chains, 0, passes_to_come(dataset, settings) + after)
     trials = [
-        Trial(changes, chain.held_out_rms_s, chain.history[-1].residual_rms_s)
-        for changes, chain in zip(CANDIDATES, chains, strict=True)
+        Trial(changes, chain.held_out_rms_s, chain.history[-1].residual_rms_s, chain.held_out_mean_s)
+        for changes, chain in zip(candidates, chains, strict=True)
     ]
-    chosen = choose(trials)
+    chosen = choose(trials) if parts == PAIRS else choose_wide(trials, _size(dataset))
     others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
     found = replace(settings, **chosen.settings)
     passes = sum(chain.total for chain in chains)
@@ -170,7 +147,8 @@ def advise(
 
 def passes_to_come(dataset: Dataset, settings: Settings) -> int:
     """Emitter passes that a reconstruction takes at most, whichever candidate is chosen."""
-    plans = [stages(dataset, replace(settings, **changes)) for changes in CANDIDATES]
+    every = (*CANDIDATES, *wide(dataset, settings))
+    plans = [stages(dataset, replace(settings, **changes)) for changes in every]
     each = max(sum(plan.sweeps for plan in found) for found in plans)
     each += settings.attenuation and dataset.log_ratio_np is not None
     each += settings.resolution_check
@@ -181,31 +159,21 @@ def passes_to_come(dataset: Dataset, settings: Settings) -> int:
 def _check_parts(settings: Settings, index: int, scan_of: Callable[[Settings, Part], Scan]) -> None:
     plan = tried(settings)[0]
     scan_of(plan, "all").problem(index)
-    for part in PARTS:
+    if part := _lacking(PAIRS, settings, index, scan_of):
+        accepted = f"sart or gauss-newton, for slice {index} has no pair that is {part}"
+        raise InvalidInput("method", repr(settings.method), accepted)
+
+
+def _lacking(
+    parts: Sequence[Part], settings: Settings, index: int, scan_of: Callable[[Settings, Part], Scan]
+) -> Part | None:
+    """The first part that the slice has no pair of; None: it has pairs of all."""
+    for part in parts:
         try:
-            scan_of(plan, part).problem(index)
-        except InvalidInput as found:
-            raise InvalidInput(
-                "method",
-                repr(settings.method),
-                f"sart or gauss-newton, for slice {index} has no pair that is {part}",
-            ) from found
-
-
-def stopped(settings: Settings, chosen: Trial, noise_s: float) -> Settings:
-    """The settings with the misfit to stop at, unless the chosen trial shows that there is less noise."""
-    if settings.stop_rms_s == 0.0 and noise_s <= EXPLAINED * chosen.held_out_rms_s:
-        return replace(settings, stop_rms_s=EXPLAINED * noise_s)
-    return settings
-
-
-def noise_of(dataset: Dataset) -> float:
-    """Standard deviation of the travel times, s: as the dataset tells it, or as their roughness does."""
-    if dataset.sigma_s is not None:
-        told = dataset.sigma_s[np.isfinite(dataset.differential_tof()) & np.isfinite(dataset.sigma_s)]
-        if told.size:
-            return math.sqrt(float((told**2).mean()))
-    return noise_level(dataset.differential_tof())
+            scan_of(tried(settings)[0], part).problem(index)
+        except InvalidInput:
+            return part
+    return None
 
 
 def choose(trials: Sequence[Trial]) -> Trial:
@@ -218,10 +186,44 @@ def choose(trials: Sequence[Trial]) -> Trial:
     return best if best.held_out_rms_s < CLEARLY * straight.held_out_rms_s else straight
 
 
+def choose_wide(trials: Sequence[Trial], size_s: float) -> Trial:
+    """Of the trials with wide rays the one that predicts better; thin rays if they do far better still.
+
+    By the mean size of what they miss, for picks of first arrivals that were too weak are wrong by periods.
+    Where both explain the times, straight rays must be clearly better than bent ones.
+
+    Args:
+        trials: of the candidates of ``wide``.
+        size_s: mean size of the times, s.
+    """
+    wide_rays = {t.settings["rays"]: t for t in trials if "ray_width_m" in t.settings}
+    straight, bent = wide_rays["straight"], wide_rays["curved"]
+    part = STRAIGHT if _mean(bent) < EXPLAINED_PART * size_s else 1.0
+    best = straight if _mean(straight) < part * _mean(bent) else bent
+    thin = min((t for t in trials if "ray_width_m" not in t.settings), key=_mean)
+    return thin if _mean(thin) < EXACT * _mean(best) else best
+
+
+def _size(dataset: Dataset) -> float:
+    """Mean size of the times, s."""
+    return float(np.nanmean(np.abs(dataset.differential_tof())))
+
+
+def _mean(trial: Trial) -> float:
+    return math.inf if trial.held_out_mean_s is None else trial.held_out_mean_s
+
+
 def reason(trials: Sequence[Trial]) -> str:
     """One sentence: what was chosen and why, and how well each trial predicted; empty without trials."""
     if not trials:
         return ""
+    if any("ray_width_m" in trial.settings for trial in trials):
+        told = [f"{_named(trial.settings)} {1e9 * _mean(trial):.0f} ns" for trial in trials]
+        why = "mean misfit of held-out views, for rays as wide as waves"
+        if _mean(trials[0]) > min(_mean(t) for t in trials if "ray_width_m" in t.settings):
+            needed = f"{100.0 * (1.0 - STRAIGHT):.0f} % better"
+            why += f"; where both explain the times straight ones must be {needed}"
+        return f"auto chose {told[0]} ({why}); the others: {', '.join(told[1:])}"
     told = [f"{_named(trial.settings)} {1e9 * trial.held_out_rms_s:.0f} ns" for trial in trials]
     best = min(trial.held_out_rms_s for trial in trials)
     why = "misfit of held-out pairs"

@@ -10,7 +10,7 @@ import numpy as np
 from ..acquisition import Dataset, pick
 from ..arrays import Floats
 from ..errors import InvalidInput
-from .linearisation import linearise
+from .gauss_newton import look
 from .problem import Problem
 from .reconstruction import reconstruct
 from .result import Progress, Reconstruction
@@ -93,14 +93,7 @@ def predicted_delta(dataset: Dataset, result: Reconstruction) -> Floats:
     for index in range(dataset.slices):
         problem = Problem.of(asked, replace(settings, reciprocity=False), index)
         speed = result.speed if result.speed.ndim == 2 else result.speed[:, :, index]
-        rows = linearise(
-            problem,
-            1.0 / speed,
-            np.arange(len(dataset.tx)),
-            rays=settings.traced,
-            eikonal=settings.front,
-            front=settings.front_smoothing_nodes,
-        )
+        rows = look(problem, settings, 1.0 / speed, np.arange(len(dataset.tx)))
         found[index][~level] = -rows.residual
     return found[0] if dataset.slice_z_m is None else found
 

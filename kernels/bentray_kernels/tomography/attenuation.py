@@ -15,6 +15,7 @@ from .linear import Linearised
 from .linearisation import Rows, linearise_losses
 from .matrix import back_project, project
 from .problem import Problem
+from .ray_width import bending, seen
 from .settings import Settings
 
 # Solutions, each with the total variation that the misfit of the one before asks for.
@@ -44,11 +45,11 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
         problem = _unfocused(problem, settings, slowness, emitters)
     return linearise_losses(
         problem,
-        slowness,
+        seen(problem, settings, slowness),
         emitters,
         rays=settings.traced,
         eikonal=settings.front,
-        front=settings.front_smoothing_nodes,
+        front=bending(problem, settings),
     )
 
 

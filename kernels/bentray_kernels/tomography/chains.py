@@ -16,6 +16,7 @@ from ..arrays import Floats, Ints
 from . import attenuation, gauss_newton, resolution, sart
 from .linearisation import Rows
 from .problem import Problem
+from .ray_width import nodes_wide
 from .result import Sweep
 from .settings import Settings
 from .stages import start
@@ -389,7 +390,8 @@ def look_again(scan: Scan, index: int, slowness: Floats, part: int) -> Rows:
 
 def recover(scan: Scan, index: int, rows: list[Rows]) -> Floats:
     """Call: the resolution check."""
-    return resolution.recovery(scan.problem(index), rows)
+    problem = scan.problem(index)
+    return resolution.recovery(problem, rows, nodes_wide(problem, scan.stages()[-1]))
 
 
 def next_batch(batch: int, used: int, seconds: float) -> int:

@@ -19,6 +19,7 @@ from .linear import Linearised
 from .linearisation import Rows, linearise
 from .matrix import back_project
 from .problem import Problem
+from .ray_width import bending, nodes_wide, seen
 from .result import Sweep, residual_counts
 from .settings import Settings
 
@@ -103,7 +104,12 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
     """
     rays: Kind = settings.traced if slowness.min() < slowness.max() else "straight"
     return linearise(
-        problem, slowness, emitters, rays=rays, eikonal=settings.front, front=settings.front_smoothing_nodes
+        problem,
+        seen(problem, settings, slowness),
+        emitters,
+        rays=rays,
+        eikonal=settings.front,
+        front=bending(problem, settings),
     )
 
 
@@ -153,6 +159,7 @@ def step(
         limit,
         state.begun * problem.spacing,
         problem.spacing * settings.edge_mps / problem.water_speed**2 or math.inf,
+        nodes_wide(problem, settings),
     ).solve(state.dual)
     return replace(
         state,

@@ -12,6 +12,7 @@ from ..arrays import Flags, Floats
 from .linearisation import Rows
 from .matrix import back_project, normal_product, project
 from .penalties import Penalty, adjoint, gradient, laplacian, length, shrink
+from .ray_width import blurred
 
 # Weight of the split in the alternating direction method, in units of the data's own curvature; on Table 6 a
 # tenth of it ended with a worse image.
@@ -55,6 +56,8 @@ class Linearised:
             edge costs hardly more than a low one and keeps its contrast. Iteratively reweighted (Candès,
             Wakin and Boyd 2008): each ``solve`` weighs the slopes by those of ``image``, so that one call is
             a convex problem, and an image without slopes gets plain total variation, as ``inf`` does.
+        width: standard deviation, nodes, of the Gaussian under which rays see the image: A·δ above is
+            then A·G·δ.
     """
 
     parts: Sequence[Rows]
@@ -67,6 +70,7 @@ class Linearised:
     huber: float = math.inf
     reference: Floats | None = None
     edge: float = math.inf
+    width: float = 0.0
 
     def solve(self, dual: Floats) -> tuple[Floats, Floats]:
         """An image nearer the minimum, and the dual variable that a later, similar problem goes on from.
@@ -134,8 +138,9 @@ class Linearised:
             if square <= enough:
                 break
             curved = np.zeros(image.size)
+            wide = blurred(direction, self.width).ravel()
             for part, weight in zip(self.parts, weights, strict=True):
-                normal_product(part.pointers, part.columns, part.lengths, weight, direction.ravel(), curved)
+                normal_product(part.pointers, part.columns, part.lengths, weight, wide, curved)
             bent = self._within(curved) + np.where(self.region, stiffness(direction), 0.0)
             step = square / float((direction * bent).sum())
             change = change + step * direction
@@ -145,12 +150,12 @@ class Linearised:
         return np.clip(image + change, *self.bounds)
 
     def _within(self, flat: Floats) -> Floats:
-        """A sum over rows as an image, over the density, in the region."""
-        return np.where(self.region, flat.reshape(self.image.shape) / self.density, 0.0)
+        """A sum over rows as an image as wide as the rays, over the density, in the region."""
+        return np.where(self.region, blurred(flat.reshape(self.image.shape), self.width) / self.density, 0.0)
 
     def _missed(self, image: Floats) -> Iterator[Floats]:
         """What an image leaves of the residuals, part by part, s."""
-        change = (image - self.image).ravel()
+        change = blurred(image - self.image, self.width).ravel()
         for part in self.parts:
             explained = np.empty(part.residual.size)
             project(part.pointers, part.columns, part.lengths, change, explained)

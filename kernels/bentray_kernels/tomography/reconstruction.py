@@ -15,12 +15,14 @@ from ..acquisition import Dataset
 from ..arrays import Floats
 from ..errors import InvalidInput
 from . import pairs
-from .advice import Part, advise, noise_of, part_of
+from .advice import advise
 from .chains import Calls, Chain, Scan, attenuate, recover
+from .holding_out import Part, part_of
 from .problem import Problem
 from .result import Progress, Reconstruction, Trial
 from .settings import Settings
 from .stages import stages
+from .stopping import noise_of
 
 if TYPE_CHECKING:
     from ..wave.chain import WaveScan

@@ -14,6 +14,7 @@ from .linear import Linearised
 from .linearisation import Rows
 from .matrix import back_project, project
 from .problem import Problem
+from .ray_width import blurred
 from .settings import Settings
 
 # Side of a field of the checkerboard, nodes.
@@ -32,7 +33,7 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
     return rows_of(problem, settings, slowness, emitters)
 
 
-def recovery(problem: Problem, parts: Sequence[Rows]) -> Floats:
+def recovery(problem: Problem, parts: Sequence[Rows], width: float = 0.0) -> Floats:
     """How much of a checkerboard comes back, node by node: 1 where all of it does, 0 where nothing.
 
     A checkerboard with fields of ``FIELD_NODES`` nodes is projected along the rays and reconstructed from
@@ -42,6 +43,7 @@ def recovery(problem: Problem, parts: Sequence[Rows]) -> Floats:
     Args:
         problem: the slice or volume.
         parts: rows of all emitters, in their order.
+        width: of the rays, nodes; see ``ray_width``.
 
     Returns:
         Of the region's shape; 0 outside the region.
@@ -52,14 +54,14 @@ def recovery(problem: Problem, parts: Sequence[Rows]) -> Floats:
     passed, seen = np.zeros(board.size), []
     for part in parts:
         times = np.empty(part.residual.size)
-        project(part.pointers, part.columns, part.lengths, board.ravel(), times)
+        project(part.pointers, part.columns, part.lengths, blurred(board, width).ravel(), times)
         seen.append(replace(part, residual=times))
         back_project(part.pointers, part.columns, part.lengths, np.ones(times.size), passed)
     density = problem.density(passed.reshape(shape))
     bounds = -crossing, crossing
     empty = np.zeros(shape)
     found, _ = Linearised(
-        seen, empty, density, problem.region, bounds, DAMPING, penalty="tikhonov", reference=empty
+        seen, empty, density, problem.region, bounds, DAMPING, "tikhonov", reference=empty, width=width
     ).solve(empty)
     near = gaussian_filter(board * board, FIELD_NODES)
     alike = gaussian_filter(found * board, FIELD_NODES)

@@ -71,11 +71,14 @@ class Trial:
         settings: what differs from those that were asked for, by name.
         held_out_rms_s: rms misfit of the pairs that it was not shown, s.
         shown_rms_s: rms misfit of those that it was shown, s, in its last sweep.
+        held_out_mean_s: mean size of the misfit of the former, s, of which wrong picks are a smaller part;
+            None in files of before it was kept.
     """
 
     settings: dict[str, Any]
     held_out_rms_s: float
     shown_rms_s: float
+    held_out_mean_s: float | None = None
 
 
 @dataclass(frozen=True)

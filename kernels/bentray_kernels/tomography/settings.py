@@ -56,6 +56,10 @@ class Settings:
         speed_range_mps: (lowest, highest) speed known to be in the object, m/s; for ``data-driven``.
         front_smoothing_nodes: standard deviation, nodes, of a Gaussian on the speed that the wave front runs
             in, which bends rays as a band-limited wave would; 0: none.
+        ray_width_m: of ``gauss-newton``: standard deviation of the Gaussian across a ray under which its time
+            sees the slowness, m; 0: thin rays. Waves see about a wavelength so; the ray then bends in what
+            twice the width leaves, unless ``front_smoothing_nodes`` says otherwise, and the image is what
+            the penalty makes of it. ``auto`` sets it by the scan's frequency.
         relaxation: the λ of SART (chapter 6, equation 1), in (0, 2).
         relaxation_decay: what λ is multiplied by after each sweep, in (0, 1].
         subset: emitters that make one update of SART together.
@@ -114,6 +118,7 @@ class Settings:
     speed_update: Literal["fixed", "data-driven"] = "fixed"
     speed_range_mps: tuple[float, float] | None = None
     front_smoothing_nodes: float = 0.0
+    ray_width_m: float = 0.0
     relaxation: float = 0.1
     relaxation_decay: float = 1.0
     subset: int = 1
@@ -178,6 +183,9 @@ class Settings:
             accepted = f"few enough that the coarsest of {self.nodes} nodes has {LEAST_NODES}"
             raise InvalidInput("coarser_grids", self.coarser_grids, accepted)
         _within("front_smoothing_nodes", self.front_smoothing_nodes, 0.0, 32.0)
+        _within("ray_width_m", self.ray_width_m, 0.0, 0.1)
+        if self.ray_width_m > 0.0 and self.method != "gauss-newton":
+            raise InvalidInput("ray_width_m", self.ray_width_m, "0, unless method is gauss-newton")
         _within("subset", self.subset, 1, 4096)
         _within("penalty_strength", self.penalty_strength, 0.0, 10.0)
         _within("edge_mps", self.edge_mps, 0.0, 1000.0)

@@ -13,15 +13,16 @@ from bentray_kernels.tomography import Settings, Trial, reconstruct
 from bentray_kernels.tomography.advice import (
     CANDIDATES,
     choose,
-    noise_of,
-    part_of,
+    choose_wide,
     reason,
-    stopped,
     told,
     tried,
+    wide,
 )
 from bentray_kernels.tomography.gauss_newton import look
+from bentray_kernels.tomography.holding_out import part_of
 from bentray_kernels.tomography.reconstruction import Here
+from bentray_kernels.tomography.stopping import noise_of, stopped
 
 WATER = 1375.0
 RING = Ring(48, 0.09)
@@ -94,7 +95,66 @@ def test_straight_times_ask_for_straight_rays(scan):
     rows = look(problem, straight, image, problem.sounding)
     delta = np.full(scan.delta_tof_s.shape, np.nan)
     delta[np.isfinite(problem.delta_tof)] = problem.delta_tof[np.isfinite(problem.delta_tof)] - rows.residual
-    assert reconstruct(replace(scan, delta_tof_s=delta), PLAN).settings.rays == "straight"
+    for frequency in (None, 4e5):
+        asked = replace(scan, delta_tof_s=delta, center_frequency_hz=frequency)
+        assert reconstruct(asked, PLAN).settings.rays == "straight"
+
+
+def test_exact_times_ask_for_thin_bent_rays_whatever_the_frequency(scan):
+    result = reconstruct(replace(scan, center_frequency_hz=4e5), replace(PLAN, sweeps=4))
+    assert result.settings.rays == "curved"
+    assert result.settings.ray_width_m == 0.0
+    assert "mean misfit of held-out views" in reason(result.trials)
+
+
+def test_a_frequency_offers_rays_as_wide_as_its_waves(scan):
+    assert wide(scan, PLAN) == []
+    told = replace(scan, center_frequency_hz=5e5)
+    assert wide(told, replace(PLAN, decomposition="volume")) == []
+    offered = wide(told, PLAN)
+    assert [one.get("ray_width_m", 0.0) for one in offered] == [WATER / 5e5, WATER / 5e5, 0.0, 0.0]
+    assert {one["rays"] for one in offered[:2]} == {"straight", "curved"}
+    # As stiff on the coarser grid of a trial as on that of the image.
+    plans = tried(replace(PLAN, nodes=128), offered)
+    assert [plan.penalty_strength for plan in plans] == pytest.approx([0.3, 0.3, 0.3, 0.3])
+    assert [one.get("penalty_strength", 0.3) for one in offered] == pytest.approx([0.6, 0.6, 0.3, 0.3])
+
+
+def test_of_wide_rays_those_that_predict_views_better_are_chosen_unless_thin_ones_are_exact():
+    def of(held_out, **changes):
+        return Trial({"method": "gauss-newton", **changes}, 9.0 * held_out, held_out, held_out)
+
+    straight = of(80e-9, rays="straight", ray_width_m=0.003)
+    bent = of(75e-9, rays="curved", ray_width_m=0.003)
+    thin = of(70e-9, rays="curved")
+    assert choose_wide([straight, bent, thin], 3e-7) is bent
+    worse = replace(bent, held_out_mean_s=85e-9)
+    assert choose_wide([straight, worse, thin], 3e-7) is straight
+    # Both explain the times.
+    assert choose_wide([straight, worse, thin], 1e-6) is worse
+    assert choose_wide([straight, replace(bent, held_out_mean_s=101e-9), thin], 2e-6) is straight
+    assert "straight ones must be 20 % better" in reason([worse, straight, thin])
+    exact = replace(thin, held_out_mean_s=20e-9)
+    assert choose_wide([straight, bent, exact], 3e-7) is exact
+    assert reason([bent, straight, thin]) == (
+        "auto chose curved gauss-newton (ray_width_m 0.003) 75 ns (mean misfit of held-out views, for rays "
+        "as wide as waves); the others: straight gauss-newton (ray_width_m 0.003) 80 ns, "
+        "curved gauss-newton 70 ns"
+    )
+
+
+def test_where_no_view_can_be_held_out_pairs_are(scan):
+    """Emitters of one half of a ring of which no view is held out."""
+    sent = np.array([0, 1, 2])
+    few = replace(
+        scan,
+        tx=sent,
+        rx=np.arange(3, 16),
+        delta_tof_s=scan.delta_tof_s[np.ix_(sent, np.arange(3, 16))],
+        center_frequency_hz=4e5,
+    )
+    result = reconstruct(few, replace(PLAN, nodes=24, sweeps=1))
+    assert len(result.trials) == len(CANDIDATES)
 
 
 def trial(rays, held_out):

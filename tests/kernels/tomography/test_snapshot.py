@@ -12,10 +12,10 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.advice import TrialChain
 from bentray_kernels.tomography.chains import Chain, attenuate, recover
 from bentray_kernels.tomography.reconstruction import Here
 from bentray_kernels.tomography.snapshot import packed, unpacked
+from bentray_kernels.tomography.trials import TrialChain
 
 PLANS = {
     "sart": Settings(nodes=32, side_m=TABLE6_SIDE_M, sweeps=2, resolution_check=True),
