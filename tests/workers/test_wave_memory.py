@@ -26,7 +26,13 @@ SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("asked", "elements", "samples"), [({"wave_bands": 2, "wave_emitters": 16}, 64, 260), ({}, 128, 300)]
+    ("asked", "elements", "samples"),
+    # Each has its largest band last.
+    [
+        ({"wave_bands": 2, "wave_emitters": 16, "attenuation": False}, 64, 260),
+        ({"attenuation": False}, 128, 300),
+        ({"wave_bands": 1}, 96, 300),
+    ],
 )
 def test_calls_take_what_the_plan_says(asked, elements, samples):
     # Freed arrays go back at once, so that a fork's peak is that of its own.
