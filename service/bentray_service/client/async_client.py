@@ -69,6 +69,10 @@ class AsyncClient:
         """See ``Client.submit``."""
         return await self._run(flows.submit(dataset_id, settings))
 
+    async def simulate(self, settings: Mapping[str, Any] | None = None) -> Record:
+        """See ``Client.simulate``."""
+        return await self._run(flows.simulate(settings))
+
     async def job(self, job_id: str) -> Record:
         """See ``Client.job``."""
         return await self._run(flows.record("GET", f"/v1/jobs/{job_id}"))

@@ -85,6 +85,10 @@ class Client:
         """Start a reconstruction; settings left out take their defaults. Returns the job record."""
         return self._run(flows.submit(dataset_id, settings))
 
+    def simulate(self, settings: Mapping[str, Any] | None = None) -> Record:
+        """Start the simulation of a scan; the job's ``dataset`` is its id once the job has succeeded."""
+        return self._run(flows.simulate(settings))
+
     def job(self, job_id: str) -> Record:
         """The job record as it is now."""
         return self._run(flows.record("GET", f"/v1/jobs/{job_id}"))

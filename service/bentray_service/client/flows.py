@@ -28,6 +28,11 @@ def submit(dataset_id: str, settings: Mapping[str, Any] | None) -> Generator[Ste
     return (yield from record("POST", "/v1/jobs", json=asked))
 
 
+def simulate(settings: Mapping[str, Any] | None) -> Generator[Step, Any, Record]:
+    asked = {"kind": "simulation", "settings": dict(settings or {})}
+    return (yield from record("POST", "/v1/jobs", json=asked))
+
+
 def picture(path: str, how: Mapping[str, str | float]) -> Generator[Step, Any, bytes]:
     return bytes((yield Ask("GET", path, {"params": dict(how)})).content)
 
