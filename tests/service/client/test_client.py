@@ -118,3 +118,12 @@ def test_a_key_is_given_or_in_the_environment(serve, tmp_path, monkeypatch):
     monkeypatch.delenv("BENTRAY_KEY")
     with Client(address, key=key) as client, pytest.raises(ClientError, match="nothing with this id"):
         client.job("job-" + "0" * 20)
+
+
+def test_a_simulation_is_asked_for_with_its_settings(client):
+    job = client.simulate({"nodes": 16, "elements": 16, "snr": 20.0})
+    assert (job["kind"], job["settings"]["elements"], job["settings"]["snr"]) == ("simulation", 16, 20.0)
+    assert job["plan"]["result_bytes"] == 2 * 8 * 16 * 16
+    assert client.simulate()["settings"]["nodes"] == 128
+    with pytest.raises(ClientError, match="nothing, unless waveform is true"):
+        client.simulate({"side_m": 0.1})
