@@ -9,7 +9,7 @@ from bentray_kernels.acquisition import Waveform, pick
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
-from bentray_kernels.wave.chain import Image
+from bentray_kernels.wave.standing import Image
 from bentray_workers import slices
 from bentray_workers.dataset_file import write_dataset
 from bentray_workers.slices import Cancelled

@@ -24,6 +24,7 @@ from bentray_kernels.wave.continuation import Here
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.refine import WavePass
 from bentray_kernels.wave.simulation import simulate
+from bentray_kernels.wave.standing import Image
 
 CENTRE_HZ, RATE_HZ, RADIUS_M, WATER = 2.5e5, 2.5e6, 0.05, 1500.0
 FINER, SPACING_M = 4, 1e-3
@@ -56,7 +57,7 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     """Of each call in the last band; of a step with all pairs of changes that it may have."""
     plan = wave_settings(dataset, settings)
     number = len(plan.bands) - 1
-    start = waves.Image(np.full((32, 32), WATER), 2.2 * RADIUS_M / 31, (-1.1 * RADIUS_M, -1.1 * RADIUS_M))
+    start = Image(np.full((32, 32), WATER), 2.2 * RADIUS_M / 31, (-1.1 * RADIUS_M, -1.1 * RADIUS_M))
     nothing = peak(lambda: None)
     assert dataset.waveform is not None
     traces = held(dataset.waveform.object, dataset.waveform.water)

@@ -1,13 +1,14 @@
 """Acoustic waves in a plane: a finite-difference simulator, its adjoint, waveform refinement of an image."""
 
 from .adjoint import Slope, slope, stored_bytes
-from .chain import BandEnd, Image, WaveChain, WaveScan, WaveStanding
+from .chain import WaveChain, WaveScan
 from .continuation import Refined, refine
 from .medium import Medium
 from .preparation import prepare
 from .problem import WaveProblem
 from .settings import Band, WaveSettings, bands
 from .simulation import simulate
+from .standing import BandEnd, Image, WaveStanding
 
 __all__ = [
     "Band",

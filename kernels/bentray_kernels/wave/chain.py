@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,29 +15,13 @@ from ..tomography.result import Sweep
 from . import refine
 from .passes import sweeps
 from .problem import WaveProblem
-from .refine import Look, Model, WaveIterate, WavePass
+from .refine import Look, Model, WaveIterate
 from .settings import WaveSettings
+from .standing import BandEnd, Entered, Image, WaveStanding
 
 # A band whose water shots are simulated with a lower correlation than this with the recorded ones is passed
 # over: its waves are too long for the array and its absorbing edges, or were not sent.
 LEAST_LIKENESS = 0.9
-
-
-@dataclass(frozen=True)
-class Image:
-    """An image.
-
-    Attributes:
-        speed: (nx, ny), m/s.
-        spacing: m.
-        origin: position of node 0, m.
-        attenuation: (nx, ny), beyond the water's, Np/m; None where it was not refined.
-    """
-
-    speed: Floats
-    spacing: float
-    origin: tuple[float, float]
-    attenuation: Floats | None = None
 
 
 class WaveScan(Protocol):
@@ -48,76 +32,6 @@ class WaveScan(Protocol):
 
     def problem(self, number: int) -> WaveProblem:
         """The problem of a band, from 0; made once in a process."""
-
-
-@dataclass(frozen=True)
-class BandEnd:
-    """What a band left.
-
-    Attributes:
-        image: the image.
-        skipped: whether held-out emitters ended the band, or one before it, so that it was left out.
-        history: a record for each image that was looked at; none of a band that was passed over or left out.
-    """
-
-    image: Image
-    skipped: bool
-    history: tuple[WavePass, ...]
-
-    @property
-    def held(self) -> float:
-        """Misfit of held-out emitters in that image; NaN where none was looked at."""
-        if not self.history:
-            return math.nan
-        judged = self.skipped or self.image.attenuation is not None
-        return self.history[refine.given_by(self.history, judged=judged)].held
-
-
-@dataclass(frozen=True)
-class Entered:
-    """The band under way, as a chain knows it, which never makes a problem itself.
-
-    Attributes:
-        state: where it stands.
-        origin: of its grid, m.
-        emitters: how many there are to look at in each iteration.
-        frozen: (nx, ny), the speed where the attenuation is refined, m/s; else None.
-    """
-
-    state: WaveIterate
-    origin: tuple[float, float]
-    emitters: int
-    frozen: Floats | None = None
-
-    @property
-    def model(self) -> Model:
-        """What is to be looked at next."""
-        if self.frozen is None:
-            return Model(self.state.image)
-        return Model(self.frozen, self.state.image)
-
-
-@dataclass(frozen=True)
-class WaveStanding:
-    """Where a chain stands; all that is needed to go on, to the bit.
-
-    Attributes:
-        ends: of the bands before.
-        band: the band under way; None between two.
-    """
-
-    ends: tuple[BandEnd, ...]
-    band: Entered | None
-
-    @property
-    def state(self) -> WaveIterate | None:
-        """Where the band under way stands."""
-        return None if self.band is None else self.band.state
-
-    @property
-    def passed(self) -> tuple[int, ...]:
-        """What differs as soon as an image or a band is done with."""
-        return len(self.ends), len(self.state.history) if self.state is not None else -1
 
 
 class WaveChain:

@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 from ..acquisition import Dataset
 from ..errors import InvalidInput
 from ..tomography.chains import Call
-from .chain import BandEnd, Image, WaveChain, step_by_waves
+from .chain import WaveChain, step_by_waves
 from .preparation import prepare
 from .problem import WaveProblem
 from .refine import WaveIterate
 from .settings import WaveSettings
 from .sounding import Mapping
+from .standing import BandEnd, Image
 
 # Called with the problem of the band under way and where it stands.
 Progress = Callable[[WaveProblem, WaveIterate], None]

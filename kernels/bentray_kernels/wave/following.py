@@ -16,9 +16,10 @@ from ..tomography.reconstruction import Drive, measured
 from ..tomography.result import Reconstruction, Trial
 from ..tomography.settings import Settings
 from .asked import check_traces, wave_settings
-from .chain import BandEnd, Image, WaveChain, WaveScan, resampled
+from .chain import WaveChain, WaveScan, resampled
 from .effort import core_seconds, worth
 from .settings import WaveSettings
+from .standing import BandEnd, Image
 
 # Makes what tells the calls of one slice their data.
 WaveScanOf = Callable[[WaveSettings, int], WaveScan]

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from ..tomography import snapshot
-from .chain import BandEnd, Entered, Image, WaveStanding
 from .refine import WaveIterate, WavePass
+from .standing import BandEnd, Entered, Image, WaveStanding
 
 TYPES: Mapping[str, type] = MappingProxyType(
     {

@@ -6,11 +6,11 @@ import numpy as np
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.waveform import Waveform
-from bentray_kernels.wave.chain import Image
 from bentray_kernels.wave.continuation import refine
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.settings import Band, WaveSettings
 from bentray_kernels.wave.simulation import simulate
+from bentray_kernels.wave.standing import Image
 
 WATER, RADIUS, CENTRE_HZ, RATE_HZ, T0 = 1500.0, 0.024, 2.5e5, 2.5e6, -2e-6
 SPACING, FINER, ELEMENTS = 5e-4, 8, 24

@@ -8,8 +8,8 @@ import pytest
 
 from bentray_kernels.acquisition import Waveform
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.wave.chain import Image
 from bentray_kernels.wave.continuation import refine
+from bentray_kernels.wave.standing import Image
 
 from .scans import SETTINGS, blob, error, lossy, refined, scan, water
 

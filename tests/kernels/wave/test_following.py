@@ -9,9 +9,9 @@ import pytest
 from bentray_kernels.acquisition import pick
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings, reconstruct
-from bentray_kernels.wave.chain import BandEnd, Image
 from bentray_kernels.wave.following import preferred
 from bentray_kernels.wave.refine import WavePass
+from bentray_kernels.wave.standing import BandEnd, Image
 
 from .scans import error, scan
 
