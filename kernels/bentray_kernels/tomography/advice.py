@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from ..acquisition import Dataset
 from ..errors import InvalidInput
@@ -19,6 +16,7 @@ from .settings import Settings
 from .stages import stages
 from .stopping import noise_of, stopped
 from .trials import TrialChain
+from .wide_trials import STRAIGHT, choose_wide, mean_of, size_of, wide
 
 PAIRS: tuple[Part, Part] = ("shown", "held-out")
 VIEWS: tuple[Part, Part] = ("shown-views", "held-out-views")
@@ -33,31 +31,6 @@ CANDIDATES: tuple[dict[str, Any], ...] = (
     {"rays": "curved", "method": "gauss-newton", "edge_mps": 7.0},
 )
 
-# What is tried where the frequency tells how wide a wave is: rays of that width, straight and bent ones by
-# the same method, so that nothing but the bends tells them apart; and thin bent ones, in case of times that
-# no wave was asked for.
-WIDE: tuple[dict[str, Any], ...] = (
-    {"rays": "straight", "method": "gauss-newton"},
-    {"rays": "curved", "method": "gauss-newton"},
-)
-THIN: tuple[dict[str, Any], ...] = CANDIDATES[4:]
-
-# Standard deviation of the Gaussian across a wide ray, wavelengths, and its penalty over the settings'. No
-# misfit tells the width: the thinner the rays, the more they explain, wrong picks too.
-WIDTH_WAVES = 1.0
-STIFFER = 2.0
-
-# So thin rays are believed once they miss by less than this part: on times of the Eikonal equation, said to
-# be of 400 kHz, it was 0.4 to 0.5, on picks from waves 0.8 to 1.
-EXACT = 0.6
-
-# Where rays miss held-out views by less than this part of the times themselves, both kinds explain the scan
-# and their difference says little: straight ones fit nearly any smooth times by a wrong image, so they must
-# miss by less than the second part of what bent ones do. Rules of thumb, from scans in
-# benchmarks/results/tried.md.
-EXPLAINED_PART = 0.1
-STRAIGHT = 0.8
-
 # Trials use half the nodes, but not fewer than this.
 TRIAL_NODES = 64
 
@@ -65,17 +38,6 @@ TRIAL_NODES = 64
 # wave simulation whose bent image was 2 m/s worse than the straight one the ratio was 0.95; on Eikonal times
 # from 0.9 (water faster than a fat ring) down to 0.35.
 CLEARLY = 0.92
-
-
-def wide(dataset: Dataset, settings: Settings) -> list[dict[str, Any]]:
-    """Candidates where the scan's frequency is known; none elsewhere, and none in space."""
-    if dataset.center_frequency_hz is None or settings.decomposition == "volume":
-        return []
-    more = {
-        "ray_width_m": WIDTH_WAVES * dataset.water_speed_mps / dataset.center_frequency_hz,
-        "penalty_strength": STIFFER * settings.penalty_strength,
-    }
-    return [*({**changes, **more} for changes in WIDE), *THIN]
 
 
 def tried(settings: Settings, candidates: Sequence[dict[str, Any]] = CANDIDATES) -> list[Settings]:
@@ -106,10 +68,10 @@ def advise(
 ) -> tuple[Settings, tuple[Trial, ...], int]:
     """The settings that explain one slice best, and how all that were tried did.
 
-    What predicts held-out pairs best is chosen, see ``choose``; where the frequency is known, of rays that
-    are as wide as waves, the straight or the bent ones, whichever predict held-out views better, see
-    ``choose_wide``. The reconstruction is told to stop at the noise of the times (Morozov's discrepancy
-    principle), for a closer fit would draw it, unless the trial shows that there is less of it.
+    Where the frequency is known rays as wide as waves are tried first, straight and bent, on held-out views,
+    see ``choose_wide``. Where it is not, or such rays do not explain the times, what predicts held-out pairs
+    best is chosen, see ``choose``. The reconstruction is told to stop at the noise of the times (Morozov's
+    discrepancy principle), for a closer fit would draw it, unless the trial shows that there is less of it.
 
     Args:
         dataset: for its frequency and the noise of its times.
@@ -126,23 +88,44 @@ def advise(
     Raises:
         InvalidInput: for a slice without pairs, or with too few to hold some out.
     """
-    candidates = wide(dataset, settings)
-    parts = VIEWS
-    if not candidates or _lacking(VIEWS, settings, index, scan_of):
-        candidates, parts = list(CANDIDATES), PAIRS
+    told = wide(dataset, settings)
+    rest = passes_to_come(dataset, settings) + after
+    trials: list[Trial] = []
+    chosen, before = None, 0
+    if told and not _lacking(VIEWS, settings, index, scan_of):
+        chains = _chains(settings, told, index, VIEWS, scan_of)
+        others_after = sum(chain.total for chain in _chains(settings, CANDIDATES, index, PAIRS, scan_of))
+        drive(chains, 0, others_after + rest)
+        trials, before = _results(told, chains), sum(chain.total for chain in chains)
+        chosen = choose_wide(trials, size_of(dataset))
+    if chosen is None:
         _check_parts(settings, index, scan_of)
+        chains = _chains(settings, CANDIDATES, index, PAIRS, scan_of)
+        drive(chains, before, rest)
+        trials, before = _results(CANDIDATES, chains), before + sum(chain.total for chain in chains)
+        chosen = choose(trials)
+    others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
+    found = replace(settings, **chosen.settings)
+    return stopped(found, chosen, noise_of(dataset)), (chosen, *others), before
+
+
+def _chains(
+    settings: Settings,
+    candidates: Sequence[dict[str, Any]],
+    index: int,
+    parts: tuple[Part, Part],
+    scan_of: Callable[[Settings, Part], Scan],
+) -> list[TrialChain]:
+    shown, held_out = parts
     plans = tried(settings, candidates)
-    chains = [TrialChain(scan_of(plan, parts[0]), index, scan_of(plan, parts[1])) for plan in plans]
-    drive(chains, 0, passes_to_come(dataset, settings) + after)
-    trials = [
+    return [TrialChain(scan_of(plan, shown), index, scan_of(plan, held_out)) for plan in plans]
+
+
+def _results(candidates: Sequence[dict[str, Any]], chains: Sequence[TrialChain]) -> list[Trial]:
+    return [
         Trial(changes, chain.held_out_rms_s, chain.history[-1].residual_rms_s, chain.held_out_mean_s)
         for changes, chain in zip(candidates, chains, strict=True)
     ]
-    chosen = choose(trials) if parts == PAIRS else choose_wide(trials, _size(dataset))
-    others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
-    found = replace(settings, **chosen.settings)
-    passes = sum(chain.total for chain in chains)
-    return stopped(found, chosen, noise_of(dataset)), (chosen, *others), passes
 
 
 def passes_to_come(dataset: Dataset, settings: Settings) -> int:
@@ -186,41 +169,14 @@ def choose(trials: Sequence[Trial]) -> Trial:
     return best if best.held_out_rms_s < CLEARLY * straight.held_out_rms_s else straight
 
 
-def choose_wide(trials: Sequence[Trial], size_s: float) -> Trial:
-    """Of the trials with wide rays the one that predicts better; thin rays if they do far better still.
-
-    By the mean size of what they miss, for picks of first arrivals that were too weak are wrong by periods.
-    Where both explain the times, straight rays must be clearly better than bent ones.
-
-    Args:
-        trials: of the candidates of ``wide``.
-        size_s: mean size of the times, s.
-    """
-    wide_rays = {t.settings["rays"]: t for t in trials if "ray_width_m" in t.settings}
-    straight, bent = wide_rays["straight"], wide_rays["curved"]
-    part = STRAIGHT if _mean(bent) < EXPLAINED_PART * size_s else 1.0
-    best = straight if _mean(straight) < part * _mean(bent) else bent
-    thin = min((t for t in trials if "ray_width_m" not in t.settings), key=_mean)
-    return thin if _mean(thin) < EXACT * _mean(best) else best
-
-
-def _size(dataset: Dataset) -> float:
-    """Mean size of the times, s."""
-    return float(np.nanmean(np.abs(dataset.differential_tof())))
-
-
-def _mean(trial: Trial) -> float:
-    return math.inf if trial.held_out_mean_s is None else trial.held_out_mean_s
-
-
 def reason(trials: Sequence[Trial]) -> str:
     """One sentence: what was chosen and why, and how well each trial predicted; empty without trials."""
     if not trials:
         return ""
     if any("ray_width_m" in trial.settings for trial in trials):
-        told = [f"{_named(trial.settings)} {1e9 * _mean(trial):.0f} ns" for trial in trials]
+        told = [f"{_named(trial.settings)} {1e9 * mean_of(trial):.0f} ns" for trial in trials]
         why = "mean misfit of held-out views, for rays as wide as waves"
-        if _mean(trials[0]) > min(_mean(t) for t in trials if "ray_width_m" in t.settings):
+        if mean_of(trials[0]) > min(mean_of(t) for t in trials if "ray_width_m" in t.settings):
             needed = f"{100.0 * (1.0 - STRAIGHT):.0f} % better"
             why += f"; where both explain the times straight ones must be {needed}"
         return f"auto chose {told[0]} ({why}); the others: {', '.join(told[1:])}"
