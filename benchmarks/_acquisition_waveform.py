@@ -1,4 +1,4 @@
-"""R10, and R4 beside it: waveforms against straight, bent and ideal rays on scans that waves made."""
+"""R10: waveforms against straight, bent and ideal rays on scans that waves made."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Made:
 
 
 def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """R10 and R4 for each scan; the picture of all of them, unless quick."""
+    """R10 for each scan; the picture of all of them, unless quick."""
     shown: dict[str, tuple[Dataset, dict[str, Made]]] = {}
     for name, dataset in scans(quick, progress):
         images = made(name, dataset, 48 if quick else 128, progress)
@@ -110,12 +110,9 @@ def judged(name: str, images: dict[str, Made]) -> Iterable[Row]:
     """The rows of one scan."""
     told = ", ".join(f"{way} {one.rms:.1f} m/s in {one.seconds:.0f} s" for way, one in images.items())
     straight, waves, best = (images[way].rms for way in ("straight", "waveform", "ideal times"))
-    bent = min(images[way].rms for way in ("bent", "bent, Gauss-Newton"))
     load = f"{os.getloadavg()[0]:.1f}"
     yield Row(f"R10 {name}, over straight", waves / straight, 0.65, "<=", "", told)
     yield Row(f"R10 {name}, over straight, then", waves / straight, 0.5, "<=", "", told)
     yield Row(f"R10 {name}, over ideal times", waves / best, 0.8, "<=", "", told)
     took = images["waveform"].seconds
     yield Row(f"R10 {name}, time", took, 300.0, "<=", "s", f"two workers, load at the end {load}")
-    yield Row(f"R4 {name}, bent over straight", bent / straight, 0.9, "<=", "", told)
-    yield Row(f"R4 {name}, bent over ideal times", bent / best, 1.15, "<=", "", told)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 
 import _acquisition_attenuation
 import _acquisition_picking
+import _acquisition_rays
 import _acquisition_waveform
 
 from bentray_service.cli.row import Row
@@ -14,6 +15,7 @@ from bentray_service.cli.terminal import Step
 # Each gives the rows of one part.
 MAKERS: tuple[Callable[[bool, Step], Iterable[Row]], ...] = (
     _acquisition_picking.rows,
+    _acquisition_rays.rows,
     _acquisition_waveform.rows,
     _acquisition_attenuation.rows,
 )

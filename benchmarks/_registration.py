@@ -1,0 +1,69 @@
+"""The error of an image whose truth was drawn in other coordinates: shifted, and perhaps transposed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+from scipy.optimize import minimize
+
+from bentray_kernels.acquisition import Truth
+from bentray_kernels.tomography import Reconstruction
+
+# Shifts to begin with, and as far as one may go, m.
+SHIFTS_M = np.arange(-4e-3, 4.1e-3, 1e-3)
+
+
+@dataclass(frozen=True)
+class Registered:
+    """The least error that a shift gives.
+
+    Attributes:
+        rms_mps: m/s.
+        shift_m: of the truth, m.
+        transposed: whether the truth's axes were exchanged.
+    """
+
+    rms_mps: float
+    shift_m: tuple[float, float]
+    transposed: bool
+
+
+def registered(image: Reconstruction, truth: Truth, radius_m: float) -> Registered:
+    """The error within a radius of the array's middle, the truth laid where it agrees best: no turn.
+
+    Args:
+        image: one slice.
+        truth: on its own grid.
+        radius_m: m.
+    """
+    axes = [
+        low + image.spacing_m[0] * np.arange(n)
+        for low, n in zip(image.origin_m, image.speed.shape, strict=True)
+    ]
+    x, y = np.meshgrid(*axes, indexing="ij")
+    inside = np.hypot(x, y) <= radius_m
+    places, speed = np.stack([x[inside], y[inside]]), image.speed[inside]
+    found = []
+    for transposed in (False, True):
+        drawn = truth.sound_speed_mps.T if transposed else truth.sound_speed_mps
+
+        def error(shift: NDArray[np.float64], drawn: NDArray[np.float64] = drawn) -> float:
+            at = (places - np.reshape(shift, (2, 1)) - np.reshape(truth.origin_m[:2], (2, 1))) / np.reshape(
+                truth.spacing_m[:2], (2, 1)
+            )
+            true = map_coordinates(drawn, at, order=1, mode="nearest")
+            return float(np.sqrt(np.mean((true - speed) ** 2)))
+
+        first = min(((a, b) for a in SHIFTS_M for b in SHIFTS_M), key=lambda s: error(np.array(s)))
+        simplex = np.array([first, (first[0] + 5e-4, first[1]), (first[0], first[1] + 5e-4)])
+        best = minimize(
+            error,
+            first,
+            method="Nelder-Mead",
+            options={"xatol": 1e-5, "fatol": 1e-3, "initial_simplex": simplex},
+        )
+        found.append(Registered(float(best.fun), (float(best.x[0]), float(best.x[1])), transposed))
+    return min(found, key=lambda one: one.rms_mps)
