@@ -86,6 +86,29 @@ def test_files_cut_short_are_refused(file_type, part):
         read_mesh(data[: int(part * len(data))])
 
 
+NUMPY = ("array", "reshape", "broadcast", "literal", "axis", "index", "list", "dimension")
+
+
+@pytest.mark.parametrize("file_type", FORMATS)
+def test_refusals_of_cut_files_are_in_words_of_ours(file_type):
+    data = exported(file_type)
+    for part in np.linspace(0.01, 0.99, 23):
+        try:
+            read_mesh(data[: int(part * len(data))])
+        except InvalidInput as error:
+            words = f"{error.value} {error.accepted}"
+            assert not [word for word in NUMPY if word in words.split("begins with")[0]], words
+
+
+@pytest.mark.parametrize("file_type", ["ply", "off", "obj", "gltf", "stl_ascii"])
+def test_a_byte_order_mark_is_passed_over(file_type):
+    assert len(read_mesh(b"\xef\xbb\xbf" + exported(file_type)).surface.mesh.faces) == 80
+
+
+def test_a_long_comment_may_come_before_an_obj():
+    assert read_mesh(b"# by hand\n" * 10_000 + exported("obj")).format == "obj"
+
+
 @given(
     st.sampled_from(FORMATS),
     st.lists(st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=4),
@@ -114,11 +137,13 @@ def lone(place, accepted="three"):
         (b"", "file: found an empty file"),
         (b"\x00\x01\x02 something else", "a file of another kind .it begins with"),
         (b"PK\x03\x04" + b"v 0 0 0" * 9, "a file of another kind"),
-        (lone("0 1 0", "9"), "file: found damaged data|out of range"),
+        (lone("0 1 0", "9"), "file: found OBJ data that are cut short, damaged"),
         (lone("nan 1 0", "3"), "not finite"),
         (lone("inf 1 0", "3"), "not finite"),
         (lone("2 0 0", "3"), "1 without area"),
         (b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "vertices: found shape|damaged"),
+        (b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "an STL of words without its end"),
+        (exported("stl")[:-1], r"or a binary STL of \d+ bytes, where its header means \d+"),
         (b"OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n", "faces: found none|damaged"),
         (b"ply\nformat ascii 1.0\nelement vertex 2000000000\nproperty float x\nend_header\n", "damaged"),
     ],

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,11 +20,15 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.defects import SoundMesh, sound
 
 from .bounded_reading import refusing
+from .off_checks import HEADERS, check_off
 
 ACCEPTED = "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB"
 
 LARGEST_BYTES = 256 * 2**20
 MOST_FACES = 2_000_000
+
+# Some editors put it before text.
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 # Chunks of GLB: JSON, "JSON" in little-endian.
 GLB_HEADER = struct.Struct("<4sII")
@@ -61,10 +68,13 @@ def read_mesh(data: bytes) -> ReadMesh:
     """
     if len(data) > LARGEST_BYTES:
         raise InvalidInput("file", f"{len(data)} bytes", f"at most {LARGEST_BYTES} bytes")
+    data = data.removeprefix(BYTE_ORDER_MARK)
     kind = _kind(data)
     if kind in ("gltf", "glb"):
         data = _without_looks(data, kind)
-    with refusing("file", f"a whole {kind.upper()} file"):
+    if kind == "off":
+        check_off(data)
+    with _whole(kind):
         loaded = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False)
         mesh = loaded.to_mesh()
         faces, vertices = np.asarray(mesh.faces), np.asarray(mesh.vertices)
@@ -82,22 +92,43 @@ def _kind(data: bytes) -> str:
         return "gltf"
     if data.startswith(b"ply"):
         return "ply"
-    if start.split(maxsplit=1)[:1] and start.split(maxsplit=1)[0] in (b"OFF", b"COFF", b"NOFF", b"CNOFF"):
+    if start.split(maxsplit=1)[:1] and start.split(maxsplit=1)[0] in HEADERS:
         return "off"
     # Binary STL begins with any 80 bytes, even with "solid"; its length tells.
-    if len(data) >= 84 and len(data) == 84 + 50 * struct.unpack_from("<I", data, 80)[0]:
+    as_stl = 84 + 50 * struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else 0
+    if as_stl and as_stl == len(data):
         return "stl"
     if start.startswith(b"solid") and b"facet" in data[:4096]:
+        if b"endsolid" not in data:
+            raise InvalidInput("file", "an STL of words without its end (endsolid)", "a whole STL file")
         return "stl"
-    if any(line.startswith((b"v ", b"v\t")) for line in data[: 2**16].splitlines()):
+    text = b"\0" not in data[: 2**16]
+    if text and re.search(rb"^v[ \t]", data, re.MULTILINE):
         return "obj"
-    found = "an empty file" if not data else f"a file of another kind (it begins with {data[:8]!r})"
+    found = f"a file of another kind (it begins with {data[:8]!r})"
+    if not data:
+        found = "an empty file"
+    elif as_stl and not text:
+        found += f"; or a binary STL of {len(data)} bytes, where its header means {as_stl}"
     raise InvalidInput("file", found, ACCEPTED)
+
+
+@contextmanager
+def _whole(kind: str) -> Iterator[None]:
+    """What trimesh raises on damage in words of ours: its own are those of the arrays that it makes."""
+    try:
+        with refusing("file", f"a whole {kind.upper()} file"):
+            yield
+    except InvalidInput as error:
+        if not error.value.startswith("damaged data"):
+            raise
+        found = f"{kind.upper()} data that are cut short, damaged, or not what the file itself says of them"
+        raise InvalidInput("file", found, error.accepted) from None
 
 
 def _without_looks(data: bytes, kind: str) -> bytes:
     """The same glTF without images and materials, once it is sure that it refers to no other file."""
-    with refusing("file", f"a whole {kind.upper()} file"):
+    with _whole(kind):
         rest = b""
         text = data
         if kind == "glb":

@@ -98,7 +98,7 @@ REFUSED: dict[str, tuple[bytes, str]] = {
     "a library of looks": (b"mtllib /etc/passwd\nv 0 0 0\nv x y z\nf 1 2 3\n", "file"),
     # OFF.
     "counts of OFF": (b"OFF\n4000000000 4000000000 0\n0 0 0\n", "file"),
-    "negative counts of OFF": (b"OFF\n-3 -1 0\n0 0 0\n", "faces"),
+    "negative counts of OFF": (b"OFF\n-3 -1 0\n0 0 0\n", "file"),
     "no counts of OFF": (b"OFF\n", "file"),
     "an OFF cut short": (OFF[: len(OFF) // 2], "file"),
     # STL.
@@ -106,7 +106,7 @@ REFUSED: dict[str, tuple[bytes, str]] = {
     "billions of triangles": (bytes(80) + struct.pack("<I", 2**32 - 1) + bytes(200), "file"),
     "no triangles": (bytes(84), "faces"),
     "triangles of noise": (bytes(80) + struct.pack("<I", 2) + b"\xff" * 100, "vertices"),
-    "an STL of words": (b"solid\nfacet normal a b c\nouter loop\nvertex x y z\nendloop\nendfacet\n", "faces"),
+    "an STL of words": (b"solid\nfacet normal a b c\nouter loop\nvertex x y z\nendfacet\nendsolid\n", "faces"),
     # glTF.
     "a buffer in a file": (gltf(buffers=[{"byteLength": 48, "uri": "/etc/passwd"}]), "buffers/uri"),
     "a buffer in the net": (gltf(buffers=[{"byteLength": 48, "uri": "http://127.0.0.1/x"}]), "buffers/uri"),

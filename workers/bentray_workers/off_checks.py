@@ -1,0 +1,66 @@
+"""OFF held against its own counts: what is missing or no number is told by line."""
+
+from __future__ import annotations
+
+import re
+
+from bentray_kernels.errors import InvalidInput
+
+HEADERS = (b"OFF", b"COFF", b"NOFF", b"CNOFF")
+
+# A line that is shown in a refusal is cut to this.
+SHOWN = 60
+
+
+def check_off(data: bytes) -> None:
+    """Refuse an OFF that has not the lines that its counts say.
+
+    Args:
+        data: the whole file, which begins with one of ``HEADERS``.
+
+    Raises:
+        InvalidInput: ``file`` for counts that are none, and for fewer lines than they say; ``vertices`` and
+            ``faces`` for the first line that is wrong.
+    """
+    plain = re.sub(rb"#[^\n]*", b"", data)
+    lines = [line for line in (one.strip() for one in plain.splitlines()) if line]
+    rest = lines[0].split(maxsplit=1)[1:] + lines[1:]
+    vertices, faces = _counts(rest[0] if rest else b"")
+    if len(rest) - 1 < vertices + faces:
+        found = f"{len(rest) - 1} lines of the {vertices} vertices and {faces} faces that its counts say"
+        raise InvalidInput("file", f"an OFF file that ends too soon: {found}", "a whole OFF file")
+    for k, line in enumerate(rest[1 : 1 + vertices]):
+        if not _numbers(line.split()[:3]):
+            raise InvalidInput("vertices", f"{_shown(line)} as vertex {k}", "three numbers, x y z")
+    for k, line in enumerate(rest[1 + vertices : 1 + vertices + faces]):
+        if not _face(line.split(), vertices):
+            accepted = f"how many corners, 3 or more, and which vertices they are, from 0 to {vertices - 1}"
+            raise InvalidInput("faces", f"{_shown(line)} as face {k}", accepted)
+
+
+def _counts(line: bytes) -> tuple[int, int]:
+    words = line.split()
+    if len(words) < 2 or not all(word.isdigit() and len(word) < 19 for word in words[:2]):
+        raise InvalidInput("file", f"an OFF file with {_shown(line)} for its counts", "vertices faces edges")
+    return int(words[0]), int(words[1])
+
+
+def _numbers(words: list[bytes]) -> bool:
+    try:
+        return len([float(word) for word in words]) == 3
+    except ValueError:
+        return False
+
+
+def _face(words: list[bytes], vertices: int) -> bool:
+    if not words[0].isdigit():
+        return False
+    count = int(words[0][:9])
+    corners = words[1 : 1 + count]
+    return 3 <= len(corners) == count and all(
+        word.isdigit() and int(word[:19]) < vertices for word in corners
+    )
+
+
+def _shown(line: bytes) -> str:
+    return repr(line[:SHOWN].decode(errors="replace"))
