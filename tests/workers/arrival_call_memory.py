@@ -17,7 +17,7 @@ from call_memory import held
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.simulation import Ring
 from bentray_workers.dataset_file import write_dataset
-from bentray_workers.first_arrivals import Arrivals, Source
+from bentray_workers.first_arrivals import Arrivals, Files, Source
 
 RATE_HZ, CENTRE_HZ, WATER_MPS, RADIUS_M = 8e6, 1e6, 1480.0, 0.05
 
@@ -46,7 +46,7 @@ def scan(elements: int, samples: int) -> Dataset:
 
 def bytes_of(path: Path, picker: str) -> dict[str, int]:
     """The first call of each name, with its arguments, less a fork that does nothing."""
-    chain = Arrivals(Source(path, path.stat().st_mtime_ns, picker, True), path.parent)
+    chain = Arrivals(Source(path, path.stat().st_mtime_ns, picker, True), Files.of(path.parent))
     waiting, found = chain.first(), {}
     while waiting:
         call = waiting.pop(0)

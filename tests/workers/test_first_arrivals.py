@@ -17,7 +17,7 @@ from bentray_workers import arrival_memory, slices
 from bentray_workers.dataset_file import read_dataset, write_dataset
 from bentray_workers.driving import run_here
 from bentray_workers.findings_file import read_findings
-from bentray_workers.first_arrivals import FINDINGS, PICKED, Arrivals, Source
+from bentray_workers.first_arrivals import PICKED, Arrivals, Files, Source
 
 from ..kernels.acquisition.traces import RATE_HZ, blob_delay, scan
 from ..kernels.wave.scans import scan as wave_scan
@@ -62,10 +62,11 @@ def arrived(dataset, folder, picker="aic", *, examined=True):
     """What goes on of a dataset in a file, and what was found."""
     path = folder / "scan.h5"
     write_dataset(path, dataset)
-    arrivals = Arrivals(Source(path, path.stat().st_mtime_ns, picker, examined), folder)
+    files = Files.of(folder)
+    arrivals = Arrivals(Source(path, path.stat().st_mtime_ns, picker, examined), files)
     run_here(None)([("", call) for call in arrivals.first()], {"": arrivals}, lambda name: None)
-    found = read_findings(folder / FINDINGS)
-    return read_dataset(folder / PICKED if found.changed else path), found
+    found = read_findings(files.findings)
+    return read_dataset(files.picked if found.changed else path), found
 
 
 def assert_same(one, other):

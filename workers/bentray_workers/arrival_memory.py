@@ -42,7 +42,8 @@ def arrival_tasks(traces: Traces | None, slices: int, settings: Settings) -> int
     if traces is None:
         return 0
     parts = len(parts_of(traces.emissions, traces.receivers * traces.samples))
-    return slices * (parts * (1 + settings.examine) + 1 + settings.examine) + 1
+    examined = slices * (parts + 1) if settings.examine else 0
+    return examined + (slices * (parts + 1) + 1) * (1 + settings.guided_rounds)
 
 
 def arrival_call_bytes(traces: Traces | None, pairs: int, settings: Settings) -> dict[str, int]:

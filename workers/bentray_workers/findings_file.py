@@ -12,6 +12,7 @@ import numpy as np
 
 from bentray_kernels.acquisition.quality import Finding
 from bentray_kernels.acquisition.quality.finding import words
+from bentray_kernels.acquisition.quality.recording import OF_TRACES, OF_WATER
 from bentray_kernels.arrays import Flags
 
 from .atomic import write_bytes
@@ -29,6 +30,11 @@ class Found(NamedTuple):
     findings: tuple[Finding, ...]
     examined: bool
     changed: bool
+
+    def of_traces(self, index: int) -> tuple[Finding, ...]:
+        """Those of the traces of a slice, not of times read from them."""
+        known = OF_TRACES + OF_WATER
+        return tuple(one for one in self.findings if one.slice == index and one.check in known)
 
     def words(self, *, stacked: bool) -> str:
         """All of it in one line; see ``finding.words``."""

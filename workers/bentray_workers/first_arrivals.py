@@ -19,15 +19,51 @@ from bentray_kernels.acquisition.quality.examination import times_judged
 from bentray_kernels.acquisition.quality.recording import Measured, judged
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography.alternation import predicted_delta
 from bentray_kernels.tomography.chains import Call
 
 from .arrival_memory import parts_of
 from .dataset_writing import write_dataset
-from .findings_file import Found, write_findings
+from .findings_file import Found, read_findings, write_findings
+from .reconstruction_file import read_reconstruction
 from .scan import read_once
 from .trace_reading import slice_opened, trace_samples
 
 PICKED, FINDINGS = "picked.h5", "findings.json"
+
+
+class Files(NamedTuple):
+    """What is made: what goes on, unless it is the scan's own file, and what was found."""
+
+    picked: Path
+    findings: Path
+
+    @classmethod
+    def of(cls, folder: Path, number: int = 0) -> Files:
+        """Those of a round of picking in the folder of a job, the first being 0."""
+        before = f"{number}-" if number else ""
+        return cls(folder / (before + PICKED), folder / (before + FINDINGS))
+
+
+class Guide(NamedTuple):
+    """What tells where arrivals are to be sought: the file of an image, and of what the traces showed."""
+
+    image: Path
+    findings: Path
+
+    def predicted(self, one: Dataset, index: int, part: range) -> Floats:
+        """(ntx, nrx), s: object minus water as the image has it; NaN but for some emissions of a slice."""
+        found, rows = np.full((len(one.tx), len(one.rx)), np.nan), slice(part.start, part.stop)
+        image = read_reconstruction(self.image)
+        speed = image.speed if image.speed.ndim == 2 else image.speed[:, :, index]
+        bare = replace(one, waveform=None, valid=None, tof_s=None, sigma_s=None, log_ratio_np=None)
+        some = replace(bare, tx=one.tx[rows], delta_tof_s=found[rows])
+        found[rows] = predicted_delta(some, replace(image, speed=speed))
+        return found
+
+    def faults(self, index: int) -> tuple[Finding, ...]:
+        """What the traces of a slice showed."""
+        return read_findings(self.findings).of_traces(index)
 
 
 class Source(NamedTuple):
@@ -61,20 +97,21 @@ class Source(NamedTuple):
 
 
 class Arrivals:
-    """The calls that make ``PICKED`` and ``FINDINGS`` in a folder, in this process or on a cluster.
+    """The calls that make ``Files``, in this process or on a cluster.
 
     Of a scan with times of its own these alone are examined, see ``Source.examines``.
 
     Args:
         source: the scan.
-        folder: where the two are written; every worker can.
+        files: in a folder that every worker can write.
+        guide: of a scan without times that was picked before: what the new times are sought by.
 
     Raises:
         InvalidInput: for a scan without times from which none can be read.
     """
 
-    def __init__(self, source: Source, folder: Path) -> None:
-        self._source, self._folder = source, folder
+    def __init__(self, source: Source, files: Files, guide: Guide | None = None) -> None:
+        self._source, self._files, self._guide = source, files, guide
         dataset = source.dataset
         self._slices = range(dataset.slices)
         self._parts: list[range] = []
@@ -82,14 +119,14 @@ class Arrivals:
             with source.slice(0) as one:
                 require_traces(one)
             self._parts = parts_of(len(dataset.tx), trace_samples(source.path) * len(dataset.rx))
-        self._found: dict[int, Any] = dict.fromkeys(self._slices, ())
+        self._found: dict[int, Any] = {k: guide.faults(k) if guide else () for k in self._slices}
         self._given: dict[tuple[Any, int], dict[int, Any]] = defaultdict(dict)
 
     def first(self) -> list[Call]:
         """Calls to begin with."""
         if not self._parts:
             return [Call(settle, (self._source, k, (), []), keep=True) for k in self._slices]
-        if not self._source.examine:
+        if self._guide or not self._source.examine:
             return [call for k in self._slices for call in self._reading(k)]
         return [
             Call(measure, (self._source, k, part), keep=True) for k in self._slices for part in self._parts
@@ -108,7 +145,7 @@ class Arrivals:
             settled_slices[index] = given
             if len(settled_slices) < len(self._slices):
                 return []
-            return [Call(join, (self._source, self._folder, self._taken(settle, 0)))]
+            return [Call(join, (self._source, self._files, self._taken(settle, 0)))]
         self._given[call.function, index][call.arguments[-1].start] = given
         if len(self._given[call.function, index]) < len(self._parts):
             return []
@@ -118,8 +155,8 @@ class Arrivals:
         return [Call(settle, (self._source, index, self._found[index], parts), keep=True)]
 
     def _reading(self, index: int) -> list[Call]:
-        found = self._found[index]
-        return [Call(read, (self._source, index, found, part), keep=True) for part in self._parts]
+        how = self._source, index, self._found[index], self._guide
+        return [Call(read, (*how, part), keep=True) for part in self._parts]
 
     def _taken(self, function: Any, index: int) -> list[Any]:
         """What the calls of a kind gave, in order; it is let go of here."""
@@ -139,11 +176,16 @@ def judge(source: Source, index: int, parts: list[Measured]) -> tuple[Finding, .
     return _accepted(source, index, findings)
 
 
-def read(source: Source, index: int, findings: tuple[Finding, ...], part: range) -> tuple[Floats, Floats]:
+def read(
+    source: Source, index: int, findings: tuple[Finding, ...], guide: Guide | None, part: range
+) -> tuple[Floats, Floats]:
     """Call: the times of some emissions with their deviations."""
     with source.slice(index, findings) as one:
-        nothing = np.full((len(one.tx), len(one.rx)), np.nan)
-        return read_times(one, part, source.picker, nothing, reach_of(one, source.picker))
+        if guide is None:
+            predicted = np.full((len(one.tx), len(one.rx)), np.nan)
+        else:
+            predicted = guide.predicted(one, index, part)
+        return read_times(one, part, source.picker, predicted, reach_of(one, source.picker))
 
 
 def settle(
@@ -161,7 +203,7 @@ def settle(
     return one, findings
 
 
-def join(source: Source, folder: Path, slices: list[tuple[Dataset, tuple[Finding, ...]]]) -> None:
+def join(source: Source, files: Files, slices: list[tuple[Dataset, tuple[Finding, ...]]]) -> None:
     """Call: write what goes on, unless it is what the file has anyway, and then all findings."""
     whole = source.dataset
     findings = tuple(replace(finding, slice=k) for k, (_, found) in enumerate(slices) for finding in found)
@@ -169,8 +211,8 @@ def join(source: Source, folder: Path, slices: list[tuple[Dataset, tuple[Finding
     if changed:
         parts = [one for one, _ in slices]
         shown = parts[0] if whole.slice_z_m is None else stacked(whole, parts)
-        write_dataset(folder / PICKED, replace(shown, truth=whole.truth))
-    write_findings(folder / FINDINGS, Found(findings, source.examines, changed))
+        write_dataset(files.picked, replace(shown, truth=whole.truth))
+    write_findings(files.findings, Found(findings, source.examines, changed))
 
 
 def _accepted(source: Source, index: int, findings: Sequence[Finding]) -> tuple[Finding, ...]:

@@ -136,7 +136,7 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[Offer]) -> Plan:
     decomposition = _decomposition(settings)
     tasks = sum(_tasks(scan, way, shape) for way in ways) + scan.slices * wave_tasks(scan.traces, settings)
     if scan.traces_bytes:
-        tasks += arrival_tasks(scan.traces, scan.slices, settings)
+        tasks = tasks * (1 + settings.guided_rounds) + arrival_tasks(scan.traces, scan.slices, settings)
     return Plan(
         decomposition,
         lane,

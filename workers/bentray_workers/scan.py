@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.quality.recording import OF_TRACES, OF_WATER
 from bentray_kernels.tomography import Problem, Settings
 from bentray_kernels.tomography.holding_out import Part, part_of
 from bentray_kernels.tomography.reconstruction import problem_of
@@ -74,8 +73,6 @@ def read_once(path: Path, stamp: int) -> Dataset:
 # Two jobs may take turns; more would cost memory, for a problem holds the traces of the object.
 @lru_cache(maxsize=2)
 def _wave_problem(scan: FileWaveScan, number: int) -> WaveProblem:
-    found = read_findings(scan.findings).findings
-    faults = [one for one in found if one.slice == scan.slice and one.check in OF_TRACES + OF_WATER]
-    return prepare(
-        read_slice(scan.path, read_once(scan.path, scan.stamp), scan.slice, faults), scan.plan, number
-    )
+    faults = read_findings(scan.findings).of_traces(scan.slice)
+    one = read_slice(scan.path, read_once(scan.path, scan.stamp), scan.slice, faults)
+    return prepare(one, scan.plan, number)

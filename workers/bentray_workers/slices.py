@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
+from typing import NamedTuple
 
 from distributed import Client
 
 from bentray_kernels.tomography import Progress, Reconstruction, Settings
+from bentray_kernels.tomography.alternation import same_picks
 from bentray_kernels.tomography.chains import Calls
 from bentray_kernels.tomography.reconstruction import carried_out, measured
 
@@ -20,8 +22,9 @@ from .checkpoints import Checkpoints
 from .dataset_file import read_dataset
 from .driving import IN_FLIGHT, Cancelled, Run, finished, run_here, run_on_cluster
 from .findings_file import Found, read_findings
-from .first_arrivals import FINDINGS, PICKED, Arrivals, Source
+from .first_arrivals import Arrivals, Files, Guide, Source
 from .offers import resources_for
+from .reconstruction_file import write_reconstruction
 from .scan import FileScan, FileWaveScan
 from .trace_reading import trace_samples
 
@@ -63,57 +66,109 @@ def reconstruct(
         else:
             attempts = Attempts(client, folder, resources_for(client, settings))
             run = run_on_cluster(client, attempts, stop)
-        found = _prepared(run, dataset_path, settings, folder)
-        checkpoints = Checkpoints(folder / "checkpoints", on_saved)
-        path = folder / PICKED if found.changed else dataset_path
-        result = _carried_out(run, path, dataset_path, settings, folder, checkpoints, on_progress)
+        job = _Job(run, dataset_path, folder, Checkpoints(folder / "checkpoints", on_saved), count())
+        rising = _Rising(on_progress)
+        path, found = _guided(job, settings, rising)
+        result = _carried_out(job, path, settings, rising)
     if not settings.examine:
         return result
     told = found.words(stacked=result.speed.ndim == 3)
     return replace(result, provenance={**result.provenance, "quality": told})
 
 
-def _prepared(run: Run, dataset_path: Path, settings: Settings, folder: Path) -> Found:
-    """What was found in the scan, which then is ready: its times picked, its faults corrected."""
-    with suppress(OSError, ValueError, KeyError):
-        return read_findings(folder / FINDINGS)
-    stamp = dataset_path.stat().st_mtime_ns
-    source = Source(dataset_path, stamp, settings.picker, settings.examine)
-    arrivals = Arrivals(source, folder)
-    run([("arrivals", call) for call in arrivals.first()], {"arrivals": arrivals}, lambda name: None)
-    return read_findings(folder / FINDINGS)
+class _Job(NamedTuple):
+    """What a reconstruction works with; ``drives`` numbers what it runs."""
+
+    run: Run
+    scan: Path
+    folder: Path
+    checkpoints: Checkpoints
+    drives: Iterator[int]
 
 
-def _carried_out(
-    run: Run,
-    path: Path,
-    traces: Path,
-    settings: Settings,
-    folder: Path,
-    checkpoints: Checkpoints,
-    on_progress: Callable[[Progress], None] | None,
-) -> Reconstruction:
-    stamp = path.stat().st_mtime_ns
-    drives = count()
+def _guided(job: _Job, settings: Settings, rising: _Rising) -> tuple[Path, Found]:
+    """A file with travel times, and what was found in the scan: picked, and again by what images predict."""
+    source = Source(job.scan, job.scan.stat().st_mtime_ns, settings.picker, settings.examine)
+    path, found = _arrived(job, source, Files.of(job.folder), None)
+    rounds = 0 if source.dataset.picked else settings.guided_rounds
+    rays = replace(
+        settings,
+        method="auto" if settings.method == "waveform" else settings.method,
+        attenuation=False,
+        resolution_check=False,
+        wave_minutes=0.0,
+    )
+    for number in range(1, rounds + 1):
+        rising.more = 1 + rounds - number
+        image = job.folder / f"{number}-image.h5"
+        write_reconstruction(image, _carried_out(job, path, rays, rising))
+        rising.step()
+        guide = Guide(image, Files.of(job.folder).findings)
+        again, found_again = _arrived(job, source, Files.of(job.folder, number), guide)
+        if same_picks(*(read_dataset(one, traces=False) for one in (path, again))):
+            break
+        path, found = again, found_again
+    rising.more = 0
+    return path, found
+
+
+def _arrived(job: _Job, source: Source, files: Files, guide: Guide | None) -> tuple[Path, Found]:
+    """What goes on after a round of picking, and what it found."""
+    try:
+        found = read_findings(files.findings)
+    except (OSError, ValueError, KeyError):
+        arrivals = Arrivals(source, files, guide)
+        first = [("arrivals", call) for call in arrivals.first()]
+        job.run(first, {"arrivals": arrivals}, lambda name: None)
+        found = read_findings(files.findings)
+    return files.picked if found.changed else job.scan, found
+
+
+def _carried_out(job: _Job, path: Path, settings: Settings, rising: _Rising) -> Reconstruction:
+    stamp, recorded = path.stat().st_mtime_ns, job.scan.stat().st_mtime_ns
+    faults = Files.of(job.folder).findings
 
     def drive(chains: Sequence[Calls], before: int, after: int) -> None:
         # What is driven first, as the trials of ``auto``, is restored as a whole and so decides as it did.
-        number = next(drives)
+        number = next(job.drives)
         named = {f"{number}-{k:05d}": chain for k, chain in enumerate(chains)}
         for name, chain in named.items():
-            standing = checkpoints.last(name)
+            standing = job.checkpoints.last(name)
             if standing is not None:
                 chain.restore(standing)
-        _drive(run, named, before, after, checkpoints, on_progress)
+        _drive(job.run, named, before, after, job.checkpoints, rising)
 
     return carried_out(
         read_dataset(path, traces=False),
         settings,
         lambda plan, part: FileScan(path, stamp, plan, part),
         drive,
-        lambda plan, index: FileWaveScan(traces, traces.stat().st_mtime_ns, plan, index, folder / FINDINGS),
-        trace_samples(traces),
+        lambda plan, index: FileWaveScan(job.scan, recorded, plan, index, faults),
+        trace_samples(job.scan),
     )
+
+
+class _Rising:
+    """The progress of reconstructions that follow each other, as of one.
+
+    Attributes:
+        more: how many may follow the present one.
+    """
+
+    def __init__(self, on_progress: Callable[[Progress], None] | None) -> None:
+        self._on_progress = on_progress
+        self._over = self._total = self.more = 0
+
+    def __call__(self, progress: Progress) -> None:
+        """Tell how far the present one is."""
+        self._total = progress.total
+        if self._on_progress is not None:
+            total = self._over + progress.total * (1 + self.more)
+            self._on_progress(replace(progress, done=self._over + progress.done, total=total))
+
+    def step(self) -> None:
+        """The present one is over."""
+        self._over += self._total
 
 
 def _drive(
@@ -122,14 +177,13 @@ def _drive(
     before: int,
     after: int,
     checkpoints: Checkpoints,
-    on_progress: Callable[[Progress], None] | None,
+    on_progress: Callable[[Progress], None],
 ) -> None:
     """Run chains, each with its name among the checkpoints, to their end."""
     first = [(name, call) for name, chain in chains.items() for call in chain.first()]
 
     def report() -> None:
-        if on_progress is not None:
-            on_progress(measured(list(chains.values()), before, after))
+        on_progress(measured(list(chains.values()), before, after))
 
     def moved(name: str) -> None:
         checkpoints.keep(name, chains[name].standing)

@@ -15,7 +15,7 @@ from bentray_kernels.tomography.chains import BATCH
 from bentray_kernels.tomography.problem import MARGIN_NODES
 from bentray_kernels.tomography.settings import DEVIATION, Settings
 
-from .arrival_memory import arrival_call_bytes, settle_bytes
+from .arrival_memory import arrival_call_bytes, parts_of, settle_bytes
 from .wave_memory import Traces
 
 REAL = 8
@@ -153,6 +153,10 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     found: dict[str, int] = {}
     if scan.traces_bytes:
         found |= arrival_call_bytes(scan.traces, scan.pairs, settings)
+        if settings.guided_rounds and scan.traces is not None:
+            # The rays of each of its emissions through the image that guides it.
+            part = len(parts_of(scan.traces.emissions, scan.traces.receivers * scan.traces.samples)[0])
+            found["read"] += field + 2 * image + 2 * rows_bytes(scan, settings, part * scan.traces.receivers)
     elif scan.period and settings.examine:
         found["settle"] = settle_bytes(scan.pairs // scan.slices)
     if settings.method == "gauss-newton":

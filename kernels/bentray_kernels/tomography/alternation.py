@@ -53,7 +53,7 @@ def alternate(
     for _ in range(rounds):
         expected = predicted_delta(picked, result)
         again = pick(dataset, settings.picker, predicted_s=expected, reach_s=reach_s)
-        settled = _same(picked, again)
+        settled = same_picks(picked, again)
         picked = again
         if settled:
             break
@@ -98,12 +98,11 @@ def predicted_delta(dataset: Dataset, result: Reconstruction) -> Floats:
     return found[0] if dataset.slice_z_m is None else found
 
 
-def _same(before: Dataset, after: Dataset) -> bool:
+def same_picks(before: Dataset, after: Dataset) -> bool:
     """Whether the picks are those of the round before."""
-    assert before.delta_tof_s is not None
-    assert after.delta_tof_s is not None
-    known = np.isfinite(before.delta_tof_s)
-    if (known != np.isfinite(after.delta_tof_s)).any():
+    was, found = before.differential_tof(), after.differential_tof()
+    known = np.isfinite(was)
+    if (known != np.isfinite(found)).any():
         return False
-    change = (after.delta_tof_s - before.delta_tof_s)[known]
+    change = (found - was)[known]
     return not change.size or float(np.sqrt(np.mean(change**2))) < SETTLED_S

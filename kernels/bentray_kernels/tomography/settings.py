@@ -82,6 +82,8 @@ class Settings:
         examine: before that, put swapped channels, inverted ones and a wrong time zero right, leave dead
             elements and broken traces out, and after it times that others contradict; see
             ``acquisition.quality``. A scan that must not be used is refused. It says what it found.
+        guided_rounds: how often, where only traces were uploaded, times are read again about those that the
+            image of the rays predicts; fewer once they stay. For slices; see ``alternation``.
         attenuation: reconstruct it too, where amplitudes were recorded; with ``waveform`` from the traces,
             once the speed is refined. Experimental there.
         focusing: take off the amplitudes what refraction does to them, by the spreading of ray tubes in the
@@ -133,6 +135,7 @@ class Settings:
     reciprocity: bool = True
     picker: Literal["aic", "threshold", "energy-ratio", "sta-lta", "correlation", "matched"] = "aic"
     examine: bool = True
+    guided_rounds: int = 0
     attenuation: bool = True
     focusing: bool = False
     resolution_check: bool = False
@@ -164,6 +167,9 @@ class Settings:
         if self.method == "waveform" and self.decomposition == "volume":
             raise InvalidInput("decomposition", "'volume'", "slices, with method waveform")
         _within("wave_bands", self.wave_bands, 1, WAVE_BANDS)
+        _within("guided_rounds", self.guided_rounds, 0, 10)
+        if self.guided_rounds and self.decomposition == "volume":
+            raise InvalidInput("guided_rounds", self.guided_rounds, "0, with decomposition volume")
         _within("wave_emitters", self.wave_emitters, 0, 4096)
         _within("wave_minutes", self.wave_minutes, 0.0, 1e6)
         _within("nodes", self.nodes, LEAST_NODES, 2048)

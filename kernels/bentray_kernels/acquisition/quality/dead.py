@@ -11,6 +11,10 @@ from .finding import Finding, Role
 # Part of an element's pairs that must have a pulse.
 LEAST_HEARD = 0.1
 
+# Where half of the elements are heard in fewer of theirs than this, pulses drown in noise, and silence tells
+# nothing.
+USUALLY_HEARD = 0.5
+
 
 def dead(dataset: Dataset, heard: Flags) -> list[Finding]:
     """Elements that do not emit, or do not receive.
@@ -29,7 +33,7 @@ def dead(dataset: Dataset, heard: Flags) -> list[Finding]:
         asked = other & (alive[None, :] if axis == 1 else alive[:, None])
         part = (heard & asked).sum(axis=axis) / np.maximum(asked.sum(axis=axis), 1)
         at_fault = np.flatnonzero(part < LEAST_HEARD)
-        if at_fault.size:
+        if at_fault.size and np.median(part) >= USUALLY_HEARD:
             pairs = np.zeros_like(heard)
             pairs[(at_fault, slice(None)) if axis == 1 else (slice(None), at_fault)] = True
             findings.append(

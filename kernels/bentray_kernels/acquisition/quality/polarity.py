@@ -16,6 +16,9 @@ REACH = 1.0
 # Part of an element's pulses that must be upside down.
 MOST = 0.6
 
+# Pulses that an element must have for that.
+FEWEST = 4
+
 
 def polarity(dataset: Dataset, strongest_s: Floats) -> list[Finding]:
     """Elements to turn over, in emission and in reception.
@@ -94,4 +97,4 @@ def _majority(sign: Floats, axis: int) -> Floats:
     """-1 for rows (axis 1) or columns (axis 0) of which most are upside down, else 1."""
     known = np.isfinite(sign)
     down = ((sign < -0.3) & known).sum(axis=axis) / np.maximum(known.sum(axis=axis), 1)
-    return np.where(down > MOST, -1.0, 1.0)
+    return np.where((down > MOST) & (known.sum(axis=axis) >= FEWEST), -1.0, 1.0)

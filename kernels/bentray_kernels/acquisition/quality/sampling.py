@@ -53,6 +53,8 @@ def frequency(dataset: Dataset) -> list[Finding]:
     if not power.any():
         return []
     of_power = np.fft.rfftfreq(traces.shape[-1], 1.0 / dataset.sampling_rate_hz)
+    # White noise lies under all frequencies alike; most of them hold nothing else.
+    power = np.maximum(power - np.median(power), 0.0)
     strong = power >= 0.1 * power.max()
     middle = float((of_power * power)[strong].sum() / power[strong].sum())
     factor = middle / dataset.center_frequency_hz

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.acquisition import Dataset, Waveform, pick
 from bentray_kernels.acquisition.quality import Examined, corrected, examine
 from bentray_kernels.errors import InvalidInput
 
@@ -60,6 +60,15 @@ def test_a_clean_scan_has_no_findings_and_goes_on_whole():
     assert examined.report.findings == ()
     assert corrected(clean(), examined.report) is clean()
     assert examined.report.usable > 0.8 * examined.report.pairs
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.2, 0.25])
+def test_noise_alone_is_no_fault(noise):
+    """Where half of the pulses drown, the others give the times that they give unexamined."""
+    noisy = scan(blob_delay(ELEMENTS), elements=ELEMENTS, noise=noise, seed=4)
+    examined = examine(noisy)
+    assert set(names(examined)) <= {"cycle jumps", "outliers", "reciprocity"}
+    np.testing.assert_array_equal(examined.picked.differential_tof(), pick(noisy).differential_tof())
 
 
 def test_three_dead_elements_are_named_and_left_out():
