@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import secrets
 import threading
+import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -22,12 +23,13 @@ class Server:
 
     Attributes:
         away: set it, and every request is answered with 503.
+        silent: set it, and none is answered before it is cleared.
         asked: method and path of every request.
     """
 
     def __init__(self) -> None:
         logging.getLogger("werkzeug").setLevel(logging.ERROR)
-        self.away = threading.Event()
+        self.away, self.silent = threading.Event(), threading.Event()
         self.asked: list[tuple[str, str]] = []
         self._moto = DomainDispatcherApplication(create_backend_app)
         self._server = make_server("127.0.0.1", 0, self._answer, threaded=True)
@@ -57,6 +59,8 @@ class Server:
 
     def _answer(self, environ: dict[str, Any], start: Callable[..., Any]) -> Iterable[bytes]:
         self.asked.append((environ["REQUEST_METHOD"], environ["PATH_INFO"]))
+        while self.silent.is_set():
+            time.sleep(0.02)
         if self.away.is_set():
             start("503 Service Unavailable", [])
             return [b""]

@@ -25,9 +25,11 @@ PARTS_AT_ONCE = 4
 MOST_PARTS = 10_000
 # What one call to S3 removes.
 MOST_REMOVED = 1000
-# Retries come on top, so that a bucket which does not answer is given up after some ten seconds.
+# Retries come on top, so that a bucket which cannot be reached is given up after some ten seconds; so is one
+# that says nothing, but where it takes in a file, which it may put together for minutes.
 CONNECT_S = 3.0
-READ_S = 30.0
+READ_S = 120.0
+ANSWER_S = 10.0
 TRIES = {"total_max_attempts": 2, "mode": "standard"}
 
 # Of the local disk: they are no fault of the bucket.
@@ -127,7 +129,7 @@ class Bucket:
             raise StorageAway(f"the bucket does not do what it is asked ({type(error).__name__})") from error
 
     def _call(self, method: str, **how: Any) -> Any:
-        return self._s3.call_s3(method, Bucket=self._name, **how)
+        return self._s3.call_s3(method, Bucket=self._name, **how, timeout=ANSWER_S)
 
     def _place(self, key: str) -> str:
         return f"{self._name}/{self._prefix}{key}"

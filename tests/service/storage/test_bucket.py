@@ -42,3 +42,16 @@ def test_a_removal_that_is_refused_is_no_removal(bucket_url, monkeypatch):
 def test_a_bucket_that_is_not_there_is_no_missing_object(bucket_url, ask):
     with pytest.raises(StorageAway):
         ask(Bucket(f"{bucket_url.removesuffix('/scans')}-missing"))
+
+
+def test_a_bucket_that_says_nothing_is_given_up(bucket_url, s3_server, monkeypatch):
+    monkeypatch.setattr(module, "ANSWER_S", 0.5)
+    bucket = Bucket(bucket_url)
+    s3_server.silent.set()
+    try:
+        with pytest.raises(StorageAway):
+            bucket.told("a")
+    finally:
+        s3_server.silent.clear()
+    monkeypatch.setattr(module, "ANSWER_S", 20.0)
+    assert bucket.told("a") is None

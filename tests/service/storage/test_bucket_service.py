@@ -149,3 +149,15 @@ def test_an_upload_in_pieces_waits_too(service, scan, s3_server, monkeypatch):
     s3_server.away.clear()
     wait(lambda: http.get(place).json()["state"] != "reading")
     assert http.get(place).json()["state"] == "done"
+
+
+def test_a_folder_from_before_there_was_a_bucket_is_put_into_it(start, uploaded, bucket_url):
+    http = start("data")
+    dataset = uploaded(http)
+    http.__exit__(None, None, None)
+    http = start("data", storage_url=bucket_url)
+    wait(lambda: [one.key for one in Bucket(bucket_url).listed("tenants/")])
+    assert [one.key for one in Bucket(bucket_url).listed("tenants/")] == [
+        f"tenants/local/datasets/{dataset}.h5"
+    ]
+    assert http.get("/health/ready").status_code == 200
