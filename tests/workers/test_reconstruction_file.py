@@ -34,6 +34,7 @@ def test_bands_of_a_refinement_come_back(tmp_path):
     waves = (
         Sweep(0, 1, 3e-8, 36, 1, given=False, band_hz=(1e5, 2e5), misfit=0.3, held_out_misfit=0.4),
         Sweep(0, 2, 2e-8, 36, 1, band_hz=(1e5, 2e5), misfit=0.1),
+        Sweep(0, 1, 2e-8, 24, 2, band_hz=(2e5, 3e5), misfit=0.2, of_attenuation=True),
     )
     whole = replace(made(), history=(*made().history, *waves))
     write_reconstruction(tmp_path / "r.h5", whole)

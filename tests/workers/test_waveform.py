@@ -53,6 +53,12 @@ def test_waves_make_the_image_of_rays_better(expected):
     waves = expected.history[len(rays.history) :]
     of_speed = {sweep.band_hz for sweep in waves if not sweep.of_attenuation}
     assert of_speed == {(62500.0, 187500.0), (62500.0, 281250.0)}
+    losses = [sweep for sweep in waves if sweep.of_attenuation]
+    assert {(sweep.stage, sweep.band_hz) for sweep in losses} == {(waves[-1].stage, (187500.0, 281250.0))}
+    assert {sweep.residual_rms_s for sweep in losses} == {expected.residual_rms_s}
+    assert "attenuation (experimental), 188 to 281 kHz: misfit" in expected.provenance["waveform"]
+    # There is none, nor do the wrong parts of the speed make much of it.
+    assert 0.0 <= expected.attenuation.min() <= expected.attenuation.mean() < 0.5
     assert min(sweep.stage for sweep in waves) > max(sweep.stage for sweep in rays.history)
 
 

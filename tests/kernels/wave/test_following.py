@@ -20,7 +20,7 @@ PLAN = Settings(method="auto", nodes=32, sweeps=2, wave_bands=3, wave_emitters=6
 
 def heard(noise=0.0):
     made = scan(seed=3, noise=noise)
-    return replace(pick(made), waveform=made.waveform)
+    return replace(pick(made), waveform=made.waveform, water_attenuation_np_m=0.25)
 
 
 def error_of(result):
@@ -37,6 +37,11 @@ def test_auto_goes_on_with_waves_where_it_may_and_they_predict_better(rays):
     found = reconstruct(heard(), PLAN, seen.append)
     assert found.settings == replace(PLAN, method="waveform")
     assert error_of(found) < 0.9 * error_of(rays)
+    # What is refined comes on top of the water's.
+    assert rays.attenuation is None
+    assert found.attenuation.shape == found.speed.shape
+    assert (found.attenuation[0] == 0.25).all()
+    assert found.attenuation.min() == 0.25
     assert seen[-1].done == seen[-1].total
     # What was chosen gives the same bits when asked for by itself.
     again = reconstruct(heard(), found.settings)

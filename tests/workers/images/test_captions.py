@@ -60,12 +60,13 @@ def test_waveforms_are_named_after_the_rays_that_they_began_with():
     bands = (
         Sweep(0, 1, 1e-7, 36, 1, band_hz=(1e5, 2e5), misfit=0.1),
         Sweep(0, 1, 5e-8, 36, 3, band_hz=(1e5, 4.5e5), misfit=0.1),
+        Sweep(0, 1, 5e-8, 24, 4, band_hz=(3e5, 4.5e5), misfit=0.1, of_attenuation=True),
     )
     rays = Trial({"rays": "straight", "method": "sart"}, 1e-7, 1e-7)
     result = replace(
         made(), settings=Settings(method="waveform"), trials=(rays,), history=(Sweep(0, 1, 2e-7, 36), *bands)
     )
     assert facts(result).startswith(
-        "straight rays  ·  SART  ·  then waveforms  ·  3 sweeps in 3 stages  ·  24 by"
+        "straight rays  ·  SART  ·  then waveforms  ·  4 sweeps in 4 stages  ·  24 by"
     )
-    assert stage_names(result) == ("128 nodes", "200 kHz", "450 kHz")
+    assert stage_names(result) == ("128 nodes", "200 kHz", "450 kHz", "attenuation")
