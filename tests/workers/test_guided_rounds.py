@@ -100,6 +100,16 @@ def test_slices_are_guided_by_their_own_images_and_faults_stay_corrected(path, t
     assert "slice 1: polarity: 1 inverted in reception (3), corrected" in two.provenance["quality"]
 
 
+def test_the_settings_of_a_guided_result_make_it_again(path):
+    plan = replace(PLAN, method="auto", rays="curved", guided_rounds=1)
+    first = slices.reconstruct(None, path, plan)
+    assert first.settings.method != "auto"
+    assert first.settings.guided_rounds == 1
+    assert len(first.trials) > 1
+    again = slices.reconstruct(None, path, first.settings)
+    np.testing.assert_array_equal(again.speed, first.speed)
+
+
 def test_times_that_came_with_the_scan_are_not_sought_again(tmp_path):
     known = replace(noisy(), waveform=None, delta_tof_s=blob_delay(ELEMENTS))
     write_dataset(tmp_path / "known.h5", known)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from distributed import Client
 
-from bentray_kernels.tomography import Progress, Reconstruction, Settings
+from bentray_kernels.tomography import Progress, Reconstruction, Settings, Trial
 from bentray_kernels.tomography.alternation import same_picks
 from bentray_kernels.tomography.chains import Calls
 from bentray_kernels.tomography.reconstruction import carried_out, measured
@@ -68,8 +68,9 @@ def reconstruct(
             run = run_on_cluster(client, attempts, stop)
         job = _Job(run, dataset_path, folder, Checkpoints(folder / "checkpoints", on_saved), count())
         rising = _Rising(on_progress)
-        path, found = _guided(job, settings, rising)
-        result = _carried_out(job, path, settings, rising)
+        path, found, chosen, trials = _guided(job, settings, rising)
+        result = _carried_out(job, path, chosen, rising)
+        result = replace(result, trials=trials or result.trials)
     if not settings.examine:
         return result
     told = found.words(stacked=result.speed.ndim == 3)
@@ -86,8 +87,14 @@ class _Job(NamedTuple):
     drives: Iterator[int]
 
 
-def _guided(job: _Job, settings: Settings, rising: _Rising) -> tuple[Path, Found]:
-    """A file with travel times, and what was found in the scan: picked, and again by what images predict."""
+def _guided(
+    job: _Job, settings: Settings, rising: _Rising
+) -> tuple[Path, Found, Settings, tuple[Trial, ...]]:
+    """A file with travel times, and what was found in the scan: picked, and again by what images predict.
+
+    Also how to go on: what ``auto`` chose for the first image holds for all, so that the settings of the
+    result make it again.
+    """
     source = Source(job.scan, job.scan.stat().st_mtime_ns, settings.picker, settings.examine)
     path, found = _arrived(job, source, Files.of(job.folder), None)
     rounds = 0 if source.dataset.picked else settings.guided_rounds
@@ -98,18 +105,24 @@ def _guided(job: _Job, settings: Settings, rising: _Rising) -> tuple[Path, Found
         resolution_check=False,
         wave_minutes=0.0,
     )
+    trials: tuple[Trial, ...] = ()
     for number in range(1, rounds + 1):
         rising.more = 1 + rounds - number
         image = job.folder / f"{number}-image.h5"
-        write_reconstruction(image, _carried_out(job, path, rays, rising))
+        made = _carried_out(job, path, rays, rising)
+        write_reconstruction(image, made)
         rising.step()
+        if settings.method == "auto" and not trials:
+            rays, trials = made.settings, made.trials
+            asked = {name: getattr(settings, name) for name in ("attenuation", "resolution_check")}
+            settings = replace(rays, **asked, wave_minutes=settings.wave_minutes)
         guide = Guide(image, Files.of(job.folder).findings)
         again, found_again = _arrived(job, source, Files.of(job.folder, number), guide)
         if same_picks(*(read_dataset(one, traces=False) for one in (path, again))):
             break
         path, found = again, found_again
     rising.more = 0
-    return path, found
+    return path, found, settings, trials
 
 
 def _arrived(job: _Job, source: Source, files: Files, guide: Guide | None) -> tuple[Path, Found]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.acquisition.dataset import Dataset, Truth
+from bentray_kernels.acquisition.quality.finding import NOTHING_FOUND
 from bentray_kernels.tomography import Reconstruction
 from bentray_kernels.tomography.advice import told
 from bentray_workers.comparison import NotComparable, compare
@@ -95,6 +96,8 @@ def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
         rows.insert(4, ("residual", f"{found['residual_rms_s'] * 1e9:.0f} ns rms"))
     if found["recovery_mean"] is not None:
         rows.append(("resolution check", f"{100 * found['recovery_mean']:.0f} % of a checkerboard recovered"))
+    if found["provenance"].get("quality", NOTHING_FOUND) != NOTHING_FOUND:
+        rows.append(("scan", found["provenance"]["quality"]))
     truth = found["truth"]
     if truth is not None:
         if truth.get("mean_absolute_error_of_range") is not None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset, Truth
+from bentray_kernels.acquisition.quality.finding import words
 from bentray_kernels.tomography import Reconstruction, Settings, Sweep, Trial
 from bentray_kernels.tomography.result import residual_counts
 from bentray_service.cli.figures import errors, figures, summary
@@ -96,7 +97,12 @@ def test_the_residual_is_that_of_the_last_sweep_over_all_slices() -> None:
     assert found["residual_rms_s"] == pytest.approx(math.sqrt((9 + 16) / 2) * 1e-7)
     assert len(found["history"]) == 4
     last = {"slice": 1, "sweep": 2, "residual_rms_s": 4e-7, "emitters": 3, "stage": 0, "given": True}
-    assert found["history"][3] == last | {"band_hz": None, "misfit": None, "held_out_misfit": None}
+    assert found["history"][3] == last | {
+        "band_hz": None,
+        "misfit": None,
+        "held_out_misfit": None,
+        "of_attenuation": False,
+    }
     assert found["truth"] is None
     assert found["seconds"] == 1.25
     assert found["speed_range_mps"] == [1450.0, 1550.0]
@@ -117,6 +123,15 @@ def test_what_a_result_lacks_is_none_or_empty() -> None:
     assert (found["residual_within_s"], found["recovery_mean"]) == (None, None)
     assert (found["reason"], found["trials"]) == ("", [])
     assert "resolution check" not in dict(summary(found))
+
+
+def test_the_summary_tells_what_was_found_in_the_scan() -> None:
+    def row(found: str) -> str | None:
+        result = replace(image(disc()), provenance={"quality": found})
+        return dict(summary(figures(result, dataset(None), 1.0))).get("scan")
+
+    assert row("dead elements: 1 without a pulse in reception (4), left out").startswith("dead elements: 1")
+    assert row(words([])) is None
 
 
 def test_residuals_resolution_and_trials_are_told() -> None:
@@ -140,4 +155,5 @@ def test_residuals_resolution_and_trials_are_told() -> None:
         "settings": {"rays": "curved"},
         "held_out_rms_s": 6e-8,
         "shown_rms_s": 5e-8,
+        "held_out_mean_s": None,
     }

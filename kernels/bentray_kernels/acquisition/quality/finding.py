@@ -17,6 +17,9 @@ Role = Literal["emission", "reception", ""]
 # Pairs that a report names one by one; of the others it gives the number.
 MOST_NAMED = 20
 
+# What a line of no findings says.
+NOTHING_FOUND = "nothing found"
+
 # Findings that a line tells, and elements of each.
 MOST_TOLD = 8
 
@@ -118,7 +121,7 @@ def words(findings: Sequence[Finding], *, stacked: bool = False) -> str:
         stacked: whether to say of which slice each is.
     """
     if not findings:
-        return "nothing found"
+        return NOTHING_FOUND
     lines = []
     for finding in findings[:MOST_TOLD]:
         where = f"slice {finding.slice}: " if stacked else ""
