@@ -62,9 +62,9 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     assert dataset.waveform is not None
     traces = held(dataset.waveform.object, dataset.waveform.water)
     fresh = Here(dataset, plan)
-    found = {"enter": traces + peak(lambda: waves.enter(fresh, number, start, 1.0)) - nothing}
+    found = {"enter": traces + peak(lambda: waves.enter(fresh, number, start)) - nothing}
     here = Here(dataset, plan)
-    entered = waves.enter(here, number, start, 1.0)
+    entered = waves.enter(here, number, start)
     assert entered is not None
     # As ``held`` counts the problem, which holds the traces of the object.
     problem = here.problem(number)

@@ -23,10 +23,6 @@ from .standing import BandEnd, Entered, Image, WaveStanding
 # over: its waves are too long for the array and its absorbing edges, or were not sent.
 LEAST_LIKENESS = 0.9
 
-# The first change of a band over the last one of the band before. A change as large as that of the first band
-# made the misfit rise, which costs a look of all emitters (``benchmarks/results/tried.md``).
-CARRIED = 0.5
-
 
 class WaveScan(Protocol):
     """Where calls find their data; it travels with them, so it holds a path or the dataset itself."""
@@ -133,7 +129,7 @@ class WaveChain:
         if self.over:
             return []
         if self._band is None:
-            return [Call(enter, (self._scan, self.number, self.image, self._first_change))]
+            return [Call(enter, (self._scan, self.number, self.image))]
         model = self._band.model
         return [
             Call(look_at_waves, (self._scan, self.number, model, place), keep=True)
@@ -166,19 +162,11 @@ class WaveChain:
             spacing = self._scan.settings().bands[self.number].spacing_m
             image = self._left(Image(given.image, spacing, self._band.origin))
             # The band is over, so that pairs of changes are not kept any longer.
-            self.ends = (*self.ends, BandEnd(image, given.skipped, given.history, given.change))
+            self.ends = (*self.ends, BandEnd(image, given.skipped, given.history))
             if given.skipped:
                 self._leave_out()
             self._band = None
         return self.first()
-
-    @property
-    def _first_change(self) -> float:
-        """Rms of the first change of the band to come: a part of the last one of the band before."""
-        of = self._scan.settings().bands[self.number].of
-        first = self._scan.settings().steps(of).first
-        before = [end.change for end in self.ends if end.change > 0.0]
-        return min(first, CARRIED * before[-1]) if before and of == "speed" else first
 
     def _leave_out(self) -> None:
         """Go past further bands of the speed, which would skip more cycles or fit more noise."""
@@ -194,21 +182,15 @@ class WaveChain:
         return replace(last, attenuation=on_it)
 
 
-def enter(scan: WaveScan, number: int, image: Image, first: float) -> Entered | None:
-    """Call: what a band begins with; None where it is passed over, see ``LEAST_LIKENESS``.
-
-    Args:
-        scan, number: of the band.
-        image: to begin with.
-        first: rms of the first change.
-    """
+def enter(scan: WaveScan, number: int, image: Image) -> Entered | None:
+    """Call: what a band begins with; None where it is passed over, see ``LEAST_LIKENESS``."""
     problem = scan.problem(number)
     if problem.likeness < LEAST_LIKENESS:
         return None
     speed, count = on_grid(image, problem), len(refine.emitters(problem))
     if problem.band.of == "speed":
-        return Entered(refine.begin(speed, first), problem.origin, count)
-    return Entered(refine.begin(np.zeros_like(speed), first), problem.origin, count, speed)
+        return Entered(refine.begin(speed), problem.origin, count)
+    return Entered(refine.begin(np.zeros_like(speed)), problem.origin, count, speed)
 
 
 def look_at_waves(scan: WaveScan, number: int, model: Model, place: int) -> Look:

@@ -88,7 +88,6 @@ class WaveIterate:
         illumination: (nx, ny), of the first image; it shapes all steps of the band.
         steps, changes: (pairs, nx, ny), of images and gradients.
         best: (nx, ny), the image that held-out emitters like best; ``best_held`` their misfit.
-        first: rms of the first change, before anything is known of the curvature.
         risen: images in turn that held-out emitters were predicted worse in.
         shortenings: of the step under way.
         skipped: whether held-out emitters ended it, so that cycles were skipped or noise was fitted.
@@ -106,26 +105,17 @@ class WaveIterate:
     changes: Floats
     best: Floats
     best_held: float
-    first: float
     risen: int = 0
     shortenings: int = 0
     skipped: bool = False
     done: bool = False
     history: tuple[WavePass, ...] = ()
 
-    @property
-    def change(self) -> float:
-        """Rms of the last change that was taken, over the nodes that changed; 0 without one."""
-        if not len(self.steps):
-            return 0.0
-        last = self.steps[-1]
-        return float(np.sqrt((last[last != 0.0] ** 2).mean()))
 
-
-def begin(image: Floats, first: float) -> WaveIterate:
-    """An image to begin with, (nx, ny), on the grid of the problem, and the rms of its first change."""
-    nothing, none, far = np.zeros_like(image), np.zeros((0, *image.shape)), float("inf")
-    return WaveIterate(image, image, nothing, far, nothing, nothing, none, none, image, far, first)
+def begin(image: Floats) -> WaveIterate:
+    """An image to begin with, (nx, ny), on the grid of the problem."""
+    nothing, none = np.zeros_like(image), np.zeros((0, *image.shape))
+    return WaveIterate(image, image, nothing, float("inf"), nothing, nothing, none, none, image, float("inf"))
 
 
 def emitters(problem: WaveProblem) -> Ints:
@@ -215,7 +205,7 @@ def _way(problem: WaveProblem, limits: Steps, state: WaveIterate) -> Floats:
     way = -direction(state.gradient, state.steps, state.changes, prior)
     size = float(np.sqrt((way[problem.region] ** 2).mean()))
     if not len(state.steps):
-        return way * (state.first / size)
+        return way * (limits.first / size)
     return way * min(1.0, limits.largest / size)
 
 

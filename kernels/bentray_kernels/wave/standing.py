@@ -35,13 +35,11 @@ class BandEnd:
         image: the image.
         skipped: whether held-out emitters ended the band, or one before it, so that it was left out.
         history: a record for each image that was looked at; none of a band that was passed over or left out.
-        change: rms of the last change that was taken, m/s or Np/m; 0 without one.
     """
 
     image: Image
     skipped: bool
     history: tuple[WavePass, ...]
-    change: float = 0.0
 
     @property
     def held(self) -> float:

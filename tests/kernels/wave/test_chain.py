@@ -4,15 +4,12 @@ import random
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from bentray_kernels.tomography import Sweep
 from bentray_kernels.tomography.chains import Call
 from bentray_kernels.wave.chain import WaveChain, on_grid, step_by_waves
 from bentray_kernels.wave.continuation import Here
 from bentray_kernels.wave.refine import WavePass
-from bentray_kernels.wave.settings import LOSS_STEPS
-from bentray_kernels.wave.standing import BandEnd, WaveStanding
 
 from .scans import SETTINGS, refined, scan, water
 
@@ -113,19 +110,8 @@ def test_after_a_stop_bands_of_the_speed_are_left_out_and_the_loss_is_not():
     state = replace(chain.standing.state, skipped=True, done=True, history=(WavePass(1.0, 1.0, taken=True),))
     (call,) = chain.after(Call(step_by_waves, ()), state)
     assert call.arguments[1] == 2
-    assert call.arguments[3] == LOSS_STEPS.first
     assert [(end.skipped, len(end.history)) for end in chain.ends] == [(True, 1), (True, 0)]
     assert chain.done == sum((band.iterations + 1) * 10 for band in SETTINGS.bands[:2])
-
-
-@pytest.mark.parametrize(("change", "first"), [(0.0, 2.0), (0.6, 0.3), (9.0, 2.0)])
-def test_a_band_begins_with_half_the_last_change_of_the_one_before(change, first):
-    chain = WaveChain(Here(scan(), SETTINGS), water())
-    (call,) = chain.first()
-    assert call.arguments[3] == SETTINGS.first_step_mps == 2.0
-    end = BandEnd(chain.image, skipped=False, history=(), change=change)
-    chain.restore(WaveStanding((end,), None))
-    assert chain.first()[0].arguments[3] == first
 
 
 def test_nodes_outside_the_array_are_water():
