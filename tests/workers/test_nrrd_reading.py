@@ -32,7 +32,7 @@ def test_a_file_of_pynrrd(tmp_path, encoding, dtype):
         "space directions": np.diag([0.5, 0.5, 2.0]),
         "space origin": [1.0, 2.0, 3.0],
     }
-    nrrd.write(str(path), ramp(dtype=dtype), {"space": "left-posterior-superior", "content": "a head", **own})
+    nrrd.write(str(path), ramp(dtype=dtype), {"space": "right-anterior-superior", "content": "a head", **own})
     volume = import_volume(path)
     np.testing.assert_array_equal(volume.values, ramp(dtype=dtype))
     np.testing.assert_allclose(volume.spacing_m, (5e-4, 5e-4, 2e-3))
@@ -134,7 +134,7 @@ def test_axes_in_any_order_and_sense_are_the_same_volume(tmp_path, order, sense)
     directions = np.diag(np.array(sense) * steps)[list(order)]
     start = origin + np.where(np.array(sense) < 0, last, 0.0)
     stored = plain[tuple(slice(None, None, one) for one in sense)].transpose(order)
-    own = {"space directions": directions, "space origin": start, "space": "left-posterior-superior"}
+    own = {"space directions": directions, "space origin": start, "space": "right-anterior-superior"}
     path = tmp_path / "turned.nrrd"
     nrrd.write(str(path), np.ascontiguousarray(stored), own)
     volume = import_volume(path)
@@ -146,3 +146,26 @@ def test_axes_in_any_order_and_sense_are_the_same_volume(tmp_path, order, sense)
 def test_sheared_axes_are_refused(tmp_path):
     path = write(tmp_path / "v.nrrd", PLAIN + "space: RAS\nspace directions: (1,0,0) (0.3,1,0) (0,0,1)\n")
     assert refused(path).field == "space directions"
+
+
+@pytest.mark.parametrize(
+    ("space", "signs"),
+    [
+        ("left-posterior-superior", (-1, -1, 1)),
+        ("LPS", (-1, -1, 1)),
+        ("left-anterior-superior", (-1, 1, 1)),
+        ("LAS", (-1, 1, 1)),
+        ("right-anterior-superior", (1, 1, 1)),
+        ("RAS", (1, 1, 1)),
+        ("3D-right-handed", (1, 1, 1)),
+    ],
+)
+def test_whichever_way_the_space_goes_it_is_the_same_body(tmp_path, space, signs):
+    """A node lies in the same place of the body whatever the file calls the way there."""
+    steps, start = np.array([0.5, 1.0, 2.0]), np.array([1.0, 2.0, 3.0])
+    own = {"space directions": np.diag(signs * steps), "space origin": signs * start, "space": space}
+    nrrd.write(str(tmp_path / "v.nrrd"), ramp(), own)
+    volume = import_volume(tmp_path / "v.nrrd")
+    np.testing.assert_array_equal(volume.values, ramp())
+    np.testing.assert_allclose(volume.spacing_m, 1e-3 * steps)
+    np.testing.assert_allclose(volume.origin_m, 1e-3 * start)

@@ -33,7 +33,8 @@ NRRD_TYPES = {
 def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
     """The volume in an NRRD file with its values after the header; raises InvalidInput for anything else.
 
-    Its axes come in the order and the sense of the file's own space.
+    Its axes go to the right, the front and the head where the file's space tells of them, as ``LPS`` does;
+    else they come in the order and the sense of that space.
 
     ``check`` is called with the shape before the values are read.
     """
@@ -89,7 +90,19 @@ def _affine(header: Any) -> Floats:
     else:
         affine[:3, :3] = (directions * around).T
     affine[:3, 3] = np.multiply(header.get("space origin", [0.0] * 3), around)
-    return affine
+    return np.diag([*_to_right_front_up(header.get("space")), 1.0]) @ affine
+
+
+def _to_right_front_up(space: Any) -> tuple[float, float, float]:
+    """What the axes of a space are times those to the right, the front and the head, as NIfTI's are.
+
+    One that names no patient, as ``3D-right-handed`` or none, stays as it is.
+    """
+    words = str(space or "").lower().removesuffix("-time")
+    words = {"ras": "right-anterior-superior", "las": "left-anterior-superior"}.get(words, words)
+    words = {"lps": "left-posterior-superior"}.get(words, words)
+    left, back = words.startswith("left-"), "-posterior-" in words
+    return -1.0 if left else 1.0, -1.0 if back else 1.0, 1.0
 
 
 def _metres(names: Sequence[str] | None) -> NDArray[np.float64]:

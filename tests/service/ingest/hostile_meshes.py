@@ -106,7 +106,10 @@ REFUSED: dict[str, tuple[bytes, str]] = {
     "billions of triangles": (bytes(80) + struct.pack("<I", 2**32 - 1) + bytes(200), "file"),
     "no triangles": (bytes(84), "faces"),
     "triangles of noise": (bytes(80) + struct.pack("<I", 2) + b"\xff" * 100, "vertices"),
-    "an STL of words": (b"solid\nfacet normal a b c\nouter loop\nvertex x y z\nendfacet\nendsolid\n", "faces"),
+    "an STL of words": (
+        b"solid\nfacet normal a b c\nouter loop\nvertex x y z\nendloop\nendfacet\nendsolid\n",
+        "file",
+    ),
     # glTF.
     "a buffer in a file": (gltf(buffers=[{"byteLength": 48, "uri": "/etc/passwd"}]), "buffers/uri"),
     "a buffer in the net": (gltf(buffers=[{"byteLength": 48, "uri": "http://127.0.0.1/x"}]), "buffers/uri"),
