@@ -94,6 +94,8 @@ class Settings:
         wave_misfit: of ``waveform``: ``correlation`` asks for the form of each trace alone, ``least-squares``
             for its amplitude too.
         wave_emitters: of ``waveform``, how many are drawn in each band, other ones in each; 0: 32 or 40.
+        wave_variation: of ``waveform``, total variation of the speed to be kept low, as a part of the first
+            misfit of a band; 0: none. For objects of flat parts with sharp edges, as phantoms.
         wave_minutes: of ``auto``, how long a core may work on ``waveform``. Where the scan has what that
             needs and the estimate is not above it, waves follow the rays, and their image is given if it
             predicts emitters that were held out clearly better. Else ``auto`` only says whether they are
@@ -142,6 +144,7 @@ class Settings:
     wave_bands: int = 4
     wave_misfit: Literal["correlation", "least-squares"] = "correlation"
     wave_emitters: int = 0
+    wave_variation: float = 0.0
     wave_minutes: float = 0.0
 
     def __post_init__(self) -> None:
@@ -171,6 +174,7 @@ class Settings:
         if self.guided_rounds and self.decomposition == "volume":
             raise InvalidInput("guided_rounds", self.guided_rounds, "0, with decomposition volume")
         _within("wave_emitters", self.wave_emitters, 0, 4096)
+        _within("wave_variation", self.wave_variation, 0.0, 10.0)
         _within("wave_minutes", self.wave_minutes, 0.0, 1e6)
         _within("nodes", self.nodes, LEAST_NODES, 2048)
         if self.axial_room_nodes is not None:

@@ -47,6 +47,7 @@ def wave_settings(dataset: Dataset, settings: Settings) -> WaveSettings:
         window_s=(BEFORE * across + pulse, AFTER * across + pulse),
         nearest_m=NEAREST * width,
         speed_bounds_mps=settings.speed_bounds_mps,
+        variation=settings.wave_variation,
         seed=settings.seed,
         roi=settings.roi,
     )

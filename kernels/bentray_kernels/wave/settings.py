@@ -110,6 +110,7 @@ class WaveSettings:
         first_step_mps: rms of the first change of a band, m/s, before anything is known of the curvature.
         memory: pairs of changes that the curvature is read from (L-BFGS).
         held_out: emitters that only judge.
+        variation: total variation of the speed to be kept low, as a part of a band's first misfit; 0: none.
         seed: of the draw of emitters.
         roi: let only the dataset's region of interest change (``mask/roi``).
     """
@@ -123,6 +124,7 @@ class WaveSettings:
     first_step_mps: float = 2.0
     memory: int = 8
     held_out: int = 4
+    variation: float = 0.0
     seed: int = 0
     roi: bool = False
 
@@ -146,6 +148,8 @@ class WaveSettings:
                 (self.largest_step_mps, self.first_step_mps),
                 "speeds > 0 m/s",
             )
+        if not 0.0 <= self.variation < float("inf"):
+            raise InvalidInput("variation", self.variation, "a part >= 0 of the misfit")
         if self.memory < 1 or self.held_out < 0:
             raise InvalidInput("memory, held_out", (self.memory, self.held_out), "memory >= 1, held_out >= 0")
 

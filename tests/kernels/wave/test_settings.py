@@ -44,6 +44,7 @@ def test_bad_bands_are_refused(words):
         ({"speed_bounds_mps": (1600.0, 1400.0)}, "speed_bounds_mps"),
         ({"first_step_mps": 0.0}, "largest_step_mps, first_step_mps"),
         ({"memory": 0}, "memory, held_out"),
+        ({"variation": -0.1}, "variation"),
     ],
 )
 def test_bad_settings_are_refused(words, field):
