@@ -306,3 +306,23 @@ def test_where_a_key_is_needed_the_page_asks_for_it_and_sends_it(page, serve, sc
     page.get_by_role("button", name="Forget the key").click()
     page.get_by_label("API key").wait_for()
     assert httpx.get(f"{address}/v1/datasets").status_code == 401
+
+
+def test_a_simulated_scan_is_there_to_be_reconstructed(page, serve, monkeypatch):
+    made = {"title": "A phantom", "source": "", "license": "", "dimension": 2, "elements": 16, "ntx": 16}
+    made |= {"nrx": 16, "slices": 1, "has_traces": False, "has_travel_times": True, "has_truth": True}
+    made |= {"water_speed_mps": 1500.0, "bytes": 1, "sha256": "0" * 64}
+    monkeypatch.setattr(kinds, "simulate_scan", lambda *given: made)
+    url = serve()
+    asked = {"kind": "simulation", "settings": {"nodes": 16, "elements": 16}}
+    assert httpx.post(f"{url}/v1/jobs", json=asked).status_code == 202
+    page.goto(url)
+    job = page.locator(".job")
+    job.get_by_role("heading", name="Simulated scan").wait_for()
+    job.get_by_text("succeeded").wait_for()
+    job.get_by_text("A phantom").wait_for()
+    expect(page.get_by_label("Scan to reconstruct")).to_contain_text("A phantom")
+    whole = job.get_by_text("the largest (")
+    assert whole.is_hidden()
+    job.get_by_text("Plan: 2 tasks").click()
+    assert whole.is_visible()

@@ -69,24 +69,31 @@ function sparkline({ values, begins }) {
   return picture;
 }
 
-function drawn(address, words) {
+// A picture that leads to a larger one.
+function drawn(address, words, larger = address) {
   const frame = make("div", "picture");
   const image = make("img");
   image.alt = words;
   image.onerror = () => frame.replaceChildren("The picture could not be drawn.");
   showOnceNear(image, address);
-  const anchor = link("", address);
+  const anchor = link("", larger);
   anchor.append(image);
   frame.append(anchor);
   return frame;
 }
 
-// A volume in space is also shown as glass.
-async function addGlass(column, job, title) {
+// The bare slice, for scales and words of the whole picture cannot be read so small, and what its colours mean;
+// a volume in space is also shown as glass.
+async function showVolume(column, job, title) {
   const volume = await request(job.links.volume);
+  const [low, high] = volume.value_range;
+  const range = low < high ? { low, high } : {};
+  const small = `${job.links.image}?${queryOf({ frame: false, size: 320, ...range })}`;
+  const words = `Sound speed, ${Math.round(low)} (dark) to ${Math.round(high)} m/s (bright)`;
+  column.replaceChildren(drawn(small, `Speed of sound, ${title}`, job.links.image), make("p", "caption", words));
   if (!volume.links.refraction) return;
   const address = `${volume.links.refraction}?${queryOf(glassOf(volume))}`;
-  column.append(make("p", "caption", "As glass"), drawn(address, `As glass, ${title}`));
+  column.append(drawn(address, `As glass, ${title}`), make("p", "caption", "As glass"));
 }
 
 // The first picture of a turntable.
@@ -100,14 +107,16 @@ function pictures(job, title) {
   if (job.links.field) {
     column.append(drawn(`${job.links.image}?${queryOf({ width: 320, height: 320, rays: 2 })}`, `As a mirror, ${title}`));
   } else if (job.links.image) {
-    column.append(drawn(job.links.image, `Speed of sound, ${title}`));
-    addGlass(column, job, title).catch(() => {});
+    column.append(make("div", "picture"));
+    showVolume(column, job, title).catch(() => {});
   } else if (job.links.animation) {
     const moving = job.settings.format === "apng";
     column.append(drawn(moving ? job.links.animation : firstFrame(job), `As glass, ${title}`));
   } else {
     const ended = job.state === "failed" || job.state === "cancelled";
-    column.append(make("div", "picture", ended ? "No image" : "Image to come"));
+    const words = job.kind === "simulation" ? "A scan, which has no image yet" : "Image to come";
+    const none = ended || job.kind === "simulation";
+    column.append(make("div", none ? "picture none" : "picture", ended ? "No image" : words));
   }
   return column;
 }
@@ -120,8 +129,20 @@ function asked({ kind, settings }) {
   if (kind === "refraction") {
     return ["Turntable", `${settings.frames} pictures of ${settings.width} × ${settings.height}, index ${settings.index.join(", ")}`];
   }
+  if (kind === "simulation") {
+    const of = settings.phantom === "table7" ? "Table 7, in space" : "Table 6";
+    return ["Simulated scan", `${of}, ${settings.waveform ? "by waves" : "travel times"}, ${settings.elements} elements`];
+  }
   const { method, rays, nodes, sweeps } = settings;
   return [method === "auto" ? "Chosen by trial" : RAYS[rays], `${METHODS[method]}, ${nodes} × ${nodes} nodes, ${sweeps} sweeps`];
+}
+
+// In a few words, and in full when asked for.
+function planned({ tasks, largest_bytes: bytes, minutes, why }) {
+  const box = make("details");
+  const time = minutes ? `, about ${duration(60 * minutes)}` : "";
+  box.append(make("summary", "", `Plan: ${tasks} tasks of up to ${Math.ceil(bytes / 2 ** 20)} MiB${time}`), make("p", "", why));
+  return box;
 }
 
 function facts(job, title, onCancel) {
@@ -130,7 +151,7 @@ function facts(job, title, onCancel) {
   const heading = make("h3", "", what);
   heading.append(make("span", `state ${job.state}`, job.state));
   box.append(heading, make("p", "", title), make("p", "", settings));
-  if (job.plan) box.append(make("p", "", job.plan.why));
+  if (job.plan) box.append(planned(job.plan));
   if (job.advice) box.append(make("p", "", job.advice));
   const { done, total } = job.progress;
   if (job.state === "running" || job.state === "cancelling") {
@@ -193,6 +214,8 @@ export function showJobs(list, jobs, titleOf, onCancel) {
     if (card.signature !== signature) {
       const focused = card.node.contains(document.activeElement) && document.activeElement.tagName === "BUTTON";
       const fresh = facts(job, title, onCancel);
+      const open = card.node.querySelector("details")?.open;
+      if (open) fresh.querySelector("details").open = true;
       if (card.state === job.state) card.node.lastChild.replaceWith(fresh);
       else card.node.replaceChildren(pictures(job, title), fresh);
       if (focused) fresh.querySelector("button")?.focus();
