@@ -46,7 +46,8 @@ def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):
             kept = Checkpoints(tmp_path / "checkpoints")
             attempts = Attempts(client, tmp_path)
             try:
-                slices._drive(run_on_cluster(client, attempts, None), {"0": chain}, 0, 0, kept, None)
+                run = run_on_cluster(client, attempts, None)
+                slices._drive(run, {"0": chain}, 0, 0, kept, lambda progress: None)
             except KilledWorker as error:
                 ends["poisoned"] = error
 
