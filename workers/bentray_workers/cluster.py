@@ -15,6 +15,7 @@ from distributed.security import Security
 
 from bentray_kernels.errors import InvalidInput
 
+from .connected import connected_workers
 from .providers import Deployed, Wanted, deploy
 from .tls import security_of
 
@@ -52,7 +53,7 @@ class Cluster:
     def describe(self) -> dict[str, Any]:
         """What there is now: scheduler address, workers, threads and the lanes offered."""
         client = self.client
-        workers = client.scheduler_info(n_workers=-1)["workers"].values()
+        workers = connected_workers(client).values()
         lanes: dict[str, float] = {}
         for worker in workers:
             for lane, amount in worker.get("resources", {}).items():

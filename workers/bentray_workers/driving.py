@@ -11,6 +11,7 @@ from distributed import Client, Future, wait
 from bentray_kernels.tomography.chains import Call
 
 from .attempts import Attempts
+from .connected import connected_workers
 
 # Tasks in flight for each worker: one at work and one ready.
 IN_FLIGHT = 2
@@ -63,7 +64,7 @@ def run_on_cluster(client: Client, attempts: Attempts, stop: Callable[[], bool] 
         attempts: of the job.
         stop: polled several times a second; true ends with ``Cancelled``.
     """
-    window = IN_FLIGHT * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+    window = IN_FLIGHT * max(1, len(connected_workers(client)))
 
     def run(
         first: list[tuple[str, Call]], chains: Mapping[str, Follows], moved: Callable[[str], None]

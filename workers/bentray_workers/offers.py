@@ -11,19 +11,19 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl import choose
 from bentray_kernels.tomography.settings import Settings
 
+from .connected import connected_workers
 from .lanes import OPENCL, RECONSTRUCTION
 from .planning import Offer, lane_of
 
 
 def offers_of(client: Client) -> tuple[Offer, ...]:
     """Of every worker that is connected now."""
-    workers = client.scheduler_info(n_workers=-1)["workers"].values()
     return tuple(
         Offer(
             int(worker.get("memory_limit") or 0),
             tuple(lane for lane, amount in worker.get("resources", {}).items() if amount > 0),
         )
-        for worker in workers
+        for worker in connected_workers(client).values()
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from distributed import Client
 
+from .connected import connected_workers
 from .driving import IN_FLIGHT, POLL_S, finished
 from .lanes import RENDER
 
@@ -40,7 +41,7 @@ class ClusterTasks:
     def __init__(self, client: Client, priority: int) -> None:
         self._client = client
         self._priority = priority
-        self.window = IN_FLIGHT * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+        self.window = IN_FLIGHT * max(1, len(connected_workers(client)))
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
         how = {"pure": False, "resources": RENDER, "priority": self._priority}

@@ -13,6 +13,7 @@ from bentray_kernels.tomography import Progress
 
 from .asked_simulation import AskedSimulation
 from .attempts import Attempts
+from .connected import connected_workers
 from .simulation_ending import finish
 from .simulation_parts import folder_of, make_part, missing, parts_of
 from .slices import IN_FLIGHT, Cancelled, finished
@@ -81,4 +82,4 @@ def simulate_scan(
 
 
 def _workers(client: Client) -> int:
-    return max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+    return max(1, len(connected_workers(client)))

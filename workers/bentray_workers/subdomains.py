@@ -29,6 +29,7 @@ from bentray_kernels.eikonal.subdomains import (
 )
 from bentray_kernels.errors import InvalidInput
 
+from .connected import connected_workers
 from .lanes import RECONSTRUCTION
 from .npy_headers import PARSING
 
@@ -249,7 +250,7 @@ def _homes(client: Client, places: Sequence[Place]) -> dict[Place, str]:
     Raises:
         ConnectionError: without workers.
     """
-    workers = sorted(client.scheduler_info(n_workers=-1)["workers"])
+    workers = sorted(connected_workers(client))
     if not workers:
         raise ConnectionError("the cluster has no workers")
     return {place: workers[k % len(workers)] for k, place in enumerate(places)}

@@ -17,6 +17,7 @@ from bentray_kernels.tomography import Progress
 
 from .asked_fields import asked
 from .atomic import replacing, write_bytes
+from .connected import connected_workers
 from .driving import IN_FLIGHT, Cancelled, finished
 from .lanes import RENDER
 from .refraction import submit
@@ -100,7 +101,7 @@ def turn(
     waiting = deque((number, frame) for number, frame in enumerate(frames) if not frame.exists())
     drawn = len(frames) - len(waiting)
     running: dict[Future, Path] = {}
-    window = IN_FLIGHT * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+    window = IN_FLIGHT * max(1, len(connected_workers(client)))
     on_progress(Progress(drawn, len(frames)))
     try:
         while waiting or running:

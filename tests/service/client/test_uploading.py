@@ -60,12 +60,13 @@ def test_so_it_does_asynchronously(serve, large):
 
 
 def test_a_client_that_gave_up_goes_on_later(serve, large, monkeypatch):
-    monkeypatch.setattr(uploading, "TRIES", 1)
     url = serve()
-    with cutting(url, [4 * MIB]) as proxy, Client(proxy.url) as client:
+    with cutting(url, [4 * MIB]) as proxy, Client(proxy.url) as client, monkeypatch.context() as patch:
+        patch.setattr(uploading, "TRIES", 1)
         with pytest.raises(ClientError) as broken:
             client.upload(large)
         assert broken.value.upload.startswith("up-")
+    # The service may not have noticed yet; the client then tries again.
     begun = []
     with Client(url) as client:
         dataset = client.upload(large, lambda done, total: begun.append(done), resume=broken.value.upload)

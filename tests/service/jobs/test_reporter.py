@@ -56,7 +56,8 @@ def test_a_residual_that_json_cannot_hold():
     jobs = FakeJobs()
     Reporter(jobs, "job", lambda: False).report(Progress(1, 1, (Sweep(0, 1, float("nan"), 0, 2),)))
     told = {"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 0, "stage": 2, "given": True}
-    assert jobs.written[0][2] == [told | {"band_hz": None, "misfit": None, "held_out_misfit": None}]
+    waves = {"band_hz": None, "misfit": None, "held_out_misfit": None, "of_attenuation": False}
+    assert jobs.written[0][2] == [told | waves]
 
 
 def test_stop_asks_the_database_now_and_then():

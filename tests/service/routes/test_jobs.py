@@ -155,7 +155,7 @@ def test_wrong_kind(http, dataset):
     assert (body["status"], body["field"], body["accepted"]) == (
         422,
         "kind",
-        "'reconstruction' or 'refraction' or 'geometry-field'",
+        "'reconstruction' or 'simulation' or 'refraction' or 'geometry-field'",
     )
 
 
