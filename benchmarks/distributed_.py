@@ -110,7 +110,7 @@ def rendering(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Ro
     path = made_up_scan(folder / "beside.h5", elements, slices)
     picture = folder / "picture.h5"
     write_reconstruction(picture, reconstruct(cluster.client, path, Settings(nodes=nodes, sweeps=1)))
-    compute = Compute(cluster)
+    compute = Compute(cluster, lambda path: path)
     stop, taken = threading.Event(), []
     settings = Settings(nodes=nodes, sweeps=1000)
 
