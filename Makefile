@@ -19,7 +19,7 @@ help: ## list the targets
 install: .venv/.installed ## make .venv and install Bentray into it, once
 install-dev: .venv/.installed-dev ## the same with what tests and checks need
 
-demo: install ## simulate a scan, send it to a service, compare straight and bent rays (about a minute)
+demo: install ## simulate a scan, send it to a service, compare straight and bent rays (three minutes the first time)
 	@$(BIN)/bentray demo
 
 serve: install ## start the service; HOST=127.0.0.1 PORT=8000
