@@ -16,6 +16,7 @@ from bentray_workers import arrival_memory, slices
 from bentray_workers.dataset_file import read_dataset, write_dataset
 
 from ..kernels.acquisition.traces import blob_delay, scan
+from .tearing import torn_runs
 
 ELEMENTS = 16
 ALONE = Settings(
@@ -58,29 +59,11 @@ def test_cluster_and_one_process_give_what_alternating_in_memory_gives(cluster, 
         assert done[-1] == seen[-1].total
 
 
-class Torn(Exception):
-    """What takes the driver away half-way."""
-
-
 def test_a_torn_run_is_gone_on_from_to_the_same_bits(cluster, path, tmp_path):
-    reached = []
+    def go_on(tear):
+        return slices.reconstruct(cluster.client, path, PLAN, tear, work_dir=tmp_path / "work")
 
-    def go_on(patience):
-        seen = []
-
-        def tear(progress):
-            seen.append(progress.done)
-            if len(seen) > patience:
-                raise Torn
-
-        try:
-            return slices.reconstruct(cluster.client, path, PLAN, tear, work_dir=tmp_path / "work")
-        except Torn:
-            return None
-        finally:
-            reached.append(seen[0])
-
-    result = next(found for patience in (4, 5, 6, 10**6) if (found := go_on(patience)) is not None)
+    result, reached = torn_runs(go_on, (4, 5, 6))
     assert len(reached) > 2
     assert reached[-1] > 0, "something was restored"
     np.testing.assert_array_equal(result.speed, expected()[1].speed)

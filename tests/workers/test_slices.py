@@ -15,6 +15,8 @@ from bentray_workers import first_arrivals, slices
 from bentray_workers.dataset_file import write_dataset
 from bentray_workers.slices import Cancelled
 
+from .tearing import torn_runs
+
 PLAN = Settings(nodes=32, sweeps=2)
 METHODS = [PLAN, replace(PLAN, method="gauss-newton", sweeps=3)]
 OTHERS = {
@@ -139,32 +141,14 @@ def test_nothing_is_left_on_the_cluster(cluster, path, plan):
         time.sleep(0.05)
 
 
-class Torn(Exception):
-    """What takes the driver away half-way."""
-
-
 @pytest.mark.parametrize("plan", [*METHODS, *OTHERS.values()], ids=[*(p.method for p in METHODS), *OTHERS])
 def test_a_torn_run_is_gone_on_from_to_the_same_bits(cluster, scan, path, tmp_path, plan):
     expected = reconstruct_here(scan, plan)
-    reached = []
 
-    def go_on(patience):
-        """What a run gives that is torn after so many reports; None where it was."""
-        seen = []
+    def go_on(tear):
+        return slices.reconstruct(cluster.client, path, plan, tear, work_dir=tmp_path / "work")
 
-        def tear(progress):
-            seen.append(progress.done)
-            if len(seen) > patience:
-                raise Torn
-
-        try:
-            return slices.reconstruct(cluster.client, path, plan, tear, work_dir=tmp_path / "work")
-        except Torn:
-            return None
-        finally:
-            reached.append(seen[0])
-
-    result = next(found for patience in (4, 12, 8, 20, 10**6) if (found := go_on(patience)) is not None)
+    result, reached = torn_runs(go_on, (4, 12, 8, 20))
     assert reached[0] == 0
     assert reached == sorted(reached)
     assert reached[-1] > 0, "something was restored"

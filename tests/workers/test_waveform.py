@@ -15,6 +15,7 @@ from bentray_workers.dataset_file import write_dataset
 from bentray_workers.slices import Cancelled
 
 from ..kernels.wave.scans import error, scan, water
+from .tearing import torn_runs
 
 PLAN = Settings(method="waveform", nodes=32, sweeps=2, wave_bands=3, wave_emitters=5)
 HEIGHTS = np.array([0.0, 0.002])
@@ -73,32 +74,12 @@ def test_cluster_and_one_process_give_the_same_bits(cluster, path, expected):
         assert seen[-1].history == expected.history
 
 
-class Torn(Exception):
-    """What takes the driver away half-way."""
-
-
 def test_a_torn_run_is_gone_on_from_to_the_same_bits(cluster, path, tmp_path, expected):
-    reached = []
-
-    def go_on(patience):
-        """What a run gives that is torn after so many reports; None where it was."""
-        seen = []
-
-        def tear(progress):
-            seen.append(progress.done)
-            if len(seen) > patience:
-                raise Torn
-
-        try:
-            return slices.reconstruct(cluster.client, path, PLAN, tear, work_dir=tmp_path / "work")
-        except Torn:
-            return None
-        finally:
-            reached.append(seen[0])
+    def go_on(tear):
+        return slices.reconstruct(cluster.client, path, PLAN, tear, work_dir=tmp_path / "work")
 
     # While rays are tried, in the first band that is gone through, and in the last.
-    runs = (go_on(patience) for patience in (20, 120, 60, 90, 10**6))
-    result = next(found for found in runs if found is not None)
+    result, reached = torn_runs(go_on, (20, 120, 60, 90))
     assert reached == sorted(reached)
     assert reached[-1] > 0, "something was restored"
     same(result, expected)

@@ -23,13 +23,13 @@ def replacing(target: Path) -> Iterator[Path]:
     partial = target.with_name(f"{target.name}.{secrets.token_hex(4)}.partial")
     try:
         yield partial
-        _sync(partial)
+        sync(partial)
         partial.replace(target)
     except BaseException:
         with suppress(FileNotFoundError):
             partial.unlink()
         raise
-    _sync(target.parent)
+    sync(target.parent)
 
 
 def write_bytes(target: Path, content: bytes) -> None:
@@ -38,7 +38,8 @@ def write_bytes(target: Path, content: bytes) -> None:
         partial.write_bytes(content)
 
 
-def _sync(path: Path) -> None:
+def sync(path: Path) -> None:
+    """Let the content of a file, or the names in a folder, survive a power cut."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

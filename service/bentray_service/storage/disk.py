@@ -1,4 +1,4 @@
-"""What the disk has to be asked for: how much lies in a folder, and that a name survives a power cut."""
+"""How much lies in a folder."""
 
 from __future__ import annotations
 
@@ -20,12 +20,3 @@ def bytes_in(folder: Path) -> int:
     except FileNotFoundError:
         return 0
     return total
-
-
-def sync_folder(folder: Path) -> None:
-    """Make a rename in ``folder`` survive a power cut."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

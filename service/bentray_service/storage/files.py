@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import IO
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.atomic import sync
 
-from .disk import sync_folder
 from .local_store import LocalStore
 from .store import Store
 from .tenant_files import KINDS, TenantFiles
@@ -72,8 +72,8 @@ class Files:
         local = self.of(LOCAL).root
         for folder in old:
             folder.replace(local / folder.name)
-        sync_folder(local)
-        sync_folder(self.root)
+        sync(local)
+        sync(self.root)
 
     def drop_leftovers(self) -> None:
         """Remove what a dead process left half done; call it once the folder is locked."""

@@ -8,7 +8,9 @@ import shutil
 from collections.abc import Callable, Collection
 from pathlib import Path
 
-from .disk import bytes_in, sync_folder
+from bentray_workers.atomic import sync
+
+from .disk import bytes_in
 
 
 class LocalStore:
@@ -16,7 +18,7 @@ class LocalStore:
 
     def publish(self, path: Path) -> None:
         """What writes a file makes its content durable; this does so for its name."""
-        sync_folder(path.parent)
+        sync(path.parent)
 
     def bring(self, path: Path) -> Path:
         if not path.exists():

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from .disk import sync_folder
+from bentray_workers.atomic import sync
 
 
 @contextmanager
@@ -58,20 +58,15 @@ def unpack(whole: Path, told: Mapping[str, str], path: Path) -> None:
             with tarfile.open(whole) as archive:
                 archive.extractall(ready, filter="data")
             for inside in ready.iterdir():
-                _sync(inside)
-            sync_folder(ready)
+                sync(inside)
+            sync(ready)
         else:
-            _sync(whole)
+            sync(whole)
         os.utime(ready, ns=(ready.stat().st_atime_ns, int(told["mtime-ns"])))
         # A folder that lies there by now is the same: no name is ever used for anything else.
         if not path.is_dir():
             ready.replace(path)
-        sync_folder(path.parent)
+        sync(path.parent)
     finally:
         if ready is not whole:
             shutil.rmtree(ready, ignore_errors=True)
-
-
-def _sync(file: Path) -> None:
-    with file.open("rb") as handle:
-        os.fsync(handle.fileno())
