@@ -1,20 +1,26 @@
-"""The quality report of a dataset file: what was found, and a page about it."""
+"""The quality report of a dataset file: what was found, and a page; traces are read an emission at a time."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.calibration import Calibration, calibrate, water_times
-from bentray_kernels.acquisition.quality import Report, corrected, examine
+from bentray_kernels.acquisition.quality import Report, examine_slices
+from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.errors import InvalidInput
 
 from .dataset_file import Limits, read_dataset
 from .dataset_reading import NUMERIC, TRACES
 from .hdf5_reading import opened
+from .trace_reading import slice_opened
+
+# Told (emissions gone through, in all).
+Told = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -34,16 +40,19 @@ class Quality:
     examined: Report
 
 
-# Traces that a task examines while somebody waits, bytes; corrections make copies of them.
+# Traces that a task examines while somebody waits, bytes: it takes a core a part of a minute.
 LARGEST_BYTES = 2**30
 
 
-def calibrate_file(path: Path, picker: str, *, fit_speed: bool) -> tuple[Quality, Calibration | None]:
+def calibrate_file(
+    path: Path, picker: str, progress: Told | None = None, *, fit_speed: bool
+) -> tuple[Quality, Calibration | None]:
     """Examine a dataset file, and calibrate its array from the water shot of its first slice.
 
     Args:
         path: of the file.
         picker: what reads times that are not there.
+        progress: of the examination.
         fit_speed: whether the size of the array is trusted more than the speed of the water.
 
     Returns:
@@ -53,50 +62,62 @@ def calibrate_file(path: Path, picker: str, *, fit_speed: bool) -> tuple[Quality
     Raises:
         InvalidInput: as ``examine_file``, and for a scan without a water shot.
     """
-    dataset = read_dataset(path)
-    quality = _examined(dataset, picker)
+    whole = read_dataset(path, traces=False)
+    quality = _examined(path, whole, picker, progress)
     if quality.picked is None:
         return quality, None
-    right = corrected(dataset, quality.examined).slice(0)
-    found = calibrate(right, water_times(right), fit_speed=fit_speed)
+    with slice_opened(path, whole, 0) as one:
+        right = apply(one, [finding for finding in quality.examined.findings if finding.slice == 0])
+        found = calibrate(right, water_times(right), fit_speed=fit_speed)
     return replace(quality, picked=found.applied(quality.picked)), found
 
 
-def examine_file(path: Path, picker: str = "aic", largest_bytes: int | None = None) -> Quality:
+def examine_file(
+    path: Path, picker: str = "aic", progress: Told | None = None, largest_bytes: int | None = None
+) -> Quality:
     """Examine a dataset file.
 
     Args:
         path: of the file.
         picker: what reads times that are not there.
-        largest_bytes: of traces; None: as many as there are.
+        progress: called after each emission, as often as its traces are looked at.
+        largest_bytes: of traces; None: as many as there are, for they are never in memory together.
 
     Raises:
         InvalidInput: from the file, for an unknown picker, or for more traces than allowed.
     """
     if largest_bytes is not None:
         _check_size(path, largest_bytes)
-    return _examined(read_dataset(path), picker)
+    return _examined(path, read_dataset(path, traces=False), picker, progress)
 
 
-def _examined(dataset: Dataset, picker: str) -> Quality:
+def _examined(path: Path, whole: Dataset, picker: str, progress: Told | None) -> Quality:
     # Matplotlib comes with it, which the service, that only hands the task out, need not hold.
     from .images.quality_page import quality_png
 
-    examined = examine(dataset, picker)
+    examined = examine_slices(whole, _slices(path, whole), picker, progress)
     of_slices = [f.slice for f in examined.report.findings]
     worst = max(set(of_slices), key=of_slices.count, default=0)
-    page = quality_png(dataset, examined, worst)
+    with slice_opened(path, whole, worst) as one:
+        page = quality_png(one, examined, worst if whole.slice_z_m is not None else None)
     return Quality(examined.report.to_dict(), page, examined.picked, examined.report)
+
+
+def _slices(path: Path, whole: Dataset) -> Iterator[Dataset]:
+    """Each slice, its traces readable until the next is asked for."""
+    for index in range(whole.slices):
+        with slice_opened(path, whole, index) as one:
+            yield one
 
 
 def quality_report(path: Path, picker: str) -> dict[str, Any]:
     """Task: the report alone."""
-    return examine_file(path, picker, LARGEST_BYTES).report
+    return examine_file(path, picker, largest_bytes=LARGEST_BYTES).report
 
 
 def quality_page(path: Path, picker: str) -> bytes:
     """Task: the page alone."""
-    return examine_file(path, picker, LARGEST_BYTES).page
+    return examine_file(path, picker, largest_bytes=LARGEST_BYTES).page
 
 
 def _check_size(path: Path, largest_bytes: int) -> None:

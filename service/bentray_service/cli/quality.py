@@ -11,7 +11,7 @@ import typer
 
 from .endings import WorkFailed
 from .paths import input_file, output_folder
-from .terminal import AsJson, print_json, print_lines, print_table
+from .terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 
 class Water(StrEnum):
@@ -50,10 +50,11 @@ def quality(
     from bentray_workers.quality import calibrate_file, examine_file
 
     calibration = None
-    if calibrate is None:
-        found = examine_file(source, picker)
-    else:
-        found, calibration = calibrate_file(source, picker, fit_speed=calibrate is Water.fitted)
+    with progress_bar("Examining") as step:
+        if calibrate is None:
+            found = examine_file(source, picker, step)
+        else:
+            found, calibration = calibrate_file(source, picker, step, fit_speed=calibrate is Water.fitted)
     paths = {kind: folder / f"quality.{kind}" for kind in ("json", "png")}
     if found.picked is not None:
         paths["h5"] = folder / "picked.h5"

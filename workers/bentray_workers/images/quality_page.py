@@ -34,21 +34,20 @@ UNREAD = "#b8b8b8"
 NO_TIME = "no time"
 
 
-def quality_png(dataset: Dataset, examined: Examined, index: int = 0) -> bytes:
+def quality_png(one: Dataset, examined: Examined, index: int | None = None) -> bytes:
     """One page about one slice.
 
     Args:
-        dataset: as it was examined.
-        examined: its report and what goes on.
-        index: of the slice.
+        one: the slice as it was examined; its traces may be ``Emissions``.
+        examined: report of the scan and what goes on.
+        index: of the slice among several; None: there is no other.
     """
-    one = dataset.slice(index)
-    picked = None if examined.picked is None else examined.picked.slice(index)
-    findings = [f for f in examined.report.findings if f.slice == index]
+    picked = None if examined.picked is None else examined.picked.slice(index or 0)
+    findings = [f for f in examined.report.findings if f.slice == (index or 0)]
     with drawing():
         figure = new_figure(*PAGE_IN)
-        title = dataset.title or "Scan"
-        which = f", slice {index}" if dataset.slice_z_m is not None else ""
+        title = one.title or "Scan"
+        which = "" if index is None else f", slice {index}"
         figure.suptitle(f"Quality of {textwrap.shorten(title, 80)}{which}: {examined.report.verdict}")
         panels = figure.subplots(2, 3)
         emission = _loudest(one, picked)

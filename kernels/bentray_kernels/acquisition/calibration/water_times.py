@@ -29,7 +29,8 @@ def water_times(dataset: Dataset) -> Floats:
     to be.
 
     Args:
-        dataset: of one slice, channels in their places and the right way up; see ``quality``.
+        dataset: of one slice, channels in their places and the right way up; see ``quality``. Its traces may
+            be ``Emissions``.
 
     Raises:
         InvalidInput: without water traces, sampling rate, centre frequency, or a pulse.
@@ -50,11 +51,13 @@ def water_times(dataset: Dataset) -> Floats:
     wanted = np.isfinite(crest) & (distance >= NEAREST * distance.max())
     if dataset.valid is not None:
         wanted &= dataset.valid
-    for e, r in np.argwhere(wanted):
-        trace = np.asarray(dataset.waveform.water[e, r], dtype=np.float64)
-        trace = trace - np.median(trace)
-        shift = (crest[e, r] - dataset.t0_s) * rate - ahead
-        lag, likeness = match(pulse, trace, begin, end, shift, REACH * period)
-        if math.isfinite(lag) and likeness >= LEAST_LIKENESS:
-            times[e, r] = dataset.t0_s + (ahead + lag) / rate
+    for e in np.flatnonzero(wanted.any(axis=1)):
+        emission = dataset.waveform.water[e]
+        for r in np.flatnonzero(wanted[e]):
+            trace = np.asarray(emission[r], dtype=np.float64)
+            trace = trace - np.median(trace)
+            shift = (crest[e, r] - dataset.t0_s) * rate - ahead
+            lag, likeness = match(pulse, trace, begin, end, shift, REACH * period)
+            if math.isfinite(lag) and likeness >= LEAST_LIKENESS:
+                times[e, r] = dataset.t0_s + (ahead + lag) / rate
     return times

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 
@@ -43,20 +44,44 @@ def examine(
     Args:
         dataset: with traces or travel times.
         picker: what reads times that are not there.
-        progress: called with (slices done, slices in all).
+        progress: called with (emissions gone through, in all), each as often as its traces are looked at.
 
     Raises:
         InvalidInput: for an unknown picker.
     """
+    return examine_slices(dataset, (dataset.slice(k) for k in range(dataset.slices)), picker, progress)
+
+
+def examine_slices(
+    dataset: Dataset,
+    slices: Iterable[Dataset],
+    picker: str = "aic",
+    progress: Callable[[int, int], None] | None = None,
+) -> Examined:
+    """As ``examine``, of slices that are given one after the other.
+
+    Args:
+        dataset: the scan; its traces need not be there.
+        slices: all of them in order, each done with when the next is asked for; traces may be ``Emissions``.
+        picker, progress: as ``examine`` takes them.
+
+    Raises:
+        InvalidInput: as ``examine``.
+    """
     findings: list[Finding] = []
     parts: list[Dataset | None] = []
     checked: tuple[str, ...] = ()
-    for k in range(dataset.slices):
-        of_slice, part, checked = _slice(dataset.slice(k), picker)
+    numbers = count(1)
+    for k, one in enumerate(slices):
+        total = dataset.slices * len(dataset.tx) * _times_read(one)
+
+        def step(total: int = total) -> None:
+            if progress is not None:
+                progress(next(numbers), total)
+
+        of_slice, part, checked = _slice(one, picker, step)
         findings += [replace(finding, slice=k) for finding in of_slice]
         parts.append(part)
-        if progress is not None:
-            progress(k + 1, dataset.slices)
     whole = [part for part in parts if part is not None]
     picked = None
     if len(whole) == len(parts):
@@ -69,17 +94,26 @@ def examine(
     return Examined(Report(tuple(findings), checked, int(other), usable, name), picked)
 
 
-def _slice(dataset: Dataset, picker: str) -> tuple[list[Finding], Dataset | None, tuple[str, ...]]:
-    """Findings of one slice, what goes on of it, and the checks that were made."""
+def _times_read(dataset: Dataset) -> int:
+    """How often an emission of a slice is gone through: once a scan to measure it, once to pick it."""
+    if dataset.waveform is None:
+        return 0
+    return 1 + (dataset.waveform.water is not None) + (not dataset.picked)
+
+
+def _slice(
+    dataset: Dataset, picker: str, step: Callable[[], None]
+) -> tuple[list[Finding], Dataset | None, tuple[str, ...]]:
+    """Findings of one slice, what goes on of it, and the checks made; ``step`` is called after emissions."""
     findings: list[Finding] = []
     checked: tuple[str, ...] = ()
     if dataset.waveform is not None:
-        findings, checked = judged(dataset, Measured.of(dataset, range(len(dataset.tx))))
+        findings, checked = judged(dataset, Measured.of(dataset, range(len(dataset.tx)), step))
     if any(finding.action == "refused" for finding in findings):
         return findings, None, checked
     dataset = apply(dataset, findings)
     if not dataset.picked:
-        dataset = pick(dataset, picker, screened=False)
+        dataset = pick(dataset, picker, lambda done, total: step(), screened=False)
     of_times = times_judged(dataset)
     findings += of_times
     if any(finding.action == "refused" for finding in of_times):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Flags, Floats
 from ..dataset import Dataset
@@ -37,11 +38,19 @@ class Measured(NamedTuple):
     object: Measures
 
     @classmethod
-    def of(cls, dataset: Dataset, emissions: Sequence[int]) -> Measured:
-        """Of one slice with traces, which may be ``Emissions``."""
+    def of(
+        cls, dataset: Dataset, emissions: Sequence[int], done: Callable[[], None] = lambda: None
+    ) -> Measured:
+        """Of one slice with traces, which may be ``Emissions``; ``done`` is called after each of a scan."""
         assert dataset.waveform is not None
+
+        def read(traces: Any) -> Iterator[NDArray[Any]]:
+            for e in emissions:
+                yield traces[e]
+                done()
+
         received, water = (
-            None if traces is None else Measures.of((traces[e] for e in emissions), dataset)
+            None if traces is None else Measures.of(read(traces), dataset)
             for traces in (dataset.waveform.object, dataset.waveform.water)
         )
         assert received is not None
