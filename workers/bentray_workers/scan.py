@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.tomography import Problem, Settings
 from bentray_kernels.tomography.holding_out import Part, part_of
 from bentray_kernels.tomography.reconstruction import problem_of
@@ -15,7 +16,7 @@ from bentray_kernels.wave import WaveProblem, WaveSettings, prepare
 
 from .dataset_file import read_dataset
 from .findings_file import read_findings
-from .trace_reading import read_slice
+from .trace_reading import slice_opened
 
 
 class FileScan(NamedTuple):
@@ -74,5 +75,5 @@ def read_once(path: Path, stamp: int) -> Dataset:
 @lru_cache(maxsize=2)
 def _wave_problem(scan: FileWaveScan, number: int) -> WaveProblem:
     faults = read_findings(scan.findings).of_traces(scan.slice)
-    one = read_slice(scan.path, read_once(scan.path, scan.stamp), scan.slice, faults)
-    return prepare(one, scan.plan, number)
+    with slice_opened(scan.path, read_once(scan.path, scan.stamp), scan.slice) as one:
+        return prepare(apply(one, faults), scan.plan, number)

@@ -1,9 +1,9 @@
-"""The traces of one slice of a dataset file, whole or an emission at a time; how many samples they have."""
+"""The traces of one slice of a dataset file, an emission at a time; how many samples they have."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.emissions import Emissions
-from bentray_kernels.acquisition.quality import Finding
-from bentray_kernels.acquisition.quality.correction import apply
 
 from .dataset_reading import NUMERIC, TRACES, trace_type
 from .hdf5_reading import Limits, Reader, opened, refusing
@@ -38,44 +36,25 @@ def samples_in(reader: Reader) -> int:
 
 
 @contextmanager
-def slice_opened(path: Path, whole: Dataset, index: int) -> Iterator[Dataset]:
+def slice_opened(
+    path: Path, whole: Dataset, index: int, poll: Callable[[], None] = lambda: None
+) -> Iterator[Dataset]:
     """One slice with its traces as ``Emissions``: what is asked for is read, as long as the context lasts.
 
     Args:
         path: of the HDF5 file.
         whole: the dataset as it was read without its traces.
         index: of the slice, from 0.
+        poll: called whenever an emission is asked for; may raise.
 
     Raises:
         InvalidInput: as ``read_dataset``; while traces are read for those that are damaged.
     """
     with opened(path, Limits()) as reader:
         stacked = whole.slice_z_m is not None
-        kept = partial(_emissions, reader, index=index if stacked else None)
+        kept = partial(_emissions, reader, poll=poll, index=index if stacked else None)
         waveform = _waveform(reader, whole, index, kept)
         yield replace(whole.slice(index), waveform=waveform)
-
-
-def read_slice(path: Path, whole: Dataset, index: int, faults: Iterable[Finding]) -> Dataset:
-    """One slice with its traces in memory, and their faults corrected.
-
-    Args:
-        path, whole, index: as ``slice_opened`` takes them.
-        faults: what ``acquisition.quality`` found in the traces of the slice.
-
-    Raises:
-        InvalidInput: as ``slice_opened``.
-    """
-    with slice_opened(path, whole, index) as opened_slice:
-        one = apply(opened_slice, faults)
-        if one.waveform is None:
-            return one
-        whole_traces = {
-            name: np.asarray(getattr(one.waveform, name))
-            for name in ("object", "water")
-            if getattr(one.waveform, name) is not None
-        }
-        return replace(one, waveform=replace(one.waveform, **whole_traces))  # type: ignore[arg-type]
 
 
 def _waveform(reader: Reader, whole: Dataset, index: int, read: Callable[[str], Any]) -> Waveform | None:
@@ -97,7 +76,7 @@ def _waveform(reader: Reader, whole: Dataset, index: int, read: Callable[[str], 
     return Waveform(received, water, 1.0 if scale is None else scale, *of_slice)
 
 
-def _emissions(reader: Reader, path: str, *, index: int | None) -> Emissions | None:
+def _emissions(reader: Reader, path: str, *, poll: Callable[[], None], index: int | None) -> Emissions | None:
     """The traces of a path, of one slice unless ``index`` is None."""
     stored = reader.checked(path, NUMERIC, TRACES)
     if stored is None:
@@ -113,5 +92,10 @@ def _emissions(reader: Reader, path: str, *, index: int | None) -> Emissions | N
             found = stored[some] if index is None else stored[index, some]
         return trace_type(path, found)
 
+    def emission(e: int) -> NDArray[Any]:
+        poll()
+        found: NDArray[Any] = rows(e // block)[e % block]
+        return found
+
     dtype = trace_type(path, np.zeros(1, dtype=stored.dtype)).dtype
-    return Emissions.of(lambda e: rows(e // block)[e % block], stored.shape[-3:], dtype)
+    return Emissions.of(emission, stored.shape[-3:], dtype)

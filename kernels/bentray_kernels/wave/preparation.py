@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
-from ..acquisition import Dataset
-from ..arrays import Floats, Ints
+import numpy as np
+from numpy.typing import NDArray
+
+from ..acquisition import Dataset, Waveform
+from ..arrays import Flags, Ints
 from ..errors import InvalidInput
 from ..tomography.roi import inside
 from .extent import Extent
@@ -19,6 +22,9 @@ from .sounding import Mapping, WaterShots, levelled, sounded
 def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mapping = map) -> WaveProblem:
     """The problem of a slice in band ``number``, its wavelet and its water's phase read from water shots.
 
+    It holds the object's traces of the emitters that the band uses, no others and none of the water: traces
+    given as ``acquisition.emissions.Emissions`` are read one emission at a time.
+
     Args:
         dataset: one slice with traces of object and water.
         settings: how to refine.
@@ -27,7 +33,7 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mappi
 
     Raises:
         InvalidInput: for a dataset that lacks one of the above or, where it is asked for, a region of
-            interest; with all emitters held out, or no node inside the array.
+            interest; with all emitters held out, no node inside the array, or traces of zeros alone.
     """
     recorded = dataset.waveform
     if recorded is None or recorded.water is None or dataset.sampling_rate_hz is None:
@@ -55,8 +61,17 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mappi
         recorded.scale * (np.ones(recorded.object.shape[:2]) if factor is None else factor)
         for factor in (recorded.object_scale, recorded.water_scale)
     )
-    weight = _weight(dataset, settings) * (np.isfinite(gain) & np.isfinite(water_gain))
-    used, held = _drawn(np.flatnonzero(weight.any(axis=1)), settings, number)
+    use = dataset.distance_m() >= settings.nearest_m
+    use &= np.isfinite(gain) & np.isfinite(water_gain)
+    if dataset.valid is not None:
+        use &= dataset.valid
+    used, held = _drawn(np.flatnonzero(use.any(axis=1)), settings, number)
+    traces, use = _alive(recorded, use, np.concatenate((used, held)))
+    used, held = (some[use[some].any(axis=1)] for some in (used, held))
+    if used.size == 0:
+        raise InvalidInput(
+            "waveform/object, waveform/water", "zeros alone", "traces of both for some emitters"
+        )
     problem = WaveProblem(
         band=band,
         emitters=flat[dataset.tx] - origin,
@@ -67,9 +82,9 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mappi
         wavelet=np.zeros(clock.steps),
         water=Water(dataset.water_speed_mps),
         likeness=0.0,
-        weight=weight,
+        weight=use.astype(np.float64),
         arrival_s=dataset.distance_m() / dataset.water_speed_mps,
-        traces=recorded.object,
+        traces=traces,
         gain=gain,
         sampler=np.empty((0, 0), dtype=np.float32),
         used=used,
@@ -81,16 +96,18 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mappi
     return found if band.of == "speed" else levelled(found, shots)
 
 
-def _weight(dataset: Dataset, settings: WaveSettings) -> Floats:
-    """(ntx, nrx): 1 for the pairs to use: valid, far enough, neither of their traces dead."""
-    assert dataset.waveform is not None
-    assert dataset.waveform.water is not None
-    use = dataset.distance_m() >= settings.nearest_m
-    if dataset.valid is not None:
-        use &= dataset.valid
-    for traces in (dataset.waveform.object, dataset.waveform.water):
-        use &= (traces != 0).any(axis=-1)
-    return use.astype(np.float64)
+def _alive(recorded: Waveform, use: Flags, emitters: Ints) -> tuple[dict[int, NDArray[Any]], Flags]:
+    """The object's traces of some emitters, and (ntx, nrx) the pairs to use without those of dead traces.
+
+    The traces are copies, for an emission that is read may be part of a larger block.
+    """
+    assert recorded.water is not None
+    found, use = {}, use.copy()
+    for emitter in np.sort(emitters).tolist():
+        found[emitter] = recorded.object[emitter].copy()
+        for traces in (found[emitter], recorded.water[emitter]):
+            use[emitter] &= (traces != 0).any(axis=-1)
+    return found, use
 
 
 def _drawn(sounding: Ints, settings: WaveSettings, number: int) -> tuple[Ints, Ints]:

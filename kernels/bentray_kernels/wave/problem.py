@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,7 +33,7 @@ class WaveProblem:
         likeness: mean correlation of simulated with recorded water shots.
         weight: (ntx, nrx), 1 for the pairs that are used, else 0.
         arrival_s: (ntx, nrx), predicted, s.
-        traces: (ntx, nrx, nt), as recorded.
+        traces: of the object by emitter, (nrx, nt) each, as recorded; of those used and held.
         gain: (ntx, nrx), pressure per count of each trace; for the attenuation such that the water shots of
             each pair have the amplitude that is simulated.
         sampler: (nt, steps), see ``resampler``.
@@ -51,7 +52,7 @@ class WaveProblem:
     likeness: float
     weight: Floats
     arrival_s: Floats
-    traces: NDArray[Any]
+    traces: Mapping[int, NDArray[Any]]
     gain: Floats
     sampler: NDArray[np.float32]
     used: Ints

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..acquisition.emissions import Emissions
 from ..arrays import Floats, Ints
 from .misfits import correlation
 from .problem import WaveProblem
@@ -35,13 +36,13 @@ class WaterShots:
     """The scan without the object.
 
     Attributes:
-        traces: (ntx, nrx, nt), as recorded.
+        traces: (ntx, nrx, nt), as recorded; in memory, or read an emission at a time.
         gain: (ntx, nrx), pressure per count of each trace.
         samples_s: (nt,), times of the samples, s.
         reach_s: (before, after) the arrival in water that traces are compared within, s.
     """
 
-    traces: NDArray[Any]
+    traces: NDArray[Any] | Emissions
     gain: Floats
     samples_s: Floats
     reach_s: tuple[float, float]
@@ -58,7 +59,7 @@ def sounded(problem: WaveProblem, shots: WaterShots, run: Mapping) -> WaveProble
         return best
     medium = problem.medium(np.full(problem.region.shape, problem.water.speed))
     model = simulate(medium, problem.emitters[shot], problem.receivers[heard], best.wavelet)
-    recorded = shots.traces[shot][heard] @ best.sampler
+    recorded = np.asarray(shots.traces[shot][heard] @ best.sampler, dtype=np.float64)
     water = fitted(problem.water, distance[heard], model, recorded, problem.clock.step_s)
     if max(abs(water.lead + water.bend * f**2) for f in (band.low_hz, band.high_hz)) > FARTHEST:
         return best

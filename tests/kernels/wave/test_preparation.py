@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bentray_kernels.acquisition.emissions import Emissions
 from bentray_kernels.acquisition.truth import Truth
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.wave.preparation import prepare
@@ -61,6 +62,44 @@ def test_dead_traces_and_near_pairs_are_left_out():
     assert 7 not in problem.heard(3)
     distance = data.distance_m()
     assert not (problem.weight * (distance < 0.012)).any()
+
+
+def test_no_other_emissions_are_read_than_the_band_uses():
+    data, read = scan(), []
+
+    def lazily(traces):
+        def one(emitter):
+            read.append(emitter)
+            return traces[emitter]
+
+        return Emissions.of(one, traces.shape, traces.dtype)
+
+    recorded = data.waveform
+    apart = replace(recorded, object=lazily(recorded.object), water=lazily(recorded.water))
+    settings = replace(SETTINGS, bands=(replace(SETTINGS.bands[0], emitters=3),), held_out=2)
+    found, expected = (prepare(replace(data, waveform=one), settings, 0) for one in (apart, recorded))
+    drawn = {*found.used.tolist(), *found.held.tolist()}
+    assert set(read) == set(found.traces) == drawn
+    assert len(drawn) == 5
+    assert np.array_equal(found.wavelet, expected.wavelet)
+    assert np.array_equal(
+        found.recorded(int(found.held[0]), np.arange(24)), expected.recorded(0, np.arange(24))
+    )
+    # What is kept is no part of a block of emissions.
+    assert all(traces.base is None for traces in found.traces.values())
+
+
+def test_dead_emitters_are_not_used():
+    data = scan()
+    whole = prepare(data, SETTINGS, 0)
+    dead = [int(whole.used[1]), int(whole.held[2])]
+    traces = data.waveform.object.copy()
+    traces[dead] = 0.0
+    found = prepare(replace(data, waveform=replace(data.waveform, object=traces)), SETTINGS, 0)
+    assert sorted({*whole.used, *whole.held} - {*found.used, *found.held}) == sorted(dead)
+    silent = replace(data, waveform=replace(data.waveform, water=np.zeros_like(traces)))
+    with pytest.raises(InvalidInput, match="waveform/object, waveform/water: found zeros alone"):
+        prepare(silent, SETTINGS, 0)
 
 
 def test_gains_of_traces_are_used():
