@@ -119,7 +119,7 @@ def test_the_choice_is_told_in_a_sentence(changes, decomposition, words):
 
 def test_traces_are_planned_for():
     heard = Traces(256, 256, 12_000, 2, 5e7, 2.5e6, 1500.0)
-    scan = replace(RING, traces=heard, traces_bytes=2 * heard.object_bytes)
+    scan = replace(RING, traces=heard, traces_bytes=2 * heard.bytes_of(heard.emissions))
     found = plan(scan, Settings(nodes=64), [])
     assert {"measure", "judge", "read", "settle", "join"} < set(found.call_bytes)
     assert found.tasks > plan(RING, Settings(nodes=64), []).tasks + 2 * 64

@@ -9,13 +9,16 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from benchmarks._peak_memory import peak
 from call_memory import held
+from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.acquisition.emissions import Emissions
 from bentray_kernels.acquisition.simulation import Ring
 from bentray_kernels.tomography import Settings
 from bentray_kernels.wave import chain as waves
@@ -41,13 +44,22 @@ def scan(elements: int, samples: int) -> Dataset:
     positions = ring + SPACING_M * half
     shot = simulate(medium, positions[0], positions, wavelet)[:, ::FINER].astype(np.float32)
     every = np.arange(elements)
-    traces = np.stack([np.roll(shot, k, axis=0) for k in every])
+
+    def read() -> Emissions:
+        """As from a file with all emissions in one chunk."""
+
+        @lru_cache(maxsize=1)
+        def block() -> NDArray[np.float32]:
+            return np.stack([np.roll(shot, k, axis=0) for k in every])
+
+        return Emissions.of(lambda e: block()[e], (elements, elements, samples), shot.dtype)
+
     return Dataset(
         ring,
         every,
         every,
         WATER,
-        waveform=Waveform(traces, traces.copy()),
+        waveform=Waveform(read(), read()),  # type: ignore[arg-type]
         center_frequency_hz=CENTRE_HZ,
         sampling_rate_hz=RATE_HZ,
     )
@@ -59,21 +71,21 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     number = len(plan.bands) - 1
     start = Image(np.full((32, 32), WATER), 2.2 * RADIUS_M / 31, (-1.1 * RADIUS_M, -1.1 * RADIUS_M))
     nothing = peak(lambda: None)
-    assert dataset.waveform is not None
-    traces = held(dataset.waveform.object, dataset.waveform.water)
     fresh = Here(dataset, plan)
-    found = {"enter": traces + peak(lambda: waves.enter(fresh, number, start)) - nothing}
+    # Measured first, for what was read once stays.
+    found = {"enter": peak(lambda: waves.enter(fresh, number, start)) - nothing}
     here = Here(dataset, plan)
     entered = waves.enter(here, number, start)
     assert entered is not None
-    # As ``held`` counts the problem, which holds the traces of the object.
+    # As ``held`` counts the problem, and the traces that it holds.
     problem = here.problem(number)
+    nothing = peak(lambda: None)
     image, model = entered.state.image, entered.model
 
     def look() -> waves.Look:
         return waves.look_at_waves(here, number, model, 0)
 
-    kept = held(problem)
+    kept = held(problem, list(problem.traces.values()))
     found["look_at_waves"] = kept + held(model) + peak(look) - nothing
     looks = [look()] * entered.emitters
     random = np.random.default_rng(0)

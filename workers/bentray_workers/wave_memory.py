@@ -13,6 +13,8 @@ from bentray_kernels.wave.asked import check_traces
 from bentray_kernels.wave.extent import Extent
 from bentray_kernels.wave.sounding import SHOTS
 
+from .trace_reading import BLOCK_BYTES
+
 # Python's own part of any call.
 FLOOR_BYTES = 11 * 2**20 // 2
 
@@ -45,10 +47,14 @@ class Traces:
     frequency_hz: float
     water_mps: float
 
+    def bytes_of(self, emissions: int) -> int:
+        """Of the object's traces of some emissions of one slice, all at most."""
+        return min(emissions, self.emissions) * self.receivers * self.samples * self.sample_bytes
+
     @property
-    def object_bytes(self) -> int:
-        """Of the object's traces in one slice."""
-        return self.emissions * self.receivers * self.samples * self.sample_bytes
+    def read_bytes(self) -> int:
+        """Of what is read at once of object or water: an emission, or those that share chunks with it."""
+        return max(self.bytes_of(1), min(self.bytes_of(self.emissions), BLOCK_BYTES))
 
 
 def plan_of(traces: Traces, settings: Settings) -> tuple[Band, ...]:
@@ -95,14 +101,14 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
     extent = Extent.of(band, 0.5 * width_m, record_s, settings.speed_bounds_mps[1])
     image, padded = 8 * extent.nodes**2, extent.padded**2
     samples = traces.receivers * extent.steps
-    # What a process keeps of a problem: recorded traces, and what takes them to the simulator's time.
-    kept = traces.object_bytes + 4 * traces.samples * extent.steps
     looks = band.emitters + WaveSettings((band,)).held_out
+    # What a process keeps of a problem: traces of its emitters, what takes them to the simulator's time.
+    kept = traces.bytes_of(looks) + 4 * traces.samples * extent.steps
     base = FLOOR_BYTES + kept
     medium = MEDIUM_BYTES * padded
     return {
         "enter": base
-        + traces.object_bytes
+        + 2 * traces.read_bytes
         + max(SAMPLER_BYTES * traces.samples * extent.steps, SHOTS * SHOT_BYTES * samples)
         + medium
         + 12 * image,
