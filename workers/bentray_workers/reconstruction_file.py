@@ -17,9 +17,8 @@ from bentray_kernels.tomography import RESIDUAL_EDGES_S, Reconstruction, Setting
 from .dataset_writing import write_array
 from .hdf5_reading import Limits, Reader, opened
 from .hdf5_writing import creating
+from .reconstruction_format import FORMAT, VERSION
 
-FORMAT = "bentray-reconstruction"
-VERSION = "1.0"
 HISTORY = {
     "slice": np.int64,
     "sweep": np.int64,

@@ -17,8 +17,7 @@ from .hdf5_reading import SIGNATURE, Limits, opened, printable
 from .nifti_reading import read_nifti
 from .npy_headers import PARSING
 from .nrrd_reading import read_nrrd
-from .reconstruction_file import FORMAT as RECONSTRUCTION
-from .reconstruction_file import read_reconstruction
+from .reconstruction_format import FORMAT as RECONSTRUCTION
 from .volume_file import FORMAT, Volume, volume_in
 
 ACCEPTED = "a volume as NumPy (.npy), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype"
@@ -146,6 +145,9 @@ def _hdf5(path: Path, check: ShapeCheck) -> Volume:
             return volume_in(reader)
     if kind != RECONSTRUCTION:
         raise InvalidInput("@format", repr(kind), f'"{FORMAT}" or "{RECONSTRUCTION}"')
+    # It loads compiled code, and each upload starts a process.
+    from .reconstruction_file import read_reconstruction
+
     result = read_reconstruction(path, limits=limits)
     return Volume.of(result.speed, result.spacing_m, result.origin_m, "Speed of sound, m/s")
 

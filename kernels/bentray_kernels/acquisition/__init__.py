@@ -1,8 +1,22 @@
 """What a ring scanner recorded, and the first arrivals read from it."""
 
+from typing import TYPE_CHECKING
+
 from .dataset import Dataset, Truth, Waveform
-from .picking import PICKERS, pick
 from .water import speed_from_temperature, temperature_from_speed
+
+if TYPE_CHECKING:
+    from .picking import PICKERS, pick
+else:
+
+    def __getattr__(name: str) -> object:
+        """Picking is compiled and slow to load; each upload starts a process that needs none of it."""
+        if name not in ("PICKERS", "pick"):
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from . import picking
+
+        return getattr(picking, name)
+
 
 __all__ = [
     "PICKERS",

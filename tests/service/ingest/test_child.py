@@ -2,6 +2,9 @@
 
 import errno
 
+import subprocess
+import sys
+
 import h5py
 import numpy as np
 import pytest
@@ -91,3 +94,15 @@ def test_text_from_a_file_is_printable_and_short(value):
     assert len(clean) <= LONGEST_TEXT
     assert clean.isprintable()
     clean.encode()
+
+
+def test_the_readers_of_scans_and_volumes_load_nothing_compiled():
+    """Each upload starts a process: Numba and SciPy would take most of its time."""
+    readers = [child.READERS[what] for what in ("dataset", "volume")]
+    code = (
+        "import importlib, sys\n"
+        f"for name in {readers!r}: importlib.import_module(name)\n"
+        "print(*sorted({'numba', 'scipy', 'distributed'} & set(sys.modules)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
