@@ -1,7 +1,6 @@
 """The ingest process: what it says of a file."""
 
 import errno
-
 import subprocess
 import sys
 
