@@ -22,7 +22,8 @@ def summary_of(path: Path, settings: Settings) -> Summary:
 
     Args:
         path: of the HDF5 file.
-        settings: with ``reciprocity``, elements that only send or only receive do both.
+        settings: with ``reciprocity``, elements that only send or only receive do both; and whether amplitudes
+            are read from traces.
 
     Raises:
         InvalidInput: for a file without positions, emitters or receivers.
@@ -48,8 +49,8 @@ def summary_of(path: Path, settings: Settings) -> Summary:
         in_space=position.shape[1] == 3,
         height_m=float(np.ptp(heights)),
         width_m=float(np.ptp(position[:, :2], axis=0).max()),
-        traces_bytes=0 if times else traces,
-        amplitudes=amplitudes,
+        traces_bytes=0 if times and not settings.listens else traces,
+        amplitudes=amplitudes or settings.listens,
         traces=waves,
         period=frequency is not None,
     )

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.amplitudes import read_log_ratios
 from bentray_kernels.acquisition.picking import reach_of, read_times, require_traces, settled
 from bentray_kernels.acquisition.quality import Finding
 from bentray_kernels.acquisition.quality.correction import apply, stacked
@@ -66,18 +67,33 @@ class Guide(NamedTuple):
         return read_findings(self.findings).of_traces(index)
 
 
+class Heard(NamedTuple):
+    """What the traces of some emissions gave, (emissions, nrx) each.
+
+    Attributes:
+        delta, sigma: s.
+        ratio: Np; None where amplitudes are not wanted.
+    """
+
+    delta: Floats
+    sigma: Floats
+    ratio: Floats | None
+
+
 class Source(NamedTuple):
     """The scan as calls know it; ``stamp`` tells a rewritten file from the old one.
 
     Attributes:
         picker: what reads the times of a scan without them.
         examine: whether the scan is examined first.
+        amplitudes: where they come from, see ``Settings``.
     """
 
     path: Path
     stamp: int
     picker: str
     examine: bool
+    amplitudes: str = "recorded"
 
     @property
     def dataset(self) -> Dataset:
@@ -89,6 +105,11 @@ class Source(NamedTuple):
         """Whether times are examined: nothing but the period tells how far two neighbours may differ."""
         return self.examine and self.dataset.center_frequency_hz is not None
 
+    @property
+    def listens(self) -> bool:
+        """Whether amplitudes are read from the traces."""
+        return self.amplitudes != "recorded"
+
     @contextmanager
     def slice(self, index: int, findings: Sequence[Finding] = ()) -> Iterator[Dataset]:
         """One slice with traces that are read as they are asked for, and what was found corrected."""
@@ -99,7 +120,8 @@ class Source(NamedTuple):
 class Arrivals:
     """The calls that make ``Files``, in this process or on a cluster.
 
-    Of a scan with times of its own these alone are examined, see ``Source.examines``.
+    Of a scan with times of its own these alone are examined, see ``Source.examines``; its traces are read
+    where amplitudes are wanted from them.
 
     Args:
         source: the scan.
@@ -107,7 +129,7 @@ class Arrivals:
         guide: of a scan without times that was picked before: what the new times are sought by.
 
     Raises:
-        InvalidInput: for a scan without times from which none can be read.
+        InvalidInput: for a scan without times from which none can be read, or without the amplitudes.
     """
 
     def __init__(self, source: Source, files: Files, guide: Guide | None = None) -> None:
@@ -115,7 +137,7 @@ class Arrivals:
         dataset = source.dataset
         self._slices = range(dataset.slices)
         self._parts: list[range] = []
-        if not dataset.picked:
+        if source.listens or not dataset.picked:
             with source.slice(0) as one:
                 require_traces(one)
             self._parts = parts_of(len(dataset.tx), trace_samples(source.path) * len(dataset.rx))
@@ -126,7 +148,7 @@ class Arrivals:
         """Calls to begin with."""
         if not self._parts:
             return [Call(settle, (self._source, k, (), []), keep=True) for k in self._slices]
-        if self._guide or not self._source.examine:
+        if self._guide or not self._source.examine or self._source.dataset.picked:
             return [call for k in self._slices for call in self._reading(k)]
         return [
             Call(measure, (self._source, k, part), keep=True) for k in self._slices for part in self._parts
@@ -178,25 +200,35 @@ def judge(source: Source, index: int, parts: list[Measured]) -> tuple[Finding, .
 
 def read(
     source: Source, index: int, findings: tuple[Finding, ...], guide: Guide | None, part: range
-) -> tuple[Floats, Floats]:
-    """Call: the times of some emissions with their deviations."""
+) -> Heard:
+    """Call: the times of some emissions with their deviations, and amplitudes where these are wanted."""
     with source.slice(index, findings) as one:
-        if guide is None:
-            predicted = np.full((len(one.tx), len(one.rx)), np.nan)
+        if one.picked:
+            delta = one.differential_tof()[part.start : part.stop]
+            sigma = np.full_like(delta, np.nan)
         else:
-            predicted = guide.predicted(one, index, part)
-        return read_times(one, part, source.picker, predicted, reach_of(one, source.picker))
+            if guide is None:
+                predicted = np.full((len(one.tx), len(one.rx)), np.nan)
+            else:
+                predicted = guide.predicted(one, index, part)
+            delta, sigma = read_times(one, part, source.picker, predicted, reach_of(one, source.picker))
+        ratio = read_log_ratios(one, part, delta, source.amplitudes) if source.listens else None
+        return Heard(delta, sigma, ratio)
 
 
 def settle(
-    source: Source, index: int, findings: tuple[Finding, ...], parts: list[tuple[Floats, Floats]]
+    source: Source, index: int, findings: tuple[Finding, ...], parts: list[Heard]
 ) -> tuple[Dataset, tuple[Finding, ...]]:
     """Call: one slice as it goes on, without traces, and all that was found in it."""
     one = apply(source.dataset.slice(index), findings)
-    if parts:
-        delta, sigma = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+    if parts and not one.picked:
+        delta, sigma = (np.concatenate(rows) for rows in zip(*(part[:2] for part in parts), strict=True))
         delta, sigma = settled(one, delta, sigma, screened=not source.examine)
         one = replace(one, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=source.picker)
+    if source.listens:
+        ratio = np.concatenate([part.ratio for part in parts if part.ratio is not None])
+        ratio = np.where(np.isfinite(one.differential_tof()), ratio, np.nan)
+        one = replace(one, log_ratio_np=ratio, amplitude_frequency_hz=one.center_frequency_hz)
     if source.examines:
         later = _accepted(source, index, times_judged(one))
         one, findings = apply(one, later), (*findings, *later)
@@ -207,7 +239,7 @@ def join(source: Source, files: Files, slices: list[tuple[Dataset, tuple[Finding
     """Call: write what goes on, unless it is what the file has anyway, and then all findings."""
     whole = source.dataset
     findings = tuple(replace(finding, slice=k) for k, (_, found) in enumerate(slices) for finding in found)
-    changed = not whole.picked or any(finding.action != "reported" for finding in findings)
+    changed = source.listens or not whole.picked or any(finding.action != "reported" for finding in findings)
     if changed:
         parts = [one for one, _ in slices]
         shown = parts[0] if whole.slice_z_m is None else stacked(whole, parts)

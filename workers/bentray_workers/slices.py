@@ -95,7 +95,8 @@ def _guided(
     Also how to go on: what ``auto`` chose for the first image holds for all, so that the settings of the
     result make it again.
     """
-    source = Source(job.scan, job.scan.stat().st_mtime_ns, settings.picker, settings.examine)
+    amplitudes = settings.amplitudes if settings.listens else "recorded"
+    source = Source(job.scan, job.scan.stat().st_mtime_ns, settings.picker, settings.examine, amplitudes)
     path, found = _arrived(job, source, Files.of(job.folder), None)
     rounds = 0 if source.dataset.picked else settings.guided_rounds
     rays = replace(

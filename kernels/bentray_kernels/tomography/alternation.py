@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..acquisition import Dataset, pick
+from ..acquisition.amplitudes import with_log_ratios
 from ..arrays import Floats
 from ..errors import InvalidInput
 from .gauss_newton import look
@@ -48,17 +49,26 @@ def alternate(
     """
     if rounds < 0:
         raise InvalidInput("rounds", rounds, "a number >= 0")
-    picked = pick(dataset, settings.picker)
+    picked = _listened(dataset, pick(dataset, settings.picker), settings)
     result = reconstruct(picked, settings, progress)
     for _ in range(rounds):
         expected = predicted_delta(picked, result)
         again = pick(dataset, settings.picker, predicted_s=expected, reach_s=reach_s)
+        again = _listened(dataset, again, settings)
         settled = same_picks(picked, again)
         picked = again
         if settled:
             break
         result = reconstruct(picked, settings, progress)
     return picked, result
+
+
+def _listened(dataset: Dataset, picked: Dataset, settings: Settings) -> Dataset:
+    """What was picked, with the amplitudes that the settings want from the traces."""
+    if not settings.listens:
+        return picked
+    heard = with_log_ratios(replace(picked, waveform=dataset.waveform), settings.amplitudes)
+    return replace(heard, waveform=None)
 
 
 def predicted_delta(dataset: Dataset, result: Reconstruction) -> Floats:

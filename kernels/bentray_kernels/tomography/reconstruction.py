@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..acquisition import Dataset
+from ..acquisition.amplitudes import with_log_ratios
 from ..arrays import Floats
 from ..errors import InvalidInput
 from . import pairs
@@ -40,7 +41,8 @@ def reconstruct(
     """Reconstruct every slice of a dataset one after the other, or its volume.
 
     Args:
-        dataset: with travel times, for ``method`` waveform beside the traces that they were picked from.
+        dataset: with travel times, for ``method`` waveform beside the traces that they were picked from. From
+            traces come amplitudes too where the settings want that; without traces they have been read.
         settings: see ``Settings``.
         progress: called after each batch of emitters.
 
@@ -59,6 +61,9 @@ def reconstruct(
                 waiting = chain.after(call, call.function(*call.arguments)) + waiting
                 if progress is not None:
                     progress(measured(chains, before, after))
+
+    if settings.listens and dataset.waveform is not None:
+        dataset = with_log_ratios(dataset, settings.amplitudes)
 
     def waves_of(plan: WaveSettings, index: int) -> WaveScan:
         from ..wave.continuation import Here as WavesHere

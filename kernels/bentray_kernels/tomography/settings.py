@@ -20,6 +20,7 @@ DEVIATION = "deviation"
 DECOMPOSITIONS = ("slices", "volume")
 PENALTIES = ("total-variation", "laplacian", "tikhonov")
 SPEED_UPDATES = ("fixed", "data-driven")
+AMPLITUDES = ("recorded", "ratio", "spectrum")
 WAVE_MISFITS = ("correlation", "least-squares")
 LEAST_NODES = 16
 WAVE_BANDS = 4
@@ -84,8 +85,12 @@ class Settings:
             ``acquisition.quality``. A scan that must not be used is refused. It says what it found.
         guided_rounds: how often, where only traces were uploaded, times are read again about those that the
             image of the rays predicts; fewer once they stay. For slices; see ``alternation``.
-        attenuation: reconstruct it too, where amplitudes were recorded; with ``waveform`` from the traces,
+        attenuation: reconstruct it too, where there are amplitudes; with ``waveform`` from the traces,
             once the speed is refined. Experimental there.
+        amplitudes: where they come from: ``recorded`` takes those of the file (``amplitude/log_ratio_np``);
+            ``ratio`` reads from the traces how much lower the first pulse is than in water; ``spectrum`` how
+            much more its high frequencies have lost than its low ones, which focusing and spreading leave
+            alone, but which only loss in proportion to the frequency shows. See ``acquisition.amplitudes``.
         focusing: take off the amplitudes what refraction does to them, by the spreading of ray tubes in the
             speed image; needs its frequency (``amplitude@frequency_hz``). Experimental.
         resolution_check: also tell how much of a checkerboard the rays recover, node by node.
@@ -139,6 +144,7 @@ class Settings:
     examine: bool = True
     guided_rounds: int = 0
     attenuation: bool = True
+    amplitudes: Literal["recorded", "ratio", "spectrum"] = "recorded"
     focusing: bool = False
     resolution_check: bool = False
     wave_bands: int = 4
@@ -155,6 +161,9 @@ class Settings:
         _one_of("picker", self.picker, tuple(PICKERS))
         _one_of("decomposition", self.decomposition, DECOMPOSITIONS)
         _one_of("penalty", self.penalty, PENALTIES)
+        _one_of("amplitudes", self.amplitudes, AMPLITUDES)
+        if self.amplitudes == "spectrum" and self.focusing:
+            raise InvalidInput("focusing", True, "false, with amplitudes spectrum, which have none in them")
         _one_of("wave_misfit", self.wave_misfit, WAVE_MISFITS)
         _speeds("speed_bounds_mps", self.speed_bounds_mps)
         if self.speed_range_mps is not None:
@@ -208,6 +217,11 @@ class Settings:
     def tries(self) -> bool:
         """Whether rays and method are chosen by trials."""
         return self.method in ("auto", "waveform")
+
+    @property
+    def listens(self) -> bool:
+        """Whether amplitudes are read from traces."""
+        return self.attenuation and self.amplitudes != "recorded"
 
     @property
     def front(self) -> str:

@@ -76,3 +76,11 @@ def blob_delay(elements: int) -> np.ndarray:
     inside = np.exp(-((np.linalg.norm(path, axis=-1) / 0.02) ** 4)).mean(axis=0)
     distance = np.linalg.norm(place[:, None] - place[None], axis=-1)
     return np.asarray(inside * distance * (1.0 / 1450.0 - 1.0 / WATER_MPS))
+
+
+def absorbed(traces: np.ndarray, loss_np: np.ndarray, rate_hz: float, frequency_hz: float) -> np.ndarray:
+    """Traces (..., nt) that have lost ``loss_np``, (...), at that frequency, and at others in proportion."""
+    length = 4 * traces.shape[-1]
+    part = np.fft.rfftfreq(length, 1.0 / rate_hz) / frequency_hz
+    left = np.fft.rfft(traces, length) * np.exp(-loss_np[..., None] * part)
+    return np.asarray(np.fft.irfft(left, length)[..., : traces.shape[-1]])
