@@ -9,8 +9,10 @@ HOST ?= 127.0.0.1
 PORT ?= 8000
 NAME ?= reconstruction
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# Tests and jobs start some hundred Pythons: each would compile all our sources anew.
+unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install install-dev demo test serve lint docs bench lock clean
+.PHONY: help install install-dev install-docs demo test serve lint docs bench lock clean
 
 help: ## list the targets
 	@echo "Bentray: make TARGET"
@@ -18,6 +20,7 @@ help: ## list the targets
 
 install: .venv/.installed ## make .venv and install Bentray into it, once
 install-dev: .venv/.installed-dev ## the same with what tests and checks need
+install-docs: .venv/.installed-docs ## the same with what builds the pages
 
 demo: install ## simulate a scan, send it to a service, compare straight and bent rays (three minutes the first time)
 	@$(BIN)/bentray demo
@@ -26,7 +29,7 @@ serve: install ## start the service; HOST=127.0.0.1 PORT=8000
 	@$(BIN)/bentray serve --host $(HOST) --port $(PORT)
 
 test: install-dev ## run the tests, up to four files at once; ARGS="tests/kernels -x" narrows them
-	@$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(ARGS)
+	@$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 lint: install-dev ## check style, types and the import rules
 	$(BIN)/ruff check .
@@ -34,7 +37,7 @@ lint: install-dev ## check style, types and the import rules
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 
-docs: .venv/.installed-docs ## build the pages of docs/ into build/docs; a warning is an error
+docs: install-docs ## build the pages of docs/ into build/docs; a warning is an error
 	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
 	@echo "The documentation: build/docs/index.html"
 

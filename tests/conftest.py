@@ -1,15 +1,30 @@
-"""What tests of several packages share: figures that were drawn, and a PostgreSQL server."""
+"""What tests of several packages share: their order, figures that were drawn, and a PostgreSQL server."""
 
 from __future__ import annotations
 
 import secrets
+from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from . import postgresql
+
+# A test marked slow takes about as long as so many others.
+SLOW = 80
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Where files are shared out over processes the long ones come first, so that all end together."""
+    if not hasattr(config, "workerinput"):
+        return
+    weight: Counter[Path] = Counter()
+    for item in items:
+        weight[item.path] += SLOW if item.get_closest_marker("slow") else 1
+    items.sort(key=lambda item: -weight[item.path])
 
 
 class Drawn(list[Figure]):
