@@ -30,7 +30,7 @@ def test_dataset_in_image_out(start, uploaded, submitted, until, work):
     assert job["state"] in ("queued", "running")
     done = until(http, job["id"])
     assert done["state"] == "succeeded"
-    assert done["progress"] == {"done": 24, "total": 24}
+    assert done["progress"] == {"done": 24, "total": 24, "phase": ""}
     assert [sweep["sweep"] for sweep in done["history"]] == [1, 2, 3]
     assert done["settings"]["rays"] == "straight"
     assert done["seconds"] >= 0

@@ -46,7 +46,7 @@ def scan(elements: int, samples: int) -> Dataset:
 
 def bytes_of(path: Path, picker: str) -> dict[str, int]:
     """The first call of each name, with its arguments, less a fork that does nothing."""
-    chain = Arrivals(Source(path, path.stat().st_mtime_ns, picker, True), Files.of(path.parent))
+    chain = Arrivals(Source(path, path.stat().st_mtime_ns, path.parent, picker, True), Files.of(path.parent))
     waiting, found = chain.first(), {}
     while waiting:
         call = waiting.pop(0)

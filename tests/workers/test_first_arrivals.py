@@ -17,7 +17,8 @@ from bentray_workers import arrival_memory, slices
 from bentray_workers.dataset_file import read_dataset, write_dataset
 from bentray_workers.driving import run_here
 from bentray_workers.findings_file import read_findings
-from bentray_workers.first_arrivals import PICKED, Arrivals, Files, Source
+from bentray_workers.first_arrivals import PICKED, Arrivals, Files, Source, measure, read
+from bentray_workers.wanted import Unwanted
 
 from ..kernels.acquisition.traces import RATE_HZ, blob_delay, scan
 from ..kernels.wave.scans import scan as wave_scan
@@ -63,7 +64,7 @@ def arrived(dataset, folder, picker="aic", *, examined=True):
     path = folder / "scan.h5"
     write_dataset(path, dataset)
     files = Files.of(folder)
-    arrivals = Arrivals(Source(path, path.stat().st_mtime_ns, picker, examined), files)
+    arrivals = Arrivals(Source(path, path.stat().st_mtime_ns, folder, picker, examined), files)
     run_here(None)([("", call) for call in arrivals.first()], {"": arrivals}, lambda name: None)
     found = read_findings(files.findings)
     return read_dataset(files.picked if found.changed else path), found
@@ -114,6 +115,37 @@ def test_a_clean_scan_gives_the_image_that_it_gave_unexamined(cluster, tmp_path)
         plain = slices.reconstruct(client, tmp_path / "scan.h5", replace(PLAN, examine=False))
         np.testing.assert_array_equal(plain.speed, expected.speed)
         assert plain.provenance == expected.provenance
+
+
+def test_it_tells_how_many_emissions_are_examined_and_picked(tmp_path, monkeypatch):
+    monkeypatch.setattr(arrival_memory, "CALL_SAMPLES", 50_000)
+    write_dataset(tmp_path / "scan.h5", clean())
+    told = []
+    slices.reconstruct(None, tmp_path / "scan.h5", PLAN, told.append)
+    steps = {
+        phase: [p.done for p in told if p.phase == phase] for phase in dict.fromkeys(p.phase for p in told)
+    }
+    assert list(steps) == ["examining", "picking", "reconstructing"]
+    assert {p.total for p in told if p.phase != "reconstructing"} == {ELEMENTS}
+    assert steps["examining"][0] == steps["picking"][0] == 0
+    assert steps["picking"][-1] == ELEMENTS
+    assert all(len(set(steps[phase])) > 3 for phase in ("examining", "picking"))
+    assert all(done == sorted(done) for done in steps.values())
+
+
+def test_calls_end_with_their_emission_once_the_job_has(tmp_path):
+    path, folder = tmp_path / "scan.h5", tmp_path / "job"
+    write_dataset(path, clean())
+    folder.mkdir()
+    source = Source(path, path.stat().st_mtime_ns, folder, "aic", True)
+    with source.slice(0) as one:
+        assert one.waveform.object[0].any()
+        folder.rmdir()
+        with pytest.raises(Unwanted):
+            one.waveform.object[1]
+    for function, arguments in ((measure, (range(4),)), (read, ((), None, range(4)))):
+        with pytest.raises(Unwanted):
+            function(source, 0, *arguments)
 
 
 def test_channels_put_back_give_the_image_of_the_clean_scan(cluster, tmp_path):

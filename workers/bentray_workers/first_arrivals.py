@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +21,7 @@ from bentray_kernels.acquisition.quality.examination import times_judged
 from bentray_kernels.acquisition.quality.recording import Measured, judged
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Progress
 from bentray_kernels.tomography.alternation import predicted_delta
 from bentray_kernels.tomography.chains import Call
 
@@ -29,8 +31,12 @@ from .findings_file import Found, read_findings, write_findings
 from .reconstruction_file import read_reconstruction
 from .scan import read_once
 from .trace_reading import slice_opened, trace_samples
+from .wanted import check_wanted
 
 PICKED, FINDINGS = "picked.h5", "findings.json"
+
+# Phases of a job's progress, each with emissions gone through of all.
+EXAMINING, PICKING = "examining", "picking"
 
 
 class Files(NamedTuple):
@@ -84,6 +90,7 @@ class Source(NamedTuple):
     """The scan as calls know it; ``stamp`` tells a rewritten file from the old one.
 
     Attributes:
+        folder: of the job; once it has gone, calls end with the emission that they are at.
         picker: what reads the times of a scan without them.
         examine: whether the scan is examined first.
         amplitudes: where they come from, see ``Settings``.
@@ -91,6 +98,7 @@ class Source(NamedTuple):
 
     path: Path
     stamp: int
+    folder: Path
     picker: str
     examine: bool
     amplitudes: str = "recorded"
@@ -113,7 +121,7 @@ class Source(NamedTuple):
     @contextmanager
     def slice(self, index: int, findings: Sequence[Finding] = ()) -> Iterator[Dataset]:
         """One slice with traces that are read as they are asked for, and what was found corrected."""
-        with slice_opened(self.path, self.dataset, index) as one:
+        with slice_opened(self.path, self.dataset, index, partial(check_wanted, self.folder)) as one:
             yield apply(one, findings)
 
 
@@ -143,6 +151,17 @@ class Arrivals:
             self._parts = parts_of(len(dataset.tx), trace_samples(source.path) * len(dataset.rx))
         self._found: dict[int, Any] = {k: guide.faults(k) if guide else () for k in self._slices}
         self._given: dict[tuple[Any, int], dict[int, Any]] = defaultdict(dict)
+        self._gone_through: dict[Any, int] = defaultdict(int)
+
+    @property
+    def progress(self) -> Progress:
+        """How far it is: emissions examined, then emissions picked, of all; none where no traces are read."""
+        total = len(self._slices) * sum(map(len, self._parts))
+        examined, picked = self._gone_through[measure], self._gone_through[read]
+        examines = self._source.examine and not self._source.dataset.picked and not self._guide
+        if examines and examined < total:
+            return Progress(examined, total, phase=EXAMINING)
+        return Progress(picked, total, phase=PICKING)
 
     def first(self) -> list[Call]:
         """Calls to begin with."""
@@ -168,7 +187,9 @@ class Arrivals:
             if len(settled_slices) < len(self._slices):
                 return []
             return [Call(join, (self._source, self._files, self._taken(settle, 0)))]
-        self._given[call.function, index][call.arguments[-1].start] = given
+        part: range = call.arguments[-1]
+        self._gone_through[call.function] += len(part)
+        self._given[call.function, index][part.start] = given
         if len(self._given[call.function, index]) < len(self._parts):
             return []
         parts = self._taken(call.function, index)

@@ -40,7 +40,7 @@ class Quality:
     examined: Report
 
 
-# Traces that a task examines while somebody waits, bytes: it takes a core a part of a minute.
+# Traces that a task examines while somebody waits, bytes: it takes a core half a minute.
 LARGEST_BYTES = 2**30
 
 

@@ -30,6 +30,9 @@ from .trace_reading import trace_samples
 
 __all__ = ["IN_FLIGHT", "Cancelled", "finished", "reconstruct"]
 
+# The phase of a job's progress after those of ``first_arrivals``.
+RECONSTRUCTING = "reconstructing"
+
 
 def reconstruct(
     client: Client | None,
@@ -96,8 +99,10 @@ def _guided(
     result make it again.
     """
     amplitudes = settings.amplitudes if settings.listens else "recorded"
-    source = Source(job.scan, job.scan.stat().st_mtime_ns, settings.picker, settings.examine, amplitudes)
-    path, found = _arrived(job, source, Files.of(job.folder), None)
+    source = Source(
+        job.scan, job.scan.stat().st_mtime_ns, job.folder, settings.picker, settings.examine, amplitudes
+    )
+    path, found = _arrived(job, source, Files.of(job.folder), None, rising)
     rounds = 0 if source.dataset.picked else settings.guided_rounds
     rays = replace(
         settings,
@@ -118,7 +123,7 @@ def _guided(
             asked = {name: getattr(settings, name) for name in ("attenuation", "resolution_check")}
             settings = replace(rays, **asked, wave_minutes=settings.wave_minutes)
         guide = Guide(image, Files.of(job.folder).findings)
-        again, found_again = _arrived(job, source, Files.of(job.folder, number), guide)
+        again, found_again = _arrived(job, source, Files.of(job.folder, number), guide, rising)
         if same_picks(*(read_dataset(one, traces=False) for one in (path, again))):
             break
         path, found = again, found_again
@@ -126,14 +131,17 @@ def _guided(
     return path, found, settings, trials
 
 
-def _arrived(job: _Job, source: Source, files: Files, guide: Guide | None) -> tuple[Path, Found]:
+def _arrived(
+    job: _Job, source: Source, files: Files, guide: Guide | None, rising: _Rising
+) -> tuple[Path, Found]:
     """What goes on after a round of picking, and what it found."""
     try:
         found = read_findings(files.findings)
     except (OSError, ValueError, KeyError):
         arrivals = Arrivals(source, files, guide)
         first = [("arrivals", call) for call in arrivals.first()]
-        job.run(first, {"arrivals": arrivals}, lambda name: None)
+        rising.tell(arrivals.progress)
+        job.run(first, {"arrivals": arrivals}, lambda name: rising.tell(arrivals.progress))
         found = read_findings(files.findings)
     return files.picked if found.changed else job.scan, found
 
@@ -178,7 +186,13 @@ class _Rising:
         self._total = progress.total
         if self._on_progress is not None:
             total = self._over + progress.total * (1 + self.more)
-            self._on_progress(replace(progress, done=self._over + progress.done, total=total))
+            done = self._over + progress.done
+            self._on_progress(replace(progress, done=done, total=total, phase=RECONSTRUCTING))
+
+    def tell(self, progress: Progress) -> None:
+        """Tell how far something else is, if there is anything to do."""
+        if self._on_progress is not None and progress.total:
+            self._on_progress(progress)
 
     def step(self) -> None:
         """The present one is over."""

@@ -56,11 +56,16 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a reconstruction is: ``done`` of ``total`` emitter passes, over all slices and sweeps."""
+    """How far a reconstruction is: ``done`` of ``total`` emitter passes, over all slices and sweeps.
+
+    Attributes:
+        phase: what the passes are of, where there are several such things; each counts its own.
+    """
 
     done: int
     total: int
     history: tuple[Sweep, ...] = ()
+    phase: str = ""
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ def reconstruct(
 
         def show(progress: Progress) -> None:
             rms = progress.history[-1].residual_rms_s if progress.history else None
-            step(progress.done, progress.total, residual_note(rms))
+            step(progress.done, progress.total, residual_note(rms) or progress.phase)
 
         result = run(source, dataset, settings, workers, show)
     found = write_results(folder, result, dataset, time.perf_counter() - started, file=str(source))

@@ -46,7 +46,7 @@ def reproduce(
 
         def show(progress: Progress) -> None:
             rms = progress.history[-1].residual_rms_s if progress.history else None
-            step(progress.done, progress.total, residual_note(rms))
+            step(progress.done, progress.total, residual_note(rms) or progress.phase)
 
         after = run(source, dataset, before.settings, workers, show)
     found = compared(before, after)

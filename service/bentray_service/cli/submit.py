@@ -131,7 +131,7 @@ def show_job(record: dict[str, Any], step: Step) -> None:
     """One record of a job on a progress bar."""
     progress, history = record["progress"], record["history"]
     note = residual_note(history[-1]["residual_rms_s"] if history else None)
-    step(progress["done"], progress["total"], note or record["state"])
+    step(progress["done"], progress["total"], note or progress["phase"] or record["state"])
 
 
 def _report(source: Path, folder: Path, volume: Path, job: dict[str, Any], as_json: bool) -> None:

@@ -63,7 +63,7 @@ class Reporter:
         history: list[dict[str, Any]] = [
             {**asdict(sweep), "residual_rms_s": finite(sweep.residual_rms_s)} for sweep in kept.history
         ]
-        self._queue.progress(self._job_id, kept.done, kept.total, history)
+        self._queue.progress(self._job_id, kept.done, kept.total, history, kept.phase)
         self._pending = None
 
     def saved(self) -> None:

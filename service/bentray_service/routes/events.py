@@ -67,8 +67,8 @@ async def _stream(
             last = event["number"]
             at = datetime.fromtimestamp(event["time"], UTC).isoformat()
             said.append(_event("state", {"state": event["state"], "note": event["note"], "time": at}, last))
-        progress = {"done": job["done"], "total": job["total"]}
-        if job["state"] == "running" and progress not in (told, {"done": 0, "total": 0}):
+        progress = {"done": job["done"], "total": job["total"], "phase": job["phase"] or ""}
+        if job["state"] == "running" and job["total"] and progress != told:
             said.append(_event("progress", progress))
             told = progress
         if not said and time.monotonic() - spoken > SILENCE_SECONDS:

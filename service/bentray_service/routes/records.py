@@ -62,6 +62,10 @@ class ProgressRecord(BaseModel):
 
     done: int
     total: int
+    phase: str = Field(
+        description="What they are of: of a reconstruction examining, picking, or reconstructing, each of "
+        "which counts anew; else empty."
+    )
 
 
 class SweepRecord(BaseModel):
@@ -205,7 +209,7 @@ def job_record(row: Row) -> JobRecord:
         settings=row["settings"],
         plan=row["plan"],
         advice=row["advice"],
-        progress=ProgressRecord(done=row["done"], total=row["total"]),
+        progress=ProgressRecord(done=row["done"], total=row["total"], phase=row["phase"] or ""),
         history=row["history"],
         volume=volume,
         mesh=row["mesh_id"],

@@ -102,6 +102,7 @@ def _to_3(connection: Connection) -> None:
         "request_sha256 VARCHAR(64)",
         "lease_owner VARCHAR(64)",
         "lease_until FLOAT",
+        "phase VARCHAR(32)",
         "plan JSON",
         "advice VARCHAR(2000)",
         "mesh_id VARCHAR(32)",

@@ -81,6 +81,7 @@ class Queue:
             fresh: Row = {
                 "done": 0,
                 "total": 0,
+                "phase": None,
                 "history": [],
                 "attempts": jobs.c.attempts + 1,
                 "started": now,
@@ -104,12 +105,11 @@ class Queue:
     def _held(self, job_id: str) -> ColumnElement[bool]:
         return and_(jobs.c.id == job_id, jobs.c.lease_owner == self._owner, jobs.c.state.in_(RUNNING))
 
-    def progress(self, job_id: str, done: int, total: int, history: list[Row]) -> None:
+    def progress(self, job_id: str, done: int, total: int, history: list[Row], phase: str = "") -> None:
         """Store how far a running job is."""
+        now: Row = {"done": done, "total": total, "history": history, "phase": phase}
         with self._database.write() as connection:
-            connection.execute(
-                update(jobs).where(self._held(job_id)).values(done=done, total=total, history=history)
-            )
+            connection.execute(update(jobs).where(self._held(job_id)).values(**now))
 
     def succeed(self, job_id: str, result: Row | None, into: str = volumes.name) -> bool:
         """Store the success and the result, if there is one; False when it was cancelled in the meantime.

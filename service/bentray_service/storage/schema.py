@@ -83,6 +83,8 @@ jobs = Table(
     Column("attempts", Integer, nullable=False, default=0),
     Column("done", Integer, nullable=False, default=0),
     Column("total", Integer, nullable=False, default=0),
+    # What is done of how much, where a job has several such things to do.
+    Column("phase", String(32)),
     Column("history", JSON, nullable=False, default=list),
     Column("error", JSON(none_as_null=True)),
     # How a reconstruction was to be cut into tasks, and what ``auto`` chose once it has.

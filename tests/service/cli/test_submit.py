@@ -55,7 +55,7 @@ class StandIn:
         return {
             "id": "job-1",
             "state": state,
-            "progress": {"done": done, "total": 24},
+            "progress": {"done": done, "total": 24, "phase": "picking"},
             "history": [{"residual_rms_s": 1e-7}] if done else [],
             "volume": "volume-1" if done else None,
             "seconds": 1.5,

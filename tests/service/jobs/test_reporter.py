@@ -22,9 +22,9 @@ class FakeJobs:
         if self.away:
             raise OperationalError("select", {}, Exception("database is locked"))
 
-    def progress(self, job_id, done, total, history):
+    def progress(self, job_id, done, total, history, phase):
         self.check()
-        self.written.append((done, total, history))
+        self.written.append((done, total, history, phase))
 
     def told(self, job_id):
         self.check()
@@ -44,12 +44,12 @@ def test_writes_are_throttled_and_the_last_one_arrives():
     reporter = Reporter(jobs, "job", lambda: False, clock)
     for done in range(1, 1001):
         clock.now += 0.001
-        reporter.report(Progress(done, 1000))
+        reporter.report(Progress(done, 1000, phase="picking"))
     reporter.flush()
     assert len(jobs.written) <= 5
-    assert jobs.written[-1][:2] == (1000, 1000)
+    assert jobs.written[-1] == (1000, 1000, [], "picking")
     reporter.flush()
-    assert [done for done, _, _ in jobs.written].count(1000) == 1
+    assert [done for done, _, _, _ in jobs.written].count(1000) == 1
 
 
 def test_a_residual_that_json_cannot_hold():

@@ -52,7 +52,7 @@ def test_a_refused_job_says_why(start, uploaded, submitted, until, work):
     work.error = InvalidInput("traveltime", "every pair missing", "at least one pair")
     done = until(http, submitted(http, uploaded(http))["id"])
     assert (done["state"], done["error"]["field"]) == ("failed", "traveltime")
-    assert done["progress"] == {"done": 24, "total": 24}
+    assert done["progress"] == {"done": 24, "total": 24, "phase": ""}
 
 
 def test_the_next_job_runs_after_a_failure(start, uploaded, submitted, until, work):

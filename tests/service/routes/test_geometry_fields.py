@@ -98,7 +98,7 @@ def test_from_an_upload_to_a_picture(tmp_path, until):
         again = http.post("/v1/jobs", json={**asked, "mesh": twin.json()["id"]}).json()
         done = until(http, again["id"])
         assert (done["state"], done["field"]) == ("succeeded", field["id"])
-        assert done["progress"] == {"done": 1, "total": 1}
+        assert done["progress"] == {"done": 1, "total": 1, "phase": ""}
         assert http.get("/v1/geometry-fields").json() == {"geometry_fields": [field]}
         assert not list((tmp_path / "tenants/local/work").iterdir())
 

@@ -204,6 +204,7 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
         "ALTER TABLE jobs ADD COLUMN request_sha256 VARCHAR(64)",
         "ALTER TABLE jobs ADD COLUMN lease_owner VARCHAR(64)",
         "ALTER TABLE jobs ADD COLUMN lease_until FLOAT",
+        "ALTER TABLE jobs ADD COLUMN phase VARCHAR(32)",
         "ALTER TABLE jobs ADD COLUMN plan JSON",
         "ALTER TABLE jobs ADD COLUMN advice VARCHAR(2000)",
         "ALTER TABLE jobs ADD COLUMN mesh_id VARCHAR(32)",

@@ -153,7 +153,7 @@ function facts(job, title, onCancel) {
   box.append(heading, make("p", "", title), make("p", "", settings));
   if (job.plan) box.append(planned(job.plan));
   if (job.advice) box.append(make("p", "", job.advice));
-  const { done, total } = job.progress;
+  const { done, total, phase } = job.progress;
   if (job.state === "running" || job.state === "cancelling") {
     const bar = make("progress");
     bar.setAttribute("aria-label", "Progress");
@@ -161,7 +161,7 @@ function facts(job, title, onCancel) {
       bar.max = total;
       bar.value = done;
     }
-    const share = total ? `${Math.floor((100 * done) / total)} %` : "starting";
+    const share = total ? `${phase} ${Math.floor((100 * done) / total)} %` : "starting";
     box.append(bar, make("p", "", `${share} · ${duration(job.seconds || 0)}`));
   } else if (job.seconds !== null && job.finished) {
     box.append(make("p", "", `took ${duration(job.seconds)}`));
