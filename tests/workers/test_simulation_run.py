@@ -2,9 +2,11 @@
 
 import hashlib
 import threading
+import time
 
 import pytest
 
+from bentray_kernels.wave import strips
 from bentray_workers import simulation_parts
 from bentray_workers.asked_simulation import AskedSimulation
 from bentray_workers.attempts import ResultsLostError
@@ -15,6 +17,7 @@ from bentray_workers.simulation_parts import folder_of, make_part, parts_of
 from bentray_workers.simulation_run import simulate_scan
 from bentray_workers.slices import Cancelled
 from bentray_workers.volume_simulation import simulate_volume
+from bentray_workers.wanted import Unwanted
 from bentray_workers.wave_simulation import simulate_waves
 
 TIMES = AskedSimulation(nodes=16, elements=70, snr=10.0, attenuation=True)
@@ -98,22 +101,43 @@ def test_a_damaged_part_is_made_anew(run, tmp_path):
     assert (tmp_path / "scan.h5").read_bytes() == first
 
 
-def test_a_stop_does_not_wait_for_the_task_at_work(run, tmp_path, monkeypatch):
-    begun, go_on = threading.Event(), threading.Event()
+def test_a_stop_does_not_wait_for_the_emission_at_work_which_ends_with_the_folder(run, tmp_path, monkeypatch):
+    begun, ended = threading.Event(), threading.Event()
 
-    def slow(settings, emission):
+    def endless(settings, emission, poll):
         begun.set()
-        go_on.wait()
-        return []
+        try:
+            while True:
+                poll()
+                time.sleep(0.01)
+        finally:
+            ended.set()
 
-    monkeypatch.setattr(simulation_parts, "simulate_emission", slow)
+    monkeypatch.setattr(simulation_parts, "simulate_emission", endless)
     try:
         with pytest.raises(Cancelled):
             run(AskedSimulation(**WAVES), stop=begun.is_set)
-        assert not go_on.is_set()
+        assert not ended.is_set()
         assert not (tmp_path / "scan.h5").exists()
     finally:
-        go_on.set()
+        (tmp_path / "work").rename(tmp_path / "work.ended")
+    assert ended.wait(60.0)
+
+
+def test_an_emission_asks_between_its_steps_whether_anybody_waits(tmp_path, monkeypatch):
+    monkeypatch.setattr(strips, "STRIP", 10**6)
+    settings = AskedSimulation(**WAVES).chosen()
+    polled = []
+
+    def gone(folder):
+        polled.append(folder)
+        if len(polled) == 3:
+            raise Unwanted
+
+    monkeypatch.setattr(simulation_parts, "check_wanted", gone)
+    make_part(settings, parts_of(settings)[0], tmp_path)
+    assert polled == 3 * [tmp_path]
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_task_whose_job_has_gone_ends_early_and_leaves_nothing(tmp_path, monkeypatch):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from bentray_kernels.wave import WaveProblem, WaveSettings, prepare
 from .dataset_file import read_dataset
 from .findings_file import read_findings
 from .trace_reading import slice_opened
+from .wanted import check_wanted
 
 
 class FileScan(NamedTuple):
@@ -38,7 +39,8 @@ class FileWaveScan(NamedTuple):
     """See ``bentray_kernels.wave.WaveScan``; ``path`` is that of a file with traces.
 
     Attributes:
-        findings: the file of what was found in the scan; faults of its traces are corrected or left out.
+        findings: the file of what was found in the scan; faults of its traces are corrected or left out. Once
+            its folder, the job's, has gone, calls end within a second.
     """
 
     path: Path
@@ -75,5 +77,6 @@ def read_once(path: Path, stamp: int) -> Dataset:
 @lru_cache(maxsize=2)
 def _wave_problem(scan: FileWaveScan, number: int) -> WaveProblem:
     faults = read_findings(scan.findings).of_traces(scan.slice)
-    with slice_opened(scan.path, read_once(scan.path, scan.stamp), scan.slice) as one:
-        return prepare(apply(one, faults), scan.plan, number)
+    poll = partial(check_wanted, scan.findings.parent)
+    with slice_opened(scan.path, read_once(scan.path, scan.stamp), scan.slice, poll) as one:
+        return prepare(apply(one, faults), scan.plan, number, poll=poll)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.sources import digest
+from bentray_kernels.wave.strips import Poll
 
 from .asked_simulation import Simulated
 from .atomic import replacing
@@ -19,6 +21,7 @@ from .checkpoints import UNREADABLE
 from .emitter_batches import simulate_emitters
 from .npy_headers import PARSING
 from .simulation_effort import emitters_a_task
+from .wanted import Unwanted, check_wanted
 from .wave_simulation import WaveSimulationSettings, simulate_emission
 
 # What the numbers of a part depend on.
@@ -63,26 +66,26 @@ def folder_of(work_dir: Path) -> Path:
 
 
 def make_part(settings: Simulated, part: Part, folder: Path) -> None:
-    """Task: compute a part into its file. It stops early, without a file, once the folder has gone."""
+    """Task: compute a part into its file. It ends within a second, without one, once the folder has gone."""
     try:
-        arrays = _computed(settings, part, folder)
-        if arrays:
-            with replacing(part.path(folder)) as partial, partial.open("wb") as file:
-                np.savez(file, allow_pickle=False, **{str(k): array for k, array in enumerate(arrays)})
+        arrays = _computed(settings, part, partial(check_wanted, folder))
+        with replacing(part.path(folder)) as unready, unready.open("wb") as file:
+            np.savez(file, allow_pickle=False, **{str(k): array for k, array in enumerate(arrays)})
+    except Unwanted:
+        return
     except FileNotFoundError:
         # The job was cancelled, and nobody waits for this.
         if folder.exists():
             raise
 
 
-def _computed(settings: Simulated, part: Part, folder: Path) -> list[NDArray[Any]]:
-    """Rows of the emitters: travel times and losses, or traces of object and water; none once cancelled."""
+def _computed(settings: Simulated, part: Part, poll: Poll) -> list[NDArray[Any]]:
+    """Rows of the emitters: travel times and losses, or traces of object and water."""
     if isinstance(settings, WaveSimulationSettings):
-        return list(simulate_emission(settings, part.first))
+        return list(simulate_emission(settings, part.first, poll))
     rows: list[list[NDArray[Any]]] = []
     for emitter in range(part.first, part.last):
-        if not folder.exists():
-            return []
+        poll()
         received = simulate_emitters(settings, part.scan, np.array([emitter]))
         rows.append([array for array in received if array is not None])
     return [np.concatenate(arrays) for arrays in zip(*rows, strict=True)]

@@ -22,6 +22,7 @@ from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.points import REACH
 from bentray_kernels.wave.simulation import simulate
 from bentray_kernels.wave.stencil import longest_step, phase_error
+from bentray_kernels.wave.strips import Poll, unheeded
 
 from .lanes import RECONSTRUCTION
 from .simulation import ring_radius
@@ -235,16 +236,16 @@ def _emissions(
 
 
 def simulate_emission(
-    settings: WaveSimulationSettings, emission: int
+    settings: WaveSimulationSettings, emission: int, poll: Poll = unheeded
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Task: traces of object and water of one emission, (elements, samples) each."""
+    """Task: traces of object and water of one emission, (elements, samples) each; ``poll`` as ``strips``."""
     places = settings.elements_m() + 0.5 * settings.side_m
     at = places[settings.senders()[emission]]
     time = settings.step_s * np.arange(settings.samples * settings.skip) - BEFORE / settings.frequency_hz
     late = time * settings.frequency_hz
     pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
     received, water = (
-        simulate(medium, at, places, pulse, ORDER)[:, :: settings.skip] for medium in _media(settings)
+        simulate(medium, at, places, pulse, ORDER, poll)[:, :: settings.skip] for medium in _media(settings)
     )
     return received.astype(np.float32), water.astype(np.float32)
 

@@ -16,6 +16,7 @@ from .points import Points
 from .simulation import Unknown, forward, placed
 from .stencil import weights
 from .stepping import advance, inject
+from .strips import Poll, strips, unheeded
 
 # A misfit of simulated traces (nrx, nt): its value, and its derivative by every sample.
 Misfit = Callable[[NDArray[Any]], tuple[float, Floats]]
@@ -48,6 +49,7 @@ def slope(
     misfit: Misfit,
     every: int = 1,
     by: Unknown = "speed",
+    poll: Poll = unheeded,
 ) -> Slope:
     """Misfit of one emitter's traces and its gradient (Plessix, Geophys. J. Int. 167, 2006).
 
@@ -62,6 +64,7 @@ def slope(
         misfit: of the traces.
         every: time steps from one stored field to the next.
         by: of what the gradient is.
+        poll: see ``strips``.
 
     Raises:
         InvalidInput: as ``simulate``; a step between fields below 1.
@@ -69,16 +72,21 @@ def slope(
     if every < 1:
         raise InvalidInput("every", every, "at least 1 step")
     source, heard = placed(medium, np.atleast_2d(emitter), wavelet), placed(medium, receivers)
-    traces, scattered = forward(medium, source, heard, wavelet, every, by=by)
+    traces, scattered = forward(medium, source, heard, wavelet, every, by=by, poll=poll)
     value, residual = misfit(traces)
-    image, light = backward(medium, heard, residual, scattered, every)
+    image, light = backward(medium, heard, residual, scattered, every, poll)
     # By (c dt / h)^2, which drives a step, and by sigma dt = c alpha dt; the adjoint field is driven too.
     along = 2.0 if by == "speed" else -(medium.spacing**2) / medium.time_step_s
     return Slope(value, along * every * float(np.abs(wavelet).max()) * image / medium.speed, light)
 
 
 def backward(
-    medium: Medium, heard: Points, residual: Floats, scattered: NDArray[Any], every: int
+    medium: Medium,
+    heard: Points,
+    residual: Floats,
+    scattered: NDArray[Any],
+    every: int,
+    poll: Poll = unheeded,
 ) -> tuple[Floats, Floats]:
     """The adjoint field correlated with a stored one: (nx, ny), and the energy of the stored one.
 
@@ -86,32 +94,39 @@ def backward(
         heard: the receivers.
         residual: (nrx, nt), derivative of the misfit by every sample.
         scattered: as ``forward`` gives it.
+        poll: see ``strips``.
     """
     kind = medium.keep.dtype
     fields = np.zeros((2, *medium.keep.shape), kind)
     image, light = np.zeros(medium.speed.shape), np.zeros(medium.speed.shape)
     scale = float(np.abs(residual).max())
-    _backward(
-        fields[0],
-        fields[1],
-        medium.keep,
-        medium.fade,
-        medium.drive,
-        weights().astype(kind),
-        heard.first,
-        heard.weights,
-        (residual / (scale or 1.0)).astype(kind),
-        medium.margin,
-        every,
-        scattered,
-        image,
-        light,
-    )
+    taps, sources = weights().astype(kind), (residual / (scale or 1.0)).astype(kind)
+    for begin, end in strips(residual.shape[1], medium.keep.size, poll):
+        _backward(
+            begin,
+            end,
+            fields[0],
+            fields[1],
+            medium.keep,
+            medium.fade,
+            medium.drive,
+            taps,
+            heard.first,
+            heard.weights,
+            sources,
+            medium.margin,
+            every,
+            scattered,
+            image,
+            light,
+        )
     return scale * image, light
 
 
 @kernel
 def _backward(
+    begin: int,
+    end: int,
     now: Any,
     old: Any,
     keep: Any,
@@ -130,7 +145,8 @@ def _backward(
     # At the top of turn n, ``now`` is the adjoint field of equation n. Every equation of the scheme is
     # symmetric but for the order of time, so the field runs backwards under the same step.
     nx, ny = image.shape
-    for n in range(residual.shape[1] - 1, -1, -1):
+    last = residual.shape[1] - 1
+    for n in range(last - begin, last - end, -1):
         if n % every == 0:
             for i in range(nx):
                 adjoint = now[i + margin, margin:]

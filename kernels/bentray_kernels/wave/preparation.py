@@ -17,9 +17,17 @@ from .problem import WaveProblem
 from .sampling import Clock, Water
 from .settings import WaveSettings
 from .sounding import Mapping, WaterShots, levelled, sounded
+from .strips import Poll, unheeded
 
 
-def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mapping = map) -> WaveProblem:
+def prepare(
+    dataset: Dataset,
+    settings: WaveSettings,
+    number: int,
+    *,
+    run: Mapping = map,
+    poll: Poll = unheeded,
+) -> WaveProblem:
     """The problem of a slice in band ``number``, its wavelet and its water's phase read from water shots.
 
     It holds the object's traces of the emitters that the band uses, no others and none of the water: traces
@@ -30,6 +38,7 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mappi
         settings: how to refine.
         number: of the band, from 0.
         run: what runs the simulated water shots.
+        poll: of these and of all simulations of the problem, see ``strips``.
 
     Raises:
         InvalidInput: for a dataset that lacks one of the above or, where it is asked for, a region of
@@ -90,6 +99,7 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, run: Mappi
         used=used,
         held=held,
         every=extent.every,
+        poll=poll,
     )
     shots = WaterShots(recorded.water, water_gain, samples, settings.window_s)
     found = sounded(problem, shots, run)

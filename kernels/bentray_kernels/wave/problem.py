@@ -15,6 +15,7 @@ from .medium import Medium
 from .misfits import around
 from .sampling import Clock, Water
 from .settings import Band
+from .strips import Poll, unheeded
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class WaveProblem:
         sampler: (nt, steps), see ``resampler``.
         used, held: emitters that make the image, and that only judge.
         every: time steps from one stored field to the next.
+        poll: of its simulations, see ``strips``.
     """
 
     band: Band
@@ -58,6 +60,7 @@ class WaveProblem:
     used: Ints
     held: Ints
     every: int
+    poll: Poll = unheeded
 
     def medium(self, speed: Floats, attenuation: Floats | None = None) -> Medium:
         """The medium of images on this grid."""

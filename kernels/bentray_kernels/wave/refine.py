@@ -139,10 +139,11 @@ def look(problem: WaveProblem, settings: WaveSettings, model: Model, some: Ints)
         window = problem.window(emitter, heard, settings.window_s)
         at, receivers = problem.emitters[emitter], problem.receivers[heard]
         if emitter in judging:
-            held += kind(simulate(medium, at, receivers, problem.wavelet), recorded, window)[0]
+            traces = simulate(medium, at, receivers, problem.wavelet, poll=problem.poll)
+            held += kind(traces, recorded, window)[0]
             continue
         compare = partial(kind, recorded=recorded, weight=window)
-        found = slope(medium, at, receivers, problem.wavelet, compare, problem.every, by)
+        found = slope(medium, at, receivers, problem.wavelet, compare, problem.every, by, problem.poll)
         misfit += found.misfit
         gradient += found.gradient
         illumination += found.illumination

@@ -14,6 +14,7 @@ from .medium import Medium
 from .points import Points, place
 from .stencil import HALO, weights
 from .stepping import advance, braked, curvature, inject, read, released, spread
+from .strips import Poll, strips, unheeded
 
 # What a gradient may be by.
 Unknown = Literal["speed", "attenuation"]
@@ -28,7 +29,12 @@ BAND_EDGE = 0.03
 
 
 def simulate(
-    medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floats, order: int = 2 * HALO
+    medium: Medium,
+    emitter: Floats,
+    receivers: Floats,
+    wavelet: Floats,
+    order: int = 2 * HALO,
+    poll: Poll = unheeded,
 ) -> Floats:
     """Traces of a point source.
 
@@ -41,6 +47,7 @@ def simulate(
         receivers: (nrx, 2), m.
         wavelet: (nt,), the source s(t) of (1/c^2) p'' - laplacian p = s(t) delta(x), a sample a time step.
         order: in space; see ``stencil.weights``. Data of another one than a refinement's test it honestly.
+        poll: see ``strips``.
 
     Returns:
         (nrx, nt), of the medium's type; sample n is the pressure at n time steps.
@@ -49,7 +56,7 @@ def simulate(
         InvalidInput: elements outside the image, a wavelet with waves too short for the grid.
     """
     source, heard = placed(medium, np.atleast_2d(emitter), wavelet), placed(medium, receivers)
-    return forward(medium, source, heard, wavelet, 0, order)[0]
+    return forward(medium, source, heard, wavelet, 0, order, poll=poll)[0]
 
 
 def placed(medium: Medium, positions: Floats, wavelet: Floats | None = None) -> Points:
@@ -84,6 +91,7 @@ def forward(
     every: int,
     order: int = 2 * HALO,
     by: Unknown = "speed",
+    poll: Poll = unheeded,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Traces, and the source of scattered waves in the image at every ``every``-th step.
 
@@ -92,6 +100,7 @@ def forward(
         every: 0: keep nothing.
         order: in space.
         by: the change that scatters.
+        poll: see ``strips``.
 
     Returns:
         traces: (nrx, nt).
@@ -108,31 +117,37 @@ def forward(
     inner = slice(medium.margin, -medium.margin)
     fade = medium.fade[inner, inner]
     turn = (1 - fade) / (1 + fade)
-    _forward(
-        fields[0],
-        fields[1],
-        medium.keep,
-        medium.fade,
-        medium.drive,
-        weights(order).astype(kind),
-        source.first[0],
-        source.weights[0],
-        heard.first,
-        heard.weights,
-        (wavelet / scale).astype(kind),
-        medium.margin,
-        every,
-        by == "attenuation",
-        turn,
-        traces,
-        scattered,
-    )
+    taps, pulse = weights(order).astype(kind), (wavelet / scale).astype(kind)
+    for begin, end in strips(nt, medium.keep.size, poll):
+        _forward(
+            begin,
+            end,
+            fields[0],
+            fields[1],
+            medium.keep,
+            medium.fade,
+            medium.drive,
+            taps,
+            source.first[0],
+            source.weights[0],
+            heard.first,
+            heard.weights,
+            pulse,
+            medium.margin,
+            every,
+            by == "attenuation",
+            turn,
+            traces,
+            scattered,
+        )
     traces *= kind.type(scale)
     return traces, scattered
 
 
 @kernel
 def _forward(
+    begin: int,
+    end: int,
     now: Any,
     old: Any,
     keep: Any,
@@ -151,7 +166,7 @@ def _forward(
     traces: Any,
     scattered: Any,
 ) -> None:
-    for n in range(wavelet.size):
+    for n in range(begin, end):
         for r in range(traces.shape[0]):
             traces[r, n] = read(now, heard_first[r], heard_along[r])
         kept = every > 0 and n % every == 0

@@ -58,7 +58,9 @@ def sounded(problem: WaveProblem, shots: WaterShots, run: Mapping) -> WaveProble
     if heard.size < LEAST_PAIRS:
         return best
     medium = problem.medium(np.full(problem.region.shape, problem.water.speed))
-    model = simulate(medium, problem.emitters[shot], problem.receivers[heard], best.wavelet)
+    model = simulate(
+        medium, problem.emitters[shot], problem.receivers[heard], best.wavelet, poll=problem.poll
+    )
     recorded = np.asarray(shots.traces[shot][heard] @ best.sampler, dtype=np.float64)
     water = fitted(problem.water, distance[heard], model, recorded, problem.clock.step_s)
     if max(abs(water.lead + water.bend * f**2) for f in (band.low_hz, band.high_hz)) > FARTHEST:
@@ -78,7 +80,9 @@ def levelled(problem: WaveProblem, shots: WaterShots) -> WaveProblem:
     apart, size = [], []
     for emitter in _sounding(problem):
         heard = problem.heard(emitter)
-        model = simulate(medium, problem.emitters[emitter], problem.receivers[heard], problem.wavelet)
+        model = simulate(
+            medium, problem.emitters[emitter], problem.receivers[heard], problem.wavelet, poll=problem.poll
+        )
         apart.append(distance[emitter][heard])
         size.append(_energy(problem, shots, emitter, heard, model))
     curve = np.polynomial.Polynomial.fit(
@@ -122,7 +126,9 @@ def _matched(problem: WaveProblem, shots: WaterShots, water: Water, run: Mapping
 
     def one(emitter: int) -> tuple[Floats, Floats]:
         heard = problem.heard(emitter)
-        model = simulate(medium, problem.emitters[emitter], problem.receivers[heard], pulse)
+        model = simulate(
+            medium, problem.emitters[emitter], problem.receivers[heard], pulse, poll=problem.poll
+        )
         recorded = shots.gain[emitter][heard][:, None] * (shots.traces[emitter][heard] @ sampler)
         return model, np.asarray(recorded, dtype=np.float64)
 

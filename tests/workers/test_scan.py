@@ -1,0 +1,30 @@
+"""Scans as tasks know them: a look at waves ends when the folder of its job has gone."""
+
+from __future__ import annotations
+
+import pytest
+
+from bentray_kernels.wave import strips
+from bentray_kernels.wave.chain import look_at_waves
+from bentray_kernels.wave.refine import Model
+from bentray_workers.dataset_file import write_dataset
+from bentray_workers.findings_file import Found, write_findings
+from bentray_workers.scan import FileWaveScan
+from bentray_workers.wanted import Unwanted
+
+from ..kernels.wave.scans import SETTINGS, scan
+
+
+def test_a_look_at_waves_ends_with_its_job(tmp_path, monkeypatch):
+    path, folder = tmp_path / "scan.h5", tmp_path / "job"
+    write_dataset(path, scan())
+    folder.mkdir()
+    write_findings(folder / "findings.json", Found((), examined=True, changed=False))
+    waves = FileWaveScan(path, path.stat().st_mtime_ns, SETTINGS, 0, folder / "findings.json")
+    problem = waves.problem(0)
+    water = Model(problem.water.speed + 0.0 * problem.region)
+    assert look_at_waves(waves, 0, water, 0).misfit > 0.0
+    monkeypatch.setattr(strips, "STRIP", 10**5)
+    folder.rename(tmp_path / "job.ended")
+    with pytest.raises(Unwanted):
+        look_at_waves(waves, 0, water, 0)
