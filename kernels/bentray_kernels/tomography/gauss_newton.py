@@ -23,8 +23,10 @@ from .ray_width import bending, nodes_wide, seen
 from .result import Sweep, residual_counts
 from .settings import Settings
 
-# A misfit above this part of the one before ends the iteration: nothing is left to gain.
+# A misfit above this part of the best before is no gain, and so many images in a row without one end the
+# iteration. Not one alone: the first of bent rays may miss as much as that of straight ones, the next far less.
 LEAST_GAIN = 0.98
+PATIENCE = 2
 
 # A step that makes the misfit grow is halved so often at most: rays of an image say little about far ones.
 MOST_HALVINGS = 3
@@ -60,6 +62,7 @@ class Iterate:
         coverage: as ``slowness``, metres of ray through each node.
         best: the best image so far: each is held against the best before it, at the limit of that one.
         halvings: of the last step.
+        idle: images in a row, up to the last, that gained nothing.
         done: whether nothing is left to do.
         history: a record per iteration, of the misfit that it began with.
     """
@@ -70,6 +73,7 @@ class Iterate:
     coverage: Floats
     best: Measured
     halvings: int = 0
+    idle: int = 0
     done: bool = False
     history: tuple[Sweep, ...] = ()
 
@@ -134,8 +138,12 @@ def step(
     if against < best.loss:
         loss = huber.loss(residual, limit)
         best = Measured(state.slowness, number, limit, loss, residual_counts(residual))
-    grown = against > state.best.loss and state.halvings < MOST_HALVINGS
-    stuck = number > 1 and against > LEAST_GAIN * state.best.loss and not grown
+    worse = against > state.best.loss
+    grown = worse and state.halvings < MOST_HALVINGS
+    # Not even a fraction of the step makes it better.
+    lost = worse and not grown
+    idle = state.idle + (not grown) if against > LEAST_GAIN * state.best.loss else 0
+    stuck = lost or idle == PATIENCE
     # The last pass only measures what the one before gave.
     last = number == settings.sweeps
     if number > 1 and (stuck or last or rms <= settings.stop_rms_s):
@@ -168,6 +176,7 @@ def step(
         coverage=coverage,
         best=best,
         halvings=0,
+        idle=idle,
         done=settings.sweeps == 1,
         history=history,
     )
