@@ -11,6 +11,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings, Trial, reconstruct
 from bentray_kernels.tomography.advice import (
+    BANDED,
     CANDIDATES,
     choose,
     reason,
@@ -104,8 +105,7 @@ def test_exact_times_ask_for_thin_bent_rays_whatever_the_frequency(scan):
     result = reconstruct(replace(scan, center_frequency_hz=4e5), PLAN, seen.append)
     assert result.settings.rays == "curved"
     assert result.settings.ray_width_m == 0.0
-    # As if the frequency were not known.
-    assert len(result.trials) == len(CANDIDATES)
+    assert len(result.trials) == len(BANDED)
     assert [p.done / p.total for p in seen] == sorted(p.done / p.total for p in seen)
     assert seen[-1].done == seen[-1].total
 
@@ -157,7 +157,10 @@ def test_where_no_view_can_be_held_out_pairs_are(scan):
         center_frequency_hz=4e5,
     )
     result = reconstruct(few, replace(PLAN, nodes=24, sweeps=1))
-    assert len(result.trials) == len(CANDIDATES)
+    assert len(result.trials) == len(BANDED)
+    # By SART alone, for the frequency is known.
+    straight = [trial.settings for trial in result.trials if trial.settings["rays"] == "straight"]
+    assert straight == [{"rays": "straight", "method": "sart"}]
 
 
 def trial(rays, held_out):
