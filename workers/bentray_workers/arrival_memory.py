@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 
+from bentray_kernels.acquisition.gate import FREQUENCIES
 from bentray_kernels.acquisition.pickers import PICKERS
+from bentray_kernels.acquisition.pulse import AFTER, BEFORE, EMISSIONS
 from bentray_kernels.tomography.settings import Settings
 
 from .wave_memory import Traces
@@ -21,6 +23,9 @@ READING_BYTES, TIMES_BYTES, JOINING_BYTES = 30 * 2**20, 6 * 2**20, 11 * 2**20
 
 # Bytes a sample of one emission: of its figures; while it is read; filtered, padded to a power of two.
 MEASURE_BYTES, READ_BYTES, FILTER_BYTES = 58, 12, 64
+
+# Bytes of the amplitudes of one emission: a sample of the gate, as long as the measured pulse; a frequency.
+GATE_BYTES, POWER_BYTES = 24, 100
 
 # Bytes a pair: of copies of a period of its pulse beside its figures; of its neighbours and their medians.
 PULSE_COPIES, FIGURE_BYTES, SETTLE_BYTES = 3 * 8, 100, 720
@@ -62,6 +67,11 @@ def arrival_call_bytes(traces: Traces | None, pairs: int, settings: Settings) ->
     reading = READING_BYTES + 2 * samples * traces.sample_bytes
     filtered = FILTER_BYTES if PICKERS[settings.picker].filtered else 0
     found["read"] = reading + (READ_BYTES + filtered) * samples + 8 * of_slice
+    if settings.listens:
+        pulse = math.ceil((BEFORE + AFTER) * traces.rate_hz / traces.frequency_hz) + 1
+        # The pulse is the median of those of several emissions.
+        found["read"] += traces.receivers * pulse * (GATE_BYTES + PULSE_COPIES * EMISSIONS)
+        found["read"] += traces.receivers * FREQUENCIES * POWER_BYTES + 8 * of_slice
     found["settle"] = settle_bytes(of_slice)
     if settings.examine:
         pulse = PULSE_COPIES * (2 * math.ceil(traces.rate_hz / traces.frequency_hz) + 1)
