@@ -24,7 +24,7 @@ from .result import Sweep, residual_counts
 from .settings import Settings
 
 # A misfit above this part of the best before is no gain, and so many images in a row without one end the
-# iteration. Not one alone: the first of bent rays may miss as much as that of straight ones, the next far less.
+# iteration; one does not: the first of bent rays may miss as much as straight ones do, and the next far less.
 LEAST_GAIN = 0.98
 PATIENCE = 2
 
