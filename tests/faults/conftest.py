@@ -34,10 +34,10 @@ def scan_file(scan: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture
-def machine(tmp_path: Path) -> Iterator[Machine]:
-    """A scheduler, two workers and a service."""
-    made = Machine(tmp_path)
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
+    """A scheduler, two workers and a service, for all tests of a file: each leaves them at work."""
+    made = Machine(tmp_path_factory.mktemp("machine"))
     try:
         made.wait_ready()
         yield made

@@ -127,10 +127,10 @@ class Machine:
         """Wait until the service and its workers answer."""
         wait_until(lambda: self.http.get("/health/ready").is_success)
 
-    def submit(self, dataset: str, **settings: Any) -> str:
-        """Queue a reconstruction; its id."""
-        asked = {"kind": "reconstruction", "dataset": dataset, "settings": settings}
-        answer = self.http.post("/v1/jobs", json=asked)
+    def submit(self, dataset: str | None = None, **settings: Any) -> str:
+        """Queue a reconstruction, or without a dataset a simulation; its id."""
+        kind = {"kind": "simulation"} if dataset is None else {"kind": "reconstruction", "dataset": dataset}
+        answer = self.http.post("/v1/jobs", json={**kind, "settings": settings})
         assert answer.status_code == 202, answer.text
         return str(answer.json()["id"])
 

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from bentray_kernels.tomography import Settings, reconstruct
+from bentray_workers.asked_simulation import AskedSimulation
+from bentray_workers.dataset_file import write_dataset
 from bentray_workers.reconstruction_file import read_reconstruction
+from bentray_workers.wave_simulation import simulate_waves
 
 from .conftest import ELEMENTS
 from .machine import wait_until
@@ -22,6 +25,9 @@ PLANS = [
     {**PLAN, "method": "sart", "sweeps": 60, "resolution_check": True},
     {**PLAN, "method": "auto", "sweeps": 24},
 ]
+
+EMISSIONS = 24
+WAVES = {"waveform": True, "frequency_hz": 4e5, "side_m": 0.05, "nodes": 32, "elements": 32, "snr": 20.0}
 
 KILLS = 20
 # Of every kind at least one; the rest as it comes.
@@ -62,6 +68,34 @@ def test_whatever_is_killed_nothing_is_lost(machine, scan, scan_file):
     attempts = sum(attempts_of(machine, job) for job in jobs)
     # Two jobs run at once, and nearly every kill but a worker's, which Dask makes good, tore one.
     assert attempts > len(jobs) + targets.count("service")
+
+
+def test_a_simulation_goes_on_from_the_emissions_it_has(machine, tmp_path):
+    asked = {**WAVES, "emissions": EMISSIONS}
+    job = machine.submit(**asked)
+    work = machine.files / "work" / job
+
+    def made():
+        return len(list(work.rglob("part-*.npz")))
+
+    wait_until(lambda: made() >= 2)
+    machine.kill_a_worker()
+    wait_until(lambda: made() >= 5)
+    machine.kill("service")
+    kept = made()
+    assert kept < EMISSIONS
+    machine.start("service")
+    machine.wait_ready()
+    assert begun_at(machine, job) >= kept
+    done = machine.ended(job)
+    assert done["state"] == "succeeded", done["error"]
+    assert attempts_of(machine, job) == 2
+    write_dataset(tmp_path / "scan.h5", simulate_waves(None, AskedSimulation(**asked).chosen()))
+    found = machine.files / "datasets" / f"{done['dataset']}.h5"
+    assert found.read_bytes() == (tmp_path / "scan.h5").read_bytes()
+    datasets = machine.http.get("/v1/datasets").json()["datasets"]
+    assert [one["id"] for one in datasets if one["job"] == job] == [done["dataset"]]
+    wait_until(lambda: not work.exists())
 
 
 def keep_busy(machine, dataset, jobs):
