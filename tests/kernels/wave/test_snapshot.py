@@ -1,5 +1,6 @@
 """Refinements cut off anywhere and gone on with from a checkpoint end as if nothing had happened."""
 
+import functools
 import json
 
 import numpy as np
@@ -14,7 +15,10 @@ from bentray_kernels.wave.snapshot import TYPES
 
 from .scans import SETTINGS, refined, scan, water
 
-HERE = Here(scan(), SETTINGS)
+
+@functools.cache
+def here():
+    return Here(scan(), SETTINGS)
 
 
 def stored(chain):
@@ -25,12 +29,12 @@ def stored(chain):
 
 def run(cuts=()):
     """A chain to its end; before each call whose number is among ``cuts`` it is lost and made anew."""
-    chain = WaveChain(HERE, water())
+    chain = WaveChain(here(), water())
     ready, done = chain.first(), 0
     while ready:
         if done in cuts:
             standing = stored(chain)
-            chain = WaveChain(HERE, water())
+            chain = WaveChain(here(), water())
             chain.restore(standing)
             ready = chain.first()
         done += 1

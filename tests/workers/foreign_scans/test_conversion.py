@@ -262,15 +262,15 @@ def test_an_archive_that_declares_more_than_it_holds_is_refused_without_the_memo
 
 
 def test_bombs_are_not_unpacked(tmp_path):
-    """A gigabyte of zeros in a megabyte, in the place of positions, in both packed formats."""
+    """A gigabyte of zeros in some megabytes, in the place of positions, in both packed formats."""
     with (
-        zipfile.ZipFile(tmp_path / "scan.npz", "w", zipfile.ZIP_DEFLATED) as archive,
+        zipfile.ZipFile(tmp_path / "scan.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
         archive.open("element_position_m.npy", "w", force_zip64=True) as member,
     ):
         member.write(_header((1 << 26, 2)))
         for _ in range(64):
             member.write(bytes(1 << 24))
-    packer = zlib.compressobj(9)
+    packer = zlib.compressobj(1)
     size = 1 << 30
     head = _element("<", "element_positions", (1 << 26, 2), "f8", (9, b""))[:-8]
     head = struct.pack("<II", 14, size + 64) + head[8:] + struct.pack("<II", 9, size)
