@@ -129,7 +129,7 @@ class WaveSimulationSettings:
         """Error of the phase speed at the centre frequency and at the highest one of the pulse, relative."""
         courant = self.coupling_mps * self.step_s / self.spacing_m
         waves = (self.coupling_mps / (times * self.frequency_hz) for times in (1.0, HIGHEST))
-        centre, highest = (phase_error(wave / self.spacing_m, courant) for wave in waves)
+        centre, highest = (phase_error(wave / self.spacing_m, courant, order=ORDER) for wave in waves)
         return centre, highest
 
     def elements_m(self) -> Floats:

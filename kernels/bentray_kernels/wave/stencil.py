@@ -35,9 +35,9 @@ def weights(order: int = 2 * HALO) -> Floats:
     return np.array([float(w) for w in (-2 * sum(sides), *sides)] + [0.0] * (HALO - m))
 
 
-def symbol(angle: Floats) -> Floats:
+def symbol(angle: Floats, order: int = 2 * HALO) -> Floats:
     """What the weights give in place of ``angle**2``; ``angle`` is wave number times spacing, any shape."""
-    centre, *sides = weights()
+    centre, *sides = weights(order)
     turns = np.cos(np.asarray(angle)[..., None] * np.arange(1, HALO + 1))
     return np.asarray(-centre - 2.0 * turns @ np.array(sides))
 
@@ -57,17 +57,20 @@ def longest_step(speed: float, spacing: float, damping: float = 0.0) -> float:
     return 2.0 / math.sqrt(damping**2 + 2.0 * shortest * (speed / spacing) ** 2)
 
 
-def phase_error(points_per_wavelength: float, courant: float = 0.0, direction: float = 0.0) -> float:
+def phase_error(
+    points_per_wavelength: float, courant: float = 0.0, direction: float = 0.0, order: int = 2 * HALO
+) -> float:
     """Numerical phase speed over the true one, minus 1.
 
     Args:
         points_per_wavelength: nodes in a wavelength.
         courant: speed times time step over spacing; 0: what space alone does.
         direction: angle of travel to the x axis, rad.
+        order: in space.
     """
     angle = 2.0 * math.pi / points_per_wavelength
     along = np.array([angle * math.cos(direction), angle * math.sin(direction)])
-    turned = math.sqrt(float(symbol(along).sum()))
+    turned = math.sqrt(float(symbol(along, order).sum()))
     if courant > 0.0:
         turned = 2.0 / courant * math.asin(0.5 * courant * turned)
     return turned / angle - 1.0

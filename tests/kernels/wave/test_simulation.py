@@ -8,7 +8,7 @@ from bentray_kernels import eikonal
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
-from bentray_kernels.wave.stencil import longest_step
+from bentray_kernels.wave.stencil import longest_step, phase_error
 
 WATER = 1500.0
 
@@ -19,12 +19,16 @@ def pulse(time, centre=2e5):
     return np.exp(-((0.8 * late) ** 2)) * np.sin(2.0 * np.pi * late)
 
 
-def analytic(distance, time, wavelet):
-    """Pressure of a line source in a uniform fluid: (i/4) of the Hankel function, frequency by frequency."""
+def analytic(distance, time, wavelet, ahead=lambda frequency: 0.0):
+    """Pressure of a line source in a uniform fluid: (i/4) of the Hankel function, frequency by frequency.
+
+    ``ahead`` is the error of the phase speed at a frequency.
+    """
     padded = 4 * time.size
-    turn = 2.0 * np.pi * np.fft.rfftfreq(padded, time[1] - time[0])
-    green = np.zeros(turn.size, dtype=complex)
-    green[1:] = -0.25j * hankel2(0, turn[1:] * distance / WATER)
+    frequency = np.fft.rfftfreq(padded, time[1] - time[0])[1:]
+    speed = WATER * np.array([1.0 + ahead(one) for one in frequency])
+    green = np.zeros(frequency.size + 1, dtype=complex)
+    green[1:] = -0.25j * hankel2(0, 2.0 * np.pi * frequency * distance / speed)
     return np.fft.irfft(green * np.fft.rfft(wavelet, padded), padded)[: time.size]
 
 
@@ -45,6 +49,26 @@ def against_green(spacing, step):
 
 def test_traces_are_those_of_the_green_function():
     assert against_green(1e-3, 2.5e-8) < 0.02
+
+
+@pytest.mark.parametrize(("order", "step"), [(8, 5e-8), (8, 2.5e-7), (6, 2.5e-7)])
+def test_what_is_left_is_the_dispersion_that_is_stated(order, step):
+    """With waves of 4.7 nodes and more that run askew: 0.8 and 21 % off, of which a tenth or less is left."""
+    spacing = 1e-3
+    medium = Medium.of(np.full((60, 50), WATER), spacing, step, edge_nodes=40, dtype=np.float64)
+    time = np.arange(round(6e-5 / step)) * step
+    source, receiver = np.array([0.008, 0.009]), np.array([[0.050, 0.037]])
+    across = receiver[0] - source
+    far, angle = float(np.linalg.norm(across)), float(np.arctan2(across[1], across[0]))
+
+    def ahead(frequency):
+        points = WATER / (frequency * spacing)
+        return phase_error(points, WATER * step / spacing, angle, order) if points > 2.2 else 0.0
+
+    found = simulate(medium, source, receiver, pulse(time, 2.1e5), order)[0]
+    exact, stated = (analytic(far, time, pulse(time, 2.1e5), error) for error in (lambda _: 0.0, ahead))
+    assert np.linalg.norm(found - stated) < 0.1 * np.linalg.norm(found - exact)
+    assert np.linalg.norm(found - stated) < 0.004 * np.linalg.norm(exact)
 
 
 def test_error_falls_as_the_square_of_the_time_step():
