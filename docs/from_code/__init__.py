@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from .command_line import commands
+from .dispersion import dispersion
 from .rest import addresses, records
 from .service_settings import settings_table
 
@@ -15,6 +16,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "commands": commands,
     "addresses": addresses,
     "records": records,
+    "dispersion": dispersion,
     "service settings": settings_table,
 }
 # Between bars a docstring has an absolute value, reStructuredText a substitution.

@@ -1,0 +1,38 @@
+"""The error of the phase that the wave simulator makes, by the nodes in a wave, as a table."""
+
+from __future__ import annotations
+
+from bentray_kernels.wave.stencil import longest_step, phase_error
+
+from .tables import table
+
+POINTS = (2.5, 3.0, 4.0, 4.5, 5.0, 6.0, 7.0, 11.0)
+# Heads with the order in space and the time step, part of the longest stable one.
+COLUMNS = {
+    "space alone, order 6": (6, 0.0),
+    "space alone, order 8": (8, 0.0),
+    "order 6, half the longest step": (6, 0.5),
+    "order 8, half the longest step": (8, 0.5),
+    "order 8, the longest step": (8, 1.0),
+}
+
+
+def dispersion() -> str:
+    """Degrees that a wave is ahead after a path of ten wavelengths along a grid line."""
+    rows = [
+        (f"{points:g}", *(f"{ahead(points, *how):+.1f}" for how in COLUMNS.values())) for points in POINTS
+    ]
+    return table(("nodes in a wave", *COLUMNS), rows)
+
+
+def ahead(points: float, order: int, part: float) -> float:
+    """Degrees after ten wavelengths.
+
+    Args:
+        points: nodes in a wave.
+        order: in space.
+        part: of the longest stable time step; 0: what space alone does.
+    """
+    # With nodes 1 m apart and a speed of 1 m/s the Courant number is the time step.
+    courant = part * longest_step(1.0, 1.0)
+    return 3600.0 * (1.0 - 1.0 / (1.0 + phase_error(points, courant, order=order)))
