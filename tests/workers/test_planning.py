@@ -39,8 +39,8 @@ def ring(elements, heights):
         ({"nodes": 128}, 256, 0),
         ({"nodes": 64, "method": "gauss-newton", "resolution_check": True}, 128, 0),
         ({"nodes": 128, "method": "gauss-newton"}, 192, 0),
-        ({"nodes": 48, "method": "gauss-newton", "decomposition": "volume"}, 24, 8),
-        ({"nodes": 64, "decomposition": "volume", "attenuation": False}, 24, 8),
+        ({"nodes": 48, "method": "gauss-newton", "decomposition": "volume"}, 12, 8),
+        ({"nodes": 64, "decomposition": "volume", "attenuation": False}, 12, 8),
     ],
     ids=["sart 64", "sart 128", "gauss-newton 64", "gauss-newton 128", "gauss-newton volume", "sart volume"],
 )

@@ -105,6 +105,20 @@ def strays(found: Traced, expected: Traced, far: float) -> int:
     return int((~same).sum())
 
 
+@pytest.mark.parametrize(
+    ("name", "roots", "structure"),
+    [("bspline2", "certain", "octree"), ("bspline4", "brent", "dda"), ("bspline6", "brent", "steps")],
+)
+def test_every_filter_and_root_finder_sees_the_ball(name, roots, structure):
+    """In place of the case above: each filter with each root finder takes seconds to build.
+
+    The other filters meet every root finder below.
+    """
+    made = Scene.build(Spline.of(RADIUS - distance(48), name), Layers((0.0,), (1.0, 1.5)), 1.0 / 47)
+    error = test_caster.screen_error(made, RADIUS, 1.5, 0.8, structure=structure, roots=roots)
+    assert np.median(error) < 2e-3
+
+
 @pytest.mark.parametrize("roots", ["certain", "brent"])
 def test_rays_through_nested_surfaces_are_those_of_the_compiled_caster(roots):
     found, expected = both(nested(), roots=roots)
