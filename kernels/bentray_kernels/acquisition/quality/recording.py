@@ -16,6 +16,7 @@ from .dead import dead
 from .finding import Finding
 from .measures import Measures
 from .polarity import polarity
+from .positions import positions
 from .sampling import frequency, sampling
 from .swapped import swapped
 from .time_zero import recording
@@ -28,6 +29,7 @@ OF_WATER = (
     "time zero of the recording",
     "swapped channels",
     "polarity",
+    "element positions",
 )
 
 
@@ -121,7 +123,7 @@ def _of_water(dataset: Dataset, strongest: Floats) -> list[Finding]:
         order, axis = exchange(dataset, finding)
         strongest = np.take(strongest, order, axis=axis)
     inverted = polarity(apply(dataset, exchanged), strongest)
-    return exchanged + inverted + recording(dataset, line)
+    return exchanged + inverted + recording(dataset, line) + positions(dataset, strongest, line)
 
 
 def _left_out(findings: list[Finding], like: Flags) -> Flags:

@@ -1,4 +1,4 @@
-"""Planted faults: each is found, named, and survived or refused with a reason; a clean scan has none."""
+"""Checks that want pulses at known times, and what is no fault; most faults: ``test_planted_faults``."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import Dataset, Waveform, pick
 from bentray_kernels.acquisition.quality import Examined, corrected, examine
 from bentray_kernels.errors import InvalidInput
 
-from ..traces import FREQUENCY_HZ, RATE_HZ, blob_delay, scan
+from ..traces import FREQUENCY_HZ, blob_delay, scan
 
 ELEMENTS = 32
 
@@ -44,11 +42,11 @@ def names(examined: Examined) -> list[str]:
     return [finding.check for finding in examined.report.findings]
 
 
-def assert_survived(examined: Examined, lost: np.ndarray | None = None, atol: float = 2e-9) -> None:
-    """The times are those of the clean scan but where they were lost."""
+def assert_survived(examined: Examined, atol: float) -> None:
+    """The times are those of the clean scan."""
     assert examined.picked is not None
     delta = examined.picked.differential_tof()
-    kept = np.isfinite(sought()) if lost is None else np.isfinite(sought()) & ~lost
+    kept = np.isfinite(sought())
     assert np.isfinite(delta[kept]).mean() > 0.99
     both = kept & np.isfinite(delta)
     np.testing.assert_allclose(delta[both], sought()[both], atol=atol)
@@ -69,71 +67,6 @@ def test_noise_alone_is_no_fault(noise):
     examined = examine(noisy)
     assert set(names(examined)) <= {"cycle jumps", "outliers", "reciprocity"}
     np.testing.assert_array_equal(examined.picked.differential_tof(), pick(noisy).differential_tof())
-
-
-def test_three_dead_elements_are_named_and_left_out():
-    dead = [3, 11, 20]
-    random = np.random.default_rng(0)
-
-    def kill(object_, water):
-        for traces in (object_, water):
-            noise = 0.01 * random.standard_normal(traces.shape)
-            traces[dead] = noise[dead]
-            traces[:, dead] = noise[:, dead]
-
-    examined = examine(with_traces(kill))
-    found = [f for f in examined.report.findings if f.check == "dead elements"]
-    assert [(f.elements, f.role, f.action) for f in found] == [
-        ((3, 11, 20), "emission", "left out"),
-        ((3, 11, 20), "reception", "left out"),
-    ]
-    lost = np.zeros((ELEMENTS, ELEMENTS), dtype=bool)
-    lost[dead] = lost[:, dead] = True
-    assert np.isnan(examined.picked.differential_tof()[lost]).all()
-    assert_survived(examined, lost)
-
-
-@given(pair=st.lists(st.integers(0, ELEMENTS - 1), min_size=2, max_size=2, unique=True))
-@settings(max_examples=4, deadline=None)
-def test_two_swapped_elements_are_put_back(pair):
-    order = np.arange(ELEMENTS)
-    order[pair] = order[pair[::-1]]
-    examined = examine(
-        with_traces(lambda object_, water: (object_[order][:, order].copy(), water[order][:, order].copy()))
-    )
-    found = [f for f in examined.report.findings if f.check == "swapped channels"]
-    assert [(set(f.elements), f.role, f.action) for f in found] == [
-        (set(pair), "reception", "corrected"),
-        (set(pair), "emission", "corrected"),
-    ]
-    assert_survived(examined)
-
-
-@pytest.mark.parametrize("roles", [("emission",), ("reception",), ("emission", "reception")])
-def test_an_inverted_element_is_turned_over(roles):
-    def invert(object_, water):
-        for traces in (object_, water):
-            if "emission" in roles:
-                traces[7] *= -1.0
-            if "reception" in roles:
-                traces[:, 7] *= -1.0
-
-    dataset = with_traces(invert)
-    examined = examine(dataset)
-    found = [f for f in examined.report.findings if f.check == "polarity"]
-    assert [(f.elements, f.role, f.action) for f in found] == [((7,), role, "corrected") for role in roles]
-    assert_survived(examined)
-    turned = corrected(dataset, examined.report)
-    np.testing.assert_array_equal(turned.waveform.water, clean().waveform.water)
-
-
-def test_a_trigger_offset_of_the_object_scan_is_taken_off():
-    late = scan(blob_delay(ELEMENTS) + 4.0e-7, elements=ELEMENTS, noise=0.01)
-    examined = examine(late)
-    (found,) = (f for f in examined.report.findings if f.check == "time zero of the object scan")
-    assert found.action == "corrected"
-    assert found.value == pytest.approx(4.0e-7, abs=5e-9)
-    assert_survived(examined, atol=8e-9)
 
 
 def test_a_recording_that_starts_at_the_wrong_time_is_moved():
@@ -186,42 +119,6 @@ def test_without_a_water_shot_traces_are_refused_and_travel_times_are_not():
     assert examine(replace(alone, delta_tof_s=sought())).report.refusal is None
 
 
-def test_clipped_traces_are_reported_and_their_times_kept():
-    examined = examine(with_traces(lambda o, w: (np.clip(o, -0.3, 0.5), np.clip(w, -0.3, 0.5))))
-    found = [f for f in examined.report.findings if f.check == "clipping"]
-    assert [f.action for f in found] == ["reported", "reported"]
-    assert "gain set too high" in found[0].found
-    assert_survived(examined, atol=3e-8)
-
-
-@pytest.mark.parametrize(
-    ("value", "check"), [(5.0, "constant traces"), (np.nan, "values"), (np.inf, "values")]
-)
-@pytest.mark.parametrize("which", [0, 1])
-def test_constant_and_broken_traces_are_left_out(value, check, which):
-    lost = np.zeros((ELEMENTS, ELEMENTS), dtype=bool)
-    lost[[2, 9], [15, 30]] = True
-
-    def spoil(*both):
-        both[which][lost] = value
-
-    examined = examine(with_traces(spoil))
-    (found,) = examined.report.findings
-    assert (found.check, found.action) == (check, "left out")
-    np.testing.assert_array_equal(found.pairs, lost)
-    assert_survived(examined, lost)
-
-
-@pytest.mark.parametrize("factor", [0.5, 0.9, 1.25, 2.0])
-def test_a_wrong_sampling_rate_is_refused(factor):
-    examined = examine(replace(clean(), sampling_rate_hz=factor * RATE_HZ))
-    assert examined.picked is None
-    assert examined.report.verdict == "refused"
-    refusal = examined.report.refusal
-    assert refusal.check in ("sampling rate", "centre frequency")
-    assert refusal.value == pytest.approx(factor, rel=0.1)
-
-
 @pytest.mark.parametrize("factor", [0.4, 2.5])
 def test_a_wrong_centre_frequency_is_refused(factor):
     examined = examine(replace(clean(), center_frequency_hz=factor * FREQUENCY_HZ))
@@ -229,19 +126,11 @@ def test_a_wrong_centre_frequency_is_refused(factor):
     assert examined.report.refusal.value == pytest.approx(1.0 / factor, rel=0.25)
 
 
-def test_an_eccentricity_of_a_millimetre_is_no_false_fault():
-    """Positions off by 1 mm are for the calibration; no element is taken for dead, swapped or inverted."""
-    angle = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
-    off = 1e-3 * np.column_stack((np.cos(2.0 * angle), np.zeros(ELEMENTS)))
-    examined = examine(replace(clean(), element_position_m=clean().element_position_m + off))
-    assert not set(names(examined)) & {"dead elements", "swapped channels", "polarity", "sampling rate"}
-    assert examined.picked is not None
-
-
-def test_random_errors_of_the_drawing_are_no_false_fault():
+def test_random_errors_of_the_drawing_are_named_and_no_other_fault():
     off = 3e-4 * np.random.default_rng(2).standard_normal((ELEMENTS, 2))
     examined = examine(replace(clean(), element_position_m=clean().element_position_m + off))
-    assert not set(names(examined)) & {"dead elements", "swapped channels", "polarity", "sampling rate"}
+    assert names(examined) == ["element positions"]
+    assert examined.report.findings[0].value == pytest.approx(4e-4, rel=0.3)
 
 
 def test_slices_are_examined_one_by_one():

@@ -1,0 +1,62 @@
+"""Elements that stand elsewhere than drawn: water times that are off, alike in both directions."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...arrays import Floats
+from ..dataset import Dataset
+from .finding import Finding
+from .water_line import WaterLine
+
+# They may be off by this part of a wavelength. Noise-free pulses, and simulated waves, show a fiftieth.
+LARGEST_OFF = 0.05
+
+# Pairs that were heard both ways, at least.
+FEWEST = 20
+
+
+def positions(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list[Finding]:
+    """What the water's times are off the places of the elements, beyond their noise.
+
+    An element that stands elsewhere, or is late, is so as emitter and as receiver; noise is not the same when
+    the two change places. So half the sum of both directions holds both, half the difference noise alone.
+
+    Args:
+        dataset: of one slice, channels in their places, with a centre frequency.
+        strongest_s: (ntx, nrx), times of the water's crests; NaN where there is none.
+        line: through them.
+    """
+    assert dataset.center_frequency_hz is not None
+    distance = dataset.distance_m()
+    off = np.where(distance > 0.25 * distance.max(), strongest_s - distance / line.speed_mps, np.nan)
+    elements = len(dataset.element_position_m)
+    full = np.full((elements, elements), np.nan)
+    full[np.ix_(dataset.tx, dataset.rx)] = off
+    half = np.triu_indices(elements, 1)
+    there, back = full[half], full.T[half]
+    both = np.isfinite(there + back)
+    if both.sum() < FEWEST:
+        return []
+    alike, noise = (_spread(0.5 * (there + sign * back)[both]) for sign in (1.0, -1.0))
+    apart = math.sqrt(max(alike**2 - noise**2, 0.0)) * dataset.water_speed_mps
+    allowed = LARGEST_OFF * dataset.water_speed_mps / dataset.center_frequency_hz
+    if apart <= allowed:
+        return []
+    return [
+        Finding(
+            "element positions",
+            f"water times {1e3 * apart:.2g} mm off those of the drawn places, alike both ways: positions or "
+            "delays to calibrate",
+            f"within {1e3 * allowed:.2g} mm, a twentieth of a wavelength",
+            "reported",
+            value=apart,
+            unit="m",
+        )
+    ]
+
+
+def _spread(values: Floats) -> float:
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))

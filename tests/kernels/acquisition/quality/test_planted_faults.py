@@ -1,0 +1,156 @@
+"""Faults planted in simulated waves: each is found, named, and survived or refused with a reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.acquisition.calibration import calibrate, water_times
+from bentray_kernels.acquisition.quality import Examined, Finding, corrected, examine
+
+from ..waves import ELEMENTS, FREQUENCY_HZ, NOISE, SKIP, STEP_S, wave_scan
+
+LATE_S = 4.0e-7
+
+# Element pairs whose traces of the object stand still or hold no number, and of the water.
+CONSTANT, INFINITE, NAN = ([2, 15], [9, 30]), ([5], [21]), ([28], [12])
+
+
+@pytest.fixture(scope="module")
+def sought() -> np.ndarray:
+    """What the scan gives that nothing is wrong with, (ntx, nrx), s."""
+    examined = examine(wave_scan())
+    assert examined.report.verdict == "clean"
+    assert examined.picked is not None
+    delta = examined.picked.differential_tof()
+    assert np.isfinite(delta).mean() > 0.85
+    return delta
+
+
+def found(examined: Examined, check: str) -> list[Finding]:
+    return [finding for finding in examined.report.findings if finding.check == check]
+
+
+def later(traces: np.ndarray, seconds: float) -> np.ndarray:
+    """Traces moved by a part of a sample; the first and last samples are as good as silent."""
+    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(traces.shape[-1], SKIP * STEP_S) * seconds)
+    return np.fft.irfft(np.fft.rfft(traces, axis=-1) * turn, traces.shape[-1], axis=-1).astype(np.float32)
+
+
+class Planted:
+    """A scan with all faults that one scan may have: in some elements, and in one pair of twenty, of which
+    the object's pulse is moved by a period or more."""
+
+    def __init__(self, elements: list[int], roles: tuple[str, ...], seed: int) -> None:
+        self.dead, self.swapped, self.inverted = sorted(elements[:3]), elements[3:5], elements[5]
+        self.roles = roles
+        random = np.random.default_rng(seed)
+        received, water = (t.copy() for t in (wave_scan().waveform.object, wave_scan().waveform.water))
+        received = later(received, LATE_S)
+        pairs = np.argwhere(~np.eye(ELEMENTS, dtype=bool))
+        self.moved = np.zeros((ELEMENTS, ELEMENTS), dtype=bool)
+        for e, r in pairs[random.permutation(len(pairs))[: len(pairs) // 20]]:
+            self.moved[e, r] = True
+            periods = random.choice([-1.0, 1.0]) * random.choice([1.0, 1.7, 2.4])
+            received[e, r] = later(received[e, r], periods / FREQUENCY_HZ)
+        order = np.arange(ELEMENTS)
+        order[self.swapped] = order[self.swapped[::-1]]
+        for traces in (received, water):
+            traces[:] = traces[order][:, order]
+            for role in roles:
+                traces[self.inverted if role == "emission" else (slice(None), self.inverted)] *= -1.0
+            noise = NOISE * random.standard_normal(traces.shape)
+            traces[self.dead], traces[:, self.dead] = noise[self.dead], noise[:, self.dead]
+            np.clip(traces, -0.7, 0.7, out=traces)
+        received[CONSTANT], received[INFINITE], water[NAN] = 0.5, np.inf, np.nan
+        self.dataset: Dataset = replace(wave_scan(), waveform=Waveform(received, water))
+
+
+@given(
+    elements=st.lists(st.integers(0, ELEMENTS - 1), min_size=6, max_size=6, unique=True),
+    roles=st.sampled_from([("emission",), ("reception",), ("emission", "reception")]),
+    seed=st.integers(0, 2**32 - 1),
+)
+@settings(max_examples=5, deadline=None)
+def test_all_at_once_are_named_and_survived(sought, elements, roles, seed):
+    planted = Planted(elements, roles, seed)
+    examined = examine(planted.dataset)
+    dead, swapped = set(planted.dead), set(planted.swapped)
+    both = ["emission", "reception"]
+    assert [(f.elements, f.role, f.action) for f in found(examined, "dead elements")] == [
+        (tuple(planted.dead), role, "left out") for role in both
+    ]
+    told = found(examined, "swapped channels")
+    assert sorted((f.role, set(f.elements), f.action) for f in told) == [
+        (role, swapped, "corrected") for role in both
+    ]
+    assert [(f.elements, f.role, f.action) for f in found(examined, "polarity")] == [
+        ((planted.inverted,), role, "corrected") for role in roles
+    ]
+    (offset,) = found(examined, "time zero of the object scan")
+    assert offset.action == "corrected"
+    assert offset.value == pytest.approx(LATE_S, abs=3e-8)
+    for check, places in (("constant traces", [CONSTANT]), ("values", [INFINITE, NAN])):
+        silent = {(e, r) for place in places for e, r in zip(*place, strict=True) if not dead & {e, r}}
+        pairs = [pair for finding in found(examined, check) for pair in np.argwhere(finding.pairs).tolist()]
+        assert sorted(map(tuple, pairs)) == sorted(silent)
+    assert {f.action for f in found(examined, "clipping")} == {"reported"}
+    assert any("gain set too high" in f.found for f in found(examined, "clipping"))
+    assert examined.picked is not None
+    delta = examined.picked.differential_tof()
+    assert np.isnan(delta[planted.dead]).all()
+    assert np.isnan(delta[:, planted.dead]).all()
+    alive = np.isfinite(sought)
+    alive[planted.dead] = alive[:, planted.dead] = False
+    left = np.isnan(delta)
+    assert left[alive & planted.moved].mean() > 0.7
+    assert left[alive & ~planted.moved].mean() < 0.03
+    off = np.abs((delta - sought)[alive & ~left])
+    assert np.mean(off > 0.1 / FREQUENCY_HZ) < 0.01
+    assert np.median(off) < 4e-8
+    jumps, outliers = (found(examined, check) for check in ("cycle jumps", "outliers"))
+    assert jumps
+    assert outliers
+
+
+@pytest.mark.parametrize(
+    ("changes", "check", "reason"),
+    [
+        ({"sampling_rate_hz": 0.9 / (SKIP * STEP_S)}, "sampling rate", "sampling rate, element positions or"),
+        ({"sampling_rate_hz": 1.25 / (SKIP * STEP_S)}, "sampling rate", "arrivals in water at"),
+        ({"waveform": None}, "water shot", "none"),
+    ],
+)
+def test_what_cannot_be_put_right_is_refused_with_the_reason(changes, check, reason):
+    if "waveform" in changes:
+        changes = {"waveform": Waveform(wave_scan().waveform.object)}
+    examined = examine(replace(wave_scan(), **changes))
+    assert examined.picked is None
+    assert examined.report.refusal.check == check
+    assert reason in examined.report.refusal.found
+    assert examined.report.refusal.accepted
+
+
+def test_an_eccentricity_of_a_millimetre_is_named_survived_and_calibrated(sought):
+    angle = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
+    true = wave_scan().element_position_m
+    drawn = true + 1e-3 * np.column_stack((np.cos(2.0 * angle), np.zeros(ELEMENTS)))
+    dataset = replace(wave_scan(), element_position_m=drawn)
+    examined = examine(dataset)
+    (finding,) = examined.report.findings
+    assert (finding.check, finding.action) == ("element positions", "reported")
+    assert 5e-4 < finding.value < 1.2e-3
+    delta = examined.picked.differential_tof()
+    assert np.isfinite(delta[np.isfinite(sought)]).mean() > 0.98
+    assert np.nanmax(np.abs(delta - sought)) < 1e-7
+    put_right = corrected(dataset, examined.report)
+    fitted = calibrate(put_right, water_times(put_right)).element_position_m
+    assert np.median(np.linalg.norm(fitted - true, axis=1)) < 0.2 * np.median(
+        np.linalg.norm(drawn - true, axis=1)
+    )
+    assert not found(examine(replace(dataset, element_position_m=fitted)), "element positions")
