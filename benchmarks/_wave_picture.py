@@ -24,12 +24,14 @@ def picture(shown: Sequence[tuple[Shot, Pair, Pair]]) -> bytes:
         figure.suptitle("The wave simulator against k-Wave, nothing scaled or shifted to fit")
         panels = figure.subplots(len(shown), 3, squeeze=False, width_ratios=(2, 2, 1.4))
         for row, (shot, raw, refined) in zip(panels, shown, strict=True):
-            title = f"{shot.name}, {shot.points:g} nodes in the shortest wave"
-            across(row[0], f"{title}: {misfit(*raw):.1%}", shot, raw, 1)
-            across(row[1], f"dispersion put into both: {misfit(*refined):.2%}", shot, refined, 10)
+            title = f"{shot.name}, {shot.points:g} nodes a wave"
+            across(row[0], f"{title}: {misfit(*raw):.1%}", shot, raw, 1, 0)
+            across(
+                row[1], f"dispersion put into both: {misfit(*refined):.2%}", shot, refined, 10, shot.spread
+            )
             later(row[2], shot, raw, refined)
         for axes in panels[0, :2]:
-            axes.legend(loc="upper left", fontsize=7)
+            axes.legend(loc="upper right", fontsize=7)
         panels[0][2].legend(loc="lower left", fontsize=7)
         for axes in panels[-1, :2]:
             axes.set_xlabel("time after the straight way through water (µs)")
@@ -37,14 +39,14 @@ def picture(shown: Sequence[tuple[Shot, Pair, Pair]]) -> bytes:
         return with_a_palette(to_png(figure))
 
 
-def across(axes: Axes, title: str, shot: Shot, pair: Pair, times: int) -> None:
-    """The traces of the receiver opposite the emitter, and so many times their difference."""
+def across(axes: Axes, title: str, shot: Shot, pair: Pair, times: int, before: int) -> None:
+    """The traces of the receiver opposite the emitter, and so many times their difference.
+
+    They begin ``before`` steps ahead of the record.
+    """
     opposite = shot.receivers // 2
     ours, theirs = (traces[opposite] / np.abs(pair[1][opposite]).max() for traces in pair)
-    # A refinement's begin earlier by as much on either side.
-    lead = (ours.size - shot.time.size) // 2
-    time = shot.time[0] + shot.step * (np.arange(ours.size) - lead)
-    late = 1e6 * (time - shot.distance[opposite] / WATER_MPS)
+    late = 1e6 * (shot.time - before * shot.step - shot.distance[opposite] / WATER_MPS)
     axes.plot(late, theirs, color=THEIRS, linewidth=3.0, label="k-Wave")
     axes.plot(late, ours, color=OURS, linewidth=1.0, label="ours")
     label = "difference" if times == 1 else f"{times} times the difference"

@@ -19,7 +19,7 @@ CENTRE_HZ = 5e5
 # The pulse is a sine under a Gaussian; at this many times its centre frequency it has 3 % of its height.
 HIGHEST = 1.54
 # Periods before the middle of the pulse, and recorded after the slowest arrival.
-BEFORE, AFTER = 3.5, 8.0
+BEFORE, AFTER = 3.5, 12.0
 # Time step, part of the longest stable one.
 STEP = 0.5
 # Of our time steps in one of k-Wave's: it is exact in the fastest of the media; in the others it has an error
@@ -27,8 +27,8 @@ STEP = 0.5
 THEIR_PARTS = 2
 # Absorbing edge of ours, nodes: what it sends back is below what is measured here.
 EDGE_NODES = 60
-# Where a refinement's filter lets waves pass, times the centre frequency, and its lead, periods.
-BAND, LEAD = (0.4, 1.2), 8.0
+# Where a refinement's filter lets waves pass, times the centre frequency, and what it spreads, periods.
+BAND, SPREAD = (0.4, 1.2), 8.0
 # As in the benchmark of attenuation: at 500 kHz gland loses 5 Np/m.
 LOSS_HZ = 5e6
 # Radius of the ring, part of the side.
@@ -46,14 +46,12 @@ class Shot:
         points: nodes in the shortest wave of the pulse, in the slowest of the media.
         side_m: of the square, m.
         receivers: on the ring, the emitter left out.
-        whole: False: only until the emitter is silent, for timing.
     """
 
     name: str
     points: float
     side_m: float
     receivers: int = 31
-    whole: bool = True
 
     @cached_property
     def slowest(self) -> float:
@@ -78,9 +76,7 @@ class Shot:
     @cached_property
     def time(self) -> np.ndarray:
         """Of the samples, the middle of the pulse at 0, (nt,), s."""
-        last = BEFORE / CENTRE_HZ
-        if self.whole:
-            last = 2.0 * RING * self.side_m / self.slowest + AFTER / CENTRE_HZ
+        last = 2.0 * RING * self.side_m / self.slowest + AFTER / CENTRE_HZ
         return np.arange(-BEFORE / CENTRE_HZ, last, self.step)
 
     @cached_property
@@ -114,6 +110,11 @@ class Shot:
         """To each receiver, (receivers,), m."""
         return self.spacing * np.linalg.norm(self.ring[1:] - self.ring[0], axis=1)
 
+    @cached_property
+    def spread(self) -> int:
+        """Time steps."""
+        return int(np.ceil(SPREAD / CENTRE_HZ / self.step))
+
     def ours(self) -> np.ndarray:
         """Traces, (receivers, nt)."""
         return self._simulated(pulse(self.time))
@@ -126,9 +127,11 @@ class Shot:
         return peer(self.speed, self.spacing, step, ring[0], ring[1:], pulse(fine), self.loss)[:, ::parts]
 
     def as_a_refinement(self, recorded: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Ours and recorded traces as a refinement compares them: filtered, our dispersion put into both."""
-        lead = int(np.ceil(LEAD / CENTRE_HZ / self.step))
-        clock = Clock(self.time[0] - lead * self.step, self.step, self.time.size + 2 * lead)
+        """Ours and recorded traces as a refinement compares them: filtered, our dispersion put into both.
+
+        Both begin ``spread`` steps before the record, and end as long before its end, which the filter blurs.
+        """
+        clock = Clock(self.time[0] - self.spread * self.step, self.step, self.time.size)
         band = (BAND[0] * CENTRE_HZ, BAND[1] * CENTRE_HZ)
         matrix = resampler(self.time, clock, band, Water(WATER_MPS), self.spacing)
         return self._simulated(pulse(self.time) @ matrix), recorded @ matrix
