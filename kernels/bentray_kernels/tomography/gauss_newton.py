@@ -122,6 +122,8 @@ def step(
 ) -> Iterate:
     """The next image from the rows of all emitters, in their order; at the end, the best of those measured.
 
+    Of two that miss about as much the last measured is given, which has met the penalty more nearly.
+
     ``settings.sweeps`` passes make one image less, for the last one measures; a single pass makes one too,
     which nothing measures.
 
@@ -135,9 +137,9 @@ def step(
     history = (*state.history, record)
     best, limit = state.best, huber.limit(residual, settings.huber_spreads, settings.huber_s or math.inf)
     against = huber.loss(residual, best.limit)
+    here = Measured(state.slowness, number, limit, huber.loss(residual, limit), residual_counts(residual))
     if against < best.loss:
-        loss = huber.loss(residual, limit)
-        best = Measured(state.slowness, number, limit, loss, residual_counts(residual))
+        best = here
     worse = against > state.best.loss
     grown = worse and state.halvings < MOST_HALVINGS
     # Not even a fraction of the step makes it better.
@@ -147,6 +149,7 @@ def step(
     # The last pass only measures what the one before gave.
     last = number == settings.sweeps
     if number > 1 and (stuck or last or rms <= settings.stop_rms_s):
+        best = here if against < state.best.loss / LEAST_GAIN else best
         history = tuple(replace(sweep, given=sweep.sweep == best.sweep) for sweep in history)
         return replace(state, slowness=best.slowness, best=best, history=history, done=True)
     if grown:

@@ -97,6 +97,16 @@ def test_the_last_pass_measures_and_the_best_image_is_given():
     assert not np.array_equal(once.slowness, states[0].slowness)
 
 
+@pytest.mark.parametrize(("misfit", "given"), [(2.03e-7, 3), (2.05e-7, 2)])
+def test_of_images_that_miss_alike_the_last_is_given(misfit, given):
+    of = problem(np.zeros((8, 8)))
+    state = gauss_newton.begin(start(of, None))
+    for missed in (4e-7, 2e-7, misfit):
+        before, state = state, gauss_newton.step(of, replace(PLAN, sweeps=3), state, [rows(missed)])
+    assert [sweep.sweep for sweep in state.history if sweep.given] == [given]
+    assert np.array_equal(state.slowness, before.slowness) == (given == 3)
+
+
 def test_no_ray_through_the_image_leaves_water():
     of = problem(np.zeros((8, 8)))
     outside = Rows(np.array([0, 1]), np.array([0], np.int32), np.ones(1, np.float32), np.array([1e-7]), 1)
