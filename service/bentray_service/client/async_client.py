@@ -102,6 +102,12 @@ class AsyncClient:
         """See ``Client.download``."""
         return await self._run(flows.download(volume_id, format, Path(path)))
 
+    async def download_dataset(
+        self, dataset_id: str, path: Path | str, on_progress: OnBytes | None = None
+    ) -> Path:
+        """See ``Client.download_dataset``."""
+        return await self._run(flows.download_dataset(dataset_id, Path(path), on_progress))
+
     async def result(self, volume_id: str) -> Result:
         """See ``Client.result``."""
         return await self._run(flows.result(volume_id))
@@ -136,7 +142,7 @@ class AsyncClient:
                 return response
         if isinstance(step, Fetch):
             async with self._answer("GET", step.path, **step.options) as response:
-                with saving(step.target) as save:
+                with saving(step, response) as save:
                     async for chunk in response.aiter_bytes(CHUNK_BYTES):
                         await anyio.to_thread.run_sync(save, chunk)
             return None

@@ -122,6 +122,10 @@ class Client:
         """Fetch a result into ``path``; the file is there whole or not at all."""
         return self._run(flows.download(volume_id, format, Path(path)))
 
+    def download_dataset(self, dataset_id: str, path: Path | str, on_progress: OnBytes | None = None) -> Path:
+        """Fetch a scan, uploaded or simulated, into ``path``; ``on_progress`` gets ``(came, total)``, bytes."""
+        return self._run(flows.download_dataset(dataset_id, Path(path), on_progress))
+
     def result(self, volume_id: str) -> Result:
         """A volume as arrays with coordinates; ``.to_xarray()`` makes a dataset of xarray of it."""
         return self._run(flows.result(volume_id))
@@ -155,7 +159,7 @@ class Client:
                 response.read()
                 return response
         if isinstance(step, Fetch):
-            with self._answer("GET", step.path, **step.options) as response, saving(step.target) as save:
+            with self._answer("GET", step.path, **step.options) as response, saving(step, response) as save:
                 for chunk in response.iter_bytes(CHUNK_BYTES):
                     save(chunk)
             return None

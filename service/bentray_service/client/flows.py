@@ -10,7 +10,7 @@ from typing import Any, Literal
 from .errors import ClientError
 from .results import Result, read_result
 from .steps import Ask, Fetch, Step
-from .uploading import PLACES
+from .uploading import PLACES, OnBytes
 
 Record = dict[str, Any]
 Format = Literal["hdf5", "nifti", "metaimage", "mat", "npy"]
@@ -39,6 +39,11 @@ def picture(path: str, how: Mapping[str, str | float]) -> Generator[Step, Any, b
 
 def download(volume_id: str, kind: Format, target: Path) -> Generator[Step, Any, Path]:
     yield Fetch(f"/v1/volumes/{volume_id}/data", {"params": {"format": kind}}, target)
+    return target
+
+
+def download_dataset(dataset_id: str, target: Path, told: OnBytes | None) -> Generator[Step, Any, Path]:
+    yield Fetch(f"/v1/datasets/{dataset_id}/file", {}, target, told)
     return target
 
 

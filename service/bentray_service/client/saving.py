@@ -5,22 +5,36 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
+
+import httpx
 
 from .errors import ClientError
+from .steps import Fetch
 
 
 @contextmanager
-def saving(target: Path) -> Iterator[Callable[[bytes], object]]:
+def saving(step: Fetch, response: httpx.Response) -> Iterator[Callable[[bytes], None]]:
     """What the chunks are given to; on leaving, the file takes the target's place.
+
+    Args:
+        step: says where it goes, and who is told how much has come.
+        response: to be read in chunks.
 
     Raises:
         ClientError: where it cannot be written.
     """
+    target = step.target
     partial = target.with_name(f"{target.name}.partial")
+    total = int(response.headers.get("content-length", 0))
     try:
         with partial.open("wb") as file:
-            yield file.write
+
+            def save(chunk: bytes) -> None:
+                file.write(chunk)
+                if step.told is not None:
+                    step.told(file.tell(), total)
+
+            yield save
             file.flush()
             os.fsync(file.fileno())
         partial.replace(target)

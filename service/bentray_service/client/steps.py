@@ -38,11 +38,18 @@ class Ask:
 
 @dataclass(frozen=True)
 class Fetch:
-    """Download into a file, which is there whole or not at all; no answer."""
+    """Download into a file, which is there whole or not at all; no answer.
+
+    Attributes:
+        path, options: of the request.
+        target: the file.
+        told: called with (bytes that came, bytes in all).
+    """
 
     path: str
     options: Mapping[str, Any]
     target: Path
+    told: Callable[[int, int], None] | None = None
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,12 @@ from ..storage.ids import new_id
 from ..wiring import CallerTenant, Service
 from . import quality
 from .bodies import only
+from .downloads import download, download_of
 from .records import DatasetList, DatasetRecord, dataset_record
 from .uploads import body_of, take_in
 
-MEDIA_TYPES = ("application/x-hdf5", "application/octet-stream")
+HDF5 = "application/x-hdf5"
+MEDIA_TYPES = (HDF5, "application/octet-stream")
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
 router.include_router(quality.router)
@@ -56,6 +58,22 @@ def list_datasets(
 def show_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> DatasetRecord:
     """One dataset."""
     return dataset_record(service.datasets.get(tenant, dataset_id))
+
+
+@router.head("/{dataset_id}/file", include_in_schema=False)
+@router.get(
+    "/{dataset_id}/file",
+    response_class=Response,
+    responses={**download_of(HDF5), **described(404, 503)},
+)
+def dataset_file(dataset_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
+    """The scan as an HDF5 file in the upload format: what a simulation made, or what was read of an upload.
+
+    A download that broke off goes on with Range, and If-Range with the ETag of the first answer.
+    """
+    row = service.datasets.get(tenant, dataset_id)
+    path = service.files.store.bring(service.files.of(tenant).dataset(row["id"]))
+    return download(request, path, repr((row["id"], row["sha256"])), HDF5)
 
 
 @router.delete("/{dataset_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409, 503))

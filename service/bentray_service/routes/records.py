@@ -172,7 +172,8 @@ class VolumeList(BaseModel):
 
 
 def dataset_record(row: Row) -> DatasetRecord:
-    links, job = {"self": f"/v1/datasets/{row['id']}"}, row["job_id"]
+    here, job = f"/v1/datasets/{row['id']}", row["job_id"]
+    links = {"self": here, "file": f"{here}/file"}
     if job is not None:
         links["job"] = f"/v1/jobs/{job}"
     return DatasetRecord(**{**row, "created": _time(row["created"])}, job=job, links=links)

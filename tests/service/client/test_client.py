@@ -7,6 +7,7 @@ from bentray_kernels.eikonal import methods
 from bentray_kernels.errors import InvalidInput
 from bentray_service.access.token import Token
 from bentray_service.client import Client, ClientError
+from bentray_workers.dataset_file import read_dataset
 
 
 @pytest.fixture
@@ -33,6 +34,14 @@ def test_whole_path(client, scan, tmp_path):
     assert np.load(client.download(done["volume"], "npy", tmp_path / "speed.npy")).shape == (16, 16)
     assert client.download(done["volume"], "hdf5", tmp_path / "r.h5").stat().st_size > 0
     assert not list(tmp_path.glob("*.partial"))
+
+
+def test_a_scan_is_fetched(client, scan, tmp_path):
+    dataset, told = client.upload(scan())["id"], []
+    path = client.download_dataset(dataset, tmp_path / "back.h5", lambda *step: told.append(step))
+    size = path.stat().st_size
+    assert told[-1] == (size, size)
+    np.testing.assert_array_equal(read_dataset(path).delta_tof_s, read_dataset(scan()).delta_tof_s)
 
 
 def test_refusal_carries_the_fields(client, dataset):

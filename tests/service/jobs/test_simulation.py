@@ -1,5 +1,6 @@
 """Jobs of kind simulation: from settings to an image, to the bits of the command line; ended and refused."""
 
+import hashlib
 import threading
 import time
 from contextlib import contextmanager
@@ -104,7 +105,8 @@ def test_from_settings_to_an_image(serving, until, tmp_path):
         words = ["--nodes", "16", "--elements", "16", "--noise-ns", "20", "--seed", "7", "-o", str(path)]
         assert CliRunner().invoke(command_line, ["simulate", *words]).exit_code == 0
         files = http.app.state.parts.files.of(LOCAL)
-        assert files.dataset(made["id"]).read_bytes() == path.read_bytes()
+        assert http.get(made["links"]["file"]).content == path.read_bytes()
+        assert hashlib.sha256(path.read_bytes()).hexdigest() == made["sha256"]
         sent = {"content": path.read_bytes(), "headers": {"Content-Type": "application/x-hdf5"}}
         again = http.post("/v1/datasets", **sent).json()
         assert {**again, "id": made["id"], "job": job["id"]} == {
@@ -211,6 +213,7 @@ def test_another_tenant_finds_neither_job_nor_dataset(serving, until):
         http.headers.update(auth["acme"])
         done = until(http, ask(http, **SMALL).json()["id"])
         links = {done["links"]["self"], done["links"]["dataset"], done["links"]["self"] + "/events"}
+        links.add(done["links"]["dataset"] + "/file")
         for link in links:
             assert http.get(link, headers=auth["other"]).status_code == 404, link
         asked = {"kind": "reconstruction", "dataset": done["dataset"]}

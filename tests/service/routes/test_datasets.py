@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from bentray_service.storage.tenants import LOCAL
+from bentray_workers.dataset_file import read_dataset
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
 
@@ -49,6 +50,25 @@ def test_octet_stream_is_taken_and_parameters_do_not_matter(start, scan):
     http = start()
     headers = {"Content-Type": "Application/Octet-Stream; charset=binary"}
     assert upload(http, scan().read_bytes(), headers).status_code == 201
+
+
+def test_a_scan_comes_back_as_a_file_and_goes_on_where_it_broke_off(start, scan, tmp_path):
+    http = start()
+    dataset = upload(http, scan().read_bytes()).json()
+    here = dataset["links"]["file"]
+    whole = http.get(here)
+    assert (whole.status_code, whole.headers["content-type"]) == (200, "application/x-hdf5")
+    assert f'filename="{dataset["id"]}.h5"' in whole.headers["content-disposition"]
+    (tmp_path / "back.h5").write_bytes(whole.content)
+    found, sent = read_dataset(tmp_path / "back.h5"), read_dataset(scan())
+    np.testing.assert_array_equal(found.delta_tof_s, sent.delta_tof_s)
+    np.testing.assert_array_equal(found.element_position_m, sent.element_position_m)
+    rest = http.get(here, headers={"Range": "bytes=1000-", "If-Range": whole.headers["etag"]})
+    assert (rest.status_code, rest.content) == (206, whole.content[1000:])
+    assert http.get(here, headers={"If-None-Match": whole.headers["etag"]}).status_code == 304
+    assert http.head(here).headers["content-length"] == str(len(whole.content))
+    assert http.delete(dataset["links"]["self"]).status_code == 204
+    assert problem(http.get(here))["status"] == 404
 
 
 def test_newest_first(start, scan):

@@ -1,0 +1,53 @@
+"""`bentray download`: a scan or an image that a running service keeps, as a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from bentray_kernels.errors import InvalidInput
+
+from .endings import service_answers
+from .paths import output_file
+from .terminal import AsJson, print_json, print_lines, progress_bar
+
+if TYPE_CHECKING:
+    from ..client.flows import Format
+
+
+def download(
+    stored: Annotated[str, typer.Argument(metavar="ID", help="Of a scan (ds-…) or of a volume (vol-…).")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File to write.")],
+    url: Annotated[str, typer.Option(help="Address of the service.")] = "http://127.0.0.1:8000",
+    force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Fetch a scan, as it was read or as a simulation made it, or a volume, in the format of OUTPUT's name.
+
+    Scans are HDF5 files (.h5), as bentray reconstruct takes them; volumes .h5, .nii, .mha, .mat or .npy.
+
+    Example:  bentray download ds-0123456789abcdef0123 -o scan.h5
+    """
+    formats: dict[str, Format] = {".h5": "hdf5"}
+    if stored.startswith("vol-"):
+        formats |= {".nii": "nifti", ".mha": "metaimage", ".mat": "mat", ".npy": "npy"}
+    elif not stored.startswith("ds-"):
+        raise InvalidInput("id", repr(stored), "the id of a scan (ds-…) or of a volume (vol-…)")
+    chosen = formats.get(output.suffix.lower())
+    if chosen is None:
+        raise InvalidInput("output", output, "a name that ends in " + ", ".join(formats))
+    target = output_file(output, force=force)
+
+    from ..client import Client
+
+    with service_answers(), Client(url) as client, progress_bar("Downloading") as step:
+        if stored.startswith("vol-"):
+            client.download(stored, chosen, target)
+        else:
+            client.download_dataset(stored, target, step)
+    if as_json:
+        print_json({"id": stored, "output": str(target), "bytes": target.stat().st_size})
+    else:
+        print_lines([str(target)])

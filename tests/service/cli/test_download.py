@@ -1,0 +1,70 @@
+"""`bentray download`: scans and volumes by their ids, in the format of the file's name; bad input is told."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import Result
+
+SCAN, VOLUME = "ds-" + "0" * 20, "vol-" + "0" * 20
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """What the client is asked for, with a stand-in that writes a few bytes."""
+    found: list[Any] = []
+
+    class StandIn:
+        def __init__(self, url: str) -> None:
+            found.append(url)
+
+        def __enter__(self) -> StandIn:
+            return self
+
+        def __exit__(self, *_: object) -> None: ...
+
+        def download(self, volume: str, format: str, path: Path) -> None:  # noqa: A002
+            found.append((volume, format))
+            path.write_bytes(b"volume")
+
+        def download_dataset(self, dataset: str, path: Path, told: Callable[[int, int], None]) -> None:
+            found.append(dataset)
+            path.write_bytes(b"scan")
+            told(4, 4)
+
+    monkeypatch.setattr("bentray_service.client.Client", StandIn)
+    return found
+
+
+def test_a_scan_and_a_volume(bentray: Callable[..., Result], tmp_path: Path, asked: list[Any]) -> None:
+    result = bentray("download", SCAN, "-o", tmp_path / "scan.h5", "--url", "http://lab:1", "--json")
+    assert result.exit_code == 0
+    assert json.loads(result.stdout) == {"id": SCAN, "output": str(tmp_path / "scan.h5"), "bytes": 4}
+    for name in ("v.nii", "v.MHA"):
+        result = bentray("download", VOLUME, "-o", tmp_path / name)
+        assert result.stdout.splitlines() == [str(tmp_path / name)]
+    told = [one for one in asked if not str(one).startswith("http")]
+    assert (asked[0], told) == ("http://lab:1", [SCAN, (VOLUME, "nifti"), (VOLUME, "metaimage")])
+
+
+@pytest.mark.parametrize(
+    ("what", "name", "said"),
+    [
+        ("mesh-1", "m.ply", "id: found 'mesh-1'"),
+        (SCAN, "scan.mat", "a name that ends in .h5"),
+        (VOLUME, "v.png", ".nii, .mha, .mat, .npy"),
+        (SCAN, "there.h5", "(exists)"),
+    ],
+)
+def test_what_is_refused_before_anybody_is_asked(
+    bentray: Callable[..., Result], tmp_path: Path, asked: list[Any], what: str, name: str, said: str
+) -> None:
+    (tmp_path / "there.h5").write_bytes(b"")
+    result = bentray("download", what, "-o", tmp_path / name)
+    assert result.exit_code == 2
+    assert said in " ".join(result.stderr.split())
+    assert asked == []
