@@ -123,7 +123,7 @@ class Client:
         return self._run(flows.download(volume_id, format, Path(path)))
 
     def download_dataset(self, dataset_id: str, path: Path | str, on_progress: OnBytes | None = None) -> Path:
-        """Fetch a scan, uploaded or simulated, into ``path``; ``on_progress`` gets ``(came, total)``, bytes."""
+        """Fetch a scan, uploaded or simulated, into ``path``; ``on_progress`` as of ``upload``."""
         return self._run(flows.download_dataset(dataset_id, Path(path), on_progress))
 
     def result(self, volume_id: str) -> Result:
