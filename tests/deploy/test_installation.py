@@ -28,7 +28,7 @@ pytestmark = [
 
 QUICK = Settings(nodes=32, sweeps=1)
 # Some seconds of work, to be in the middle of when something dies.
-LONG = Settings(nodes=64, sweeps=150, rays="straight")
+LONG = Settings(nodes=64, sweeps=80, rays="straight")
 
 
 @pytest.fixture(scope="module")
