@@ -54,6 +54,7 @@ def test_cluster_and_one_process_give_what_alternating_in_memory_gives(cluster, 
         assert (result.history, result.settings) == (image.history, PLAN)
         last = sorted((tmp_path / name).glob("*-picked.h5"))[-1]
         np.testing.assert_allclose(read_dataset(last).delta_tof_s, picked.delta_tof_s, atol=1e-9)
+        seen = [progress for progress in seen if progress.phase == slices.RECONSTRUCTING]
         done = [progress.done for progress in seen]
         assert done == sorted(done)
         assert done[-1] == seen[-1].total
@@ -63,7 +64,7 @@ def test_a_torn_run_is_gone_on_from_to_the_same_bits(cluster, path, tmp_path):
     def go_on(tear):
         return slices.reconstruct(cluster.client, path, PLAN, tear, work_dir=tmp_path / "work")
 
-    result, reached = torn_runs(go_on, (4, 5, 6))
+    result, reached = torn_runs(go_on, (2, 3, 4))
     assert len(reached) > 2
     assert reached[-1] > 0, "something was restored"
     np.testing.assert_array_equal(result.speed, expected()[1].speed)

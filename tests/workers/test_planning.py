@@ -140,8 +140,14 @@ def test_waves_are_planned_for():
     assert {"enter", "look_at_waves", "step_by_waves"} < set(found.call_bytes)
     assert found.tasks > plan(heard, replace(asked, method="auto"), [LARGE]).tasks
     with pytest.raises(InvalidInput) as refusal:
-        plan(heard, replace(asked, nodes=32), [Offer(760 * MIB, BOTH)])
+        plan(heard, replace(asked, nodes=32), [Offer(160 * MIB, BOTH)])
     assert refusal.value.field == "wave_bands"
+    # ``auto`` judges by waves; in space by times alone.
+    tried = replace(asked, method="auto", nodes=32)
+    with pytest.raises(InvalidInput) as refusal:
+        plan(heard, tried, [Offer(100 * MIB, BOTH)])
+    assert refusal.value.field == "method"
+    assert "judge_by_waves" not in plan(replace(heard, in_space=True, height_m=0.1), tried, []).call_bytes
 
 
 @given(

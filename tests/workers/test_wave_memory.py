@@ -15,7 +15,7 @@ from bentray_kernels.tomography import Settings
 from bentray_workers.dataset_file import write_dataset
 from bentray_workers.dataset_summary import summary_of
 from bentray_workers.task_memory import MIB
-from bentray_workers.wave_memory import Traces, wave_call_bytes
+from bentray_workers.wave_memory import Traces, wave_call_bytes, wave_tasks
 
 from ..kernels.wave.scans import CENTRE_HZ, ELEMENTS, RATE_HZ, WATER, scan
 
@@ -78,6 +78,18 @@ def test_more_of_anything_never_takes_less(bands, emissions, samples, width):
         assert all(other[name] > size for name, size in found.items())
     more = wave_call_bytes(traces, width, replace(settings, wave_bands=bands + 1))
     assert all(more[name] >= size for name, size in found.items())
+
+
+def test_what_auto_may_do_is_planned():
+    """It judges by waves where there are traces, and refines where it is given minutes."""
+    auto = Settings(method="auto")
+    judged = wave_call_bytes(SCAN, 0.1, auto)
+    assert list(judged) == ["judge_by_waves"]
+    assert wave_call_bytes(SCAN, 0.1, replace(auto, wave_minutes=1.0)) == wave_call_bytes(
+        SCAN, 0.1, replace(auto, method="waveform")
+    )
+    assert wave_tasks(SCAN, auto) == 0 < wave_tasks(SCAN, replace(auto, wave_minutes=1.0))
+    assert wave_call_bytes(None, 0.1, auto) == wave_call_bytes(SCAN, 0.1, Settings()) == {}
 
 
 def test_traces_are_summed_up_where_there_are_both(tmp_path):

@@ -24,6 +24,7 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.wave import chain as waves
 from bentray_kernels.wave.asked import wave_settings
 from bentray_kernels.wave.continuation import Here
+from bentray_kernels.wave.judging import judge_by_waves, judging
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.refine import WavePass
 from bentray_kernels.wave.simulation import simulate
@@ -74,6 +75,8 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     fresh = Here(dataset, plan)
     # Measured first, for what was read once stays.
     found = {"enter": peak(lambda: waves.enter(fresh, number, start)) - nothing}
+    judged = Here(dataset, judging(plan))
+    found["judge_by_waves"] = peak(lambda: judge_by_waves(judged, start)) - nothing
     here = Here(dataset, plan)
     entered = waves.enter(here, number, start)
     assert entered is not None

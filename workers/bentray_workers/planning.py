@@ -120,12 +120,15 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[Offer]) -> Plan:
     for way in ways:
         for name, size in call_bytes(scan, way).items():
             calls[name] = max(size, calls.get(name, 0))
-    waves = wave_call_bytes(scan.traces, scan.width_m, settings)
+    # Trials of elements in space are judged by times alone.
+    heard = None if scan.in_space and settings.method == "auto" else scan.traces
+    waves = wave_call_bytes(heard, scan.width_m, settings)
     calls |= waves
     room = max((offer.task_bytes for offer in fitting), default=math.inf)
     name, size = max(calls.items(), key=lambda item: item[1])
     if size > room:
-        field, found = ("wave_bands", settings.wave_bands) if name in waves else ("nodes", settings.nodes)
+        field: str = "nodes" if name not in waves else "method" if name == "judge_by_waves" else "wave_bands"
+        found = getattr(settings, field)
         raise InvalidInput(
             field,
             f"{found}, for which a task ({name}) takes {size} bytes",
@@ -134,7 +137,7 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[Offer]) -> Plan:
     able = [offer for offer in fitting if offer.task_bytes >= size]
     shape = shape_of(scan, settings)
     decomposition = _decomposition(settings)
-    tasks = sum(_tasks(scan, way, shape) for way in ways) + scan.slices * wave_tasks(scan.traces, settings)
+    tasks = sum(_tasks(scan, way, shape) for way in ways) + scan.slices * wave_tasks(heard, settings)
     if scan.traces_bytes:
         tasks = tasks * (1 + settings.guided_rounds) + arrival_tasks(scan.traces, scan.slices, settings)
     return Plan(

@@ -11,6 +11,7 @@ from bentray_kernels.tomography.settings import Settings
 from bentray_kernels.wave import Band, WaveSettings, asked
 from bentray_kernels.wave.asked import check_traces
 from bentray_kernels.wave.extent import Extent
+from bentray_kernels.wave.judging import judging
 from bentray_kernels.wave.sounding import SHOTS
 
 from .trace_reading import BLOCK_BYTES
@@ -62,9 +63,14 @@ def plan_of(traces: Traces, settings: Settings) -> tuple[Band, ...]:
     return asked.plan_of(traces.frequency_hz, traces.water_mps, settings)
 
 
+def refines(settings: Settings) -> bool:
+    """Whether an image may be refined by waves; ``auto`` does so where it is given the minutes."""
+    return settings.method == "waveform" or (settings.method == "auto" and settings.wave_minutes > 0.0)
+
+
 def wave_tasks(traces: Traces | None, settings: Settings) -> int:
     """Calls of one slice: looks of single emitters and steps, unless some are shortened; 0 without waves."""
-    if settings.method != "waveform" or traces is None:
+    if not refines(settings) or traces is None:
         return 0
     plan = plan_of(traces, settings)
     held_out = WaveSettings(plan).held_out
@@ -72,7 +78,7 @@ def wave_tasks(traces: Traces | None, settings: Settings) -> int:
 
 
 def wave_call_bytes(traces: Traces | None, width_m: float, settings: Settings) -> dict[str, int]:
-    """Bytes of each kind of call, over all bands.
+    """Bytes of each kind of call, over all bands, and of the call by which trials are judged.
 
     Args:
         traces: of the dataset.
@@ -80,19 +86,21 @@ def wave_call_bytes(traces: Traces | None, width_m: float, settings: Settings) -
         settings: as asked for.
 
     Returns:
-        By the call's name in ``wave.chain``; nothing where ``method`` is not waveform.
+        By the call's name in ``wave.chain`` and ``wave.judging``; nothing where no waves are simulated.
 
     Raises:
         InvalidInput: for a refinement without traces.
     """
-    if settings.method != "waveform":
+    if settings.method == "waveform":
+        check_traces(0 if traces is None else traces.samples)
+    if traces is None or not settings.tries:
         return {}
-    check_traces(0 if traces is None else traces.samples)
-    assert traces is not None
-    found = {"enter": 0, "look_at_waves": 0, "step_by_waves": 0}
-    for band in plan_of(traces, settings):
+    plan = plan_of(traces, settings)
+    (judge,) = judging(WaveSettings(plan)).bands
+    found = {"judge_by_waves": _band_bytes(traces, width_m, settings, judge)["enter"]}
+    for band in plan if refines(settings) else ():
         for name, size in _band_bytes(traces, width_m, settings, band).items():
-            found[name] = max(size, found[name])
+            found[name] = max(size, found.get(name, 0))
     return found
 
 

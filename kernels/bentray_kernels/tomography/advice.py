@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 from ..acquisition import Dataset
 from ..errors import InvalidInput
 from . import pairs
-from .chains import Chain, Scan
+from .chains import Drive, Scan
 from .holding_out import Part
 from .result import Reconstruction, Trial
 from .settings import Settings
@@ -17,6 +17,9 @@ from .stages import stages
 from .stopping import noise_of, stopped
 from .trials import TrialChain
 from .wide_trials import STRAIGHT, choose_wide, mean_of, size_of, wide
+
+ScanOf = Callable[[Settings, Part], Scan]
+Candidates = Sequence[dict[str, Any]]
 
 PAIRS: tuple[Part, Part] = ("shown", "held-out")
 VIEWS: tuple[Part, Part] = ("shown-views", "held-out-views")
@@ -46,6 +49,25 @@ TRIAL_NODES = 64
 CLEARLY = 0.92
 
 
+class Waves(Protocol):
+    """Who tells images apart by traces, see ``wave.following.Following``."""
+
+    @property
+    def passes(self) -> int:
+        """Emitter passes of looking at one image."""
+
+    def heard(
+        self,
+        trials: Sequence[Trial],
+        chains: Sequence[TrialChain],
+        index: int,
+        drive: Drive,
+        before: int,
+        after: int,
+    ) -> list[Trial]:
+        """The trials with what waves through their chains' images miss."""
+
+
 def tried(settings: Settings, candidates: Sequence[dict[str, Any]] = CANDIDATES) -> list[Settings]:
     """The settings of each trial: those of the candidates on a coarser grid."""
     nodes = min(settings.nodes, max(TRIAL_NODES, -(-settings.nodes // 2)))
@@ -68,17 +90,19 @@ def advise(
     dataset: Dataset,
     settings: Settings,
     index: int,
-    scan_of: Callable[[Settings, Part], Scan],
-    drive: Callable[[Sequence[Chain], int, int], None],
+    scan_of: ScanOf,
+    drive: Drive,
     after: int = 0,
+    waves: Waves | None = None,
 ) -> tuple[Settings, tuple[Trial, ...], int]:
     """The settings that explain one slice best, and how all that were tried did.
 
     Where the frequency is known rays as wide as waves are tried first, straight and bent, on held-out views,
     see ``choose_wide``. Where it is not, or such rays do not explain the times, what predicts held-out pairs
-    best is chosen among thin rays, see ``choose``. The reconstruction is told to stop at the noise of the
-    times (Morozov's discrepancy principle), for a closer fit would draw it, unless the trial shows that there
-    is less of it.
+    best is chosen among thin rays, see ``choose``. Where there are traces, waves through the images that were
+    tried decide in place of times, for they judge the image itself and not a model of rays. The
+    reconstruction is told to stop at the noise of the times (Morozov's discrepancy principle), for a closer
+    fit would draw it, unless the trial shows that there is less of it.
 
     Args:
         dataset: for its frequency and the noise of its times.
@@ -87,6 +111,7 @@ def advise(
         scan_of: makes a scan of a part of the pairs.
         drive: runs chains to their end.
         after: emitter passes that come after the reconstruction, at most.
+        waves: who tells images apart by traces; None where there are none.
 
     Returns:
         The settings; the trials, the chosen one first and the others by what they predict; and the emitter
@@ -98,42 +123,57 @@ def advise(
     told = wide(dataset, settings)
     thin = BANDED if told else CANDIDATES
     rest = passes_to_come(dataset, settings) + after
+    trying = _Trying(settings, index, scan_of, drive, waves)
     trials: list[Trial] = []
-    chosen, before = None, 0
+    chosen = None
     if told and not _lacking(VIEWS, settings, index, scan_of):
-        chains = _chains(settings, told, index, VIEWS, scan_of)
-        others_after = sum(chain.total for chain in _chains(settings, thin, index, PAIRS, scan_of))
-        drive(chains, 0, others_after + rest)
-        trials, before = _results(told, chains), sum(chain.total for chain in chains)
+        trials = trying.run(told, VIEWS, trying.passes(thin, PAIRS) + rest)
         chosen = choose_wide(trials, size_of(dataset))
     if chosen is None:
         _check_parts(settings, index, scan_of)
-        chains = _chains(settings, thin, index, PAIRS, scan_of)
-        drive(chains, before, rest)
-        trials, before = _results(thin, chains), before + sum(chain.total for chain in chains)
+        trials = trying.run(thin, PAIRS, rest)
         chosen = choose(trials)
-    others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
+    others = sorted((t for t in trials if t is not chosen), key=missed)
     found = replace(settings, **chosen.settings)
-    return stopped(found, chosen, noise_of(dataset)), (chosen, *others), before
+    return stopped(found, chosen, noise_of(dataset)), (chosen, *others), trying.made
 
 
-def _chains(
-    settings: Settings,
-    candidates: Sequence[dict[str, Any]],
-    index: int,
-    parts: tuple[Part, Part],
-    scan_of: Callable[[Settings, Part], Scan],
-) -> list[TrialChain]:
-    shown, held_out = parts
-    plans = tried(settings, candidates)
-    return [TrialChain(scan_of(plan, shown), index, scan_of(plan, held_out)) for plan in plans]
+class _Trying:
+    """Runs candidates on part of a slice's pairs; ``made`` counts emitter passes."""
 
+    def __init__(
+        self, settings: Settings, index: int, scan_of: ScanOf, drive: Drive, waves: Waves | None
+    ) -> None:
+        self._settings, self._index, self._scan_of = settings, index, scan_of
+        self._drive, self._waves = drive, waves
+        self.made = 0
 
-def _results(candidates: Sequence[dict[str, Any]], chains: Sequence[TrialChain]) -> list[Trial]:
-    return [
-        Trial(changes, chain.held_out_rms_s, chain.history[-1].residual_rms_s, chain.held_out_mean_s)
-        for changes, chain in zip(candidates, chains, strict=True)
-    ]
+    def passes(self, candidates: Candidates, parts: tuple[Part, Part]) -> int:
+        """Emitter passes that they take at most."""
+        judging = 0 if self._waves is None else len(candidates) * self._waves.passes
+        return judging + sum(chain.total for chain in self._chains(candidates, parts))
+
+    def run(self, candidates: Candidates, parts: tuple[Part, Part], later: int) -> list[Trial]:
+        """What became of them; ``later`` passes follow at most."""
+        chains = self._chains(candidates, parts)
+        after = 0 if self._waves is None else len(candidates) * self._waves.passes
+        self._drive(chains, self.made, after + later)
+        self.made += sum(chain.total for chain in chains)
+        trials = [
+            Trial(changes, chain.held_out_rms_s, chain.history[-1].residual_rms_s, chain.held_out_mean_s)
+            for changes, chain in zip(candidates, chains, strict=True)
+        ]
+        if self._waves is None:
+            return trials
+        trials = self._waves.heard(trials, chains, self._index, self._drive, self.made, later)
+        self.made += after
+        return trials
+
+    def _chains(self, candidates: Candidates, parts: tuple[Part, Part]) -> list[TrialChain]:
+        shown, held_out = parts
+        plans = tried(self._settings, candidates)
+        scan_of = self._scan_of
+        return [TrialChain(scan_of(plan, shown), self._index, scan_of(plan, held_out)) for plan in plans]
 
 
 def passes_to_come(dataset: Dataset, settings: Settings) -> int:
@@ -147,7 +187,7 @@ def passes_to_come(dataset: Dataset, settings: Settings) -> int:
     return each * sum(len(pairs.of(dataset, settings, index).emitters) for index in problems)
 
 
-def _check_parts(settings: Settings, index: int, scan_of: Callable[[Settings, Part], Scan]) -> None:
+def _check_parts(settings: Settings, index: int, scan_of: ScanOf) -> None:
     plan = tried(settings)[0]
     scan_of(plan, "all").problem(index)
     if part := _lacking(PAIRS, settings, index, scan_of):
@@ -155,9 +195,7 @@ def _check_parts(settings: Settings, index: int, scan_of: Callable[[Settings, Pa
         raise InvalidInput("method", repr(settings.method), accepted)
 
 
-def _lacking(
-    parts: Sequence[Part], settings: Settings, index: int, scan_of: Callable[[Settings, Part], Scan]
-) -> Part | None:
+def _lacking(parts: Sequence[Part], settings: Settings, index: int, scan_of: ScanOf) -> Part | None:
     """The first part that the slice has no pair of; None: it has pairs of all."""
     for part in parts:
         try:
@@ -169,31 +207,39 @@ def _lacking(
 
 def choose(trials: Sequence[Trial]) -> Trial:
     """The trial that predicts best; one with straight rays unless bent ones are clearly better."""
-    best = min(trials, key=lambda trial: trial.held_out_rms_s)
-    straight = min(
-        (trial for trial in trials if trial.settings["rays"] == "straight"),
-        key=lambda trial: trial.held_out_rms_s,
-    )
-    return best if best.held_out_rms_s < CLEARLY * straight.held_out_rms_s else straight
+    best = min(trials, key=missed)
+    straight = min((trial for trial in trials if trial.settings["rays"] == "straight"), key=missed)
+    return best if missed(best) < CLEARLY * missed(straight) else straight
+
+
+def missed(trial: Trial) -> float:
+    """What its image misses: traces of some emitters where waves were simulated, else held-out times, s."""
+    return trial.held_out_rms_s if trial.wave_misfit is None else trial.wave_misfit
 
 
 def reason(trials: Sequence[Trial]) -> str:
     """One sentence: what was chosen and why, and how well each trial predicted; empty without trials."""
     if not trials:
         return ""
-    if any("ray_width_m" in trial.settings for trial in trials):
-        told = [f"{_named(trial.settings)} {1e9 * mean_of(trial):.0f} ns" for trial in trials]
+    chosen = trials[0]
+    as_waves = [trial for trial in trials if "ray_width_m" in trial.settings]
+    held_to = f"; bent rays must be {100.0 * (1.0 - CLEARLY):.0f} % better"
+    if chosen.wave_misfit is not None:
+        values = [f"{missed(trial):.2g}" for trial in trials]
+        why = f"misfit of waves through its image; of waves in water {chosen.water_misfit:.2g}"
+        surprising = not as_waves and chosen is not min(trials, key=missed)
+    elif as_waves:
+        values = [f"{1e9 * mean_of(trial):.0f} ns" for trial in trials]
         why = "mean misfit of held-out views, for rays as wide as waves"
-        if mean_of(trials[0]) > min(mean_of(t) for t in trials if "ray_width_m" in t.settings):
-            needed = f"{100.0 * (1.0 - STRAIGHT):.0f} % better"
-            why += f"; where both explain the times straight ones must be {needed}"
-        return f"auto chose {told[0]} ({why}); the others: {', '.join(told[1:])}"
-    told = [f"{_named(trial.settings)} {1e9 * trial.held_out_rms_s:.0f} ns" for trial in trials]
-    best = min(trial.held_out_rms_s for trial in trials)
-    why = "misfit of held-out pairs"
-    if trials[0].held_out_rms_s > best:
-        why += f"; bent rays must be {100.0 * (1.0 - CLEARLY):.0f} % better"
-    return f"auto chose {told[0]} ({why}); the others: {', '.join(told[1:])}"
+        surprising = mean_of(chosen) > min(map(mean_of, as_waves))
+        needed = f"{100.0 * (1.0 - STRAIGHT):.0f} % better"
+        held_to = f"; where both explain the times straight ones must be {needed}"
+    else:
+        values = [f"{1e9 * missed(trial):.0f} ns" for trial in trials]
+        why = "misfit of held-out pairs"
+        surprising = chosen is not min(trials, key=missed)
+    told = [f"{_named(trial.settings)} {value}" for trial, value in zip(trials, values, strict=True)]
+    return f"auto chose {told[0]} ({why}{held_to if surprising else ''}); the others: {', '.join(told[1:])}"
 
 
 def told(result: Reconstruction) -> str:

@@ -50,7 +50,7 @@ def alternate(
     if rounds < 0:
         raise InvalidInput("rounds", rounds, "a number >= 0")
     picked = _listened(dataset, pick(dataset, settings.picker), settings)
-    result = reconstruct(picked, settings, progress)
+    result = reconstruct(_with_traces(picked, dataset, settings), settings, progress)
     for _ in range(rounds):
         expected = predicted_delta(picked, result)
         again = pick(dataset, settings.picker, predicted_s=expected, reach_s=reach_s)
@@ -59,7 +59,7 @@ def alternate(
         picked = again
         if settled:
             break
-        result = reconstruct(picked, settings, progress)
+        result = reconstruct(_with_traces(picked, dataset, settings), settings, progress)
     return picked, result
 
 
@@ -69,6 +69,11 @@ def _listened(dataset: Dataset, picked: Dataset, settings: Settings) -> Dataset:
         return picked
     heard = with_log_ratios(replace(picked, waveform=dataset.waveform), settings.amplitudes)
     return replace(heard, waveform=None)
+
+
+def _with_traces(picked: Dataset, dataset: Dataset, settings: Settings) -> Dataset:
+    """What was picked, with the traces by which trials are judged."""
+    return replace(picked, waveform=dataset.waveform) if settings.tries else picked
 
 
 def predicted_delta(dataset: Dataset, result: Reconstruction) -> Floats:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -97,6 +97,11 @@ class Calls(Protocol):
             call: the one that has finished.
             given: what it gave, or its handle where ``call.keep``.
         """
+
+
+# Runs chains to their end, and tells the passes done of all after each call; the numbers are of passes made
+# before and of those that come after, at most.
+Drive = Callable[[Sequence[Calls], int, int], None]
 
 
 @dataclass(frozen=True)

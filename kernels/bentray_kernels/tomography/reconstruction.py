@@ -17,7 +17,7 @@ from ..arrays import Floats
 from ..errors import InvalidInput
 from . import pairs
 from .advice import advise
-from .chains import Calls, Chain, Scan, attenuate, recover
+from .chains import Calls, Chain, Drive, Scan, attenuate, recover
 from .holding_out import Part, part_of
 from .problem import Problem
 from .result import Progress, Reconstruction, Trial
@@ -29,10 +29,6 @@ if TYPE_CHECKING:
     from ..wave.chain import WaveScan
     from ..wave.following import Following, WaveScanOf
     from ..wave.settings import WaveSettings
-
-# Runs chains to their end, and tells the passes done of all after each call; the numbers are of passes made
-# before and of those that come after, at most.
-Drive = Callable[[Sequence[Calls], int, int], None]
 
 
 def reconstruct(
@@ -107,7 +103,7 @@ def carried_out(
     following = waves if allowed else None
     after = 0 if following is None else following.total
     if settings.tries:
-        settings, trials, before = advise(dataset, settings, count // 2, scan_of, drive, after)
+        settings, trials, before = advise(dataset, settings, count // 2, scan_of, drive, after, waves)
     scan = scan_of(settings, "all")
     chains = [Chain(scan, index) for index in range(count)]
     drive(chains, before, after)

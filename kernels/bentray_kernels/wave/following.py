@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 from ..acquisition import Dataset
 from ..tomography import pairs
 from ..tomography.advice import CLEARLY
-from ..tomography.reconstruction import Drive, measured
+from ..tomography.chains import Drive
+from ..tomography.reconstruction import measured
 from ..tomography.result import Reconstruction, Trial
 from ..tomography.settings import Settings
+from ..tomography.trials import TrialChain
 from .asked import check_traces, wave_settings
 from .chain import WaveChain, WaveScan, resampled
 from .effort import core_seconds, worth
+from .judging import Judge, judging, passes
 from .settings import WaveSettings
 from .standing import BandEnd, Image
 
@@ -71,6 +74,29 @@ class Following:
             told = f"{_told(rays, self._plan, chains)}; not clearly better, so the image of the rays is given"
             return replace(rays, history=history, provenance={**rays.provenance, "waveform": told})
         return self._result(rays, chains)
+
+    @property
+    def passes(self) -> int:
+        """Emitter passes of looking at one image."""
+        return passes(self._plan)
+
+    def heard(
+        self,
+        trials: Sequence[Trial],
+        chains: Sequence[TrialChain],
+        index: int,
+        drive: Drive,
+        before: int,
+        after: int,
+    ) -> list[Trial]:
+        """The trials with what waves through their chains' images miss, see ``judging``."""
+        scan = self._scan_of(judging(self._plan), index)
+        judges = [Judge(scan, Image(*chain.image), chain.history) for chain in chains]
+        drive(judges, before, after)
+        return [
+            replace(trial, wave_misfit=judge.judgement.misfit, water_misfit=judge.judgement.water)
+            for trial, judge in zip(trials, judges, strict=True)
+        ]
 
     def worth(self, rays: Trial, noise_s: float) -> str:
         """As ``effort.worth``."""

@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from ..tomography import snapshot
+from .judging import Judgement, Judging
 from .refine import WaveIterate, WavePass
 from .standing import BandEnd, Entered, Image, WaveStanding
 
-TYPES: Mapping[str, type] = MappingProxyType(
-    {
-        **snapshot.TYPES,
-        **{kind.__name__: kind for kind in (WaveStanding, BandEnd, Entered, Image, WaveIterate, WavePass)},
-    }
-)
+KINDS = (WaveStanding, BandEnd, Entered, Image, WaveIterate, WavePass, Judging, Judgement)
+
+TYPES: Mapping[str, type] = MappingProxyType({**snapshot.TYPES, **{kind.__name__: kind for kind in KINDS}})

@@ -8,7 +8,8 @@ import pytest
 
 from bentray_kernels.acquisition import pick
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.tomography import Settings, Trial, reconstruct
+from bentray_kernels.wave.effort import worth
 from bentray_kernels.wave.following import preferred
 from bentray_kernels.wave.refine import WavePass
 from bentray_kernels.wave.standing import BandEnd, Image
@@ -52,20 +53,29 @@ def test_auto_goes_on_with_waves_where_it_may_and_they_predict_better(rays):
 def test_without_leave_it_only_says_so(rays):
     assert rays.settings.method in ("sart", "gauss-newton")
     assert rays.provenance["waveform"].startswith("method waveform ")
-    assert "minutes of a core" in rays.provenance["waveform"]
+    assert rays.provenance["waveform"].endswith("it takes about a minute of a core")
     # A second is too little.
     hurried = reconstruct(heard(), replace(PLAN, wave_minutes=1.0 / 60.0))
     assert np.array_equal(hurried.speed, rays.speed)
     assert hurried.provenance == rays.provenance
 
 
-def test_rays_that_miss_by_more_than_the_noise_ask_for_waves(rays):
-    sure = replace(heard(), sigma_s=np.full((12, 24), 1e-10))
-    found = reconstruct(sure, replace(PLAN, wave_minutes=0.0))
-    assert found.provenance["waveform"].startswith("method waveform is advised, for rays miss held-out times")
-    unsure = replace(sure, sigma_s=np.full((12, 24), 1e-6))
-    found = reconstruct(unsure, replace(PLAN, wave_minutes=0.0))
-    assert found.provenance["waveform"].startswith("method waveform would gain little")
+def test_waves_are_advised_where_the_image_explains_less_than_water_does(rays):
+    """The image of rays leaves four times what is left in water; beside noise that is nothing."""
+    advised = rays.provenance["waveform"]
+    assert advised.startswith("method waveform is advised, for waves through the image of rays miss")
+    noisy = reconstruct(heard(0.05), replace(PLAN, wave_minutes=0.0))
+    assert noisy.provenance["waveform"].startswith("method waveform would gain little, for waves through")
+    assert noisy.trials[0].wave_misfit < 1.5 * noisy.trials[0].water_misfit
+
+
+def test_without_waves_times_tell_whether_they_are_advised():
+    missed = Trial({}, held_out_rms_s=100e-9, shown_rms_s=50e-9)
+    assert worth(missed, 10e-9, 3.4) == (
+        "method waveform is advised, for rays miss held-out times by 100 ns, whose noise is 10 ns; "
+        "it takes about 3 minutes of a core"
+    )
+    assert worth(missed, 80e-9, 0.2).startswith("method waveform would gain little, for rays miss")
 
 
 def test_held_out_emitters_decide_against_it():
