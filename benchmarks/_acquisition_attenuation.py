@@ -1,4 +1,4 @@
-"""R8 on wave-equation data: attenuation by waveforms, against log ratios along rays."""
+"""R8 on wave-equation data: attenuation by waveforms, against amplitudes along rays."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from _lossy_scan import lossy_scan, with_log_ratios
+from _lossy_scan import lossy_scan
 
 from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
@@ -25,9 +25,6 @@ OTHERS = Path(__file__).parents[2] / "shared" / "data" / "ring_wave_a.h5"
 # What R8 asks for, and above what a figure is told as experimental.
 GOAL, EXPERIMENTAL = 0.3, 0.15
 
-# Pairs nearer than this part of the ring's width hear what the skin scatters.
-NEAREST = 0.16
-
 
 def rows(quick: bool, progress: Step) -> Iterable[Row]:
     """NRMSE inside the object by waveforms and by rays, of the true range; quick, of a small scan alone."""
@@ -42,11 +39,13 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
 
 
 def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
-    """Names and scans, with the traces that losses leave."""
-    small, usual = (3e5, 0.05, 32, 16, 64), (4e5, 0.08, 64, 32, 128)
-    frequency, side, elements, emissions, nodes = small if quick else usual
-    asked = WaveSimulationSettings(frequency, side, elements, emissions, nodes=nodes)
-    yield f"simulated {1e-3 * frequency:.0f} kHz", lossy_scan(asked, progress)
+    """Names and scans, with the traces that losses leave, of all frequencies alike or in proportion."""
+    small, usual, fine = (3e5, 0.05, 32, 16, 64), (4e5, 0.08, 64, 32, 128), (1e6, 0.08, 128, 64, 256)
+    asked = [(small, False)] if quick else [(usual, False), (usual, True), (fine, True)]
+    for (frequency, side, elements, emissions, nodes), proportional in asked:
+        scan = WaveSimulationSettings(frequency, side, elements, emissions, nodes=nodes)
+        name = f"simulated {1e-3 * frequency:.0f} kHz{', loss as the frequency' if proportional else ''}"
+        yield name, lossy_scan(scan, progress, proportional=proportional)
     if not quick and OTHERS.exists():
         yield "ring_wave_a 400 kHz", read_dataset(OTHERS)
 
@@ -61,18 +60,19 @@ def by_waves(dataset: Dataset, quick: bool, progress: Step) -> tuple[Reconstruct
 
 
 def by_rays(dataset: Dataset, nodes: int, progress: Step) -> dict[str, float]:
-    """Along straight and bent rays, as the log ratios are and with the focusing of ray tubes taken off."""
-    width = float(np.ptp(dataset.element_position_m, axis=0).max())
-    ratios = with_log_ratios(dataset, NEAREST * width)
-    asked = replace(pick(dataset), log_ratio_np=ratios.log_ratio_np)
-    asked = replace(asked, amplitude_frequency_hz=ratios.amplitude_frequency_hz)
+    """Along straight and bent rays: log ratios, these with the focusing of ray tubes off, and spectra."""
+    picked = replace(pick(dataset), waveform=dataset.waveform)
+    ways = {
+        "ratios": Settings(nodes=nodes, amplitudes="ratio"),
+        "ratios, focusing taken off": Settings(nodes=nodes, amplitudes="ratio", focusing=True),
+        "spectra": Settings(nodes=nodes, amplitudes="spectrum"),
+    }
     found = {}
     for rays in ("straight", "curved"):
-        for focusing in (False, True):
-            name = f"{rays} rays, {'focusing taken off' if focusing else 'as they are'}"
-            progress(len(found), 4, name)
-            settings = Settings(nodes=nodes, rays=rays, focusing=focusing)
-            found[name] = error(reconstruct(asked, settings), dataset)
+        for way, settings in ways.items():
+            name = f"{rays} rays, {way}"
+            progress(len(found), 2 * len(ways), name)
+            found[name] = error(reconstruct(picked, replace(settings, rays=rays)), dataset)
     return found
 
 

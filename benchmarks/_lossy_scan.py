@@ -1,13 +1,12 @@
-"""A ring scan of the Table 6 phantom by waves that tissue absorbs, and log ratios read from its traces."""
+"""A ring scan of the Table 6 phantom by waves that tissue absorbs."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset, Truth, Waveform
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.wave.absorption import Absorbing, simulate_absorbed
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
 from bentray_service.cli.terminal import Step
@@ -25,26 +24,35 @@ from bentray_workers.wave_simulation import (
 TABLE6_HZ = 5e6
 
 
-def lossy_scan(asked: WaveSimulationSettings, progress: Step) -> Dataset:
-    """Traces of object and water, of another grid and order than any refinement's, without noise."""
+def lossy_scan(asked: WaveSimulationSettings, progress: Step, *, proportional: bool) -> Dataset:
+    """Traces of object and water, of another grid and order than any refinement's, without noise.
+
+    Args:
+        asked: the scan.
+        progress: told of emissions.
+        proportional: whether the loss grows as the frequency, as tissue's does; else all frequencies lose
+            what the pulse's centre does, as in a refinement's model.
+    """
     phantom, nodes = table6(asked.coupling_mps), asked.fine_nodes
     part = asked.frequency_hz / TABLE6_HZ
-    speed = phantom.speed(nodes, TABLE6_SIDE_M)
-    media = [
-        Medium.of(c, asked.spacing_m, asked.step_s, attenuation=loss, edge_nodes=EDGE_NODES)
-        for c, loss in (
-            (speed, part * phantom.attenuation(nodes, TABLE6_SIDE_M)),
-            (np.full_like(speed, asked.coupling_mps), None),
-        )
-    ]
+    speed, loss = phantom.speed(nodes, TABLE6_SIDE_M), part * phantom.attenuation(nodes, TABLE6_SIDE_M)
+    grid = asked.spacing_m, asked.step_s
+    water = Medium.of(np.full_like(speed, asked.coupling_mps), *grid, edge_nodes=EDGE_NODES)
+    tissue: Medium | Absorbing
+    if proportional:
+        centre = asked.frequency_hz
+        tissue = Absorbing.of(speed, *grid, attenuation=loss, frequency_hz=centre, edge_nodes=EDGE_NODES)
+    else:
+        tissue = Medium.of(speed, *grid, attenuation=loss, edge_nodes=EDGE_NODES)
     places = asked.elements_m() + 0.5 * asked.side_m
     late = asked.step_s * asked.frequency_hz * np.arange(asked.samples * asked.skip) - BEFORE
     pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
     traces = np.empty((2, asked.emissions, asked.elements, asked.samples), np.float32)
     for k, emitter in enumerate(asked.senders()):
         progress(k, asked.emissions, "simulating waves with loss")
-        for of_medium, medium in zip(traces, media, strict=True):
-            of_medium[k] = simulate(medium, places[emitter], places, pulse, ORDER)[:, :: asked.skip]
+        for of_medium, medium in zip(traces, (tissue, water), strict=True):
+            through = simulate_absorbed if isinstance(medium, Absorbing) else simulate
+            of_medium[k] = through(medium, places[emitter], places, pulse, ORDER)[:, :: asked.skip]
     apart = asked.side_m / (asked.nodes - 1)
     return Dataset(
         element_position_m=asked.elements_m(),
@@ -64,17 +72,3 @@ def lossy_scan(asked: WaveSimulationSettings, progress: Step) -> Dataset:
         sampling_rate_hz=SAMPLES_A_PERIOD * asked.frequency_hz,
         t0_s=-BEFORE / asked.frequency_hz,
     )
-
-
-def with_log_ratios(dataset: Dataset, nearest_m: float) -> Dataset:
-    """The dataset with ln(A_water / A_object) of the energy of whole traces; NaN for nearer pairs."""
-    assert dataset.waveform is not None
-    assert dataset.waveform.water is not None
-    energy = [
-        (traces.astype(np.float64) ** 2).sum(axis=-1)
-        for traces in (dataset.waveform.water, dataset.waveform.object)
-    ]
-    far = dataset.distance_m() >= nearest_m
-    ratio = np.full(far.shape, np.nan)
-    ratio[far] = 0.5 * np.log(energy[0][far] / energy[1][far])
-    return replace(dataset, log_ratio_np=ratio, amplitude_frequency_hz=dataset.center_frequency_hz)
