@@ -12,7 +12,6 @@ from ..arrays import Floats
 from .chains import Chain, Gathering, Scan, cut
 from .gauss_newton import look
 from .linearisation import Rows
-from .problem import Problem
 
 
 class TrialChain(Chain):
@@ -53,24 +52,15 @@ class HeldOut(Gathering):
 
     def __init__(self, scan: Scan, index: int) -> None:
         self._scan = scan
-        super().__init__(look_held_out, misfit, judging(scan, index).sounding)
+        super().__init__(look_held_out, misfit, scan.problem(index).sounding)
 
     def first(self, scan: Scan, index: int, image: Floats) -> list[Any]:
         return super().first(self._scan, index, image)
 
 
-def judging(scan: Scan, index: int) -> Problem:
-    """The held-out pairs, those measured both ways with their mean, as ``gauss-newton`` has them.
-
-    Were methods judged by the times that they are given, the mean's lower noise would speak for one of them.
-    """
-    problem = scan.problem(index)
-    return problem.each_pair_once() if scan.stages()[-1].reciprocity else problem
-
-
 def look_held_out(scan: Scan, index: int, slowness: Floats, part: int) -> Rows:
     """Call: the rays of some held-out pairs through the finished image."""
-    problem = judging(scan, index)
+    problem = scan.problem(index)
     return look(problem, scan.stages()[-1], slowness, cut(problem.sounding)[part])
 
 
