@@ -105,8 +105,18 @@ def _of_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], Flo
         findings += clipped(dataset, measures, which)
     if measured.water is None:
         return findings, None
-    valid, strongest = apply(dataset, findings).valid, measured.water.strongest_s
+    valid, strongest = apply(dataset, findings).valid, _whole_crests(measured.water)
     return findings, strongest if valid is None else np.where(valid, strongest, np.nan)
+
+
+def _whole_crests(water: Measures) -> Floats:
+    """Times of the crests, (ntx, nrx), s: where most pulses are whole, without those that were cut off.
+
+    A cut crest is off by a part of a period, and near pairs are cut, for they are loud: the line would lean.
+    """
+    whole = np.where(water.clipped, np.nan, water.strongest_s)
+    most = 2 * np.isfinite(whole).sum() >= np.isfinite(water.strongest_s).sum()
+    return whole if most else water.strongest_s
 
 
 def _of_water(dataset: Dataset, strongest: Floats) -> list[Finding]:
