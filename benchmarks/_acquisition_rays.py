@@ -90,11 +90,14 @@ def judged(name: str, dataset: Dataset, nodes: int) -> Iterable[Row]:
         "bent": {},
         "bent, Gauss-Newton": all_at_once,
         "bent, wide": as_waves,
+        "auto without traces": {"method": "auto"},
         "auto": {"method": "auto"},
     }
     found, advice = {}, ""
     for way, changes in ways.items():
-        result = reconstruct(picked, replace(plan, **changes))
+        # By times alone, but for the last: it hears the traces.
+        heard = replace(picked, waveform=dataset.waveform) if way == "auto" else picked
+        result = reconstruct(heard, replace(plan, **changes))
         found[way] = error(result, dataset)
         advice = reason(result.trials)
     exact = replace(picked, delta_tof_s=ideal(dataset), sigma_s=None)
