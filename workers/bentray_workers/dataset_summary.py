@@ -22,8 +22,8 @@ def summary_of(path: Path, settings: Settings) -> Summary:
 
     Args:
         path: of the HDF5 file.
-        settings: with ``reciprocity``, elements that only send or only receive do both; and whether amplitudes
-            are read from traces.
+        settings: with ``reciprocity``, elements that only send or only receive do both; and whether
+            amplitudes are read from traces.
 
     Raises:
         InvalidInput: for a file without positions, emitters or receivers.
