@@ -1,4 +1,4 @@
-"""Acoustic waves in a plane: a finite-difference simulator, its adjoint, waveform refinement of an image."""
+"""Acoustic waves: a finite-difference simulator in plane and space; in a plane its adjoint and refinement."""
 
 from .adjoint import Slope, slope, stored_bytes
 from .chain import WaveChain, WaveScan
@@ -6,6 +6,7 @@ from .continuation import Refined, refine
 from .medium import Medium
 from .preparation import prepare
 from .problem import WaveProblem
+from .room import emission_bytes
 from .settings import Band, WaveSettings, bands
 from .simulation import simulate
 from .standing import BandEnd, Image, WaveStanding
@@ -23,6 +24,7 @@ __all__ = [
     "WaveSettings",
     "WaveStanding",
     "bands",
+    "emission_bytes",
     "prepare",
     "refine",
     "simulate",

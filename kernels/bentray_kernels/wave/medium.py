@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Floats
 from ..errors import InvalidInput
+from .room import check_room
 from .stencil import HALO, longest_step
 
 # Width of the absorbing edge, nodes; power of its profile; what its end sends back at normal incidence.
@@ -29,8 +32,8 @@ class Medium:
     value at the centre of the band. The edges are the same term, growing outwards as a power (a sponge).
 
     Attributes:
-        keep, fade, drive: (nx + 2 margin, ny + 2 margin), float32 or float64.
-        speed: (nx, ny), m/s, of the image alone.
+        keep, fade, drive: (nx + 2 margin, ny + 2 margin[, nz + 2 margin]), float32 or float64.
+        speed: (nx, ny[, nz]), m/s, of the image alone.
         spacing: m.
         time_step_s: s.
         margin: nodes of edge and halo on every side of the image.
@@ -54,32 +57,36 @@ class Medium:
         attenuation: Floats | None = None,
         edge_nodes: int = EDGE_NODES,
         dtype: DTypeLike = np.float32,
+        room_bytes: float = math.inf,
     ) -> Medium:
         """The medium of an image, its outermost values continued through the edges.
 
         Args:
-            speed: (nx, ny), m/s, > 0.
+            speed: (nx, ny[, nz]), m/s, > 0.
             spacing: of the nodes, m.
             time_step_s: s.
-            attenuation: (nx, ny), Np/m, >= 0; None: no loss.
+            attenuation: as ``speed``, Np/m, >= 0; None: no loss.
             edge_nodes: width of the absorbing edges, nodes.
             dtype: of the fields; float64 for tests of exactness.
+            room_bytes: what one emission may take, see ``room.emission_bytes``.
 
         Raises:
-            InvalidInput: for a speed or an attenuation that is none, an edge without a node, or a time step
-                beyond the limit of stability.
+            InvalidInput: for a speed or an attenuation that is none, an edge without a node, a time step
+                beyond the limit of stability, or more nodes than there is room for.
         """
         speed = np.asarray(speed, dtype=np.float64)
-        if speed.ndim != 2 or 0 in speed.shape or not (np.isfinite(speed) & (speed > 0.0)).all():
-            raise InvalidInput("speed", f"shape {speed.shape}", "(nx, ny) of finite numbers > 0 m/s")
+        if speed.ndim not in (2, 3) or 0 in speed.shape or not (np.isfinite(speed) & (speed > 0.0)).all():
+            raise InvalidInput("speed", f"shape {speed.shape}", "(nx, ny[, nz]) of finite numbers > 0 m/s")
         if not 0.0 < spacing < np.inf:
             raise InvalidInput("spacing", spacing, "a finite spacing > 0 m")
         if edge_nodes < 1:
             raise InvalidInput("edge_nodes", edge_nodes, "at least 1 node")
+        check_room(speed.shape, edge_nodes, dtype, room_bytes)
         margin = edge_nodes + HALO
         c = np.pad(speed, margin, mode="edge")
         # By the speed of the rim, so that no change of the object changes the edges.
-        rim = np.concatenate((speed[0], speed[-1], speed[:, 0], speed[:, -1])).mean()
+        faces = [speed.take(end, axis).ravel() for axis in range(speed.ndim) for end in (0, -1)]
+        rim = np.concatenate(faces).mean()
         damping = _sponge(speed.shape, edge_nodes) * rim / spacing
         if attenuation is not None:
             loss = np.asarray(attenuation, dtype=np.float64)
@@ -88,14 +95,15 @@ class Medium:
                     "attenuation", f"shape {loss.shape}", f"{speed.shape} of finite numbers >= 0 Np/m"
                 )
             damping = damping + c * np.pad(loss, margin, mode="edge")
-        limit = longest_step(float(c.max()), spacing, float(damping.max()))
+        limit = longest_step(float(c.max()), spacing, float(damping.max()), speed.ndim)
         if not 0.0 < time_step_s <= limit:
             raise InvalidInput("time_step_s", time_step_s, f"a step > 0 and <= {limit:.4g} s, to be stable")
         turn = damping * time_step_s
-        keep = (2.0 - turn**2) / (1.0 + turn)
-        fade = (1.0 - turn) / (1.0 + turn)
-        drive = (c * time_step_s / spacing) ** 2 / (1.0 + turn)
-        keep, fade, drive = (np.ascontiguousarray(part, dtype=dtype) for part in (keep, fade, drive))
+        del damping
+        # Each made of its type before the next: in space they are what the memory goes into.
+        keep = np.ascontiguousarray((2.0 - turn**2) / (1.0 + turn), dtype=dtype)
+        fade = np.ascontiguousarray((1.0 - turn) / (1.0 + turn), dtype=dtype)
+        drive = np.ascontiguousarray((c * time_step_s / spacing) ** 2 / (1.0 + turn), dtype=dtype)
         return cls(keep, fade, drive, speed, spacing, time_step_s, margin)
 
 
@@ -111,4 +119,4 @@ def _sponge(shape: tuple[int, ...], edge_nodes: int) -> Floats:
         place = np.arange(nodes + 2 * margin) - margin
         depth = np.clip(np.maximum(-place, place - (nodes - 1)) / edge_nodes, 0.0, 1.0)
         profiles.append(strongest * depth**EDGE_POWER)
-    return np.asarray(np.maximum(profiles[0][:, None], profiles[1][None, :]))
+    return np.asarray(reduce(np.maximum, np.ix_(*profiles)))

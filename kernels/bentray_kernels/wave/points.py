@@ -20,32 +20,32 @@ class Points(NamedTuple):
     """Elements on a grid.
 
     Attributes:
-        first: (elements, 2), the first node that each one touches.
-        weights: (elements, 2, 2 REACH), along x and along y; a node's weight is the product.
+        first: (elements, d), d = 2 or 3, the first node that each one touches.
+        weights: (elements, d, 2 REACH), along each axis; a node's weight is the product.
     """
 
     first: Ints
     weights: Floats
 
 
-def place(positions: Floats, spacing: float, shape: tuple[int, int], margin: int) -> Points:
+def place(positions: Floats, spacing: float, shape: tuple[int, ...], margin: int) -> Points:
     """Elements of an image as they lie on the padded grid.
 
     A source spread with these weights and a field read with them are transposes of each other, so that
     emitter and receiver may change places.
 
     Args:
-        positions: (elements, 2), m, node 0 of the image at 0.
+        positions: (elements, d), m, node 0 of the image at 0.
         spacing: of the nodes, m.
-        shape: of the image, nodes.
+        shape: of the image, d numbers of nodes.
         margin: nodes of the padding on every side.
 
     Raises:
         InvalidInput: for an element outside the image.
     """
     where = np.asarray(positions, dtype=np.float64) / spacing
-    if where.ndim != 2 or where.shape[1] != 2:
-        raise InvalidInput("element_position_m", f"shape {where.shape}", "(elements, 2)")
+    if where.ndim != 2 or where.shape[1] != len(shape):
+        raise InvalidInput("element_position_m", f"shape {where.shape}", f"(elements, {len(shape)})")
     outside = ~((where >= 0.0) & (where <= np.array(shape) - 1.0)).all(axis=1)
     if outside.any():
         k = int(np.flatnonzero(outside)[0])

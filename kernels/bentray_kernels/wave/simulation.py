@@ -12,6 +12,7 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from .medium import Medium
 from .points import Points, place
+from .space import forward_in_space
 from .stencil import HALO, weights
 from .stepping import advance, braked, curvature, inject, read, released, spread
 from .strips import Poll, strips, unheeded
@@ -42,9 +43,9 @@ def simulate(
     are taken through ``sampling.resampler``. Releases the GIL.
 
     Args:
-        medium: to travel through.
-        emitter: (2,), m, node 0 of the image at 0.
-        receivers: (nrx, 2), m.
+        medium: to travel through, of two axes or three.
+        emitter: (d,), m, node 0 of the image at 0.
+        receivers: (nrx, d), m.
         wavelet: (nt,), the source s(t) of (1/c^2) p'' - laplacian p = s(t) delta(x), a sample a time step.
         order: in space; see ``stencil.weights``. Data of another one than a refinement's test it honestly.
         poll: see ``strips``.
@@ -56,6 +57,8 @@ def simulate(
         InvalidInput: elements outside the image, a wavelet with waves too short for the grid.
     """
     source, heard = placed(medium, np.atleast_2d(emitter), wavelet), placed(medium, receivers)
+    if medium.speed.ndim == 3:
+        return forward_in_space(medium, source, heard, wavelet, order, poll)
     return forward(medium, source, heard, wavelet, 0, order, poll=poll)[0]
 
 
@@ -69,8 +72,14 @@ def placed(medium: Medium, positions: Floats, wavelet: Floats | None = None) -> 
                 f"{points:.2f} nodes in the shortest wave",
                 f"at least {LEAST_POINTS:g}: a finer grid or a lower frequency",
             )
-    found = place(positions, medium.spacing, (medium.speed.shape[0], medium.speed.shape[1]), medium.margin)
+    found = place(positions, medium.spacing, medium.speed.shape, medium.margin)
     return Points(found.first, found.weights.astype(medium.keep.dtype))
+
+
+def check_flat(medium: Medium) -> None:
+    """Refuse a medium in space, where waves are followed in a plane alone."""
+    if medium.speed.ndim != 2:
+        raise InvalidInput("speed", f"shape {medium.speed.shape}", "(nx, ny)")
 
 
 def points_per_wavelength(medium: Medium, wavelet: Floats) -> float:
@@ -106,7 +115,11 @@ def forward(
         traces: (nrx, nt).
         scattered: (ceil(nt / every), nx, ny), over the wavelet's highest value: h^2 (laplacian p + s), what
             a change of 1/c^2 would radiate; or next - before + 2 sigma dt now, what one of sigma dt takes.
+
+    Raises:
+        InvalidInput: for a medium in space, which ``simulate`` alone takes.
     """
+    check_flat(medium)
     kind = medium.keep.dtype
     nt = wavelet.size
     traces = np.empty((len(heard.first), nt), kind)

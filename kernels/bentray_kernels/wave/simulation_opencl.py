@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats
 from .medium import Medium
 from .points import REACH, Points
-from .simulation import forward, placed
+from .simulation import check_flat, forward, placed
 from .stencil import HALO, weights
 from .stepping import QUIET
 
@@ -21,7 +21,8 @@ def simulate_opencl(medium: Medium, emitter: Floats, receivers: Floats, wavelet:
     """As ``simulate``, from the same stencil, factors and weights; equal to it but for rounding.
 
     Raises:
-        InvalidInput: as ``simulate``, and where ``BENTRAY_OPENCL_DEVICE`` names no one device.
+        InvalidInput: as ``simulate``, for a medium in space, and where ``BENTRAY_OPENCL_DEVICE`` names no
+            one device.
 
     Warns:
         OpenCLFallbackWarning: once, where no device passes its trial and ``simulate`` computes instead.
@@ -29,6 +30,7 @@ def simulate_opencl(medium: Medium, emitter: Floats, receivers: Floats, wavelet:
     # Here, so that whoever never asks for OpenCL never loads it.
     from ..opencl.choice import session_or_warning
 
+    check_flat(medium)
     source, heard = placed(medium, np.atleast_2d(emitter), wavelet), placed(medium, receivers)
     session = session_or_warning(instead="simulate")
     if session is None:

@@ -42,19 +42,20 @@ def symbol(angle: Floats, order: int = 2 * HALO) -> Floats:
     return np.asarray(-centre - 2.0 * turns @ np.array(sides))
 
 
-def longest_step(speed: float, spacing: float, damping: float = 0.0) -> float:
-    """Longest stable time step in two dimensions, s.
+def longest_step(speed: float, spacing: float, damping: float = 0.0, dimensions: int = 2) -> float:
+    """Longest stable time step, s.
 
     The scheme is stable while no mode turns by more than half a circle a step: with the damping sigma,
-    dt^2 (sigma^2 + 2 S c^2 / h^2) <= 4, where S is the symbol at the shortest wave.
+    dt^2 (sigma^2 + d S c^2 / h^2) <= 4, where S is the symbol at the shortest wave and d the dimensions.
 
     Args:
         speed: the highest, m/s.
         spacing: of the nodes, m.
         damping: the highest rate sigma, 1/s.
+        dimensions: 2 or 3.
     """
     shortest = float(symbol(np.array(math.pi)))
-    return 2.0 / math.sqrt(damping**2 + 2.0 * shortest * (speed / spacing) ** 2)
+    return 2.0 / math.sqrt(damping**2 + dimensions * shortest * (speed / spacing) ** 2)
 
 
 def phase_error(
