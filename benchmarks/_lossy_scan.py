@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset, Truth, Waveform
@@ -48,11 +51,17 @@ def lossy_scan(asked: WaveSimulationSettings, progress: Step, *, proportional: b
     late = asked.step_s * asked.frequency_hz * np.arange(asked.samples * asked.skip) - BEFORE
     pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
     traces = np.empty((2, asked.emissions, asked.elements, asked.samples), np.float32)
-    for k, emitter in enumerate(asked.senders()):
-        progress(k, asked.emissions, "simulating waves with loss")
+
+    def emission(k: int) -> None:
+        emitter = places[asked.senders()[k]]
         for of_medium, medium in zip(traces, (tissue, water), strict=True):
             through = simulate_absorbed if isinstance(medium, Absorbing) else simulate
-            of_medium[k] = through(medium, places[emitter], places, pulse, ORDER)[:, :: asked.skip]
+            of_medium[k] = through(medium, emitter, places, pulse, ORDER)[:, :: asked.skip]
+
+    # The simulators let other threads run beside them.
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for k, _ in enumerate(pool.map(emission, range(asked.emissions))):
+            progress(k, asked.emissions, "simulating waves with loss")
     apart = asked.side_m / (asked.nodes - 1)
     return Dataset(
         element_position_m=asked.elements_m(),
