@@ -10,6 +10,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.asked_simulation import OWN, AskedSimulation
 from bentray_workers.simulation import SimulationSettings
 from bentray_workers.volume_simulation import VolumeSimulationSettings
+from bentray_workers.volume_wave_simulation import VolumeWaveSettings
 from bentray_workers.wave_simulation import WaveSimulationSettings
 
 SIZES = {"nodes": st.integers(16, 1024), "elements": st.integers(8, 4096), "seed": st.integers(0, 2**40)}
@@ -45,13 +46,15 @@ def test_which_scan_is_meant():
     assert AskedSimulation(phantom="table7").chosen() == VolumeSimulationSettings()
     waves = AskedSimulation(waveform=True, nodes=256, elements=128).chosen()
     assert waves == WaveSimulationSettings()
+    in_space = AskedSimulation(phantom="table7", waveform=True, nodes=256, elements=128).chosen()
+    assert in_space == VolumeWaveSettings()
 
 
 @pytest.mark.parametrize(
     ("given", "field"),
     [
         ({"phantom": "table8"}, "phantom"),
-        ({"phantom": "table7", "waveform": True}, "waveform"),
+        ({"phantom": "table7", "waveform": True, "slices": 4}, "slices"),
         ({"elements": 2}, "elements"),
         ({"side_m": float("nan"), "waveform": True}, "side_m"),
         ({"phantom": "table7", "array": "rings"}, "array"),

@@ -33,6 +33,7 @@ WAVES = AskedSimulation(waveform=True)
             AskedSimulation(attenuation=True),
             AskedSimulation(phantom="table7", slices=3, nodes=64),
             WAVES,
+            AskedSimulation(phantom="table7", waveform=True),
         ]
     ),
     more=st.sampled_from(["elements", "nodes"]),
@@ -66,6 +67,7 @@ def test_every_emitter_is_in_one_part(elements, nodes, slices):
         (AskedSimulation(elements=4096, attenuation=True, snr=9.0), "elements"),
         (AskedSimulation(phantom="table7", three_d=True, refinement=4), "nodes"),
         (AskedSimulation(waveform=True, frequency_hz=5e6), "frequency_hz"),
+        (AskedSimulation(phantom="table7", waveform=True, frequency_hz=4e5), "frequency_hz"),
         (AskedSimulation(waveform=True, elements=4096, side_m=0.3), "elements"),
         (AskedSimulation(phantom="table7", elements=4096, slices=1000), "elements"),
     ],

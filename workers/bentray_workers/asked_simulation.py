@@ -10,6 +10,7 @@ from bentray_kernels.errors import InvalidInput
 from .asked_fields import asked, check
 from .simulation import SimulationSettings
 from .volume_simulation import VolumeSimulationSettings
+from .volume_wave_simulation import VolumeWaveSettings
 from .wave_simulation import WaveSimulationSettings
 
 Simulated = SimulationSettings | VolumeSimulationSettings | WaveSimulationSettings
@@ -20,9 +21,9 @@ CHOICES = {"phantom": ("table6", "table7")}
 OWN = {
     "refinement": "waveform is false",
     "noise_s": "phantom is table6 and waveform is false",
-    "slices": "phantom is table7",
-    "array": "phantom is table7",
-    "three_d": "phantom is table7",
+    "slices": "phantom is table7 and waveform is false",
+    "array": "phantom is table7 and waveform is false",
+    "three_d": "phantom is table7 and waveform is false",
     "attenuation": "waveform is false",
     "frequency_hz": "waveform is true",
     "emissions": "waveform is true",
@@ -42,7 +43,7 @@ class AskedSimulation:
         "table6", "The breast of Table 6, in a plane, or that of Table 7, in space."
     )
     waveform: bool = asked(
-        False, "table6: simulate waves and record traces of object and water, not travel times."
+        False, "Simulate waves and record traces of object and water, not travel times; of table7 in space."
     )
     nodes: int = asked(128, "Nodes along a side of the truth, and of the image it is meant for.")
     elements: int = asked(256, "Transducers of a ring; each sends and receives.")
@@ -61,21 +62,21 @@ class AskedSimulation:
         None, "table7: one ring moved (the default), or rings at all heights that receive each other."
     )
     three_d: bool | None = asked(None, "table7: wave fronts in space, not in each slice by itself.")
-    frequency_hz: float | None = asked(None, "Waves: middle of the pulse, Hz; 500000 by default.")
+    frequency_hz: float | None = asked(
+        None, "Waves: middle of the pulse, Hz; 500000 by default, of table7 100000."
+    )
     emissions: int | None = asked(None, "Waves: elements that send; 64 by default.")
     side_m: float | None = asked(None, "Waves: side of the square with phantom and ring, m; 0.12 by default.")
 
     def __post_init__(self) -> None:
         check(self, CHOICES, {})
-        if self.waveform and self.phantom != "table6":
-            raise InvalidInput("waveform", self.waveform, "false, unless phantom is table6")
         self.chosen()
 
     def chosen(self) -> Simulated:
         """The settings of the scan that is meant, with the defaults of what is left out."""
         kind: type[Simulated] = SimulationSettings
         if self.waveform:
-            kind = WaveSimulationSettings
+            kind = VolumeWaveSettings if self.phantom == "table7" else WaveSimulationSettings
         elif self.phantom == "table7":
             kind = VolumeSimulationSettings
         known = {one.name for one in fields(kind)}

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from bentray_kernels.acquisition.volume_simulation import AXIAL_MARGIN_NODES
-from bentray_kernels.wave.stencil import HALO
+from bentray_kernels.wave.points import REACH
+from bentray_kernels.wave.room import padded_nodes
 
 from .simulation import SimulationSettings
 from .task_memory import MIB, REAL
 from .volume_simulation import VolumeSimulationSettings
-from .wave_simulation import EDGE_NODES, WaveSimulationSettings
+from .wave_simulation import WaveSimulationSettings
 
 Timed = SimulationSettings | VolumeSimulationSettings
 
@@ -23,8 +24,10 @@ PLANE_BYTES, SPACE_BYTES, WAVE_BYTES = 96, 96, 88
 PAIR_BYTES, LOSS_BYTES, NOISE_BYTES = 20, 12, 16
 
 # Seconds on a core of 2020: a node of a medium while it is sampled, without and with attenuation; a node that
-# a front crosses; a padded node of a wave's media, and one that a step moves; a byte of a file.
-MEDIUM_S, LOSSY_MEDIUM_S, FRONT_S, WAVE_MEDIUM_S, STEP_S, BYTE_S = 3e-6, 1.4e-5, 4e-7, 1.5e-5, 1e-9, 2e-8
+# a front crosses; a padded node of a wave's media, and one that a step moves, in a plane and in space; a
+# byte of a file.
+MEDIUM_S, LOSSY_MEDIUM_S, FRONT_S, WAVE_MEDIUM_S, BYTE_S = 3e-6, 1.4e-5, 4e-7, 1.5e-5, 2e-8
+STEP_S = {2: 1e-9, 3: 2.1e-9}
 
 # Of a task that has several emitters.
 TASK_S = 1.0
@@ -87,7 +90,10 @@ def cpu_seconds(settings: Timed | WaveSimulationSettings) -> tuple[float, float]
     packing = BYTE_S * result_bytes(settings)
     if isinstance(settings, WaveSimulationSettings):
         steps = settings.samples * settings.skip * settings.emissions
-        return 2 * STEP_S * _padded(settings) * steps + packing, WAVE_MEDIUM_S * _padded(settings)
+        # Each element is read from the nodes about it.
+        moved = _padded(settings) + settings.elements * (2 * REACH) ** settings.dimensions
+        waves = 2 * STEP_S[settings.dimensions] * moved * steps
+        return waves + packing, WAVE_MEDIUM_S * _padded(settings)
     nodes, media = fine_nodes(settings), len({settings.medium_number(k) for k in range(settings.scans)})
     sampled = LOSSY_MEDIUM_S if settings.attenuation else MEDIUM_S
     fronts = FRONT_S * nodes * settings.scans * settings.emitters
@@ -113,4 +119,4 @@ def _noisy(settings: Timed) -> bool:
 
 
 def _padded(settings: WaveSimulationSettings) -> int:
-    return (settings.fine_nodes + 2 * (EDGE_NODES + HALO)) ** 2
+    return padded_nodes(settings.grid, settings.edge_nodes)

@@ -1,22 +1,26 @@
-"""A ring scan of the Table 6 phantom by simulated waves, its emissions shared out over workers or cores."""
+"""A ring scan of a phantom by simulated waves, its emissions shared out over workers or cores."""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 from distributed import Client, as_completed
+from distributed.system import MEMORY_LIMIT
 from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Dataset, Truth, Waveform
 from bentray_kernels.acquisition.simulation import Ring
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.phantoms import TABLE6_SIDE_M, EllipsePhantom, table6
+from bentray_kernels.phantoms.volume import PhantomSlice
 from bentray_kernels.tomography import Progress
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.points import REACH
@@ -36,6 +40,9 @@ ORDER, NODES_A_WAVE, STEP = 6, 7.0, 0.5
 
 # Wider than those of a refinement.
 EDGE_NODES = 40
+
+# More nodes than these nobody waits for.
+MOST_NODES = 8192**2
 
 # Recorded samples in a period of the centre frequency.
 SAMPLES_A_PERIOD = 8
@@ -70,6 +77,12 @@ class WaveSimulationSettings:
     snr: float | None = None
     seed: int = 0
 
+    # Of the waves, what a scan in space has otherwise.
+    dimensions: ClassVar[int] = 2
+    edge_nodes: ClassVar[int] = EDGE_NODES
+    phantom_side_m: ClassVar[float] = TABLE6_SIDE_M
+    phantom_name: ClassVar[str] = "Table 6"
+
     def __post_init__(self) -> None:
         if not 1e4 <= self.frequency_hz <= 1e7:
             raise InvalidInput("frequency_hz", self.frequency_hz, "1e4 to 1e7 Hz")
@@ -85,15 +98,33 @@ class WaveSimulationSettings:
             raise InvalidInput("snr", self.snr, "a finite ratio > 0")
         if self.seed < 0:
             raise InvalidInput("seed", self.seed, "0 or more")
-        if self.fine_nodes > 8192:
-            accepted = f"at most {self.frequency_hz * 8192 / self.fine_nodes:.3g} for this side"
-            raise InvalidInput("frequency_hz", self.frequency_hz, accepted)
-        table6(self.coupling_mps)
+        size = math.prod(self.grid)
+        if size > MOST_NODES:
+            most = self.frequency_hz * (MOST_NODES / size) ** (1.0 / self.dimensions)
+            raise InvalidInput("frequency_hz", self.frequency_hz, f"at most {most:.3g} for this side")
+
+    @property
+    def phantom(self) -> EllipsePhantom | PhantomSlice:
+        """In the plane of the ring."""
+        return table6(self.coupling_mps)
+
+    @property
+    def grid(self) -> tuple[int, ...]:
+        """Nodes of the simulation along each axis."""
+        return self.fine_nodes, self.fine_nodes
+
+    def places_m(self) -> Floats:
+        """Elements in the medium, (elements, dimensions), m, node 0 at 0."""
+        return self.elements_m() + 0.5 * self.side_m
+
+    def speed(self) -> Floats:
+        """Of the object on the grid, m/s."""
+        return self.phantom.speed(self.fine_nodes, self.phantom_side_m)
 
     @property
     def speeds(self) -> tuple[float, float]:
         """Lowest and highest in the medium, m/s."""
-        low, high = table6(self.coupling_mps).speed_range()
+        low, high = self.phantom.speed_range()
         return min(low, self.coupling_mps), max(high, self.coupling_mps)
 
     @property
@@ -103,6 +134,11 @@ class WaveSimulationSettings:
         return int(np.ceil(self.side_m * NODES_A_WAVE / wave)) + 2 * REACH
 
     @property
+    def told_grid(self) -> str:
+        """As people read it."""
+        return " by ".join(str(nodes) for nodes in self.grid)
+
+    @property
     def spacing_m(self) -> float:
         """Of that grid, m."""
         return self.side_m / (self.fine_nodes - 1)
@@ -110,7 +146,7 @@ class WaveSimulationSettings:
     @property
     def skip(self) -> int:
         """Time steps from one recorded sample to the next."""
-        longest = STEP * longest_step(self.speeds[1], self.spacing_m)
+        longest = STEP * longest_step(self.speeds[1], self.spacing_m, dimensions=self.dimensions)
         return int(np.ceil(1.0 / (SAMPLES_A_PERIOD * self.frequency_hz) / longest))
 
     @property
@@ -188,7 +224,7 @@ class Noise:
 
 def scan_of(settings: WaveSimulationSettings, waveform: Waveform) -> Dataset:
     """The dataset of traces, or of stand-ins for them."""
-    phantom = table6(settings.coupling_mps)
+    phantom = settings.phantom
     spacing = settings.side_m / (settings.nodes - 1)
     low, high = settings.dispersion
     return Dataset(
@@ -197,9 +233,9 @@ def scan_of(settings: WaveSimulationSettings, waveform: Waveform) -> Dataset:
         rx=np.arange(settings.elements),
         water_speed_mps=settings.coupling_mps,
         waveform=waveform,
-        roi=phantom.inside(settings.nodes, TABLE6_SIDE_M),
+        roi=phantom.inside(settings.nodes, settings.phantom_side_m),
         truth=Truth(
-            sound_speed_mps=phantom.speed(settings.nodes, TABLE6_SIDE_M),
+            sound_speed_mps=phantom.speed(settings.nodes, settings.phantom_side_m),
             spacing_m=(spacing, spacing),
             origin_m=(-0.5 * settings.side_m, -0.5 * settings.side_m),
         ),
@@ -207,9 +243,12 @@ def scan_of(settings: WaveSimulationSettings, waveform: Waveform) -> Dataset:
         center_frequency_hz=settings.frequency_hz,
         sampling_rate_hz=SAMPLES_A_PERIOD * settings.frequency_hz,
         t0_s=-BEFORE / settings.frequency_hz,
-        title=f"Table 6 phantom, {1e3 * settings.side_m:g} mm, waves of {1e-3 * settings.frequency_hz:g} kHz",
+        title=(
+            f"{settings.phantom_name} phantom, {1e3 * settings.side_m:g} mm, "
+            f"waves of {1e-3 * settings.frequency_hz:g} kHz"
+        ),
         source=(
-            f"made by bentray simulate: order {ORDER} in space, {settings.fine_nodes}² nodes of "
+            f"made by bentray simulate: order {ORDER} in space, {settings.told_grid} nodes of "
             f"{1e3 * settings.spacing_m:.3g} mm, phase speed wrong by {low:.1e} in the middle of the pulse "
             f"and {high:.1e} at its highest frequency"
         ),
@@ -239,7 +278,7 @@ def simulate_emission(
     settings: WaveSimulationSettings, emission: int, poll: Poll = unheeded
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Task: traces of object and water of one emission, (elements, samples) each; ``poll`` as ``strips``."""
-    places = settings.elements_m() + 0.5 * settings.side_m
+    places = settings.places_m()
     at = places[settings.senders()[emission]]
     time = settings.step_s * np.arange(settings.samples * settings.skip) - BEFORE / settings.frequency_hz
     late = time * settings.frequency_hz
@@ -253,12 +292,14 @@ def simulate_emission(
 @lru_cache(maxsize=1)
 def _media(settings: WaveSimulationSettings) -> tuple[Medium, Medium]:
     """Of object and water."""
-    nodes = settings.fine_nodes
-    speeds = (
-        table6(settings.coupling_mps).speed(nodes, TABLE6_SIDE_M),
-        np.full((nodes, nodes), settings.coupling_mps),
-    )
     received, water = (
-        Medium.of(speed, settings.spacing_m, settings.step_s, edge_nodes=EDGE_NODES) for speed in speeds
+        Medium.of(
+            speed,
+            settings.spacing_m,
+            settings.step_s,
+            edge_nodes=settings.edge_nodes,
+            room_bytes=MEMORY_LIMIT or math.inf,
+        )
+        for speed in (settings.speed(), np.full(settings.grid, settings.coupling_mps))
     )
     return received, water

@@ -69,11 +69,13 @@ def simulate(
     waveform: Annotated[
         bool,
         typer.Option(
-            "--waveform", help="table6: simulate waves and record traces of object and water, not times."
+            "--waveform",
+            help="Simulate waves and record traces of object and water, not times; of table7 in space.",
         ),
     ] = False,
     frequency: Annotated[
-        float | None, typer.Option(show_default="500000", help="--waveform: middle of the pulse, Hz.")
+        float | None,
+        typer.Option(show_default="500000, table7 100000", help="--waveform: middle of the pulse, Hz."),
     ] = None,
     emissions: Annotated[
         int | None, typer.Option(show_default="64", help="--waveform: elements that send.")
@@ -99,7 +101,6 @@ def simulate(
     if waveform:
         times = {"--slices": slices, "--array": array, "--three-d": three_d or None, "--noise-ns": noise_ns}
         _refuse("without --waveform", {**times, "--attenuation": attenuation or None})
-        _refuse("--phantom is table6", {"--waveform": None if phantom is Phantom.TABLE6 else "with table7"})
         from .wave_simulation import simulate_to
 
         asked = {
@@ -110,9 +111,8 @@ def simulate(
             "snr": snr,
         }
         asked |= {"elements": elements, "coupling_mps": coupling, "seed": seed}
-        simulate_to(
-            path, {name: value for name, value in asked.items() if value is not None}, as_json=as_json
-        )
+        given = {name: value for name, value in asked.items() if value is not None}
+        simulate_to(path, given, in_space=phantom is Phantom.TABLE7, as_json=as_json)
         return
     _refuse("with --waveform", own_of_waves)
     both: dict[str, Any] = {

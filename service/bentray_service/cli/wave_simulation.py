@@ -10,18 +10,20 @@ from typing import Any
 from .terminal import print_json, print_lines, print_table, progress_bar
 
 
-def simulate_to(path: Path, asked: dict[str, Any], *, as_json: bool) -> None:
+def simulate_to(path: Path, asked: dict[str, Any], *, in_space: bool, as_json: bool) -> None:
     """Simulate a scan into a dataset file, and say how.
 
     Args:
         path: of the file.
         asked: of ``WaveSimulationSettings``, what was given.
+        in_space: the phantom of Table 7, else that of Table 6 in a plane.
         as_json: for machines.
     """
     from bentray_workers.dataset_file import write_dataset
+    from bentray_workers.volume_wave_simulation import VolumeWaveSettings
     from bentray_workers.wave_simulation import WaveSimulationSettings, simulate_waves
 
-    settings = WaveSimulationSettings(**asked)
+    settings = VolumeWaveSettings(**asked) if in_space else WaveSimulationSettings(**asked)
     started = time.perf_counter()
     with progress_bar("Simulating") as step:
         dataset = simulate_waves(None, settings, lambda now: step(now.done, now.total, "emissions"))
@@ -32,7 +34,7 @@ def simulate_to(path: Path, asked: dict[str, Any], *, as_json: bool) -> None:
         found = {"output": str(path), "seconds": round(seconds, 3), "settings": asdict(settings)}
         print_json({**found, "phase_speed_error": {"centre": centre, "highest": highest}})
         return
-    grid = f"{settings.fine_nodes} by {settings.fine_nodes} nodes of {1e3 * settings.spacing_m:.3g} mm"
+    grid = f"{settings.told_grid} nodes of {1e3 * settings.spacing_m:.3g} mm"
     rows = [
         ("elements", f"{settings.elements}, {settings.emissions} of them send"),
         ("ring", f"{1e3 * (dataset.radius_m or 0.0):.1f} mm radius"),

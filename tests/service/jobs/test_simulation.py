@@ -178,7 +178,7 @@ def test_a_stopped_service_goes_on_where_it_was(serving, until, held):
         ({"nodes": 4}, "settings.nodes"),
         ({"nodes": "many"}, "settings.nodes"),
         ({"waveform": True, "refinement": 4}, "settings.refinement"),
-        ({"phantom": "table7", "waveform": True}, "settings.waveform"),
+        ({"phantom": "table7", "waveform": True, "slices": 4}, "settings.slices"),
         ({"wavform": True}, "settings.wavform"),
         ({"refinement": 64}, "nodes"),
         ({"elements": 4096, "attenuation": True}, "elements"),
