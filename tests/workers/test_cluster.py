@@ -3,6 +3,7 @@
 import os
 import socket
 import threading
+import warnings
 from types import SimpleNamespace
 from urllib.parse import urlsplit
 
@@ -32,6 +33,13 @@ def test_given_scheduler_is_joined_and_survives_leaving(cluster):
         assert joined.describe()["embedded"] is False
         assert joined.client.submit(sum, [1, 2], resources=RENDER).result() == 3
     assert cluster.client.submit(sum, [2, 2]).result() == 4
+
+
+def test_large_arguments_are_no_reason_to_warn(cluster):
+    """Dask would from 10 MB on; a step of a refinement takes as much."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert cluster.client.submit(len, bytes(2 * 10**7)).result() == 2 * 10**7
 
 
 @pytest.fixture(scope="module")

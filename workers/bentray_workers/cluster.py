@@ -9,6 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import dask
 from distributed import Client
 from distributed.core import rpc
 from distributed.security import Security
@@ -16,6 +17,7 @@ from distributed.security import Security
 from bentray_kernels.errors import InvalidInput
 
 from .connected import connected_workers
+from .dask_settings import OF_CLIENTS
 from .providers import Deployed, Wanted, deploy
 from .tls import security_of
 
@@ -27,6 +29,8 @@ class Cluster:
     """A client of a running scheduler, and the scheduler itself where it is ours."""
 
     def __init__(self, connect: Callable[[], Client], deployed: Deployed | None = None) -> None:
+        # For the whole process: a client looks them up whenever something is submitted.
+        dask.config.set(OF_CLIENTS)
         self._connect = connect
         self._deployed = deployed
         self._client = connect()

@@ -1,4 +1,4 @@
-"""The settings of Dask that every scheduler and worker of ours runs under."""
+"""The settings of Dask that every scheduler, worker and client of ours runs under."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ SETTINGS = {
     # page faults took nearly half of a straight-ray reconstruction. These are glibc's own limits, in bytes.
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**25,
-    # A step of a refinement takes the images of many steps before it; Dask would warn from 10 MB on.
-    "distributed.admin.large-graph-warning-threshold": "100MB",
     # Dask starts a web server in every process and has no way to ask who calls: it is given no pages.
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
 }
+
+# The settings of a process that has a client: a step of a refinement takes the images of many steps before
+# it, and Dask would warn from 10 MB on.
+OF_CLIENTS = {"distributed.admin.large-graph-warning-threshold": "100MB"}
 
 # Where that web server listens, since it cannot be left out: a free port of loopback.
 NO_DASHBOARD = "127.0.0.1:0"
