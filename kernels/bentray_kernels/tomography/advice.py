@@ -50,7 +50,7 @@ CLEARLY = 0.92
 
 
 class Waves(Protocol):
-    """Who tells images apart by traces, see ``wave.following.Following``."""
+    """Who holds images against traces, see ``wave.following.Following``."""
 
     @property
     def passes(self) -> int:
@@ -99,10 +99,11 @@ def advise(
 
     Where the frequency is known rays as wide as waves are tried first, straight and bent, on held-out views,
     see ``choose_wide``. Where it is not, or such rays do not explain the times, what predicts held-out pairs
-    best is chosen among thin rays, see ``choose``. Where there are traces, waves through the images that were
-    tried decide in place of times, for they judge the image itself and not a model of rays. The
-    reconstruction is told to stop at the noise of the times (Morozov's discrepancy principle), for a closer
-    fit would draw it, unless the trial shows that there is less of it.
+    best is chosen among thin rays, see ``choose``. The reconstruction is told to stop at the noise of the
+    times (Morozov's discrepancy principle), for a closer fit would draw it, unless the trial shows that there
+    is less of it. Where there are traces, the trials say too what waves through their images miss, by which
+    waveforms are advised; they do not choose, for images on the coarser grid of a trial are worse than those
+    to come, and not in their order (``benchmarks/results/tried.md``).
 
     Args:
         dataset: for its frequency and the noise of its times.
@@ -111,7 +112,7 @@ def advise(
         scan_of: makes a scan of a part of the pairs.
         drive: runs chains to their end.
         after: emitter passes that come after the reconstruction, at most.
-        waves: who tells images apart by traces; None where there are none.
+        waves: who holds images against traces; None where there are none.
 
     Returns:
         The settings; the trials, the chosen one first and the others by what they predict; and the emitter
@@ -133,7 +134,7 @@ def advise(
         _check_parts(settings, index, scan_of)
         trials = trying.run(thin, PAIRS, rest)
         chosen = choose(trials)
-    others = sorted((t for t in trials if t is not chosen), key=missed)
+    others = sorted((t for t in trials if t is not chosen), key=_missed)
     found = replace(settings, **chosen.settings)
     return stopped(found, chosen, noise_of(dataset)), (chosen, *others), trying.made
 
@@ -207,39 +208,31 @@ def _lacking(parts: Sequence[Part], settings: Settings, index: int, scan_of: Sca
 
 def choose(trials: Sequence[Trial]) -> Trial:
     """The trial that predicts best; one with straight rays unless bent ones are clearly better."""
-    best = min(trials, key=missed)
-    straight = min((trial for trial in trials if trial.settings["rays"] == "straight"), key=missed)
-    return best if missed(best) < CLEARLY * missed(straight) else straight
+    best = min(trials, key=_missed)
+    straight = min((trial for trial in trials if trial.settings["rays"] == "straight"), key=_missed)
+    return best if _missed(best) < CLEARLY * _missed(straight) else straight
 
 
-def missed(trial: Trial) -> float:
-    """What its image misses: traces of some emitters where waves were simulated, else held-out times, s."""
-    return trial.held_out_rms_s if trial.wave_misfit is None else trial.wave_misfit
+def _missed(trial: Trial) -> float:
+    return trial.held_out_rms_s
 
 
 def reason(trials: Sequence[Trial]) -> str:
     """One sentence: what was chosen and why, and how well each trial predicted; empty without trials."""
     if not trials:
         return ""
-    chosen = trials[0]
-    as_waves = [trial for trial in trials if "ray_width_m" in trial.settings]
-    held_to = f"; bent rays must be {100.0 * (1.0 - CLEARLY):.0f} % better"
-    if chosen.wave_misfit is not None:
-        values = [f"{missed(trial):.2g}" for trial in trials]
-        why = f"misfit of waves through its image; of waves in water {chosen.water_misfit:.2g}"
-        surprising = not as_waves and chosen is not min(trials, key=missed)
-    elif as_waves:
-        values = [f"{1e9 * mean_of(trial):.0f} ns" for trial in trials]
+    if any("ray_width_m" in trial.settings for trial in trials):
+        told = [f"{_named(trial.settings)} {1e9 * mean_of(trial):.0f} ns" for trial in trials]
         why = "mean misfit of held-out views, for rays as wide as waves"
-        surprising = mean_of(chosen) > min(map(mean_of, as_waves))
-        needed = f"{100.0 * (1.0 - STRAIGHT):.0f} % better"
-        held_to = f"; where both explain the times straight ones must be {needed}"
-    else:
-        values = [f"{1e9 * missed(trial):.0f} ns" for trial in trials]
-        why = "misfit of held-out pairs"
-        surprising = chosen is not min(trials, key=missed)
-    told = [f"{_named(trial.settings)} {value}" for trial, value in zip(trials, values, strict=True)]
-    return f"auto chose {told[0]} ({why}{held_to if surprising else ''}); the others: {', '.join(told[1:])}"
+        if mean_of(trials[0]) > min(mean_of(t) for t in trials if "ray_width_m" in t.settings):
+            needed = f"{100.0 * (1.0 - STRAIGHT):.0f} % better"
+            why += f"; where both explain the times straight ones must be {needed}"
+        return f"auto chose {told[0]} ({why}); the others: {', '.join(told[1:])}"
+    told = [f"{_named(trial.settings)} {1e9 * trial.held_out_rms_s:.0f} ns" for trial in trials]
+    why = "misfit of held-out pairs"
+    if trials[0] is not min(trials, key=_missed):
+        why += f"; bent rays must be {100.0 * (1.0 - CLEARLY):.0f} % better"
+    return f"auto chose {told[0]} ({why}); the others: {', '.join(told[1:])}"
 
 
 def told(result: Reconstruction) -> str:

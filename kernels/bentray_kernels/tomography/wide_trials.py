@@ -52,9 +52,8 @@ def wide(dataset: Dataset, settings: Settings) -> list[dict[str, Any]]:
 def choose_wide(trials: Sequence[Trial], size_s: float) -> Trial | None:
     """Of the trials with wide rays the one that predicts better; None if thin rays do far better still.
 
-    By what waves through their images miss, where there are traces. By times it is the mean size of what
-    they miss, for picks of first arrivals that were too weak are wrong by periods; and where both explain
-    the times, straight rays must be clearly better than bent ones.
+    By the mean size of what they miss, for picks of first arrivals that were too weak are wrong by periods.
+    Where both explain the times, straight rays must be clearly better than bent ones.
 
     Args:
         trials: of the candidates of ``wide``.
@@ -62,11 +61,8 @@ def choose_wide(trials: Sequence[Trial], size_s: float) -> Trial | None:
     """
     wide_rays = {t.settings["rays"]: t for t in trials if "ray_width_m" in t.settings}
     straight, bent = wide_rays["straight"], wide_rays["curved"]
-    if straight.wave_misfit is not None and bent.wave_misfit is not None:
-        best = straight if straight.wave_misfit < bent.wave_misfit else bent
-    else:
-        part = STRAIGHT if mean_of(bent) < EXPLAINED_PART * size_s else 1.0
-        best = straight if mean_of(straight) < part * mean_of(bent) else bent
+    part = STRAIGHT if mean_of(bent) < EXPLAINED_PART * size_s else 1.0
+    best = straight if mean_of(straight) < part * mean_of(bent) else bent
     thin = min((t for t in trials if "ray_width_m" not in t.settings), key=mean_of)
     return None if mean_of(thin) < EXACT * mean_of(best) else best
 
