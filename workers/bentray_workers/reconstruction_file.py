@@ -186,10 +186,6 @@ def _residuals(reader: Reader) -> NDArray[np.int64] | None:
     return np.asarray(found, dtype=np.int64)
 
 
-# What files of earlier versions may lack of a trial.
-LATER = ("held_out_mean_s", "wave_misfit", "water_misfit")
-
-
 def _trials(reader: Reader) -> tuple[Trial, ...]:
     try:
         found = json.loads(reader.text("", "trials") or "[]")
@@ -198,7 +194,7 @@ def _trials(reader: Reader) -> tuple[Trial, ...]:
                 dict(one["settings"]),
                 float(one["held_out_rms_s"]),
                 float(one["shown_rms_s"]),
-                *(None if one.get(name) is None else float(one[name]) for name in LATER),
+                None if one.get("held_out_mean_s") is None else float(one["held_out_mean_s"]),
             )
             for one in found
         )

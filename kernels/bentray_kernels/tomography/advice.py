@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 from ..acquisition import Dataset
 from ..errors import InvalidInput
 from . import pairs
-from .chains import Drive, Scan
+from .chains import Chain, Scan
 from .holding_out import Part
 from .result import Reconstruction, Trial
 from .settings import Settings
@@ -17,9 +17,6 @@ from .stages import stages
 from .stopping import noise_of, stopped
 from .trials import TrialChain
 from .wide_trials import STRAIGHT, choose_wide, mean_of, size_of, wide
-
-ScanOf = Callable[[Settings, Part], Scan]
-Candidates = Sequence[dict[str, Any]]
 
 PAIRS: tuple[Part, Part] = ("shown", "held-out")
 VIEWS: tuple[Part, Part] = ("shown-views", "held-out-views")
@@ -49,25 +46,6 @@ TRIAL_NODES = 64
 CLEARLY = 0.92
 
 
-class Waves(Protocol):
-    """Who holds images against traces, see ``wave.following.Following``."""
-
-    @property
-    def passes(self) -> int:
-        """Emitter passes of looking at one image."""
-
-    def heard(
-        self,
-        trials: Sequence[Trial],
-        chains: Sequence[TrialChain],
-        index: int,
-        drive: Drive,
-        before: int,
-        after: int,
-    ) -> list[Trial]:
-        """The trials with what waves through their chains' images miss."""
-
-
 def tried(settings: Settings, candidates: Sequence[dict[str, Any]] = CANDIDATES) -> list[Settings]:
     """The settings of each trial: those of the candidates on a coarser grid."""
     nodes = min(settings.nodes, max(TRIAL_NODES, -(-settings.nodes // 2)))
@@ -90,10 +68,9 @@ def advise(
     dataset: Dataset,
     settings: Settings,
     index: int,
-    scan_of: ScanOf,
-    drive: Drive,
+    scan_of: Callable[[Settings, Part], Scan],
+    drive: Callable[[Sequence[Chain], int, int], None],
     after: int = 0,
-    waves: Waves | None = None,
 ) -> tuple[Settings, tuple[Trial, ...], int]:
     """The settings that explain one slice best, and how all that were tried did.
 
@@ -101,9 +78,7 @@ def advise(
     see ``choose_wide``. Where it is not, or such rays do not explain the times, what predicts held-out pairs
     best is chosen among thin rays, see ``choose``. The reconstruction is told to stop at the noise of the
     times (Morozov's discrepancy principle), for a closer fit would draw it, unless the trial shows that there
-    is less of it. Where there are traces, the trials say too what waves through their images miss, by which
-    waveforms are advised; they do not choose, for images on the coarser grid of a trial are worse than those
-    to come, and not in their order (``benchmarks/results/tried.md``).
+    is less of it.
 
     Args:
         dataset: for its frequency and the noise of its times.
@@ -112,7 +87,6 @@ def advise(
         scan_of: makes a scan of a part of the pairs.
         drive: runs chains to their end.
         after: emitter passes that come after the reconstruction, at most.
-        waves: who holds images against traces; None where there are none.
 
     Returns:
         The settings; the trials, the chosen one first and the others by what they predict; and the emitter
@@ -124,57 +98,42 @@ def advise(
     told = wide(dataset, settings)
     thin = BANDED if told else CANDIDATES
     rest = passes_to_come(dataset, settings) + after
-    trying = _Trying(settings, index, scan_of, drive, waves)
     trials: list[Trial] = []
-    chosen = None
+    chosen, before = None, 0
     if told and not _lacking(VIEWS, settings, index, scan_of):
-        trials = trying.run(told, VIEWS, trying.passes(thin, PAIRS) + rest)
+        chains = _chains(settings, told, index, VIEWS, scan_of)
+        others_after = sum(chain.total for chain in _chains(settings, thin, index, PAIRS, scan_of))
+        drive(chains, 0, others_after + rest)
+        trials, before = _results(told, chains), sum(chain.total for chain in chains)
         chosen = choose_wide(trials, size_of(dataset))
     if chosen is None:
         _check_parts(settings, index, scan_of)
-        trials = trying.run(thin, PAIRS, rest)
+        chains = _chains(settings, thin, index, PAIRS, scan_of)
+        drive(chains, before, rest)
+        trials, before = _results(thin, chains), before + sum(chain.total for chain in chains)
         chosen = choose(trials)
-    others = sorted((t for t in trials if t is not chosen), key=_missed)
+    others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
     found = replace(settings, **chosen.settings)
-    return stopped(found, chosen, noise_of(dataset)), (chosen, *others), trying.made
+    return stopped(found, chosen, noise_of(dataset)), (chosen, *others), before
 
 
-class _Trying:
-    """Runs candidates on part of a slice's pairs; ``made`` counts emitter passes."""
+def _chains(
+    settings: Settings,
+    candidates: Sequence[dict[str, Any]],
+    index: int,
+    parts: tuple[Part, Part],
+    scan_of: Callable[[Settings, Part], Scan],
+) -> list[TrialChain]:
+    shown, held_out = parts
+    plans = tried(settings, candidates)
+    return [TrialChain(scan_of(plan, shown), index, scan_of(plan, held_out)) for plan in plans]
 
-    def __init__(
-        self, settings: Settings, index: int, scan_of: ScanOf, drive: Drive, waves: Waves | None
-    ) -> None:
-        self._settings, self._index, self._scan_of = settings, index, scan_of
-        self._drive, self._waves = drive, waves
-        self.made = 0
 
-    def passes(self, candidates: Candidates, parts: tuple[Part, Part]) -> int:
-        """Emitter passes that they take at most."""
-        judging = 0 if self._waves is None else len(candidates) * self._waves.passes
-        return judging + sum(chain.total for chain in self._chains(candidates, parts))
-
-    def run(self, candidates: Candidates, parts: tuple[Part, Part], later: int) -> list[Trial]:
-        """What became of them; ``later`` passes follow at most."""
-        chains = self._chains(candidates, parts)
-        after = 0 if self._waves is None else len(candidates) * self._waves.passes
-        self._drive(chains, self.made, after + later)
-        self.made += sum(chain.total for chain in chains)
-        trials = [
-            Trial(changes, chain.held_out_rms_s, chain.history[-1].residual_rms_s, chain.held_out_mean_s)
-            for changes, chain in zip(candidates, chains, strict=True)
-        ]
-        if self._waves is None:
-            return trials
-        trials = self._waves.heard(trials, chains, self._index, self._drive, self.made, later)
-        self.made += after
-        return trials
-
-    def _chains(self, candidates: Candidates, parts: tuple[Part, Part]) -> list[TrialChain]:
-        shown, held_out = parts
-        plans = tried(self._settings, candidates)
-        scan_of = self._scan_of
-        return [TrialChain(scan_of(plan, shown), self._index, scan_of(plan, held_out)) for plan in plans]
+def _results(candidates: Sequence[dict[str, Any]], chains: Sequence[TrialChain]) -> list[Trial]:
+    return [
+        Trial(changes, chain.held_out_rms_s, chain.history[-1].residual_rms_s, chain.held_out_mean_s)
+        for changes, chain in zip(candidates, chains, strict=True)
+    ]
 
 
 def passes_to_come(dataset: Dataset, settings: Settings) -> int:
@@ -188,7 +147,7 @@ def passes_to_come(dataset: Dataset, settings: Settings) -> int:
     return each * sum(len(pairs.of(dataset, settings, index).emitters) for index in problems)
 
 
-def _check_parts(settings: Settings, index: int, scan_of: ScanOf) -> None:
+def _check_parts(settings: Settings, index: int, scan_of: Callable[[Settings, Part], Scan]) -> None:
     plan = tried(settings)[0]
     scan_of(plan, "all").problem(index)
     if part := _lacking(PAIRS, settings, index, scan_of):
@@ -196,7 +155,9 @@ def _check_parts(settings: Settings, index: int, scan_of: ScanOf) -> None:
         raise InvalidInput("method", repr(settings.method), accepted)
 
 
-def _lacking(parts: Sequence[Part], settings: Settings, index: int, scan_of: ScanOf) -> Part | None:
+def _lacking(
+    parts: Sequence[Part], settings: Settings, index: int, scan_of: Callable[[Settings, Part], Scan]
+) -> Part | None:
     """The first part that the slice has no pair of; None: it has pairs of all."""
     for part in parts:
         try:
@@ -208,13 +169,12 @@ def _lacking(parts: Sequence[Part], settings: Settings, index: int, scan_of: Sca
 
 def choose(trials: Sequence[Trial]) -> Trial:
     """The trial that predicts best; one with straight rays unless bent ones are clearly better."""
-    best = min(trials, key=_missed)
-    straight = min((trial for trial in trials if trial.settings["rays"] == "straight"), key=_missed)
-    return best if _missed(best) < CLEARLY * _missed(straight) else straight
-
-
-def _missed(trial: Trial) -> float:
-    return trial.held_out_rms_s
+    best = min(trials, key=lambda trial: trial.held_out_rms_s)
+    straight = min(
+        (trial for trial in trials if trial.settings["rays"] == "straight"),
+        key=lambda trial: trial.held_out_rms_s,
+    )
+    return best if best.held_out_rms_s < CLEARLY * straight.held_out_rms_s else straight
 
 
 def reason(trials: Sequence[Trial]) -> str:
@@ -229,8 +189,9 @@ def reason(trials: Sequence[Trial]) -> str:
             why += f"; where both explain the times straight ones must be {needed}"
         return f"auto chose {told[0]} ({why}); the others: {', '.join(told[1:])}"
     told = [f"{_named(trial.settings)} {1e9 * trial.held_out_rms_s:.0f} ns" for trial in trials]
+    best = min(trial.held_out_rms_s for trial in trials)
     why = "misfit of held-out pairs"
-    if trials[0] is not min(trials, key=_missed):
+    if trials[0].held_out_rms_s > best:
         why += f"; bent rays must be {100.0 * (1.0 - CLEARLY):.0f} % better"
     return f"auto chose {told[0]} ({why}); the others: {', '.join(told[1:])}"
 

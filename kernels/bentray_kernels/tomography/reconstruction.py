@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
@@ -101,19 +100,19 @@ def carried_out(
     waves = _waves(dataset, settings, samples, waves_of)
     allowed = waves is not None and (settings.method == "waveform" or waves.minutes <= settings.wave_minutes)
     following = waves if allowed else None
-    after = 0 if following is None else following.total
+    after = following.total if following is not None else waves.passes if waves is not None else 0
     if settings.tries:
-        settings, trials, before = advise(dataset, settings, count // 2, scan_of, drive, after, waves)
+        settings, trials, before = advise(dataset, settings, count // 2, scan_of, drive, after)
     scan = scan_of(settings, "all")
     chains = [Chain(scan, index) for index in range(count)]
     drive(chains, before, after)
     rays = _assembled(dataset, settings, scan.problem(0), chains, trials)
-    if waves is not None and following is None:
-        told = waves.worth(trials[0], noise_of(dataset))
-        return replace(rays, provenance={**rays.provenance, "waveform": told})
-    if following is None:
+    if waves is None:
         return rays
-    return following.refined(rays, drive, before + sum(chain.total for chain in chains))
+    made = before + sum(chain.total for chain in chains)
+    if following is None:
+        return waves.advised(rays, noise_of(dataset), drive, made)
+    return following.refined(rays, drive, made)
 
 
 def _waves(dataset: Dataset, settings: Settings, samples: int, waves_of: WaveScanOf) -> Following | None:

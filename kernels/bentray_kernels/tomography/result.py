@@ -78,17 +78,12 @@ class Trial:
         shown_rms_s: rms misfit of those that it was shown, s, in its last sweep.
         held_out_mean_s: mean size of the misfit of the former, s, of which wrong picks are a smaller part;
             None in files of before it was kept.
-        wave_misfit: of waves through its image from the traces of a few emitters, 0 where they agree and 1
-            where they have nothing in common; None where there are no traces of object and water.
-        water_misfit: the same of water shots in water: noise, and what the simulator cannot do.
     """
 
     settings: dict[str, Any]
     held_out_rms_s: float
     shown_rms_s: float
     held_out_mean_s: float | None = None
-    wave_misfit: float | None = None
-    water_misfit: float | None = None
 
 
 @dataclass(frozen=True)

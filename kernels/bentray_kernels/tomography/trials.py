@@ -31,12 +31,6 @@ class TrialChain(Chain):
         return [HeldOut(self._held_out, self._index)]
 
     @property
-    def image(self) -> tuple[Floats, float, tuple[float, float]]:
-        """(nx, ny), m/s, where it stands; its spacing and the position of node 0, m."""
-        problem = self._scan.problem(self._index)
-        return 1.0 / self.state.slowness, problem.spacing, (problem.origin[0], problem.origin[1])
-
-    @property
     def held_out_rms_s(self) -> float:
         """Root mean square misfit of the pairs that were held out, s."""
         return float(self.found(misfit)[0])

@@ -7,6 +7,7 @@ import numpy as np
 from ..acquisition import Dataset
 from ..tomography.result import Trial
 from .extent import Extent
+from .judging import Judgement
 from .settings import WaveSettings
 
 # Seconds a node and time step of a look, there and back, with all that belongs to it; a core of 2020.
@@ -38,18 +39,19 @@ def core_seconds(dataset: Dataset, plan: WaveSettings, samples: int) -> float:
     return found
 
 
-def worth(rays: Trial, noise_s: float, minutes: float) -> str:
+def worth(judgement: Judgement, rays: Trial, noise_s: float, minutes: float) -> str:
     """One sentence: whether waves are advised after rays, and what they take.
 
     Args:
-        rays: the trial with the best ones.
+        judgement: of the image of the rays.
+        rays: the trial with the best ones, for where waves say nothing.
         noise_s: standard deviation of the travel times, s.
         minutes: that a core would work on waves.
     """
-    if rays.wave_misfit is not None and rays.water_misfit is not None:
-        gain = rays.wave_misfit > MUCH * rays.water_misfit
-        found = f"waves through the image of rays miss held-out emitters by {rays.wave_misfit:.2g}"
-        found += f", those in water by {rays.water_misfit:.2g}"
+    if judgement.misfit is not None and judgement.water is not None:
+        gain = judgement.misfit > MUCH * judgement.water
+        found = f"waves through the image of rays miss held-out emitters by {judgement.misfit:.2g}"
+        found += f", those in water by {judgement.water:.2g}"
     else:
         gain = rays.held_out_rms_s > MUCH_OF_NOISE * noise_s
         found = f"rays miss held-out times by {1e9 * rays.held_out_rms_s:.0f} ns"

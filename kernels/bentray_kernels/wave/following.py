@@ -14,9 +14,8 @@ from ..tomography import pairs
 from ..tomography.advice import CLEARLY
 from ..tomography.chains import Drive
 from ..tomography.reconstruction import measured
-from ..tomography.result import Reconstruction, Trial
+from ..tomography.result import Reconstruction
 from ..tomography.settings import Settings
-from ..tomography.trials import TrialChain
 from .asked import check_traces, wave_settings
 from .chain import WaveChain, WaveScan, resampled
 from .effort import core_seconds, worth
@@ -77,30 +76,24 @@ class Following:
 
     @property
     def passes(self) -> int:
-        """Emitter passes of looking at one image."""
+        """Emitter passes of ``advised``."""
         return passes(self._plan)
 
-    def heard(
-        self,
-        trials: Sequence[Trial],
-        chains: Sequence[TrialChain],
-        index: int,
-        drive: Drive,
-        before: int,
-        after: int,
-    ) -> list[Trial]:
-        """The trials with what waves through their chains' images miss, see ``judging``."""
-        scan = self._scan_of(judging(self._plan), index)
-        judges = [Judge(scan, Image(*chain.image), chain.history) for chain in chains]
-        drive(judges, before, after)
-        return [
-            replace(trial, wave_misfit=judge.judgement.misfit, water_misfit=judge.judgement.water)
-            for trial, judge in zip(trials, judges, strict=True)
-        ]
+    def advised(self, rays: Reconstruction, noise_s: float, drive: Drive, before: int) -> Reconstruction:
+        """The reconstruction with a sentence whether waves are advised, by what they miss through its image.
 
-    def worth(self, rays: Trial, noise_s: float) -> str:
-        """As ``effort.worth``."""
-        return worth(rays, noise_s, self.minutes)
+        Args:
+            rays: the reconstruction, with its trials; of several slices the middle one is looked at.
+            noise_s: standard deviation of the travel times, s.
+            drive: runs chains to their end.
+            before: emitter passes that were made.
+        """
+        images = _slices(rays, rays.speed)
+        index = len(images) // 2
+        judge = Judge(self._scan_of(judging(self._plan), index), images[index], rays.history)
+        drive([judge], before, 0)
+        told = worth(judge.judgement, rays.trials[0], noise_s, self.minutes)
+        return replace(rays, provenance={**rays.provenance, "waveform": told})
 
     def _stage(self, rays: Reconstruction) -> int:
         return 1 + max(sweep.stage for sweep in rays.history)

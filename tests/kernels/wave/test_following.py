@@ -11,6 +11,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings, Trial, reconstruct
 from bentray_kernels.wave.effort import worth
 from bentray_kernels.wave.following import preferred
+from bentray_kernels.wave.judging import Judgement
 from bentray_kernels.wave.refine import WavePass
 from bentray_kernels.wave.standing import BandEnd, Image
 
@@ -66,16 +67,17 @@ def test_waves_are_advised_where_the_image_explains_less_than_water_does(rays):
     assert advised.startswith("method waveform is advised, for waves through the image of rays miss")
     noisy = reconstruct(heard(0.05), replace(PLAN, wave_minutes=0.0))
     assert noisy.provenance["waveform"].startswith("method waveform would gain little, for waves through")
-    assert noisy.trials[0].wave_misfit < 1.5 * noisy.trials[0].water_misfit
 
 
 def test_without_waves_times_tell_whether_they_are_advised():
     missed = Trial({}, held_out_rms_s=100e-9, shown_rms_s=50e-9)
-    assert worth(missed, 10e-9, 3.4) == (
+    assert worth(Judgement(), missed, 10e-9, 3.4) == (
         "method waveform is advised, for rays miss held-out times by 100 ns, whose noise is 10 ns; "
         "it takes about 3 minutes of a core"
     )
-    assert worth(missed, 80e-9, 0.2).startswith("method waveform would gain little, for rays miss")
+    assert worth(Judgement(), missed, 80e-9, 0.2).startswith(
+        "method waveform would gain little, for rays miss"
+    )
 
 
 def test_held_out_emitters_decide_against_it():

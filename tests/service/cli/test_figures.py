@@ -156,6 +156,4 @@ def test_residuals_resolution_and_trials_are_told() -> None:
         "held_out_rms_s": 6e-8,
         "shown_rms_s": 5e-8,
         "held_out_mean_s": None,
-        "wave_misfit": None,
-        "water_misfit": None,
     }
