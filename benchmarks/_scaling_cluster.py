@@ -13,13 +13,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import dask
 import psutil
 from _scaling_tasks import pause
 from _scaling_work import Work
 
 from bentray_workers.cluster import Cluster, open_cluster
-from bentray_workers.dask_settings import NO_DASHBOARD, SETTINGS
+from bentray_workers.dask_settings import NO_DASHBOARD, ours
 from bentray_workers.driving import IN_FLIGHT, finished
 from bentray_workers.lanes import RECONSTRUCTION, THREADS
 
@@ -116,7 +115,7 @@ def machine(folder: Path) -> Iterator[Machine]:
     address = f"tcp://127.0.0.1:{port}"
     lanes = " ".join(f"{lane}={amount}" for lane, amount in RECONSTRUCTION.items())
     try:
-        with dask.config.set(SETTINGS):
+        with ours():
             scheduler = start("scheduler", "--host=127.0.0.1", f"--port={port}")
             with open_cluster(address, connect_timeout_s=60.0) as cluster:
                 yield Machine(

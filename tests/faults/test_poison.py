@@ -4,7 +4,6 @@ import os
 import threading
 from pathlib import Path
 
-import dask
 import numpy as np
 import pytest
 from distributed import Client, KilledWorker, LocalCluster
@@ -15,7 +14,7 @@ from bentray_kernels.tomography.chains import Chain
 from bentray_workers import slices
 from bentray_workers.attempts import Attempts, ResultsLostError
 from bentray_workers.checkpoints import Checkpoints
-from bentray_workers.dask_settings import NO_DASHBOARD, SETTINGS
+from bentray_workers.dask_settings import NO_DASHBOARD, ours
 from bentray_workers.driving import run_on_cluster
 from bentray_workers.lanes import OFFERED, THREADS
 
@@ -33,7 +32,7 @@ def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):
     # Without the preload, so that workers are back at once.
     how = {"threads_per_worker": THREADS, "resources": OFFERED, "local_directory": str(tmp_path / "scratch")}
     with (
-        dask.config.set(SETTINGS),
+        ours(),
         LocalCluster(n_workers=2, dashboard_address=NO_DASHBOARD, **how) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):

@@ -15,6 +15,7 @@ import yaml
 from bentray_kernels.errors import InvalidInput
 from bentray_workers import providers
 from bentray_workers.cluster import open_cluster
+from bentray_workers.dask_settings import ours
 from bentray_workers.providers import PROVIDERS, Wanted, deploy
 from bentray_workers.tls import security_of
 
@@ -62,6 +63,13 @@ def test_slurm_jobs_offer_our_lanes_are_warm_and_publish_no_page(managers: list[
     )
     assert made.asked["scheduler_options"]["dashboard_address"] == "127.0.0.1:0"
     assert made.settings == [], "under our settings of Dask"
+
+
+def test_a_scheduler_that_adds_pages_adds_them_to_its_own_settings_alone() -> None:
+    with ours():
+        dask.config.get("distributed.scheduler.http.routes").append("a page")
+    with ours():
+        assert dask.config.get("distributed.scheduler.http.routes") == []
 
 
 def test_a_site_can_add_a_lane(managers: list[FakeManager], tmp_path: Path) -> None:

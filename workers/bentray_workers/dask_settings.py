@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+
+import dask
+
 SETTINGS = {
     # A queue without workers fails its tasks after this long instead of waiting for ever.
     "distributed.scheduler.no-workers-timeout": "60s",
@@ -24,3 +28,8 @@ OF_CLIENTS = {"distributed.admin.large-graph-warning-threshold": "100MB"}
 
 # Where that web server listens, since it cannot be left out: a free port of loopback.
 NO_DASHBOARD = "127.0.0.1:0"
+
+
+def ours() -> dask.config.set:
+    """A context under our settings. Each has its own copy: a scheduler adds pages to the list it is given."""
+    return dask.config.set(copy.deepcopy(SETTINGS))

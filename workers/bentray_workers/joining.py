@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import dask
 from distributed import Nanny
 from distributed.comm.addressing import parse_host_port
 from distributed.security import Security
 
 from .cluster import identity_of
-from .dask_settings import NO_DASHBOARD, SETTINGS
+from .dask_settings import NO_DASHBOARD, ours
 from .lanes import THREADS
 from .providers import PRELOAD
 
@@ -66,7 +65,7 @@ def join(asked: Joining, say: Callable[[str], None], connect_timeout_s: float = 
         InvalidInput: when no scheduler answers at first.
     """
     identity_of(asked.scheduler, asked.security, connect_timeout_s)
-    with dask.config.set(SETTINGS):
+    with ours():
         asyncio.run(_serve(asked, say))
 
 

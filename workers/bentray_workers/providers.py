@@ -10,13 +10,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
 
-import dask
 import yaml
 from distributed import LocalCluster
 
 from bentray_kernels.errors import InvalidInput
 
-from .dask_settings import NO_DASHBOARD, SETTINGS
+from .dask_settings import NO_DASHBOARD, ours
 from .lanes import OFFERED, THREADS
 from .tls import security_of
 
@@ -124,7 +123,7 @@ def deploy(kind: str, wanted: Wanted) -> Deployed:
         raise InvalidInput("cluster", repr(kind), "one of " + ", ".join(PROVIDERS))
     if wanted.workers is not None and wanted.workers < 1:
         raise InvalidInput("workers", wanted.workers, "at least 1")
-    with dask.config.set(SETTINGS):
+    with ours():
         return PROVIDERS[kind](wanted)
 
 
