@@ -66,12 +66,13 @@ def by_waves(dataset: Dataset, quick: bool, progress: Step) -> tuple[Reconstruct
 
 
 def by_rays(dataset: Dataset, nodes: int, progress: Step) -> dict[str, Reconstruction]:
-    """Along straight and bent rays: log ratios, these with the focusing of ray tubes off, and spectra."""
+    """Along straight and bent rays: log ratios, these with the focusing of ray tubes off, and by spectra."""
     picked = replace(pick(dataset), waveform=dataset.waveform)
     ways = {
         "ratios": Settings(nodes=nodes, amplitudes="ratio"),
         "ratios, focusing taken off": Settings(nodes=nodes, amplitudes="ratio", focusing=True),
         "spectra": Settings(nodes=nodes, amplitudes="spectrum"),
+        "centroids": Settings(nodes=nodes, amplitudes="centroid"),
     }
     found: dict[str, Reconstruction] = {}
     for rays in ("straight", "curved"):

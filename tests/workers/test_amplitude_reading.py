@@ -11,6 +11,7 @@ from bentray_kernels.acquisition import Waveform, pick
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
+from bentray_kernels.tomography.settings import OF_SPECTRA
 from bentray_workers import arrival_memory, slices
 from bentray_workers.dataset_file import write_dataset
 from bentray_workers.dataset_summary import summary_of
@@ -53,7 +54,8 @@ def test_a_scan_without_traces_and_focusing_of_spectra_are_refused(lossy, tmp_pa
     write_dataset(tmp_path / "scan.h5", pick(lossy))
     with pytest.raises(InvalidInput, match="waveform/object"):
         slices.reconstruct(None, tmp_path / "scan.h5", replace(PLAN, amplitudes="ratio"))
-    with pytest.raises(InvalidInput, match="focusing"):
-        Settings(amplitudes="spectrum", focusing=True)
+    for way in OF_SPECTRA:
+        with pytest.raises(InvalidInput, match="focusing"):
+            Settings(amplitudes=way, focusing=True)
     with pytest.raises(InvalidInput, match="amplitudes"):
-        Settings(amplitudes="centroid")
+        Settings(amplitudes="height")

@@ -20,7 +20,9 @@ DEVIATION = "deviation"
 DECOMPOSITIONS = ("slices", "volume")
 PENALTIES = ("total-variation", "laplacian", "tikhonov")
 SPEED_UPDATES = ("fixed", "data-driven")
-AMPLITUDES = ("recorded", "ratio", "spectrum")
+AMPLITUDES = ("recorded", "ratio", "spectrum", "centroid")
+# Those that focusing is not in.
+OF_SPECTRA = ("spectrum", "centroid")
 WAVE_MISFITS = ("correlation", "least-squares")
 LEAST_NODES = 16
 WAVE_BANDS = 4
@@ -90,7 +92,8 @@ class Settings:
         amplitudes: where they come from: ``recorded`` takes those of the file (``amplitude/log_ratio_np``);
             ``ratio`` reads from the traces how much lower the first pulse is than in water; ``spectrum`` how
             much more its high frequencies have lost than its low ones, which focusing and spreading leave
-            alone, but which only loss in proportion to the frequency shows. See ``acquisition.amplitudes``.
+            alone, but which only loss in proportion to the frequency shows; ``centroid`` how far the middle
+            of its spectrum has gone down, which tells the same. See ``acquisition.amplitudes``.
         focusing: take off the amplitudes what refraction does to them, by the spreading of ray tubes in the
             speed image; needs its frequency (``amplitude@frequency_hz``). Experimental.
         resolution_check: also tell how much of a checkerboard the rays recover, node by node.
@@ -144,7 +147,7 @@ class Settings:
     examine: bool = True
     guided_rounds: int = 0
     attenuation: bool = True
-    amplitudes: Literal["recorded", "ratio", "spectrum"] = "recorded"
+    amplitudes: Literal["recorded", "ratio", "spectrum", "centroid"] = "recorded"
     focusing: bool = False
     resolution_check: bool = False
     wave_bands: int = 4
@@ -162,8 +165,8 @@ class Settings:
         _one_of("decomposition", self.decomposition, DECOMPOSITIONS)
         _one_of("penalty", self.penalty, PENALTIES)
         _one_of("amplitudes", self.amplitudes, AMPLITUDES)
-        if self.amplitudes == "spectrum" and self.focusing:
-            raise InvalidInput("focusing", True, "false, with amplitudes spectrum, which have none in them")
+        if self.amplitudes in OF_SPECTRA and self.focusing:
+            raise InvalidInput("focusing", True, f"false, with amplitudes {self.amplitudes}, which have none")
         _one_of("wave_misfit", self.wave_misfit, WAVE_MISFITS)
         _speeds("speed_bounds_mps", self.speed_bounds_mps)
         if self.speed_range_mps is not None:

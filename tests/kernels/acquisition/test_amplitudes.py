@@ -11,7 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import Waveform
-from bentray_kernels.acquisition.amplitudes import MOST_UNSURE_NP, WAYS, read_log_ratios, with_log_ratios
+from bentray_kernels.acquisition.amplitudes import (
+    MOST_UNSURE_NP,
+    WAYS,
+    Powers,
+    read_log_ratios,
+    with_log_ratios,
+)
 from bentray_kernels.errors import InvalidInput
 
 from .traces import FREQUENCY_HZ, RATE_HZ, absorbed, scan
@@ -19,6 +25,7 @@ from .traces import FREQUENCY_HZ, RATE_HZ, absorbed, scan
 ELEMENTS, DELAY_S = 10, 2.3e-7
 EVERY = np.arange(ELEMENTS)
 APART = EVERY[:, None] != EVERY
+SPECTRA = ("spectrum", "centroid")
 
 
 @cache
@@ -43,10 +50,11 @@ def heard(loss_np, way, *, height=1.0, noise=0.0, seed=0, **changes):
     height=st.floats(0.05, 20.0),
     seed=st.integers(0, 2**31),
 )
-def test_the_spectrum_tells_the_loss_whatever_the_height(loss, height, seed):
+@pytest.mark.parametrize("way", SPECTRA)
+def test_the_spectrum_tells_the_loss_whatever_the_height(way, loss, height, seed):
     """Each pair of another height, as if focused, or as if its transducers were unlike."""
     heights = height * np.exp(np.random.default_rng(seed).normal(0.0, 0.7, APART.shape))[..., None]
-    found = heard(loss, "spectrum", height=heights)
+    found = heard(loss, way, height=heights)
     # What the gate cuts off the pulse blurs its spectrum, and takes a part.
     assert found[APART] == pytest.approx(loss, rel=0.1, abs=0.005)
     ratios = heard(loss, "ratio", height=heights)
@@ -62,13 +70,14 @@ def test_noise_spreads_the_values_and_moves_their_mean_little(way, loss, noise, 
     known = found[np.isfinite(found)]
     assert known.size > 0.95 * found.size
     # At a loss of a neper the object's SNR is a third of the water's.
-    spread = (10.0 if way == "spectrum" else 2.0) * noise * np.exp(loss)
+    spread = (10.0 if way in SPECTRA else 2.0) * noise * np.exp(loss)
     assert known.std() < spread
     assert abs(known.mean() - loss) < 0.13 * loss + 0.01 + 0.4 * spread
 
 
-def test_what_loses_all_frequencies_alike_is_invisible_to_the_spectrum():
-    assert np.abs(heard(0.0, "spectrum", height=np.exp(-1.0))[APART]).max() < 1e-3
+@pytest.mark.parametrize("way", SPECTRA)
+def test_what_loses_all_frequencies_alike_is_invisible_to_the_spectrum(way):
+    assert np.abs(heard(0.0, way, height=np.exp(-1.0))[APART]).max() < 1e-3
     assert heard(0.0, "ratio", height=np.exp(-1.0))[APART] == pytest.approx(1.0, abs=1e-3)
 
 
@@ -86,11 +95,46 @@ def test_louder_noise_leaves_out_and_never_lies(way):
     assert sorted(counts, reverse=True) == counts
 
 
+@settings(max_examples=20, deadline=None)
+@given(loss=st.floats(0.0, 3.0), middle=st.floats(0.7, 1.3), width=st.floats(0.05, 0.25))
+def test_the_centroid_of_a_gaussian_tells_the_loss_exactly(loss, middle, width):
+    """Quan and Harris: it keeps its width, and moves by the loss times its variance."""
+    frequency = np.linspace(-2.0, 4.0, 400)
+    water = np.exp(-(((frequency - middle) / width) ** 2))[None]
+    nothing = np.zeros((1, 1))
+    powers = Powers(
+        water, water * np.exp(-2.0 * loss * frequency), nothing, nothing, frequency, np.eye(frequency.size)
+    )
+    with np.errstate(invalid="ignore"):
+        value, sigma = WAYS["centroid"](powers)
+    assert value[0] == pytest.approx(loss, abs=1e-9)
+    assert sigma[0] == 0.0
+
+
+@pytest.mark.parametrize("way", SPECTRA)
+def test_the_deviation_that_is_told_is_the_one_that_noise_makes(way):
+    """White noise on the values of a spectrum, independent of each other: many draws against the estimate."""
+    random = np.random.default_rng(11)
+    frequency = np.linspace(0.6, 1.4, 24)
+    clean = np.exp(-(((frequency - 1.0) / 0.3) ** 2) / 2.0)
+    level = 1e-3
+
+    def heard_as(amplitude):
+        noise = random.standard_normal((4000, 24)) + 1j * random.standard_normal((4000, 24))
+        return np.abs(amplitude + np.sqrt(0.5 * level) * noise) ** 2
+
+    noises = np.full((4000, 1), level)
+    powers = Powers(heard_as(clean), heard_as(clean), noises, noises, frequency, np.eye(24))
+    value, sigma = WAYS[way](powers)
+    assert np.median(sigma) == pytest.approx(value.std(), rel=0.1)
+    assert abs(value.mean()) < 0.1 * value.std()
+
+
 def test_factors_of_single_traces_count_for_heights_only():
     random = np.random.default_rng(5)
     scales = {name: random.uniform(0.5, 2.0, APART.shape) for name in ("object_scale", "water_scale")}
     change = np.log(scales["water_scale"] / scales["object_scale"])
-    for way, expected in (("ratio", change), ("spectrum", 0.0 * change)):
+    for way, expected in (("ratio", change), ("spectrum", 0.0 * change), ("centroid", 0.0 * change)):
         moved = heard(0.5, way, **scales) - heard(0.5, way)
         np.testing.assert_allclose(moved[APART], expected[APART], atol=1e-9)
 
@@ -117,7 +161,7 @@ def test_pairs_without_a_time_and_slices_of_their_own():
 @pytest.mark.parametrize(
     ("changes", "way", "field"),
     [
-        ({}, "centroid", "amplitudes"),
+        ({}, "height", "amplitudes"),
         ({}, "recorded", "amplitudes"),
         ({"waveform": None}, "ratio", "waveform/object"),
         ({"center_frequency_hz": None}, "spectrum", "center_frequency_hz"),
