@@ -14,8 +14,14 @@ from bentray_kernels.acquisition import PICKERS, Dataset, Waveform, pick
 from bentray_workers.images.canvas import drawing, new_figure, to_png
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
-SHOWN = ("straight", "bent", "waveform")
-MARKS = ("#d1495b", "#00798c", "#edae49", "#30638e", "#66a182", "#8d6a9f", "#222222", "#ff7f0e")
+SHOWN = ("straight", "bent, wide", "waveform")
+
+# Of the gather's panel, over an image's.
+GATHER_WIDTH = 1.9
+
+# Of each picker's marks, and their sizes, points.
+MARKS = ("#e6194b", "#ffe119", "#3cb44b", "#4363d8", "#f58231", "#42d4f4")
+SIZES = (4.5, 3.9, 3.3, 2.7, 2.1, 1.5)
 
 
 def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Any]]], seconds: str) -> bytes:
@@ -26,9 +32,10 @@ def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Any]]], seconds: str
         seconds: what they are seconds of.
     """
     with drawing():
-        figure = new_figure(13.0, 3.1 * len(scans) + 0.4)
+        figure = new_figure(15.0, 3.1 * len(scans) + 0.4)
         figure.suptitle(f"Images from raw traces; {seconds}")
-        panels = figure.subplots(len(scans), 2 + len(SHOWN), squeeze=False)
+        widths = [GATHER_WIDTH, *(1.0 for _ in range(1 + len(SHOWN)))]
+        panels = figure.subplots(len(scans), len(widths), squeeze=False, width_ratios=widths)
         for row, (name, (dataset, images)) in zip(panels, scans.items(), strict=True):
             gather(row[0], name, dataset)
             truth = dataset.truth
@@ -60,7 +67,10 @@ def gather(axes: Axes, name: str, dataset: Dataset) -> None:
     assert dataset.sampling_rate_hz is not None
     assert dataset.center_frequency_hz is not None
     water = dataset.distance_m()[0] / dataset.water_speed_mps
-    late = np.arange(-5.0, 5.0, 0.05) / dataset.center_frequency_hz
+    one, period = first_emission(dataset), 1.0 / dataset.center_frequency_hz
+    picks = {picker: pick(one, picker).differential_tof()[0] for picker in PICKERS}
+    every = np.stack(list(picks.values()))
+    late = np.arange(np.nanmin(every) - 2.0 * period, np.nanmax(every) + 4.0 * period, 0.05 * period)
     samples = dataset.t0_s + np.arange(dataset.waveform.object.shape[-1]) / dataset.sampling_rate_hz
     shifted = np.stack(
         [
@@ -71,16 +81,20 @@ def gather(axes: Axes, name: str, dataset: Dataset) -> None:
     shifted /= np.abs(shifted).max(axis=1, keepdims=True) + 1e-300
     extent = (0, len(shifted), 1e6 * late[0], 1e6 * late[-1])
     axes.imshow(shifted.T, aspect="auto", origin="lower", cmap="gray", vmin=-0.8, vmax=0.8, extent=extent)
-    one = first_emission(dataset)
-    for picker, colour in zip(PICKERS, MARKS, strict=False):
-        times = pick(one, picker).differential_tof()[0]
-        axes.plot(np.arange(len(times)) + 0.5, 1e6 * times, ".", color=colour, markersize=2, label=picker)
+    # Smaller marks upon larger ones, so that pickers that agree are all seen.
+    for (picker, times), colour, size in zip(picks.items(), MARKS, SIZES, strict=True):
+        receivers = np.arange(len(times)) + 0.5
+        axes.plot(
+            receivers, 1e6 * times, "o", color=colour, markersize=size, markeredgewidth=0.0, label=picker
+        )
     axes.set_title(name)
     axes.set_xlabel("receiver")
     axes.set_ylabel("time less that in water (µs)")
     axes.set_ylim(1e6 * late[0], 1e6 * late[-1])
-    legend = axes.legend(fontsize=6, markerscale=4, loc="upper center", ncols=2, framealpha=0.9)
+    legend = axes.legend(fontsize=6, loc="upper left", ncols=3, framealpha=0.9)
     legend.get_frame().set_facecolor("white")
+    for mark in legend.legend_handles:
+        mark.set_markersize(4.0)
 
 
 def first_emission(dataset: Dataset) -> Dataset:
