@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -11,20 +12,22 @@ from ..arrays import Floats, Ints
 from ..errors import InvalidInput
 from . import huber
 from .focusing import focusing
-from .linear import Linearised
+from .linear import Linearised, smoothing
 from .linearisation import Rows, linearise_losses
 from .matrix import back_project, project
 from .problem import Problem
 from .ray_width import bending, seen
 from .settings import Settings
 
-# Solutions, each with the total variation that the misfit of the one before asks for.
+# Solutions, each with the outliers, and the total variation, that the misfit of the one before asks for: more
+# with total variation, none of whose solutions is carried to its end.
 PASSES, ROBUST_PASSES = 3, 12
 
 # What is read from traces holds diffraction and later paths, more than is absorbed, and far more where these
-# cancel the pulse: the penalty is so much stronger, and values count as outliers from so much less on. On the
-# simulated waves of ``benchmarks/results/tried.md`` the error was 1.3 to 8 times larger without.
-TRACES_STIFFER, TRACES_STRICTER = 3.0, 2.0
+# cancel the pulse. Of details below a Fresnel zone, √(wavelength · longest ray), rays know nothing: the image
+# is smooth over so many of them, and values count as outliers from so much less on. Chosen on scans by waves,
+# where total variation did worse (``benchmarks/results/tried.md``).
+ZONES, TRACES_STRICTER = 3.0, 2.0
 
 # More than any tissue has at the frequencies that pass through it, Np/m.
 MOST_NP_M = 500.0
@@ -62,8 +65,7 @@ def _unfocused(problem: Problem, settings: Settings, slowness: Floats, emitters:
     """The problem with the log ratios of some emitters as absorption alone would have them."""
     if problem.log_ratio is None:
         return problem
-    if problem.wavelength_m is None:
-        raise InvalidInput("amplitude@frequency_hz", "nothing", "a frequency in Hz, for the setting focusing")
+    wavelength = _wavelength(problem, "focusing")
     ratio = problem.log_ratio.copy()
     for ring in np.unique(problem.ring[emitters]):
         members = emitters[problem.ring[emitters] == ring]
@@ -72,7 +74,7 @@ def _unfocused(problem: Problem, settings: Settings, slowness: Floats, emitters:
             problem.spacing,
             problem.emitters[members],
             problem.receivers[ring],
-            wavelength_m=problem.wavelength_m,
+            wavelength_m=wavelength,
             longest_m=problem.longest_m,
             eikonal=settings.front,
         )
@@ -87,6 +89,9 @@ def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> 
 
     Returns:
         of the region's shape, Np/m, at least 0; that of the water outside the array.
+
+    Raises:
+        InvalidInput: for amplitudes from traces without a frequency.
     """
     shape = problem.region.shape
     water = np.full(shape, problem.water_attenuation * problem.spacing)
@@ -100,10 +105,10 @@ def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> 
     # Rays through a blurred speed image are all somewhat off, and none is an outlier: on Table 6 after SART
     # the limit made the error larger, after Gauss–Newton a third smaller.
     spreads = settings.huber_spreads if settings.method == "gauss-newton" else 0.0
-    strength = settings.penalty_strength
+    smooth = None
     if settings.listens:
-        spreads, strength = settings.huber_spreads / TRACES_STRICTER, TRACES_STIFFER * strength
-    for _ in range(ROBUST_PASSES if spreads else PASSES):
+        spreads, smooth = settings.huber_spreads / TRACES_STRICTER, _smoothing(problem, settings)
+    for _ in range(ROBUST_PASSES if spreads and smooth is None else PASSES):
         left = [
             Rows(p.pointers, p.columns, p.lengths, p.residual - _along(p, image - water), p.emitters)
             for p in parts
@@ -111,17 +116,36 @@ def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> 
         residual = np.concatenate([part.residual for part in left])
         limit = huber.limit(residual, spreads)
         bounds = (0.0, MOST_NP_M * problem.spacing)
-        problem_now = Linearised(
+        misfit = huber.clipped_rms(residual, limit)
+        image, dual = Linearised(
             left,
             image,
             density,
             problem.region,
             bounds,
-            strength * huber.clipped_rms(residual, limit),
+            settings.penalty_strength * misfit if smooth is None else smooth,
+            "total-variation" if smooth is None else "laplacian",
             huber=limit,
-        )
-        image, dual = problem_now.solve(dual)
+        ).solve(dual)
     return image / problem.spacing
+
+
+def _smoothing(problem: Problem, settings: Settings) -> float:
+    """Strength of the penalty of what is read from traces."""
+    finest_m = ZONES * math.sqrt(
+        _wavelength(problem, f"amplitudes {settings.amplitudes}") * problem.longest_m
+    )
+    usual = settings.penalty_strength / Settings.penalty_strength
+    return usual * smoothing(2.0 * math.pi * problem.spacing / finest_m)
+
+
+def _wavelength(problem: Problem, setting: str) -> float:
+    """Of the amplitudes, in water, m; refused where none is known and a setting needs it."""
+    if problem.wavelength_m is None:
+        raise InvalidInput(
+            "amplitude@frequency_hz", "nothing", f"a frequency in Hz, for the setting {setting}"
+        )
+    return problem.wavelength_m
 
 
 def _along(part: Rows, image: Floats) -> Floats:

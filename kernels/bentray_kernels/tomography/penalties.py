@@ -36,6 +36,12 @@ def laplacian(image: Floats) -> Floats:
     return -adjoint(gradient(image))
 
 
+def roughness(shape: tuple[int, ...]) -> Floats:
+    """Eigenvalues of minus ``laplacian``, squared wavenumbers, 1/node²; of the type 2 cosine transform."""
+    angles = np.ix_(*(np.pi * np.arange(nodes) / nodes for nodes in shape))
+    return np.asarray(sum(2.0 - 2.0 * np.cos(angle) for angle in angles))
+
+
 def length(slope: Floats) -> Floats:
     """Of each gradient: shape from (ndim, *shape)."""
     return np.asarray(np.sqrt((slope**2).sum(axis=0)))

@@ -71,7 +71,7 @@ class Settings:
         penalty: of ``gauss-newton``: ``total-variation`` keeps edges, ``laplacian`` prefers smooth images,
             ``tikhonov`` ones near to the iteration's start.
         penalty_strength: of the penalty, and of the attenuation's total variation, over the rms misfit;
-            0: none.
+            0: none. Attenuation from traces is as smooth as waves are wide, by more or less of it too.
         edge_mps: with total variation, speeds that differ by much more than this from node to node cost
             little more for differing further: images become flat parts with sharp edges. For objects that are
             such, as phantoms; 0: every difference costs.

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import map_coordinates
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
@@ -52,7 +53,8 @@ def test_what_traces_gave_is_smoothed_more_for_it_holds_more_than_absorption(sca
     shape = scan.log_ratio_np.shape
     # As waves have it: larger than the absorption, and here and there far more.
     spread = 2.0 * scan.log_ratio_np[inside_ring(scan)].std() * np.where(rng.random(shape) < 0.1, 4.0, 1.0)
-    loud = replace(scan, log_ratio_np=scan.log_ratio_np + spread * rng.standard_normal(shape))
+    noise = spread * rng.standard_normal(shape)
+    loud = replace(scan, log_ratio_np=scan.log_ratio_np + noise, amplitude_frequency_hz=5e5)
     quick = plan("sart", rays="straight", sweeps=1)
     recorded, read = (
         rmse(reconstruct(loud, replace(quick, amplitudes=way)).attenuation, truth, inside)
@@ -60,6 +62,30 @@ def test_what_traces_gave_is_smoothed_more_for_it_holds_more_than_absorption(sca
     )
     assert read < 0.7 * recorded
     assert read < 0.2 * (truth.max() - truth.min())
+
+
+@pytest.mark.parametrize("rays", ["straight", "curved"])
+def test_what_traces_gave_is_as_smooth_on_any_grid(scan, rays):
+    """The penalty is in metres: grids see the same image, each at its own nodes."""
+    heard = replace(scan, amplitude_frequency_hz=2e5)
+    coarse, fine = (
+        reconstruct(heard, replace(plan("sart", rays=rays, sweeps=2, amplitudes="ratio"), nodes=nodes))
+        for nodes in (NODES // 2, NODES)
+    )
+    # Both have their first node at the same corner.
+    nodes = np.arange(NODES // 2) * coarse.spacing_m[0] / fine.spacing_m[0]
+    there = map_coordinates(
+        fine.attenuation, np.meshgrid(nodes, nodes, indexing="ij"), order=1, mode="nearest"
+    )
+    apart = np.abs(there - coarse.attenuation)
+    assert apart.max() < 0.12 * there.max()
+    assert apart.mean() < 0.03 * there.max()
+
+
+def test_amplitudes_from_traces_need_a_frequency(scan):
+    with pytest.raises(InvalidInput) as refusal:
+        reconstruct(scan, plan("sart", rays="straight", sweeps=1, amplitudes="ratio"))
+    assert refusal.value.field == "amplitude@frequency_hz"
 
 
 def inside_ring(scan):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array, diags_array, eye_array, kron, random_array
 
-from bentray_kernels.tomography.linear import Linearised
+from bentray_kernels.tomography.linear import Linearised, smoothing
 from bentray_kernels.tomography.linearisation import Rows
 
 
@@ -109,6 +109,51 @@ def test_quadratic_penalties_reach_the_minimum_of_the_normal_equations(penalty):
     right = matrix.T @ (matrix @ TRUTH.ravel()) / asked.density + strength * stiff @ centre.ravel()
     image, _ = asked.solve(np.zeros((2, *TRUTH.shape)))
     assert np.abs(image.ravel() - np.linalg.solve(left, right)).max() < 1e-3
+
+
+def lines(nodes):
+    """Rays from all sides through a square image, as a matrix: a node long in each node that they pass."""
+    steps = np.arange(nodes) - 0.5 * (nodes - 1)
+    angles = np.linspace(0.0, np.pi, 2 * nodes, endpoint=False)
+    angle, offset = (part.ravel()[:, None] for part in np.meshgrid(angles, steps, indexing="ij"))
+    # The nearest node of each step along the line; outside the image there is nothing.
+    x, y = (
+        np.rint(across * offset + along * steps + 0.5 * (nodes - 1)).astype(int)
+        for across, along in ((-np.sin(angle), np.cos(angle)), (np.cos(angle), np.sin(angle)))
+    )
+    met = (x >= 0) & (x < nodes) & (y >= 0) & (y < nodes)
+    row = np.broadcast_to(np.arange(offset.size)[:, None], met.shape)
+    return csr_array(
+        (np.ones(met.sum(), np.float32), (row[met], (nodes * x + y)[met])), (offset.size, nodes**2)
+    )
+
+
+@pytest.mark.parametrize("periods", [2, 4])
+@pytest.mark.parametrize("nodes", [32, 64])
+def test_smoothing_takes_half_of_its_wavelength_whatever_the_grid(nodes, periods):
+    """Shorter waves are lost, longer ones stay: the data's curvature is that of rays from all sides."""
+    matrix, region = lines(nodes), np.ones((nodes, nodes), dtype=bool)
+    density, wavenumber = float(matrix.sum() / nodes**2), 2.0 * np.pi * periods / nodes
+
+    def left(part):
+        wave = np.cos(part * wavenumber * np.arange(nodes))[:, None] * np.ones(nodes)
+        residual = matrix @ wave.ravel()
+        asked = Linearised(
+            [rows_of(matrix, residual)],
+            np.zeros_like(wave),
+            density,
+            region,
+            (-9.0, 9.0),
+            smoothing(wavenumber),
+            "laplacian",
+        )
+        image, _ = asked.solve(np.zeros((2, nodes, nodes)))
+        middle = slice(nodes // 4, -nodes // 4)
+        return (image * wave)[middle, middle].sum() / (wave**2)[middle, middle].sum()
+
+    assert left(1.0) == pytest.approx(0.5, abs=0.15)
+    assert left(0.5) > 0.85
+    assert left(2.0) < 0.15
 
 
 def test_without_a_reference_tikhonov_stays_near_the_image():
