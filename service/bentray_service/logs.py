@@ -21,6 +21,10 @@ _SECRETS = (
     re.compile(r"(://[^\s:/@]*:)[^\s/@]+(?=@)"),
 )
 
+# Where Dask shows a traceback for what it still had to say when a connection closed, as at each stop. What is
+# lost with a connection, others tell.
+CLOSED = "distributed.batched"
+
 
 @contextmanager
 def about(**what: str) -> Iterator[None]:
@@ -94,20 +98,20 @@ def configured(form: Literal["text", "json"]) -> Iterator[None]:
     """
     handler = _Stderr()
     handler.setFormatter(Words() if form == "text" else Lines())
-    root, own = logging.getLogger(), logging.getLogger("bentray")
+    root, own, closed = (logging.getLogger(name) for name in (None, "bentray", CLOSED))
     known = [logging.getLogger(name) for name in list(logging.Logger.manager.loggerDict)]
-    before = [(logger, logger.handlers[:], logger.propagate) for logger in (root, *known)]
-    level = own.level
-    for logger, handlers, _ in before:
+    before = [(logger, logger.handlers[:], logger.propagate, logger.level) for logger in (root, *known)]
+    for logger, handlers, *_ in before:
         if handlers:
             logger.handlers[:] = []
             logger.propagate = True
     root.addHandler(handler)
     if form == "json":
         own.setLevel(logging.INFO)
+    closed.setLevel(logging.WARNING)
     try:
         yield
     finally:
-        for logger, handlers, propagate in before:
+        for logger, handlers, propagate, level in before:
             logger.handlers[:], logger.propagate = handlers, propagate
-        own.setLevel(level)
+            logger.setLevel(level)

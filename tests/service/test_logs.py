@@ -4,6 +4,7 @@ import json
 import logging
 
 import pytest
+from distributed import batched
 
 from bentray_service import logs
 from bentray_service.access.token import Token
@@ -64,10 +65,27 @@ def test_nobody_forges_a_line():
 
 
 def test_afterwards_all_is_as_before():
-    before = [logging.getLogger(name).handlers[:] for name in (None, "distributed")]
+    def states():
+        loggers = [logging.getLogger(name) for name in (None, "bentray", "distributed", logs.CLOSED)]
+        return [(logger.handlers[:], logger.propagate, logger.level) for logger in loggers]
+
+    before = states()
     with logs.configured("json"):
-        assert [logging.getLogger(name).handlers[:] for name in (None, "distributed")] != before
-    assert [logging.getLogger(name).handlers[:] for name in (None, "distributed")] == before
+        assert all(here != there for here, there in zip(states(), before, strict=True))
+    assert states() == before
+
+
+@pytest.mark.parametrize("form", ["text", "json"])
+def test_connections_that_close_at_a_stop_show_no_traceback(form, capsys):
+    with logs.configured(form):
+        try:
+            raise ConnectionError("closed")
+        except ConnectionError:
+            logging.getLogger(batched.__name__).info("Batched Comm Closed %r", "tcp://...", exc_info=True)
+        logging.getLogger(batched.__name__).error("Error in batched write")
+    said = capsys.readouterr().err
+    assert "Traceback" not in said
+    assert "Error in batched write" in said
 
 
 def test_requests_and_jobs_can_be_followed_and_no_key_is_told(start, uploaded, submitted, until, work, lines):
