@@ -9,7 +9,7 @@ from typing import Any
 from ..acquisition import Dataset
 from ..errors import InvalidInput
 from . import pairs
-from .chains import Chain, Scan
+from .chains import Drive, Scan
 from .holding_out import Part
 from .result import Reconstruction, Trial
 from .settings import Settings
@@ -69,7 +69,7 @@ def advise(
     settings: Settings,
     index: int,
     scan_of: Callable[[Settings, Part], Scan],
-    drive: Callable[[Sequence[Chain], int, int], None],
+    drive: Drive,
     after: int = 0,
 ) -> tuple[Settings, tuple[Trial, ...], int]:
     """The settings that explain one slice best, and how all that were tried did.

@@ -166,7 +166,7 @@ class Settings:
         _one_of("penalty", self.penalty, PENALTIES)
         _one_of("amplitudes", self.amplitudes, AMPLITUDES)
         if self.amplitudes in OF_SPECTRA and self.focusing:
-            raise InvalidInput("focusing", True, f"false, with amplitudes {self.amplitudes}, which have none")
+            raise InvalidInput("focusing", True, f"false: there is none in amplitudes {self.amplitudes}")
         _one_of("wave_misfit", self.wave_misfit, WAVE_MISFITS)
         _speeds("speed_bounds_mps", self.speed_bounds_mps)
         if self.speed_range_mps is not None:
