@@ -12,7 +12,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests and jobs start some hundred Pythons: each would compile all our sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install install-dev install-docs demo test serve lint docs bench lock clean
+.PHONY: help install install-dev install-docs demo test test-all serve lint docs bench lock clean
 
 help: ## list the targets
 	@echo "Bentray: make TARGET"
@@ -29,7 +29,10 @@ serve: install ## start the service; HOST=127.0.0.1 PORT=8000
 	@$(BIN)/bentray serve --host $(HOST) --port $(PORT)
 
 test: install-dev ## run the tests, up to four files at once; ARGS="tests/kernels -x" narrows them
-	@$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS)
+	@$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m "not nightly" $(ARGS)
+
+test-all: install-dev ## run the tests, then the long searches and the soak; ARGS as above
+	@HYPOTHESIS_PROFILE=nightly $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 lint: install-dev ## check style, types and the import rules
 	$(BIN)/ruff check .

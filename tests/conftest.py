@@ -1,17 +1,27 @@
-"""What tests of several packages share: their order, figures that were drawn, and a PostgreSQL server."""
+"""What tests share: their order, profiles of hypothesis, drawn figures, a PostgreSQL server."""
 
 from __future__ import annotations
 
+import os
 import secrets
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from . import postgresql
+
+# `push`, which `make test` and CI use, tries the same examples every time: a change is not judged by luck.
+# `nightly`, of `make test-all`, searches at random and prints what repeats a failure (@reproduce_failure).
+settings.register_profile("push", derandomize=True, database=None, deadline=None)
+settings.register_profile(
+    "nightly", deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "push"))
 
 # A test marked slow takes about as long as so many others.
 SLOW = 80
