@@ -123,4 +123,12 @@ def _to_3(connection: Connection) -> None:
         new.create(connection)
 
 
-STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType({1: _to_2, 2: _to_3})
+def _to_4(connection: Connection) -> None:
+    """Files have checksums, and what is too old is marked before it goes."""
+    connection.execute(text("ALTER TABLE about ADD COLUMN observed_s FLOAT NOT NULL DEFAULT 0"))
+    connection.execute(text("ALTER TABLE about ADD COLUMN begun INTEGER NOT NULL DEFAULT 0"))
+    for new in (schema.checksums, schema.too_old):
+        new.create(connection)
+
+
+STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType({1: _to_2, 2: _to_3, 3: _to_4})

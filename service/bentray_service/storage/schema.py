@@ -18,7 +18,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 3
+VERSION = 4
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
@@ -37,6 +37,11 @@ about = Table(
     metadata,
     Column("version", Integer, primary_key=True, autoincrement=False),
     Column("probed", Float, nullable=False),
+    # How long services have been at work on this database, s: no clock that can be set tells it.
+    Column("observed_s", Float, nullable=False, server_default="0"),
+    # How often a service has begun on this database; a data folder that knows of more belongs to a later
+    # state of it than this one.
+    Column("begun", Integer, nullable=False, server_default="0"),
 )
 
 datasets = Table(
@@ -241,3 +246,30 @@ keys = Table(
 
 # What tells this database from all others, for the bucket that keeps its files; one row, made when asked for.
 bucket_mark = Table("bucket_mark", metadata, Column("database", String(32), primary_key=True))
+
+# What a file held when it was written, or, of one from before version 4, when it was first read. Of a folder
+# it is the digest of its files. ``path`` is relative to the tenant's folder.
+checksums = Table(
+    "checksums",
+    metadata,
+    Column("tenant", String(64), primary_key=True),
+    Column("path", String(100), primary_key=True),
+    Column("bytes", BigInteger, nullable=False),
+    Column("sha256", String(64), nullable=False),
+    Column("noted", Float, nullable=False),
+    # Whether it is that of the file as it was written.
+    Column("as_written", Boolean, nullable=False),
+    # Since when it is known to hold something else.
+    Column("damaged", Float),
+)
+
+# What is older than it may become, and how much time (``about.observed_s``) had been observed when that was
+# first noticed. It goes if it still is a day of such time later.
+too_old = Table(
+    "too_old",
+    metadata,
+    Column("tenant", String(64), primary_key=True),
+    Column("id", String(32), primary_key=True),
+    Column("what", String(16), nullable=False),
+    Column("noticed_s", Float, nullable=False),
+)

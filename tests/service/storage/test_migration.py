@@ -50,7 +50,7 @@ INSERT INTO about VALUES (1, 0.0);
 DATASET, DONE, WAITING = new_id("dataset"), new_id("job"), new_id("job")
 
 
-@pytest.fixture(params=[1, 2])
+@pytest.fixture(params=[1, 2, 3])
 def old(request, tmp_path):
     """A database as an older version left it, with a finished and a waiting job."""
     path = tmp_path / "old.sqlite"
@@ -116,6 +116,7 @@ def test_the_old_tables_were_those_of_version_1(old, tmp_path):
         names = {row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     connection.close()
     later = {"uploaded_volumes", "meshes", "geometry_fields", "keys", "uploads", "bucket_mark"}
+    later |= {"checksums", "too_old"}
     assert names == set(expected) - later
 
 
@@ -156,10 +157,10 @@ def test_keys_hold_afterwards(old):
 
 def test_what_fails_half_way_leaves_the_old_database(old, monkeypatch):
     def broken(connection):
-        migration._to_3(connection)
+        migration._to_4(connection)
         raise RuntimeError("the power went")
 
-    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 2: broken})
+    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 3: broken})
     with pytest.raises(RuntimeError, match="power"):
         open_database(old)
     monkeypatch.undo()
@@ -221,6 +222,10 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
         "keys",
         "uploads",
         "bucket_mark",
+        "ALTER TABLE about ADD COLUMN observed_s FLOAT NOT NULL DEFAULT 0",
+        "ALTER TABLE about ADD COLUMN begun INTEGER NOT NULL DEFAULT 0",
+        "checksums",
+        "too_old",
     ]
     assert told.said[-1].startswith("UPDATE about SET version")
 
