@@ -65,10 +65,11 @@ DESCRIPTION = (
     "what is accepted."
 )
 
-# What is told of routes that the guard keeps; it looks at every request, whatever is said here.
+# What is told of routes that the guard keeps; it looks at every request, whatever is said here. Each of them
+# needs the database.
 CLOSED: Any = {
     "dependencies": [Depends(HTTPBearer(auto_error=False, description="A key, where one is asked for."))],
-    "responses": errors.described(401, 403, 429),
+    "responses": errors.described(401, 403, 429, 503),
 }
 
 

@@ -110,6 +110,7 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.NoAnimation: Kind(404, "no-animation", "The job has no animation"),
     refusals.StorageFull: Kind(507, "storage-full", "The disk of the service is full"),
     refusals.StorageAway: Kind(503, "storage-away", "The storage of the service does not answer"),
+    refusals.DatabaseAway: Kind(503, "database-away", "The database of the service does not answer"),
     refusals.Busy: Kind(503, "busy", "No worker was free in time"),
     refusals.NotReady: Kind(503, "not-ready", "The service cannot work now"),
 }
@@ -198,7 +199,7 @@ def _refused(request: Request, error: Exception) -> Response:
 def refused(error: InvalidInput, path: str) -> Response:
     """The answer that says what an :class:`InvalidInput` (or a refusal) says."""
     headers: dict[str, str] = {}
-    if isinstance(error, refusals.Busy | refusals.QueueFull | refusals.StorageAway):
+    if isinstance(error, refusals.Busy | refusals.QueueFull | refusals.StorageAway | refusals.DatabaseAway):
         headers["Retry-After"] = RETRY_AFTER
     if isinstance(error, refusals.TooOften):
         headers["Retry-After"] = str(math.ceil(error.wait_s))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sqlalchemy.exc import SQLAlchemyError
+
 from bentray_kernels.errors import InvalidInput
 
 # Where things are listed that are not called as their ids are.
@@ -128,6 +130,28 @@ class StorageAway(InvalidInput):
 
     def __init__(self, found: str) -> None:
         super().__init__("storage", found, "another try, once it answers again")
+
+
+class DatabaseAway(InvalidInput, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
+    """The database does not answer, is held by another program, or has too many waiting for it already."""
+
+    def __init__(self, found: str) -> None:
+        InvalidInput.__init__(self, "database", found, "another try, once it answers again")
+
+    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
+        return InvalidInput, (self.field, self.value, self.accepted)
+
+
+class DatabaseFull(StorageFull, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
+    """The disk of the database is full."""
+
+    def __init__(self) -> None:
+        InvalidInput.__init__(
+            self, "database", "no space to write a row", "a larger disk, or other files gone"
+        )
+
+    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
+        return InvalidInput, (self.field, self.value, self.accepted)
 
 
 class Busy(InvalidInput):

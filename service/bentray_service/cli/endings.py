@@ -31,7 +31,10 @@ class Commands(TyperGroup):
         try:
             code = super().main(*args, **options)
         except InvalidInput as error:
-            _end(str(error), BAD_INPUT)
+            from ..refusals import DatabaseAway, StorageAway, StorageFull
+
+            away = isinstance(error, DatabaseAway | StorageAway | StorageFull)
+            _end(str(error), WORK_FAILED if away else BAD_INPUT)
         except WorkFailed as error:
             _end(str(error), WORK_FAILED)
         except typer.TyperException as error:

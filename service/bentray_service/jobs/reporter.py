@@ -12,6 +12,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.tomography.result import Progress
 
+from ..refusals import DatabaseAway
 from ..storage.queue import Queue
 from .kinds import finite
 
@@ -50,8 +51,10 @@ class Reporter:
             return
         try:
             self.flush()
-        except SQLAlchemyError:
+        except DatabaseAway:
             # A database that is away for a while must not cost a job; the next report says the same.
+            pass
+        except SQLAlchemyError:
             log.warning("the progress of %s could not be stored", self._job_id, exc_info=True)
 
     def flush(self) -> None:
@@ -72,6 +75,8 @@ class Reporter:
             try:
                 self._queue.got_further(self._job_id)
                 self._further = True
+            except DatabaseAway:
+                pass
             except SQLAlchemyError:
                 log.warning("that %s got further could not be stored", self._job_id, exc_info=True)
 
@@ -85,6 +90,8 @@ class Reporter:
                 told = self._queue.told(self._job_id)
                 self.lost = told is None
                 self._stopped = told != "running"
+            except DatabaseAway:
+                pass
             except SQLAlchemyError:
                 log.warning("whether %s is cancelled could not be read", self._job_id, exc_info=True)
         return self._stopped

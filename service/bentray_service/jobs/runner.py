@@ -21,7 +21,7 @@ from bentray_workers.slices import Cancelled
 
 from ..compute import Compute
 from ..logs import about
-from ..refusals import StorageAway
+from ..refusals import DatabaseAway, StorageAway
 from ..storage.files import Files
 from ..storage.queue import LEASE_S, Queue
 from ..storage.schema import ENDED
@@ -74,6 +74,7 @@ class Runner:
         self._alone = alone
         self._wake = threading.Condition()
         self._leaving = threading.Event()
+        self._in_hand: set[str] = set()
         self._threads = [
             threading.Thread(target=self._loop, name=f"job-{i}", daemon=True) for i in range(at_once)
         ]
@@ -87,7 +88,8 @@ class Runner:
             thread.start()
 
     def _recover(self) -> None:
-        again = self._queue.recover(CRASHED.model_dump(exclude_none=True), alone=self._alone)
+        crashed = CRASHED.model_dump(exclude_none=True)
+        again = self._queue.recover(crashed, alone=self._alone, held=tuple(self._in_hand))
         if again:
             log.warning("%d jobs of a service that died wait again", again)
             self.notify()
@@ -95,8 +97,10 @@ class Runner:
     def _keep_leases(self) -> None:
         while not self._leaving.wait(LEASE_CHECK_SECONDS):
             try:
-                self._queue.renew()
+                self._queue.renew(tuple(self._in_hand))
                 self._recover()
+            except DatabaseAway as error:
+                log.warning("the leases could not be renewed: %s", error)
             except SQLAlchemyError:
                 log.exception("the leases could not be renewed")
 
@@ -126,10 +130,16 @@ class Runner:
             try:
                 job = self._queue.claim() if self._has_room() and self._files.store.fault() is None else None
                 if job is not None:
-                    self._run(job)
+                    self._in_hand.add(job["id"])
+                    try:
+                        self._run(job)
+                    finally:
+                        self._in_hand.discard(job["id"])
                     continue
+            except DatabaseAway:
+                # The thread must outlive it; that it is away is in the log already, once.
+                pass
             except SQLAlchemyError:
-                # The thread must outlive a database that is away for a while.
                 log.exception("the database refused; trying again in %g s", IDLE_SECONDS)
             with self._wake:
                 self._wake.wait(IDLE_SECONDS)
@@ -173,6 +183,11 @@ class Runner:
                 lambda: self._queue.release(job_id, "the workers were away; it goes on when they are back")
             )
             self._leaving.wait(IDLE_SECONDS)
+        except DatabaseAway as error:
+            log.warning("%s waits for the database: %s", job_id, error)
+            self._settle(
+                lambda: self._queue.release(job_id, "the database was away; it goes on when it is back")
+            )
         except StorageAway as error:
             log.warning("%s waits for the storage: %s", job_id, error)
             self._settle(
@@ -241,7 +256,8 @@ class Runner:
         while True:
             try:
                 return write_the_end()
-            except SQLAlchemyError:
-                log.exception("the end of a job could not be stored; trying again in %g s", IDLE_SECONDS)
+            except SQLAlchemyError as error:
+                if not isinstance(error, DatabaseAway):
+                    log.exception("the end of a job could not be stored; trying again in %g s", IDLE_SECONDS)
                 if self._leaving.wait(IDLE_SECONDS):
                     raise

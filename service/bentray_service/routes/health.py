@@ -9,6 +9,8 @@ from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from pydantic import BaseModel, Field
 from sqlalchemy.exc import SQLAlchemyError
 
+from bentray_kernels.errors import InvalidInput
+
 from ..errors import described
 from ..refusals import NotReady
 from ..wiring import Service
@@ -32,8 +34,9 @@ class Ready(BaseModel):
 
 
 @router.get("/live")
-def live() -> Alive:
+async def live() -> Alive:
     """Whether the process answers; a failure here means: start it anew."""
+    # No thread is asked for, so that it answers while all of them wait for something.
     return Alive()
 
 
@@ -44,9 +47,8 @@ def ready(service: Service) -> Ready:
     try:
         service.database.probe()
     except SQLAlchemyError as error:
-        faults.append(
-            ("database", str(getattr(error, "orig", None) or error), "a database that can be written")
-        )
+        found = error.value if isinstance(error, InvalidInput) else type(error).__name__
+        faults.append(("database", found, "a database that can be written"))
     free = shutil.disk_usage(service.files.root).free
     needed = service.settings.min_free_bytes
     if free < needed:

@@ -8,38 +8,71 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event, insert, inspect, select, update
+from sqlalchemy import Connection, Engine, create_engine, event, exc, insert, inspect, select, update
 from sqlalchemy.engine import make_url
-from sqlalchemy.exc import ArgumentError, NoSuchModuleError, SQLAlchemyError
 
 from bentray_kernels.errors import InvalidInput
 
+from ..refusals import DatabaseAway, DatabaseFull
 from . import schema
+from .admission import MOST_AT_ONCE, Admission
 from .migration import SQLITE_PRAGMAS, STEPS, migrate
 
 log = logging.getLogger("bentray.storage")
 
-BUSY_SECONDS = 30.0
+# How long a transaction waits for another's to end, or for a connection, s.
+BUSY_SECONDS = 5.0
+# Connections to PostgreSQL that stay open, and that come on top while many ask.
+KEPT_CONNECTIONS, MORE_CONNECTIONS = 5, 10
+
+# How often the log tells that the database cannot be used, s; every refused request would be too often.
+SILENCE_SECONDS = 60.0
+
+# How SQLite and PostgreSQL say that there is no space.
+FULL = ("database or disk is full", "No space left on device")
 
 
 class Database:
-    """One engine and the two ways to use it."""
+    """One engine and the two ways to use it.
+
+    Both raise ``DatabaseAway`` while the database does not answer or is held by another program, and
+    ``DatabaseFull`` where it has no space; a write has not happened then, unless the connection broke just
+    when it was to become durable.
+    """
 
     def __init__(self, engine: Engine) -> None:
         self._writer = engine
         self._reader = engine.execution_options(bentray_read_only=True)
+        self._admission = Admission()
+        self._said = -SILENCE_SECONDS
 
     @contextmanager
     def read(self) -> Iterator[Connection]:
         """A transaction that only reads; it never waits for a writer."""
-        with self._reader.begin() as connection:
+        with self._told(), self._reader.begin() as connection:
             yield connection
 
     @contextmanager
     def write(self) -> Iterator[Connection]:
         """A transaction that is durable once the block ends without an error."""
-        with self._writer.begin() as connection:
+        with self._told(), self._writer.begin() as connection:
             yield connection
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """Let a thread to the database, and tell what is no fault of its statement as a refusal."""
+        with self._admission():
+            try:
+                yield
+            except (exc.DBAPIError, exc.TimeoutError) as error:
+                refusal = _refusal(error)
+                if refusal is None:
+                    raise
+                # Callers are not told where the database is.
+                if time.monotonic() - self._said >= SILENCE_SECONDS:
+                    self._said = time.monotonic()
+                    log.warning("the database cannot be used: %s", getattr(error, "orig", None) or error)
+                raise refusal from error
 
     def probe(self) -> None:
         """Write one number, as a proof that writing works; raises what goes wrong."""
@@ -64,7 +97,7 @@ def open_database(address: str) -> Database:
             current = _make_or_check(connection, shown)
         if not current:
             _update(address, shown)
-    except (SQLAlchemyError, ArgumentError, NoSuchModuleError, ImportError) as error:
+    except (exc.SQLAlchemyError, ImportError) as error:
         reason = str(getattr(error, "orig", None) or error).splitlines()[0]
         raise InvalidInput(
             "database_url", f"{shown} ({reason})", "the SQLAlchemy address of a database that can be written"
@@ -73,15 +106,38 @@ def open_database(address: str) -> Database:
 
 
 def _options(address: str) -> dict[str, Any]:
-    return (
-        {"connect_args": {"timeout": BUSY_SECONDS}}
-        if address.startswith("sqlite")
-        else {"pool_pre_ping": True}
-    )
+    if address.startswith("sqlite"):
+        waiting: dict[str, Any] = {"connect_args": {"timeout": BUSY_SECONDS}}
+        return waiting if ":memory:" in address else {**waiting, "pool_size": MOST_AT_ONCE, "max_overflow": 0}
+    return {
+        "pool_pre_ping": True,
+        "pool_size": KEPT_CONNECTIONS,
+        "max_overflow": MORE_CONNECTIONS,
+        "pool_timeout": BUSY_SECONDS,
+        "connect_args": {"connect_timeout": int(BUSY_SECONDS)},
+    }
 
 
-def _engine(address: str, pragmas: tuple[str, ...]) -> Engine:
-    """An engine; ``pragmas`` are for SQLite alone."""
+def _refusal(error: exc.SQLAlchemyError) -> DatabaseAway | DatabaseFull | None:
+    """What to tell of an error that says more about the database than about the statement; None of others."""
+    if isinstance(error, exc.DBAPIError):
+        if any(words in str(error.orig) for words in FULL):
+            return DatabaseFull()
+        if not (error.connection_invalidated or isinstance(error, exc.OperationalError | exc.InterfaceError)):
+            return None
+        if "locked" in str(error.orig) or "lock timeout" in str(error.orig):
+            return DatabaseAway(f"locked by another program for more than {BUSY_SECONDS:g} s")
+    return DatabaseAway("no answer")
+
+
+def _engine(address: str, pragmas: tuple[str, ...], *, patient: bool = True) -> Engine:
+    """An engine.
+
+    Args:
+        address: of the database.
+        pragmas: for SQLite alone.
+        patient: whether it gives up statements that take long; PostgreSQL alone.
+    """
 
     def configure_sqlite(connection: Any, _record: object) -> None:
         # The driver's own idea of when a transaction begins is switched off; _begin_sqlite says it instead.
@@ -93,7 +149,18 @@ def _engine(address: str, pragmas: tuple[str, ...]) -> Engine:
     if engine.dialect.name == "sqlite":
         event.listen(engine, "connect", configure_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
+    elif engine.driver == "psycopg" and patient:
+        event.listen(engine, "do_connect", _connect_patiently)
     return engine
+
+
+def _connect_patiently(_dialect: object, _record: object, words: list[Any], how: dict[str, Any]) -> Any:
+    from .postgresql_patience import PatientConnection
+
+    connection = PatientConnection.connect(*words, **how)
+    connection.execute(f"SET lock_timeout = '{BUSY_SECONDS:g}s'")
+    connection.commit()
+    return connection
 
 
 def _begin_sqlite(connection: Connection) -> None:
@@ -121,7 +188,8 @@ def _make_or_check(connection: Connection, shown: str) -> bool:
 
 def _update(address: str, shown: str) -> None:
     """Change the tables by a connection of its own: SQLite takes the pragmas before a transaction only."""
-    engine = _engine(address, SQLITE_PRAGMAS)
+    # A large table may take its time.
+    engine = _engine(address, SQLITE_PRAGMAS, patient=False)
     try:
         with engine.begin() as connection:
             found = _version(connection)

@@ -6,9 +6,10 @@ import os
 import secrets
 import socket
 import time
+from collections.abc import Collection
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, and_, func, insert, select, update
+from sqlalchemy import ColumnElement, Connection, and_, func, insert, or_, select, update
 
 from . import schema
 from .database import Database
@@ -91,10 +92,10 @@ class Queue:
             claimed = select(jobs).where(jobs.c.id == job_id)
             return dict(connection.execute(claimed).mappings().one())
 
-    def renew(self) -> None:
-        """Say that this service is still at work on its jobs."""
+    def renew(self, held: Collection[str]) -> None:
+        """Say that this service is still at work on some jobs."""
         with self._database.write() as connection:
-            mine = jobs.c.lease_owner == self._owner, jobs.c.state.in_(RUNNING)
+            mine = jobs.c.id.in_(held), jobs.c.lease_owner == self._owner, jobs.c.state.in_(RUNNING)
             connection.execute(update(jobs).where(*mine).values(lease_until=time.time() + LEASE_S))
 
     def got_further(self, job_id: str) -> None:
@@ -167,7 +168,7 @@ class Queue:
             connection, job_id, before, after, note, held, **values, lease_owner=None, lease_until=None
         )
 
-    def recover(self, crashed: Row, *, alone: bool) -> int:
+    def recover(self, crashed: Row, *, alone: bool, held: Collection[str] = ()) -> int:
         """Take up what a dead service left: running jobs go back to the queue, cancelling ones end.
 
         A job that saw ``MAX_ATTEMPTS`` services die without getting any further is failed with the problem
@@ -177,14 +178,17 @@ class Queue:
             crashed: the problem.
             alone: no other service uses this database, so that what is running and not of this one is left
                 over; otherwise its lease must have ended.
+            held: the jobs that this service is at work on. Another one of its own it does not know of: the
+                connection broke when the claim was to become durable.
 
         Returns:
             how many wait again.
         """
         now, again = time.time(), 0
-        dead = jobs.c.lease_owner.is_distinct_from(self._owner)
-        if not alone:
-            dead = and_(dead, func.coalesce(jobs.c.lease_until, 0.0) < now)
+        dead: ColumnElement[bool] = func.coalesce(jobs.c.lease_until, 0.0) < now
+        if alone:
+            dead = or_(dead, jobs.c.lease_owner.is_distinct_from(self._owner))
+        dead = and_(dead, jobs.c.id.not_in(held))
         left = select(jobs).where(jobs.c.state.in_(RUNNING), dead).with_for_update(skip_locked=True)
         free: Row = {"lease_owner": None, "lease_until": None}
         with self._database.write() as connection:

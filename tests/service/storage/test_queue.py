@@ -123,10 +123,10 @@ def test_a_service_beside_others_takes_only_what_is_given_up(database, jobs, que
     assert queue.recover(PROBLEM, alone=False) == 0
     later = time.time() + LEASE_S + 1.0
     monkeypatch.setattr("bentray_service.storage.queue.time.time", lambda: later)
-    other.renew()
+    other.renew([job["id"]])
     assert queue.recover(PROBLEM, alone=False) == 0
     monkeypatch.setattr("bentray_service.storage.queue.time.time", lambda: later + LEASE_S + 1.0)
-    assert other.recover(PROBLEM, alone=False) == 0, "its own job is at work"
+    assert other.recover(PROBLEM, alone=False, held=[job["id"]]) == 0, "its own job is at work"
     assert queue.recover(PROBLEM, alone=False) == 1
     assert queue.claim()["id"] == job["id"]
     # The first one wakes up and has lost its job.
@@ -138,6 +138,17 @@ def test_a_service_beside_others_takes_only_what_is_given_up(database, jobs, que
     row = jobs.get(LOCAL, job["id"])
     assert (row["state"], row["done"], queue.told(job["id"])) == ("running", 0, "running")
     assert queue.succeed(job["id"], volume(job["id"]))
+
+
+def test_a_claim_whose_answer_was_lost_is_taken_up_again(jobs, queue, dataset, monkeypatch):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    queue.claim()
+    queue.renew([])
+    assert queue.recover(PROBLEM, alone=True) == 0, "it may be on its way"
+    later = time.time() + LEASE_S + 1.0
+    monkeypatch.setattr("bentray_service.storage.queue.time.time", lambda: later)
+    assert queue.recover(PROBLEM, alone=True) == 1
+    assert queue.claim()["id"] == job["id"]
 
 
 def test_tenants_take_turns(jobs, queue, dataset):
