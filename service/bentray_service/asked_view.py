@@ -46,7 +46,10 @@ def _signature(kind: type[Any]) -> inspect.Signature:
         default: Any = field.default
         several = isinstance(default, tuple)
         annotation: Any = list[float] if several else types[field.name]
-        query = Query(description=field.metadata["description"] + (" May be repeated." if several else ""))
+        query = Query(
+            description=field.metadata["description"] + (" May be repeated." if several else ""),
+            json_schema_extra=field.metadata.get("json_schema_extra"),
+        )
         found.append(
             inspect.Parameter(
                 field.name,

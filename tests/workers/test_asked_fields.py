@@ -6,17 +6,18 @@ from dataclasses import dataclass, fields
 import pytest
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.ranges import Range
 from bentray_workers.asked_fields import asked, check
 
 
 @dataclass(frozen=True)
 class Asked:
     mode: str = asked("red", "Which one.")
-    size: float = asked(1.0, "How large.")
+    size: float = asked(1.0, "How large.", Range(0.5, 2.0))
 
 
 def look(given):
-    check(given, {"mode": ("red", "blue")}, {"size": (0.5, 2.0)})
+    check(given, {"mode": ("red", "blue")})
 
 
 def test_what_is_within_passes():
@@ -32,6 +33,7 @@ def test_what_is_within_passes():
         (Asked(size=2.1), "size", "a number from 0.5 to 2"),
         (Asked(size=math.nan), "size", "a number from 0.5 to 2"),
         (Asked(size=-math.inf), "size", "a number from 0.5 to 2"),
+        (Asked(size=10**400), "size", "a number from 0.5 to 2"),
     ],
 )
 def test_the_first_wrong_field_is_named(given, field, accepted):

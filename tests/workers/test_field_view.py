@@ -4,7 +4,10 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.asking import WAYS
-from bentray_workers.field_view import CHOICES, LOOKUPS, WITHIN, FieldView
+from bentray_kernels.ranges import ranges_of
+from bentray_workers.field_view import CHOICES, LOOKUPS, FieldView
+
+WITHIN = {name: (within.least, within.most) for name, within in ranges_of(FieldView).items()}
 
 
 def test_every_field_is_checked():

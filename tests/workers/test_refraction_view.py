@@ -9,7 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.refraction_view import CHOICES, WITHIN, RefractionView, check_even
+from bentray_kernels.ranges import ranges_of
+from bentray_workers.refraction_view import CHOICES, RefractionView, check_even
+
+WITHIN = {name: (within.least, within.most) for name, within in ranges_of(RefractionView).items()}
 
 
 def test_every_field_says_what_it_means():

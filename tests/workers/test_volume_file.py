@@ -108,7 +108,7 @@ def test_a_spacing_must_be_three_distances(steps):
 def test_a_spacing_that_nothing_has_is_refused(step, axis):
     steps = [1e-3] * 3
     steps[axis] = step
-    with pytest.raises(InvalidInput, match=r"spacing_m: .* three even distances from 1e-09 to 1000 m"):
+    with pytest.raises(InvalidInput, match=r"spacing_m: .* three times a number from 1e-09 to 1000 m"):
         Volume.of(np.zeros((2, 2, 2)), steps)
 
 

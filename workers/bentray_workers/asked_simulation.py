@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.ranges import Range, ranges_of
 
 from .asked_fields import asked, check
 from .simulation import SimulationSettings
@@ -15,7 +16,22 @@ from .wave_simulation import WaveSimulationSettings
 
 Simulated = SimulationSettings | VolumeSimulationSettings | WaveSimulationSettings
 
+KINDS = (SimulationSettings, VolumeSimulationSettings, WaveSimulationSettings, VolumeWaveSettings)
+
 CHOICES = {"phantom": ("table6", "table7")}
+
+
+def among(name: str) -> Range:
+    """What a number may be in any of the scans; each of them checks its own range."""
+    found = [known[name] for known in map(ranges_of, KINDS) if name in known]
+    return Range(
+        min(one.least for one in found),
+        max(one.most for one in found),
+        all(one.above for one in found),
+        all(one.below for one in found),
+        found[0].unit,
+    )
+
 
 # What only some scans have, and when.
 OWN = {
@@ -45,31 +61,41 @@ class AskedSimulation:
     waveform: bool = asked(
         False, "Simulate waves and record traces of object and water, not travel times; of table7 in space."
     )
-    nodes: int = asked(128, "Nodes along a side of the truth, and of the image it is meant for.")
-    elements: int = asked(256, "Transducers of a ring; each sends and receives.")
-    coupling_mps: float = asked(1500.0, "Speed of the water, m/s.")
-    snr: float | None = asked(None, "Signal over noise, as 10; none without it.")
-    seed: int = asked(0, "Of the noise.")
+    nodes: int = asked(
+        128, "Nodes along a side of the truth, and of the image it is meant for.", among("nodes")
+    )
+    elements: int = asked(256, "Transducers of a ring; each sends and receives.", among("elements"))
+    coupling_mps: float = asked(1500.0, "Speed of the water, m/s.", among("coupling_mps"))
+    snr: float | None = asked(None, "Signal over noise, as 10; none without it.", among("snr"))
+    seed: int = asked(0, "Of the noise.", among("seed"))
     refinement: int | None = asked(
-        None, "Travel times: how many times finer their grid is, 4 by default; at least 2 in space, else 4."
+        None,
+        "Travel times: how many times finer their grid is, 4 by default; at least 2 in space, else 4.",
+        among("refinement"),
     )
     attenuation: bool | None = asked(None, "Travel times: record amplitudes too.")
     noise_s: float | None = asked(
-        None, "Travel times of table6: standard deviation of the noise on them, s; 0 by default."
+        None,
+        "Travel times of table6: standard deviation of the noise on them, s; 0 by default.",
+        among("noise_s"),
     )
-    slices: int | None = asked(None, "table7: heights of the ring, one node apart; 40 by default.")
+    slices: int | None = asked(
+        None, "table7: heights of the ring, one node apart; 40 by default.", among("slices")
+    )
     array: Literal["moved", "rings"] | None = asked(
         None, "table7: one ring moved (the default), or rings at all heights that receive each other."
     )
     three_d: bool | None = asked(None, "table7: wave fronts in space, not in each slice by itself.")
     frequency_hz: float | None = asked(
-        None, "Waves: middle of the pulse, Hz; 500000 by default, of table7 100000."
+        None, "Waves: middle of the pulse, Hz; 500000 by default, of table7 100000.", among("frequency_hz")
     )
-    emissions: int | None = asked(None, "Waves: elements that send; 64 by default.")
-    side_m: float | None = asked(None, "Waves: side of the square with phantom and ring, m; 0.12 by default.")
+    emissions: int | None = asked(None, "Waves: elements that send; 64 by default.", among("emissions"))
+    side_m: float | None = asked(
+        None, "Waves: side of the square with phantom and ring, m; 0.12 by default.", among("side_m")
+    )
 
     def __post_init__(self) -> None:
-        check(self, CHOICES, {})
+        check(self, CHOICES)
         self.chosen()
 
     def chosen(self) -> Simulated:

@@ -9,6 +9,7 @@ from typing import Any
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.cube import MOST_SAMPLES
+from bentray_kernels.ranges import Range
 
 from .asked_fields import asked, check
 
@@ -17,14 +18,6 @@ MOST_FACES = 300_000
 
 # Changed whenever the same mesh and settings give other tables.
 VERSION = 1
-
-WITHIN = {
-    "samples": (4, MOST_SAMPLES),
-    "inner_samples": (4, MOST_SAMPLES),
-    "divisions": (1, 64),
-    "image_size": (33, 1025),
-    "image_threshold": (0.0, 0.5),
-}
 
 
 @dataclass(frozen=True)
@@ -36,23 +29,30 @@ class FieldSettings:
     """
 
     samples: int = asked(
-        24, "Samples along an edge of the cube for rays from outside, n: the table has 36n⁴ entries."
+        24,
+        "Samples along an edge of the cube for rays from outside, n: the table has 36n⁴ entries.",
+        Range(4, MOST_SAMPLES),
     )
-    inner_samples: int = asked(16, "The same for rays that leave the surface itself.")
+    inner_samples: int = asked(16, "The same for rays that leave the surface itself.", Range(4, MOST_SAMPLES))
     divisions: int = asked(
-        16, "Small cubes along an edge of the cube, in which points of the surface count as one."
+        16,
+        "Small cubes along an edge of the cube, in which points of the surface count as one.",
+        Range(1, 64),
     )
     image_size: int = asked(
-        513, "Pixels along a side of the geometry image; the most, where there is a threshold."
+        513,
+        "Pixels along a side of the geometry image; the most, where there is a threshold.",
+        Range(33, 1025),
     )
     image_threshold: float = asked(
         0.0,
         "Greatest rms distance of the image from the surface, in edges of the unit cube: the image is "
         "halved as long as it keeps it; 0 keeps image_size.",
+        Range(0.0, 0.5),
     )
 
     def __post_init__(self) -> None:
-        check(self, {}, WITHIN)
+        check(self, {})
 
     def plain(self) -> dict[str, Any]:
         """Its fields as JSON has them."""

@@ -6,20 +6,10 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.ranges import Range
 
 from .asked_fields import MOST_PIXELS, MOST_RAYS, asked, check
 
-WITHIN = {
-    "index": (0.1, 10.0),
-    "share": (0.0, 1.0),
-    "azimuth_deg": (-36000.0, 36000.0),
-    "elevation_deg": (-89.0, 89.0),
-    "zoom": (0.05, 50.0),
-    "width": (1, MOST_PIXELS),
-    "height": (1, MOST_PIXELS),
-    "rays": (1, 8),
-    "depth": (0, 64),
-}
 # The names that people know, and those of the kernels.
 LOOKUPS = {"nearest": "nearest", "linear": "linear", "accurate": "walk", "exact": "exact"}
 CHOICES = {
@@ -57,22 +47,26 @@ class FieldView:
         "accurate", "How mirrored and refracted rays ask the field; exact intersects the mesh itself."
     )
     eye: Literal["nearest", "linear", "accurate", "exact"] = asked("exact", "The same for rays of the eye.")
-    index: float = asked(1.5, "Refractive index of glass.")
+    index: float = asked(1.5, "Refractive index of glass.", Range(0.1, 10.0))
     share: float = asked(
-        0.85, "Of the light, what is mirrored or refracted; the rest is the mesh's own colour."
+        0.85,
+        "Of the light, what is mirrored or refracted; the rest is the mesh's own colour.",
+        Range(0.0, 1.0),
     )
     camera: Literal["perspective", "orthographic"] = asked("perspective", "Kind of camera.")
-    azimuth_deg: float = asked(-60.0, "Where the camera stands: angle about the vertical, degrees.")
-    elevation_deg: float = asked(15.0, "Its height above the horizon, degrees.")
-    zoom: float = asked(1.0, "1 shows the whole scene, 2 half of it.")
+    azimuth_deg: float = asked(
+        -60.0, "Where the camera stands: angle about the vertical, degrees.", Range(-36000.0, 36000.0)
+    )
+    elevation_deg: float = asked(15.0, "Its height above the horizon, degrees.", Range(-89.0, 89.0))
+    zoom: float = asked(1.0, "1 shows the whole scene, 2 half of it.", Range(0.05, 50.0))
     up: Literal["z", "y"] = asked("z", "Which axis of the mesh is up.")
-    width: int = asked(512, "Pixels.")
-    height: int = asked(512, "Pixels.")
-    rays: int = asked(1, "Along each side of a pixel.")
-    depth: int = asked(4, "Most surfaces at which a ray goes on.")
+    width: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
+    height: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
+    rays: int = asked(1, "Along each side of a pixel.", Range(1, 8))
+    depth: int = asked(4, "Most surfaces at which a ray goes on.", Range(0, 64))
 
     def __post_init__(self) -> None:
-        check(self, CHOICES, WITHIN)
+        check(self, CHOICES)
         count = self.width * self.height * self.rays**2
         if count > MOST_RAYS:
             raise InvalidInput("width, height, rays", f"{count} rays", f"at most {MOST_RAYS}")

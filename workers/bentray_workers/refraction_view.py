@@ -8,25 +8,13 @@ from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.isosurface.octree import MOST_ISOS
+from bentray_kernels.ranges import Range
 from bentray_kernels.refraction import Layers
 from bentray_kernels.splines import FILTERS
 from bentray_kernels.splines.prefilter import MOST_SMOOTHING
 
 from .asked_fields import MOST_PIXELS, MOST_RAYS, asked, check
 
-WITHIN = {
-    "outside": (0.01, 100.0),
-    "smoothing": (0.0, MOST_SMOOTHING),
-    "azimuth_deg": (-36000.0, 36000.0),
-    "elevation_deg": (-90.0, 90.0),
-    "zoom": (0.05, 50.0),
-    "squares": (1, 512),
-    "backdrop_distance": (0.5, 100.0),
-    "degree": (1, 8),
-    "width": (1, MOST_PIXELS),
-    "height": (1, MOST_PIXELS),
-    "depth": (1, 256),
-}
 CHOICES = {
     "filter": tuple(FILTERS),
     "camera": ("orthographic", "perspective"),
@@ -50,7 +38,7 @@ class RefractionView:
         (), "Rising iso-values, unit of the volume; without any, the middle of its range after smoothing."
     )
     index: tuple[float, ...] = asked((1.5,), "Refractive index above each iso-value.")
-    outside: float = asked(1.0, "Refractive index below the first iso-value.")
+    outside: float = asked(1.0, "Refractive index below the first iso-value.", Range(0.01, 100.0))
     surroundings: int = asked(
         0, "Which layer goes on around the volume: 0 the one below the first iso-value, 1 the next, ..."
     )
@@ -58,29 +46,40 @@ class RefractionView:
     smoothing: float = asked(
         0.0,
         "How much a B-spline smooths away; 0 passes through the nodes, 10 to 100 takes off steps of 8 bits.",
+        Range(0.0, MOST_SMOOTHING),
     )
     camera: Literal["orthographic", "perspective"] = asked("orthographic", "Kind of camera.")
-    azimuth_deg: float = asked(30.0, "Where the camera stands: angle about the z axis, degrees.")
-    elevation_deg: float = asked(20.0, "Its height above the x-y plane, degrees.")
-    zoom: float = asked(1.0, "1 shows the whole volume, 2 half of it.")
+    azimuth_deg: float = asked(
+        30.0, "Where the camera stands: angle about the z axis, degrees.", Range(-36000.0, 36000.0)
+    )
+    elevation_deg: float = asked(20.0, "Its height above the x-y plane, degrees.", Range(-90.0, 90.0))
+    zoom: float = asked(1.0, "1 shows the whole volume, 2 half of it.", Range(0.05, 50.0))
     backdrop: Literal["checkerboard", "picture"] = asked("checkerboard", "What is seen through the volume.")
-    squares: int = asked(16, "Squares of the checkerboard across the shorter side of the picture.")
-    backdrop_distance: float = asked(1.0, "From the middle of the volume, in its diagonals.")
+    squares: int = asked(
+        16, "Squares of the checkerboard across the shorter side of the picture.", Range(1, 512)
+    )
+    backdrop_distance: float = asked(
+        1.0, "From the middle of the volume, in its diagonals.", Range(0.5, 100.0)
+    )
     supersampling: Literal["none", "prss", "real"] = asked(
         "prss",
         "prss: more samples of the backdrop after refraction; real: more rays.",
     )
-    degree: int = asked(1, "Samples beside each pixel for prss; rays along each side of it for real.")
+    degree: int = asked(
+        1, "Samples beside each pixel for prss; rays along each side of it for real.", Range(1, 8)
+    )
     fresnel: bool = asked(False, "Whether light is weakened by what each surface mirrors away.")
     mode: Literal["refract", "shaded"] = asked("refract", "refract, or shaded: the first surface, lit.")
-    width: int = asked(512, "Pixels.")
-    height: int = asked(512, "Pixels.")
+    width: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
+    height: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
     depth: int = asked(
-        16, "Most surfaces that a ray may meet; where it would meet more, the picture is dark grey."
+        16,
+        "Most surfaces that a ray may meet; where it would meet more, the picture is dark grey.",
+        Range(1, 256),
     )
 
     def __post_init__(self) -> None:
-        check(self, CHOICES, WITHIN)
+        check(self, CHOICES)
         if len(self.iso) > MOST_ISOS:
             raise InvalidInput("iso", f"{len(self.iso)} iso-values", f"at most {MOST_ISOS}")
         if len(self.index) != max(len(self.iso), 1):

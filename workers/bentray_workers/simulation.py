@@ -14,7 +14,9 @@ from bentray_kernels.acquisition.noise import with_noise
 from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.ranges import Range, check_ranges, ranged
 from bentray_kernels.tomography import Progress
 from bentray_kernels.tomography.problem import MARGIN_NODES
 
@@ -22,6 +24,10 @@ from .emitter_batches import arrivals
 
 # More costs memory, which grows with its square, and gains nothing that noise would not hide.
 MOST_REFINEMENT = 64
+
+# Of every simulated scan.
+NODES, SEED = Range(16, 1024), Range(0, 2**63 - 1)
+SNR = Range(1e-6, 1e12)
 
 
 @dataclass(frozen=True)
@@ -40,31 +46,19 @@ class SimulationSettings:
             times and amplitudes alike; None: no such noise.
     """
 
-    nodes: int = 128
-    elements: int = 256
-    coupling_mps: float = 1500.0
-    refinement: int = 4
-    noise_s: float = 0.0
-    seed: int = 0
+    nodes: int = ranged(128, NODES)
+    elements: int = ranged(256, Range(3, 4096))
+    coupling_mps: float = ranged(1500.0, SPEED_MPS)
+    refinement: int = ranged(4, Range(4, MOST_REFINEMENT))
+    noise_s: float = ranged(0.0, Range(0.0, 1.0, below=True, unit="s"))
+    seed: int = ranged(0, SEED)
     attenuation: bool = False
-    snr: float | None = None
+    snr: float | None = ranged(None, SNR)
 
     def __post_init__(self) -> None:
-        if not 16 <= self.nodes <= 1024:
-            raise InvalidInput("nodes", self.nodes, "16 to 1024")
-        if not 0.0 <= self.noise_s < 1.0:
-            raise InvalidInput("noise_s", self.noise_s, "seconds, 0 or more and less than 1")
-        if not 3 <= self.elements <= 4096:
-            raise InvalidInput("elements", self.elements, "3 to 4096")
-        if self.refinement > MOST_REFINEMENT:
-            raise InvalidInput("refinement", self.refinement, f"at most {MOST_REFINEMENT}")
-        if self.seed < 0:
-            raise InvalidInput("seed", self.seed, "0 or more")
-        if self.snr is not None:
-            if not 0.0 < self.snr < np.inf:
-                raise InvalidInput("snr", self.snr, "a finite ratio > 0")
-            if self.noise_s > 0.0:
-                raise InvalidInput("snr", self.snr, "nothing where noise_s is given")
+        check_ranges(self)
+        if self.snr is not None and self.noise_s > 0.0:
+            raise InvalidInput("snr", self.snr, "nothing where noise_s is given")
         self.scan()
 
     def scan(self) -> TravelTimeScan:

@@ -13,6 +13,7 @@ from distributed import Client, Future
 from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.ranges import Range
 from bentray_kernels.tomography import Progress
 
 from .asked_fields import asked
@@ -43,9 +44,11 @@ class Turntable(RefractionView):
         InvalidInput: naming the first field that is wrong.
     """
 
-    frames: int = asked(36, "Pictures.")
+    frames: int = asked(36, "Pictures.", Range(1, MOST_FRAMES))
     turn_deg: float = asked(
-        360.0, "How far the camera goes, degrees; the last picture is a step short of it."
+        360.0,
+        "How far the camera goes, degrees; the last picture is a step short of it.",
+        Range(-3600.0, 3600.0),
     )
     format: Literal["zip", "apng"] = asked("zip", "zip: one PNG a picture; apng: an animated PNG.")
 
@@ -53,10 +56,6 @@ class Turntable(RefractionView):
         super().__post_init__()
         if self.format not in FORMATS:
             raise InvalidInput("format", repr(self.format), "one of " + ", ".join(FORMATS))
-        if not 1 <= self.frames <= MOST_FRAMES:
-            raise InvalidInput("frames", self.frames, f"a whole number from 1 to {MOST_FRAMES}")
-        if not abs(self.turn_deg) <= 3600.0:
-            raise InvalidInput("turn_deg", self.turn_deg, "a number from -3600 to 3600")
         pixels = self.frames * self.width * self.height
         if pixels > MOST_PIXELS:
             raise InvalidInput(

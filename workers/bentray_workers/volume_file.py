@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import SPACING_M
+from bentray_kernels.ranges import Range
 
 from .hdf5_reading import Limits, Reader, opened, printable
 from .hdf5_writing import creating
@@ -22,8 +24,8 @@ VERSION = "1.0"
 # Types that are kept; every other one becomes float32.
 KEPT = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
 
-# Between nodes, m. Far beyond these, what is made of them leaves the range of numbers.
-LEAST_SPACING_M, MOST_SPACING_M = 1e-9, 1e3
+# Of node 0: kilometres from where the patient is say nothing, but do no harm either.
+ORIGIN_M = Range(-1e6, 1e6, unit="m")
 MOST_FLOAT32 = float(np.finfo(np.float32).max)
 # Parts of its range that a volume must still show when it becomes float32, as many as 8 bits have.
 LEVELS = 256
@@ -36,8 +38,8 @@ class Volume:
 
     Attributes:
         values: (nx, ny, nz), uint8, uint16 or float32, finite, any unit.
-        spacing_m: between nodes along each axis, 1e-9 to 1e3 m.
-        origin_m: place of node 0, m.
+        spacing_m: between nodes along each axis, within ``SPACING_M``.
+        origin_m: place of node 0, m, within ``ORIGIN_M``.
         title: what it is.
 
     Raises:
@@ -54,12 +56,12 @@ class Volume:
         if not np.isfinite(self.values).all():
             place = tuple(int(k) for k in np.argwhere(~np.isfinite(self.values))[0])
             raise InvalidInput("values", f"{self.values[place]} at node {place}", "finite numbers")
-        sane = [LEAST_SPACING_M <= step <= MOST_SPACING_M for step in self.spacing_m]
-        if len(sane) != 3 or not all(sane):
-            accepted = f"three even distances from {LEAST_SPACING_M:g} to {MOST_SPACING_M:g} m"
-            raise InvalidInput("spacing_m", self.spacing_m, accepted)
-        if len(self.origin_m) != 3 or not all(math.isfinite(place) for place in self.origin_m):
-            raise InvalidInput("origin_m", self.origin_m, "three finite places, m")
+        for name, given, within in (
+            ("spacing_m", self.spacing_m, SPACING_M),
+            ("origin_m", self.origin_m, ORIGIN_M),
+        ):
+            if len(given) != 3 or not all(map(within.holds, given)):
+                raise InvalidInput(name, given, f"three times {within.words}")
 
     @classmethod
     def of(

@@ -16,11 +16,13 @@ from bentray_kernels.acquisition.simulation import Ring
 from bentray_kernels.acquisition.volume_simulation import VolumeScan
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE7_FREQUENCY_HZ, TABLE7_GRIDS, TABLE7_SIDE_M, table7, table7_slices
+from bentray_kernels.ranges import Range, check_ranges, ranged
 from bentray_kernels.tomography import Progress
 
 from .emitter_batches import arrivals
-from .simulation import MOST_REFINEMENT, ring_radius
+from .simulation import MOST_REFINEMENT, NODES, SEED, SNR, ring_radius
 
 # The coarsest voxels that the phantom's lesions are measured in; wider ones would join them.
 LEAST_NODES = min(nodes for nodes, _ in TABLE7_GRIDS)
@@ -44,34 +46,23 @@ class VolumeSimulationSettings:
         seed: of the noise.
     """
 
-    nodes: int = 128
-    slices: int = 40
-    elements: int = 256
-    coupling_mps: float = 1500.0
-    refinement: int = 4
+    nodes: int = ranged(128, NODES)
+    slices: int = ranged(40, Range(2, 1024))
+    elements: int = ranged(256, Range(3, 4096))
+    coupling_mps: float = ranged(1500.0, SPEED_MPS)
+    refinement: int = ranged(4, Range(2, MOST_REFINEMENT))
     three_d: bool = False
     array: Literal["moved", "rings"] = "moved"
     attenuation: bool = False
-    snr: float | None = None
-    seed: int = 0
+    snr: float | None = ranged(None, SNR)
+    seed: int = ranged(0, SEED)
 
     def __post_init__(self) -> None:
-        if not 16 <= self.nodes <= 1024:
-            raise InvalidInput("nodes", self.nodes, "16 to 1024")
-        if not 2 <= self.slices <= 1024:
-            raise InvalidInput("slices", self.slices, "2 to 1024")
-        if not 3 <= self.elements <= 4096:
-            raise InvalidInput("elements", self.elements, "3 to 4096")
-        if self.refinement > MOST_REFINEMENT:
-            raise InvalidInput("refinement", self.refinement, f"at most {MOST_REFINEMENT}")
-        if self.seed < 0:
-            raise InvalidInput("seed", self.seed, "0 or more")
+        check_ranges(self)
         if self.array not in ("moved", "rings"):
             raise InvalidInput("array", repr(self.array), "moved or rings")
         if self.array == "rings" and not self.three_d:
             raise InvalidInput("array", repr(self.array), "moved, unless three_d is true")
-        if self.snr is not None and not 0.0 < self.snr < np.inf:
-            raise InvalidInput("snr", self.snr, "a finite ratio > 0")
         self.scan()
 
     def scan(self) -> VolumeScan:

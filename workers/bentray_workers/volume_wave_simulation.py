@@ -12,10 +12,11 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.phantoms import TABLE7_SIDE_M, table7
 from bentray_kernels.phantoms.table7 import CHEST_M, NIPPLE_M
 from bentray_kernels.phantoms.volume import PhantomSlice
+from bentray_kernels.ranges import ranged
 from bentray_kernels.wave.medium import EDGE_NODES
 from bentray_kernels.wave.points import REACH
 
-from .wave_simulation import WaveSimulationSettings
+from .wave_simulation import FREQUENCY_HZ, WaveSimulationSettings
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class VolumeWaveSettings(WaveSimulationSettings):
     traces too. Beyond the chest wall the breast goes on as it is there, into the absorbing edge.
     """
 
-    frequency_hz: float = 1e5
+    frequency_hz: float = ranged(1e5, FREQUENCY_HZ)
 
     dimensions: ClassVar[int] = 3
     # Each node of an edge costs far more than in a plane.

@@ -19,8 +19,10 @@ from bentray_kernels.acquisition import Dataset, Truth, Waveform
 from bentray_kernels.acquisition.simulation import Ring
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE6_SIDE_M, EllipsePhantom, table6
 from bentray_kernels.phantoms.volume import PhantomSlice
+from bentray_kernels.ranges import Range, check_ranges, ranged
 from bentray_kernels.tomography import Progress
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.points import REACH
@@ -29,7 +31,7 @@ from bentray_kernels.wave.stencil import longest_step, phase_error
 from bentray_kernels.wave.strips import Poll, unheeded
 
 from .lanes import RECONSTRUCTION
-from .simulation import ring_radius
+from .simulation import NODES, SEED, SNR, ring_radius
 
 # The pulse is a sine under a Gaussian; at this many times its centre frequency it has 3 % of its height.
 HIGHEST = 1.54
@@ -37,6 +39,8 @@ HIGHEST = 1.54
 # The simulation has another order in space than a refinement's 8, more nodes in its shortest wave than that
 # one's 4.5, and steps of this part of the longest stable one.
 ORDER, NODES_A_WAVE, STEP = 6, 7.0, 0.5
+
+FREQUENCY_HZ = Range(1e4, 1e7, unit="Hz")
 
 # Wider than those of a refinement.
 EDGE_NODES = 40
@@ -68,14 +72,14 @@ class WaveSimulationSettings:
         seed: of the noise.
     """
 
-    frequency_hz: float = 5e5
-    side_m: float = 0.12
-    elements: int = 128
-    emissions: int = 64
-    nodes: int = 256
-    coupling_mps: float = 1500.0
-    snr: float | None = None
-    seed: int = 0
+    frequency_hz: float = ranged(5e5, FREQUENCY_HZ)
+    side_m: float = ranged(0.12, Range(1e-3, 1.0, unit="m"))
+    elements: int = ranged(128, Range(8, 4096))
+    emissions: int = ranged(64, Range(1, 4096))
+    nodes: int = ranged(256, NODES)
+    coupling_mps: float = ranged(1500.0, SPEED_MPS)
+    snr: float | None = ranged(None, SNR)
+    seed: int = ranged(0, SEED)
 
     # Of the waves, what a scan in space has otherwise.
     dimensions: ClassVar[int] = 2
@@ -84,20 +88,9 @@ class WaveSimulationSettings:
     phantom_name: ClassVar[str] = "Table 6"
 
     def __post_init__(self) -> None:
-        if not 1e4 <= self.frequency_hz <= 1e7:
-            raise InvalidInput("frequency_hz", self.frequency_hz, "1e4 to 1e7 Hz")
-        if not 1e-3 <= self.side_m <= 1.0:
-            raise InvalidInput("side_m", self.side_m, "0.001 to 1 m")
-        if not 8 <= self.elements <= 4096:
-            raise InvalidInput("elements", self.elements, "8 to 4096")
+        check_ranges(self)
         if not 1 <= self.emissions <= self.elements:
             raise InvalidInput("emissions", self.emissions, f"1 to {self.elements}")
-        if not 16 <= self.nodes <= 1024:
-            raise InvalidInput("nodes", self.nodes, "16 to 1024")
-        if self.snr is not None and not 0.0 < self.snr < np.inf:
-            raise InvalidInput("snr", self.snr, "a finite ratio > 0")
-        if self.seed < 0:
-            raise InvalidInput("seed", self.seed, "0 or more")
         size = math.prod(self.grid)
         if size > MOST_NODES:
             most = self.frequency_hz * (MOST_NODES / size) ** (1.0 / self.dimensions)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal
 
@@ -10,6 +9,7 @@ from ..acquisition import PICKERS
 from ..acquisition.dataset import PLAUSIBLE_SPEED_MPS
 from ..eikonal import methods
 from ..errors import InvalidInput
+from ..ranges import Range, check_ranges, ranged
 
 METHODS = ("sart", "gauss-newton", "auto", "waveform")
 RAYS = ("curved", "straight", "adjoint")
@@ -119,44 +119,45 @@ class Settings:
     rays: Literal["curved", "straight", "adjoint"] = "curved"
     eikonal: str = DEVIATION
     decomposition: Literal["slices", "volume"] = "slices"
-    axial_room_nodes: int | None = None
-    nodes: int = 128
-    side_m: float | None = None
-    sweeps: int = 5
-    straight_sweeps: int = 0
-    coarser_grids: int = 0
-    stop_rms_s: float = 0.0
+    axial_room_nodes: int | None = ranged(None, Range(2, 4096))
+    nodes: int = ranged(128, Range(LEAST_NODES, 2048))
+    side_m: float | None = ranged(None, Range(1e-4, 100.0, unit="m"))
+    sweeps: int = ranged(5, Range(1, 1000))
+    straight_sweeps: int = ranged(0, Range(0, 1000))
+    coarser_grids: int = ranged(0, Range(0, 6))
+    stop_rms_s: float = ranged(0.0, Range(0.0, 1.0, unit="s"))
     speed_bounds_mps: tuple[float, float] = (1300.0, 1800.0)
     speed_update: Literal["fixed", "data-driven"] = "fixed"
     speed_range_mps: tuple[float, float] | None = None
-    front_smoothing_nodes: float = 0.0
-    ray_width_m: float = 0.0
-    relaxation: float = 0.1
-    relaxation_decay: float = 1.0
-    subset: int = 1
-    smoothing_nodes: float = 1.0
-    seed: int = 0
+    front_smoothing_nodes: float = ranged(0.0, Range(0.0, 32.0))
+    ray_width_m: float = ranged(0.0, Range(0.0, 0.1, unit="m"))
+    relaxation: float = ranged(0.1, Range(0.0, 2.0, above=True, below=True))
+    relaxation_decay: float = ranged(1.0, Range(0.0, 1.0, above=True))
+    subset: int = ranged(1, Range(1, 4096))
+    smoothing_nodes: float = ranged(1.0, Range(0.0, 32.0))
+    seed: int = ranged(0, Range(0, 2**63 - 1))
     penalty: Literal["total-variation", "laplacian", "tikhonov"] = "total-variation"
-    penalty_strength: float = 0.3
-    edge_mps: float = 0.0
-    huber_s: float = 0.0
-    huber_spreads: float = 3.0
+    penalty_strength: float = ranged(0.3, Range(0.0, 10.0))
+    edge_mps: float = ranged(0.0, Range(0.0, 1000.0, unit="m/s"))
+    huber_s: float = ranged(0.0, Range(0.0, 1.0, unit="s"))
+    huber_spreads: float = ranged(3.0, Range(0.0, 100.0))
     roi: bool = False
     reciprocity: bool = True
     picker: Literal["aic", "threshold", "energy-ratio", "sta-lta", "correlation", "matched"] = "aic"
     examine: bool = True
-    guided_rounds: int = 0
+    guided_rounds: int = ranged(0, Range(0, 10))
     attenuation: bool = True
     amplitudes: Literal["recorded", "ratio", "spectrum", "centroid"] = "recorded"
     focusing: bool = False
     resolution_check: bool = False
-    wave_bands: int = 4
+    wave_bands: int = ranged(4, Range(1, WAVE_BANDS))
     wave_misfit: Literal["correlation", "least-squares"] = "correlation"
-    wave_emitters: int = 0
-    wave_variation: float = 0.0
-    wave_minutes: float = 0.0
+    wave_emitters: int = ranged(0, Range(0, 4096))
+    wave_variation: float = ranged(0.0, Range(0.0, 10.0))
+    wave_minutes: float = ranged(0.0, Range(0.0, 1e6))
 
     def __post_init__(self) -> None:
+        check_ranges(self)
         _one_of("method", self.method, METHODS)
         _one_of("rays", self.rays, RAYS)
         _one_of("eikonal", self.eikonal, (DEVIATION, *methods()))
@@ -181,40 +182,13 @@ class Settings:
             )
         if self.method == "waveform" and self.decomposition == "volume":
             raise InvalidInput("decomposition", "'volume'", "slices, with method waveform")
-        _within("wave_bands", self.wave_bands, 1, WAVE_BANDS)
-        _within("guided_rounds", self.guided_rounds, 0, 10)
         if self.guided_rounds and self.decomposition == "volume":
             raise InvalidInput("guided_rounds", self.guided_rounds, "0, with decomposition volume")
-        _within("wave_emitters", self.wave_emitters, 0, 4096)
-        _within("wave_variation", self.wave_variation, 0.0, 10.0)
-        _within("wave_minutes", self.wave_minutes, 0.0, 1e6)
-        _within("nodes", self.nodes, LEAST_NODES, 2048)
-        if self.axial_room_nodes is not None:
-            _within("axial_room_nodes", self.axial_room_nodes, 2, 4096)
-        _within("sweeps", self.sweeps, 1, 1000)
-        if self.side_m is not None:
-            _within("side_m", self.side_m, 1e-4, 100.0)
-        if not 0.0 < self.relaxation < 2.0:
-            raise InvalidInput("relaxation", self.relaxation, "a number between 0 and 2")
-        _within("smoothing_nodes", self.smoothing_nodes, 0.0, 32.0)
-        if not 0.0 < self.relaxation_decay <= 1.0:
-            raise InvalidInput("relaxation_decay", self.relaxation_decay, "a number above 0 and at most 1")
-        _within("straight_sweeps", self.straight_sweeps, 0, 1000)
-        _within("coarser_grids", self.coarser_grids, 0, 6)
         if self.coarser_grids and self.nodes >> self.coarser_grids < LEAST_NODES:
             accepted = f"few enough that the coarsest of {self.nodes} nodes has {LEAST_NODES}"
             raise InvalidInput("coarser_grids", self.coarser_grids, accepted)
-        _within("front_smoothing_nodes", self.front_smoothing_nodes, 0.0, 32.0)
-        _within("ray_width_m", self.ray_width_m, 0.0, 0.1)
         if self.ray_width_m > 0.0 and self.method != "gauss-newton":
             raise InvalidInput("ray_width_m", self.ray_width_m, "0, unless method is gauss-newton")
-        _within("subset", self.subset, 1, 4096)
-        _within("penalty_strength", self.penalty_strength, 0.0, 10.0)
-        _within("edge_mps", self.edge_mps, 0.0, 1000.0)
-        _within("huber_s", self.huber_s, 0.0, 1.0)
-        _within("huber_spreads", self.huber_spreads, 0.0, 100.0)
-        _within("stop_rms_s", self.stop_rms_s, 0.0, 1.0)
-        _within("seed", self.seed, 0, 2**63 - 1)
 
     @property
     def tries(self) -> bool:
@@ -244,11 +218,6 @@ class Settings:
 def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:
     if value not in known:
         raise InvalidInput(name, repr(value), "one of " + ", ".join(known))
-
-
-def _within(name: str, value: float, low: float, high: float) -> None:
-    if not (math.isfinite(value) and low <= value <= high):
-        raise InvalidInput(name, value, f"a number from {low:g} to {high:g}")
 
 
 def _speeds(name: str, pair: tuple[float, float]) -> None:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.images.look import COLORMAPS, LEAST_FRAMED, LEAST_SIZE, MOST_SIZE, Look
+from bentray_workers.images.look import COLORMAPS, COLOUR_VALUE, LEAST_FRAMED, LEAST_SIZE, MOST_SIZE, Look
 from bentray_workers.images.plane import check_plane
 
 from ..wiring import CallerTenant, Service
 from .pictures import PICTURE, picture
 
 router = APIRouter()
+
+COLOUR_SCHEMA = cast("dict[str, Any]", COLOUR_VALUE.schema)
 
 
 def asked_look(
@@ -62,8 +63,13 @@ def slice_png(
             "upload: value."
         ),
     ] = None,
-    low: Annotated[float | None, Query(description="Value of the darkest colour; m/s for speed.")] = None,
-    high: Annotated[float | None, Query(description="Value of the brightest colour.")] = None,
+    low: Annotated[
+        float | None,
+        Query(description="Value of the darkest colour; m/s for speed.", json_schema_extra=COLOUR_SCHEMA),
+    ] = None,
+    high: Annotated[
+        float | None, Query(description="Value of the brightest colour.", json_schema_extra=COLOUR_SCHEMA)
+    ] = None,
 ) -> Response:
     """One slice as a PNG, drawn by a worker.
 
@@ -72,8 +78,8 @@ def slice_png(
     volume = service.volumes.get(tenant, volume_id)
     check_plane(volume["shape"], volume["spacing_m"], axis, index)
     for name, value in (("low", low), ("high", high)):
-        if value is not None and not math.isfinite(value):
-            raise InvalidInput(name, value, "a finite number")
+        if value is not None:
+            COLOUR_VALUE.check(name, value)
     how: dict[str, Any] = {"axis": axis, "index": index, "low": low, "high": high, **asdict(look)}
     path = service.files.of(tenant).volume(volume["id"])
     if "job_id" in volume:

@@ -8,12 +8,16 @@ from collections.abc import Callable
 from typing import Any
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import SPACING_M
+from bentray_kernels.ranges import Range
 
 from ..ingest.child import ACCEPTED
 
 Row = dict[str, Any]
 
 LONGEST_TITLE = 200
+# Nodes along an axis of a volume of raw bytes.
+SIDE = Range(2, 2**31)
 FORM = "names, each with its value in base 64, parted by commas"
 
 
@@ -48,21 +52,26 @@ def volume_given(title: str, spacing_m: str | None, shape: str | None, dtype: st
     """As ``volume_reading.Given`` takes it.
 
     Raises:
-        InvalidInput: for what are no numbers.
+        InvalidInput: for what are no numbers, or are out of range.
     """
     return {
         "title": title,
-        "spacing_m": _numbers("spacing_m", spacing_m, float, "0.001 or 0.001,0.001,0.002"),
-        "shape": _numbers("shape", shape, int, "nx,ny,nz"),
+        "spacing_m": _numbers("spacing_m", spacing_m, float, SPACING_M, "0.001 or 0.001,0.001,0.002"),
+        "shape": _numbers("shape", shape, int, SIDE, "nx,ny,nz"),
         "dtype": dtype,
     }
 
 
-def _numbers(field: str, text: str | None, kind: Callable[[str], float], accepted: str) -> list[float] | None:
+def _numbers(
+    field: str, text: str | None, kind: Callable[[str], float], within: Range, accepted: str
+) -> list[float] | None:
     """The numbers in a text, which commas part."""
     if text is None:
         return None
     try:
-        return [kind(part) for part in text.split(",")]
+        found = [kind(part) for part in text.split(",")]
     except ValueError:
         raise InvalidInput(field, repr(text[:80]), accepted) from None
+    for number in found:
+        within.check(field, number)
+    return found

@@ -114,7 +114,7 @@ def test_any_text_gives_settings_or_names_the_setting(name: str, text: str) -> N
             ["--speed-range", "1600", "1400"],
             "speed_range_mps: found (1600.0, 1400.0); accepted: (lowest, highest)",
         ),
-        (["--relaxation", "2"], "relaxation: found 2.0; accepted: a number between 0 and 2"),
+        (["--relaxation", "2"], "relaxation: found 2.0; accepted: a number above 0 and below 2"),
         (["--nodes", "4"], "nodes: found 4; accepted: a number from 16 to 2048"),
         (["--sweeps", "0"], "sweeps: found 0; accepted: a number from 1 to 1000"),
         (["--smoothing", "nan"], "smoothing_nodes: found nan; accepted: a number from 0 to 32"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.ranges import Range
 
 COLORMAPS = ("viridis", "magma", "inferno", "plasma", "cividis", "gray", "bone", "turbo", "coolwarm")
 # Between the values of nodes, and what Matplotlib calls it.
@@ -12,6 +13,8 @@ INTERPOLATIONS = {"nearest": "nearest", "cubic": "bicubic"}
 LEAST_SIZE, MOST_SIZE = 32, 4096
 # With a frame; below this nobody can read its text.
 LEAST_FRAMED = 200
+# The values of the darkest and the brightest colour: those that a volume may have (float32).
+COLOUR_VALUE = Range(-3.4e38, 3.4e38)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +10,13 @@ from bentray_kernels.errors import InvalidInput
 
 from ..reconstruction_file import read_reconstruction
 from .captions import LABELS, NAMES, facts
-from .look import Look
+from .look import COLOUR_VALUE, Look
 from .maps import RECOVERY_LIMITS, Limits, robust_limits
 from .plane import UPRIGHT, plane_of
 from .plane_picture import plane_png
+
+# Of the larger of two limits, so much lies between them at least.
+LEAST_SPAN = 1e-9
 
 
 def slice_png(
@@ -66,13 +69,15 @@ def given_limits(limits: Limits, low: float | None, high: float | None) -> Limit
     """The limits with what was asked for in their place.
 
     Raises:
-        InvalidInput: for what is not finite, or not lower than the other.
+        InvalidInput: for what no volume can hold, or is not clearly lower than the other.
     """
     for name, value in (("low", low), ("high", high)):
-        if value is not None and not math.isfinite(value):
-            raise InvalidInput(name, value, "a finite number")
+        if value is not None:
+            COLOUR_VALUE.check(name, value)
     chosen = (limits[0] if low is None else low, limits[1] if high is None else high)
-    if not chosen[0] < chosen[1]:
+    # Colours need steps between the two that numbers of this size can tell apart.
+    least = max(LEAST_SPAN * max(map(abs, chosen)), sys.float_info.min)
+    if not chosen[1] - chosen[0] > least:
         if low is None:
             raise InvalidInput("high", high, f"a number above {chosen[0]:.6g}, or a low below it")
         raise InvalidInput("low", low, f"a number below {chosen[1]:.6g}")

@@ -1,0 +1,88 @@
+"""The range of a number, declared once with its field and checked once where the number enters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from .errors import InvalidInput
+
+# Under this key a field's metadata holds its ``Range``.
+RANGE = "range"
+
+
+@dataclass(frozen=True)
+class Range:
+    """All numbers between two, which belong to it unless it says otherwise.
+
+    Attributes:
+        least, most: the bounds.
+        above, below: whether the number must lie above ``least``, and below ``most``.
+        unit: of the bounds; empty for a count or a ratio.
+    """
+
+    least: float
+    most: float
+    above: bool = False
+    below: bool = False
+    unit: str = ""
+
+    def holds(self, value: float) -> bool:
+        """Whether a number of any size lies in it; NaN lies in no range."""
+        # Python compares an integer of 400 digits with a float exactly, where float() of it overflows.
+        low = self.least < value if self.above else self.least <= value
+        return bool(low and (value < self.most if self.below else value <= self.most))
+
+    def check(self, name: str, value: float) -> None:
+        """Refuse a number that is not in it.
+
+        Raises:
+            InvalidInput: naming ``name``.
+        """
+        if not self.holds(value):
+            raise InvalidInput(name, value, self.words)
+
+    @property
+    def words(self) -> str:
+        """As a refusal and a description say it."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.above or self.below:
+            low, high = "above" if self.above else "from", "below" if self.below else "at most"
+            return f"a number {low} {self.least:g} and {high} {self.most:g}{unit}"
+        return f"a number from {self.least:g} to {self.most:g}{unit}"
+
+    @property
+    def schema(self) -> dict[str, float]:
+        """The same in JSON Schema."""
+        low = "exclusiveMinimum" if self.above else "minimum"
+        return {low: self.least, "exclusiveMaximum" if self.below else "maximum": self.most}
+
+
+def ranged(default: Any, within: Range, **metadata: Any) -> Any:
+    """A field of a dataclass that takes numbers of one range, or None.
+
+    Args:
+        default: of the field.
+        within: the range; it stands in the JSON schema of the field too.
+        metadata: of the field, beside.
+    """
+    return field(default=default, metadata={RANGE: within, "json_schema_extra": within.schema, **metadata})
+
+
+def ranges_of(kind: Any) -> Mapping[str, Range]:
+    """The ranges of a dataclass by its fields."""
+    return {one.name: one.metadata[RANGE] for one in fields(kind) if RANGE in one.metadata}
+
+
+def check_ranges(given: Any) -> None:
+    """Hold every number of a dataclass against the range of its field; None is not held against any.
+
+    Raises:
+        InvalidInput: naming the first field that is wrong, or the ``place`` in its metadata.
+    """
+    for one in fields(given):
+        within = one.metadata.get(RANGE)
+        value = getattr(given, one.name)
+        if within is not None and value is not None:
+            within.check(one.metadata.get("place", one.name), value)

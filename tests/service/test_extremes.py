@@ -1,0 +1,109 @@
+"""Extreme numbers wherever a request takes one: refused by name, or answered; never a 500."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+
+from bentray_kernels.ranges import RANGE
+from bentray_kernels.tomography.settings import Settings
+from bentray_service.openapi import description
+from bentray_workers.asked_simulation import AskedSimulation
+from bentray_workers.field_settings import FieldSettings
+from bentray_workers.turntable import Turntable
+
+from ..extremes import EXTREMES
+
+STREAM = {"Content-Type": "application/octet-stream"}
+JSON = {"Content-Type": "application/json"}
+KINDS = {
+    "reconstruction": Settings,
+    "simulation": AskedSimulation,
+    "refraction": Turntable,
+    "geometry-field": FieldSettings,
+}
+# Numbers whose range depends on another one, and lists of them.
+OTHERS = {
+    "reconstruction": ("speed_bounds_mps", "speed_range_mps"),
+    "refraction": ("iso", "index", "surroundings"),
+}
+
+
+@pytest.fixture
+def http(start):
+    return start(max_queued_jobs=10_000)
+
+
+@pytest.fixture
+def volume(http):
+    buffer = io.BytesIO()
+    np.save(buffer, np.arange(60, dtype=np.uint8).reshape(3, 4, 5))
+    return http.post("/v1/volumes", content=buffer.getvalue(), headers=STREAM).json()
+
+
+def numbers_of(kind):
+    ranged = [name for name, one in KINDS[kind].__dataclass_fields__.items() if RANGE in one.metadata]
+    return [*ranged, *OTHERS.get(kind, ())]
+
+
+def refused_by_name(answer, name):
+    """A 422 whose field ends in the name of what was wrong; a name of one letter more is no other field."""
+    problem = answer.json()
+    assert answer.status_code == 422, answer.text[:400]
+    assert name in problem["field"], problem
+    assert len(answer.content) < 4000
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_extreme_setting_of_a_job_is_refused_or_taken(http, uploaded, volume, work, kind):
+    named = {"reconstruction": {"dataset": uploaded(http)}, "refraction": {"volume": volume["id"]}}
+    refused = 0
+    for name in numbers_of(kind):
+        for value in (*EXTREMES, list(EXTREMES[:2]), "1e999", "9" * 400):
+            asked = {"kind": kind, "settings": {name: value}, **named.get(kind, {})}
+            if kind == "geometry-field":
+                asked["mesh"] = "mesh-0123456789abcdef0123"
+            answer = http.post("/v1/jobs", content=json.dumps(asked), headers=JSON)
+            if answer.status_code == 422:
+                refused_by_name(answer, name.split("_")[0])
+                refused += 1
+            else:
+                # There is no such mesh; what was asked of it was right.
+                assert answer.status_code in (202, 404), answer.text[:400]
+    assert refused > 10 * len(numbers_of(kind))
+
+
+@pytest.mark.parametrize("name", ["low", "high", "index", "size"])
+def test_an_extreme_number_of_a_slice(http, volume, name):
+    for value in EXTREMES:
+        answer = http.get(volume["links"]["image"], params={name: str(value)})
+        if answer.status_code != 200:
+            refused_by_name(answer, name)
+
+
+def test_colours_over_all_numbers_are_refused(http, volume):
+    answer = http.get(volume["links"]["image"], params={"low": "-1e308", "high": "1e308"})
+    refused_by_name(answer, "low")
+    wide = http.get(volume["links"]["image"], params={"low": "-3e38", "high": "3e38"})
+    assert wide.status_code == 200
+    for low, high in (("0", "5e-324"), ("1", "1.0000000000000002"), ("-0.0", "0.0")):
+        refused_by_name(http.get(volume["links"]["image"], params={"low": low, "high": high}), "low")
+
+
+def test_every_number_of_a_query_or_header_has_bounds(http, volume):
+    """Each is drawn from the description, so that a new one is held against the extremes too."""
+    drawn = 0
+    for path, operations in json.loads(description())["paths"].items():
+        for parameter in operations.get("get", {}).get("parameters", ()):
+            types = [parameter["schema"], *parameter["schema"].get("anyOf", ())]
+            if parameter["in"] != "query" or not {"integer", "number"} & {one.get("type") for one in types}:
+                continue
+            where = path.format(
+                volume_id=volume["id"], **dict.fromkeys(("dataset_id", "job_id", "field_id"), "none")
+            )
+            for value in EXTREMES:
+                answer = http.get(where, params={parameter["name"]: str(value)})
+                assert answer.status_code in (200, 404, 422), (path, parameter["name"], answer.text[:300])
+                drawn += 1
+    assert drawn > 100
