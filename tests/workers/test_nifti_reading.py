@@ -149,9 +149,33 @@ def test_what_is_refused(tmp_path, content, field, capfd, caplog):
     assert (caplog.text, *capfd.readouterr()) == ("", "", "")
 
 
-def test_a_bomb_gives_what_was_declared_and_no_more(tmp_path):
+def test_a_bomb_is_read_a_little_beyond_what_was_declared_and_refused(tmp_path):
     (tmp_path / "v").write_bytes(gzip.compress(image().to_bytes() + b"\0" * 200_000_000, 9))
+    assert "more data after the values" in refused(tmp_path / "v").value
+
+
+def test_a_few_bytes_may_follow_the_values(tmp_path):
+    (tmp_path / "v").write_bytes(gzip.compress(image().to_bytes() + b"\0" * 512))
     np.testing.assert_array_equal(import_volume(tmp_path / "v").values, ramp(dtype=np.int16))
+
+
+@pytest.mark.parametrize("byte", [-1, -4, -5, -8, -40])
+def test_a_flipped_bit_in_packed_values_their_check_sum_or_length_is_refused(tmp_path, byte):
+    """Stored without compression, so that the flip changes a value and nothing else.
+
+    The values are longer than what gzip reads ahead, where it would meet the check sum by chance.
+    """
+    values = np.zeros((60, 60, 60), np.int16)
+    content = bytearray(gzip.compress(image(values).to_bytes(), compresslevel=0))
+    content[byte] ^= 1
+    (tmp_path / "v").write_bytes(content)
+    assert "damaged data" in refused(tmp_path / "v").value
+
+
+@pytest.mark.parametrize("missing", [1, 8])
+def test_packed_values_without_the_whole_check_sum_are_refused(tmp_path, missing):
+    (tmp_path / "v").write_bytes(gzip.compress(image().to_bytes())[:-missing])
+    assert "damaged data" in refused(tmp_path / "v").value
 
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -104,10 +104,20 @@ def test_a_header_without_an_end(tmp_path):
     assert "without an end" in refused(write(tmp_path / "v", PLAIN, b"", end="")).value
 
 
-def test_a_bomb_gives_what_was_declared_and_no_more(tmp_path):
-    packed = gzip.compress(b"\0" * 200_000_000, 9)
-    volume = import_volume(write(tmp_path / "v", PLAIN.replace("raw", "gzip"), packed))
-    assert volume.values.shape == (3, 4, 5)
+@pytest.mark.parametrize("encoding", ["raw", "gzip"])
+def test_more_values_than_declared_are_refused_unread(tmp_path, encoding):
+    data = b"\0" * 200_000_000
+    data = gzip.compress(data, 9) if encoding == "gzip" else data[:61]
+    error = refused(write(tmp_path / "v", PLAIN.replace("raw", encoding), data))
+    assert "more data after the values" in error.value
+
+
+@pytest.mark.parametrize("byte", [-1, -4, -5, -8, -40])
+def test_a_flipped_bit_in_packed_values_their_check_sum_or_length_is_refused(tmp_path, byte):
+    packed = bytearray(gzip.compress(ramp().tobytes("F"), compresslevel=0))
+    packed[byte] ^= 1
+    error = refused(write(tmp_path / "v", PLAIN.replace("raw", "gzip"), bytes(packed)))
+    assert "damaged data" in error.value
 
 
 def test_packed_values_that_end_early_or_are_none(tmp_path):

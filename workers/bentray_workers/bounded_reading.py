@@ -18,6 +18,9 @@ LARGEST_BYTES = 2 * 2**30
 # Before the values of a file; longer ones are no honest headers.
 LONGEST_HEADER = 2**20
 
+# After the values, of a file that is packed: some writers align its end, none adds much.
+LONGEST_TAIL = 2**16
+
 # Units of length in headers.
 UNITS_M = {"m": 1.0, "meter": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "micron": 1e-6}
 
@@ -47,6 +50,21 @@ def whole(file: Any, count: int) -> bytes:
     if len(data) < count:
         raise InvalidInput("file", f"{len(data)} bytes of values", f"{count}, as its header says")
     return data
+
+
+def at_end(file: Any, tail: int = 0) -> None:
+    """See that an unpacked file ends here, which makes its reader verify the check sum and the length.
+
+    Args:
+        file: all of whose values have been read.
+        tail: bytes that may follow.
+
+    Raises:
+        InvalidInput: where more follows. The reader itself raises where the check sum is another.
+    """
+    if len(file.read(tail + 1)) > tail:
+        found = "more data after the values than its header declares"
+        raise InvalidInput("file", found, "the values and nothing more")
 
 
 @contextmanager

@@ -11,7 +11,17 @@ from numpy.typing import NDArray
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 
-from .bounded_reading import LONGEST_HEADER, UNITS_M, ShapeCheck, any_shape, declared, refusing, whole
+from .bounded_reading import (
+    LONGEST_HEADER,
+    LONGEST_TAIL,
+    UNITS_M,
+    ShapeCheck,
+    any_shape,
+    at_end,
+    declared,
+    refusing,
+    whole,
+)
 from .volume_axes import turned
 from .volume_file import Volume
 
@@ -26,7 +36,7 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
     left of a tilt is not kept. A file that says nothing of directions (both codes 0) stays as it is stored.
 
     Args:
-        file: at its beginning.
+        file: at its beginning. It is read to its end, so that one that was packed verifies its check sum.
         check: called with the shape in the file before the values are read.
 
     Raises:
@@ -58,6 +68,7 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
             raise InvalidInput("vox_offset", offset, f"{size} to {LONGEST_HEADER} bytes")
         file.seek(offset)
         values = np.frombuffer(whole(file, count), dtype).reshape(shape, order="F")
+        at_end(file, LONGEST_TAIL)
         if (slope or 1.0, intercept or 0.0) != (1.0, 0.0):
             with np.errstate(over="ignore", invalid="ignore"):
                 values = values * np.float32(slope) + np.float32(intercept)

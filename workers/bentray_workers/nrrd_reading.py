@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 
-from .bounded_reading import LONGEST_HEADER, UNITS_M, ShapeCheck, any_shape, declared, refusing, whole
+from .bounded_reading import (
+    LONGEST_HEADER,
+    UNITS_M,
+    ShapeCheck,
+    any_shape,
+    at_end,
+    declared,
+    refusing,
+    whole,
+)
 from .volume_axes import turned
 from .volume_file import Volume
 
@@ -67,9 +76,11 @@ def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
         encoding = header["encoding"]
         if encoding == "raw":
             data = whole(file, count)
+            at_end(file)
         elif encoding in ("gzip", "gz"):
             with gzip.open(file) as unpacked:
                 data = whole(unpacked, count)
+                at_end(unpacked)
         else:
             raise InvalidInput("encoding", repr(encoding), "raw or gzip")
         values = np.frombuffer(data, dtype).reshape(shape, order="F")

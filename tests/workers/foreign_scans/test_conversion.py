@@ -19,6 +19,7 @@ from bentray_kernels.acquisition import speed_from_temperature
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.dataset_file import read_dataset, write_dataset
 from bentray_workers.foreign_scans import convert_dataset
+from bentray_workers.foreign_scans.matlab5 import Matlab5
 
 from ...kernels.acquisition.traces import scan
 from .scans import (
@@ -291,6 +292,30 @@ def _refused_in_little_memory(tmp_path: Path, name: str) -> int:
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
+
+
+def test_a_flipped_bit_in_an_archive_is_told_by_its_check_sum(tmp_path):
+    """Not compressed, so that a flip in the middle of the traces changes one value and nothing else."""
+    np.savez(tmp_path / "scan.npz", **named(scan(2e-7, elements=ELEMENTS)))
+    content = bytearray((tmp_path / "scan.npz").read_bytes())
+    with zipfile.ZipFile(tmp_path / "scan.npz") as archive:
+        traces_at = archive.getinfo("waveform/object.npy")
+        content[traces_at.header_offset + traces_at.compress_size // 2] ^= 1
+    (tmp_path / "scan.npz").write_bytes(content)
+    with pytest.raises(InvalidInput, match="waveform/object: found damaged data .*CRC"):
+        convert_dataset(tmp_path / "scan.npz", tmp_path / "canonical.h5")
+
+
+@pytest.mark.parametrize("byte", [-1, -4])
+def test_packed_numbers_of_matlab_have_a_check_sum_that_is_verified(tmp_path, byte):
+    savemat(tmp_path / "scan.mat", {"delta_tof": travel_times()["delta_tof"]}, do_compression=True)
+    packed = bytearray((tmp_path / "scan.mat").read_bytes())
+    arrays = Matlab5(tmp_path / "scan.mat")
+    assert arrays.whole("delta_tof").shape == (ELEMENTS, ELEMENTS)
+    packed[byte] ^= 1
+    (tmp_path / "scan.mat").write_bytes(packed)
+    with pytest.raises(InvalidInput, match="delta_tof: found damaged data"):
+        Matlab5(tmp_path / "scan.mat").whole("delta_tof")
 
 
 @pytest.mark.parametrize("kind", ["matlab5", "matlab5-packed", "matlab73", "npz"])

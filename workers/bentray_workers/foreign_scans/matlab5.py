@@ -43,6 +43,8 @@ COMPLEX = 0x0800
 
 MOST_VARIABLES = 1000
 LONGEST_NAME = 200
+# After the numbers of an array, whose size is a multiple of it.
+PADDING_BYTES = 8
 # zlib packs at best 1032 times.
 PACKING = 1100.0
 
@@ -132,6 +134,7 @@ class Matlab5:
                 with np.errstate(invalid="ignore"):
                     part = np.frombuffer(data, dtype=stored).astype(dtype)
                 yield part
+            stream.end(PADDING_BYTES)
 
     def _index(self, file: IO[bytes], size: int) -> Iterator[tuple[str, _Variable]]:
         at = HEADER_BYTES

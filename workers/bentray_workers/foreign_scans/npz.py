@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from ..bounded_reading import LONGEST_HEADER, refusing
+from ..bounded_reading import LONGEST_HEADER, at_end, refusing
 from ..npy_headers import PARSING
 from .arrays import check_declared, check_row
 
@@ -65,6 +65,7 @@ class Npz:
         with refusing(name, WHOLE), self._open(name) as file:
             shape, fortran, dtype = self._header(name, file)
             data = _exactly(name, file, math.prod(shape) * dtype.itemsize)
+            at_end(file)
             flat = np.frombuffer(data, dtype=dtype)
             return flat.reshape(shape[::-1]).T if fortran else flat.reshape(shape)
 
@@ -79,6 +80,8 @@ class Npz:
                 with refusing(name, WHOLE):
                     data = _exactly(name, file, math.prod(shape[1:]) * dtype.itemsize)
                 yield np.frombuffer(data, dtype=dtype).reshape(shape[1:])
+            with refusing(name, WHOLE):
+                at_end(file)
 
     def _open(self, name: str) -> IO[bytes]:
         with refusing(name, WHOLE):

@@ -48,6 +48,24 @@ class Stream:
             self.read(part)
             count -= part
 
+    def end(self, tail: int) -> None:
+        """See that a packed element ends here, which makes zlib verify its check sum.
+
+        Args:
+            tail: bytes of padding that may follow.
+
+        Raises:
+            InvalidInput: where more follows, where the end is missing, and for another check sum.
+        """
+        if self._unpack is None:
+            return
+        while part := self._some(tail + 1):
+            tail -= len(part)
+            if tail < 0:
+                raise InvalidInput(self._name, "more data than its header declares", "whole data")
+        if not self._unpack.eof:
+            raise InvalidInput(self._name, "packed data without their end", "whole data")
+
     def _some(self, most: int) -> bytes:
         if self._unpack is None:
             return self._stored(most)
