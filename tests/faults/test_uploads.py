@@ -115,7 +115,7 @@ def test_an_upload_survives_the_service(tmp_path):
         )
         assert sent.status_code == 204
         incoming = tmp_path / "data" / "tenants" / "local" / "incoming"
-        wait_for(lambda: list(incoming.glob("*.partial")))
+        wait_for(lambda: list(incoming.glob("*.reading/*.partial")))
         assert httpx.get(service.url + place).json()["state"] == "reading"
         service.kill()
         assert stored.stat().st_size == len(content)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import h5py
@@ -12,20 +12,26 @@ import h5py
 from bentray_kernels.acquisition import Dataset
 
 from .dataset_reading import NUMERIC, TRACES, dataset_of, stand_ins, trace_type
-from .dataset_writing import Piece, write_dataset
+from .dataset_writing import Piece, bytes_of, write_dataset
 from .hdf5_reading import Limits, opened, refusing
 
 # Of one piece. It takes about three times as much while it is read, converted and packed.
 PIECE_BYTES = 16 * 2**20
 
 
-def copy_dataset(source: Path, target: Path, limits: Limits | None = None) -> Dataset:
+def copy_dataset(
+    source: Path,
+    target: Path,
+    limits: Limits | None = None,
+    on_size: Callable[[int], None] = lambda size: None,
+) -> Dataset:
     """Check a dataset file and write it anew, with no more than a piece of its traces in memory.
 
     Args:
         source: of the HDF5 file.
         target: replaced whole or not touched.
         limits: what the file may ask for; None: the defaults of ``Limits``.
+        on_size: told before ``target`` is written how many bytes it will have at most, but for its headers.
 
     Returns:
         What it holds. In place of traces there are arrays of their shape and type that take no memory.
@@ -36,6 +42,7 @@ def copy_dataset(source: Path, target: Path, limits: Limits | None = None) -> Da
     """
     with opened(source, limits or Limits()) as reader:
         dataset = dataset_of(reader, stand_ins)
+        on_size(bytes_of(dataset))
 
         def pieces(name: str, chunk: tuple[int, ...]) -> Iterator[Piece]:
             path = f"waveform/{name}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,13 @@ def write_dataset(path: Path, dataset: Dataset, pieces: Pieces | None = None) ->
         raise InvalidInput("traveltime", "neither travel times nor traces", "at least one of the two")
     with creating(Path(path)) as file:
         _write(file, dataset, pieces)
+
+
+def bytes_of(dataset: Dataset) -> int:
+    """Of all arrays of a dataset; its file packs them, and is larger by its headers at most."""
+    parts = [part for part in (dataset, dataset.waveform, dataset.truth) if part is not None]
+    arrays = (getattr(part, one.name) for part in parts for one in fields(part))
+    return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
 
 def write_array(group: h5py.Group, name: str, array: Any) -> None:

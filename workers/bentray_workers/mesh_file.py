@@ -33,6 +33,12 @@ class StoredMesh:
     mesh: TriangleMesh
     colours: Floats | None = None
 
+    @property
+    def nbytes(self) -> int:
+        """Of its arrays; a file packs them."""
+        parts = (self.mesh.vertices, self.mesh.faces, self.colours)
+        return sum(part.nbytes for part in parts if part is not None)
+
     def content(self) -> str:
         """SHA-256 of vertices, faces and colours, in hexadecimal."""
         digest = hashlib.sha256()

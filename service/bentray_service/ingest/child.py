@@ -1,6 +1,8 @@
 """The process that opens an uploaded file: limits itself, reads, rewrites, and prints one line of JSON.
 
 ``python -m bentray_service.ingest.child WHAT IN OUT --memory BYTES --seconds SECONDS --given JSON``
+
+Before it writes, it prints a line ``{"reserve": bytes}`` and waits for a line ``go`` on its input.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ import json
 import math
 import resource
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +22,8 @@ from bentray_workers.dataset_record import record_of, text
 
 if TYPE_CHECKING:
     from bentray_workers.volume_file import Volume
+
+OnSize = Callable[[int], None]
 
 OPEN_FILES = 64
 # How much larger the canonical file of a large upload may be: it is packed quickly, not well.
@@ -43,7 +48,7 @@ def main() -> None:
     parser.add_argument("--given", type=json.loads, required=True, help="what the user says of the file")
     asked = parser.parse_args()
     limit(asked.memory, asked.seconds, PACKING * asked.source.stat().st_size)
-    answer = convert(asked.what, asked.source, asked.target, asked.given)
+    answer = convert(asked.what, asked.source, asked.target, asked.given, reserve)
     sys.stdout.write(json.dumps(answer) + "\n")
 
 
@@ -62,8 +67,26 @@ def limit(memory_bytes: int, seconds: float, file_bytes: int = 0) -> None:
         resource.setrlimit(what, (allowed, allowed))
 
 
-def convert(what: str, source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
-    """Read ``source``, write the canonical ``target``, and say what it holds or what is wrong with it."""
+def reserve(size: int) -> None:
+    """Tell the service how large the canonical file will be at most, and wait for its word."""
+    sys.stdout.write(json.dumps({"reserve": size}) + "\n")
+    sys.stdout.flush()
+    if not sys.stdin.readline():
+        # The service is gone, or refuses it and ends this process.
+        raise SystemExit(1)
+
+
+def convert(
+    what: str,
+    source: Path,
+    target: Path,
+    given: dict[str, Any],
+    on_size: OnSize = lambda size: None,
+) -> dict[str, Any]:
+    """Read ``source``, write the canonical ``target``, and say what it holds or what is wrong with it.
+
+    ``on_size`` is told before it is written how many bytes it will have at most, but for a header.
+    """
     try:
         from bentray_kernels.errors import InvalidInput
 
@@ -72,7 +95,7 @@ def convert(what: str, source: Path, target: Path, given: dict[str, Any]) -> dic
         # Where memory ends, NumPy says that it cannot be imported.
         return _error("file", "no memory left to start the reader", "a larger BENTRAY_INGEST_MEMORY_BYTES")
     try:
-        return {"ok": CONVERTED[what](source, target, given)}
+        return {"ok": CONVERTED[what](source, target, given, on_size)}
     except InvalidInput as error:
         return _error(error.field, error.value, error.accepted)
     except MemoryError:
@@ -84,27 +107,29 @@ def convert(what: str, source: Path, target: Path, given: dict[str, Any]) -> dic
         return _error("file", f"{type(error).__name__}: {error}", ACCEPTED[what])
 
 
-def _dataset(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
+def _dataset(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) -> dict[str, Any]:
     from bentray_workers.foreign_scans import convert_dataset
 
-    return record_of(convert_dataset(source, target))
+    return record_of(convert_dataset(source, target, on_size=on_size))
 
 
-def _volume(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
+def _volume(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) -> dict[str, Any]:
     from bentray_workers.volume_file import write_volume
     from bentray_workers.volume_reading import Given, import_volume
 
     volume = import_volume(source, Given(**given))
+    on_size(volume.values.nbytes)
     write_volume(target, volume)
     return volume_summary(volume)
 
 
-def _mesh(source: Path, target: Path, given: dict[str, Any]) -> dict[str, Any]:
+def _mesh(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) -> dict[str, Any]:
     from bentray_workers.mesh_file import StoredMesh, summary_of, write_mesh
     from bentray_workers.mesh_reading import read_mesh
 
     found = read_mesh(source.read_bytes())
     stored = StoredMesh(found.surface.mesh, found.colours)
+    on_size(stored.nbytes)
     write_mesh(target, stored)
     return summary_of(stored, found.surface, found.format) | {"title": text(given["title"])}
 

@@ -9,6 +9,8 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
+import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -23,6 +25,9 @@ log = logging.getLogger("bentray.ingest")
 
 # Slow for reading and packing traces: a busy machine must be able to.
 BYTES_PER_S = 8 * 2**20
+
+# Of what a process that fails says on its error output, which goes to the log.
+LONGEST_COMPLAINT = 2000
 
 # One thread each: every further one reserves address space, which is limited. No filter plug-in is loaded.
 ENVIRONMENT = {
@@ -45,8 +50,12 @@ def ingest(
     scratch: Path,
     given: Mapping[str, Any] = MappingProxyType({}),
     started: Callable[[int], None] = lambda process_id: None,
+    reserve: Callable[[int], None] = lambda size: None,
 ) -> dict[str, Any]:
     """Check ``source`` in a process of its own and write the canonical ``target``.
+
+    What it leaves beside ``target`` when it is killed is for the caller to remove: its temporary files lie
+    there too.
 
     Args:
         what: a key of ``ACCEPTED``.
@@ -56,6 +65,8 @@ def ingest(
         scratch: the folder it runs in.
         given: what the user says of it: of a volume as ``volume_reading.Given``, of a mesh its title.
         started: told the id of the process.
+        reserve: told the bytes that ``target`` will have at most, before the process writes it; what it
+            raises ends the process.
 
     Returns:
         The summary of what it holds.
@@ -67,30 +78,28 @@ def ingest(
     seconds += source.stat().st_size // BYTES_PER_S
     command = [sys.executable, "-I", "-m", "bentray_service.ingest.child", what, str(source), str(target)]
     command += ["--memory", str(memory_bytes), "--seconds", str(seconds), "--given", json.dumps(dict(given))]
-    process = subprocess.Popen(  # noqa: S603 - our own program and paths
-        command,
-        cwd=scratch,
-        env=ENVIRONMENT,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-    )
-    try:
-        started(process.pid)
-        output, complaint = process.communicate(timeout=seconds)
-    except subprocess.TimeoutExpired:
-        raise InvalidInput(
-            "file", f"a file that takes more than {seconds:g} s to read", ACCEPTED[what]
-        ) from None
-    finally:
-        _kill(process)
-    if process.returncode != 0:
-        log.warning(
-            "the ingest process ended with %s: %s", process.returncode, complaint.decode(errors="replace")
+    with tempfile.TemporaryFile(dir=scratch) as complaint:
+        process = subprocess.Popen(  # noqa: S603 - our own program and paths
+            command,
+            cwd=scratch,
+            env={**ENVIRONMENT, "TMPDIR": str(target.parent)},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=complaint,
+            start_new_session=True,
         )
-        raise InvalidInput("file", _death(process.returncode, memory_bytes), ACCEPTED[what])
-    answer: dict[str, Any] = json.loads(output)
+        try:
+            started(process.pid)
+            answer = _answer(process, seconds, reserve)
+        finally:
+            _kill(process)
+        if answer is None:
+            raise InvalidInput("file", f"a file that takes more than {seconds:g} s to read", ACCEPTED[what])
+        if process.returncode != 0:
+            complaint.seek(0)
+            said = complaint.read(LONGEST_COMPLAINT).decode(errors="replace")
+            log.warning("the ingest process ended with %s: %s", process.returncode, said)
+            raise InvalidInput("file", _death(process.returncode, memory_bytes), ACCEPTED[what])
     if "full" in answer:
         raise StorageFull("body", "no space for the checked copy", "a smaller file, or a larger disk")
     if "error" in answer:
@@ -98,12 +107,54 @@ def ingest(
     return dict(answer["ok"])
 
 
+def _answer(
+    process: subprocess.Popen[bytes], seconds: float, reserve: Callable[[int], None]
+) -> dict[str, Any] | None:
+    """The last line that the process says, once it has ended; None when it took longer than allowed."""
+    assert process.stdin is not None
+    assert process.stdout is not None
+    late = threading.Event()
+
+    def end() -> None:
+        late.set()
+        _kill_group(process)
+
+    answer: dict[str, Any] = {}
+    watch = threading.Timer(seconds, end)
+    watch.start()
+    try:
+        for line in process.stdout:
+            if not line.endswith(b"\n"):
+                # It died while it wrote.
+                break
+            answer = json.loads(line)
+            if "reserve" in answer:
+                reserve(int(answer["reserve"]))
+                # A process that is dead by now is told of by its exit code.
+                with contextlib.suppress(BrokenPipeError):
+                    process.stdin.write(b"go\n")
+                    process.stdin.flush()
+        process.wait()
+    finally:
+        watch.cancel()
+        watch.join()
+    return None if late.is_set() else answer
+
+
+def _kill_group(process: subprocess.Popen[bytes]) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+
+
 def _kill(process: subprocess.Popen[bytes]) -> None:
     """End the process and whatever it started, then collect it."""
     if process.returncode is None:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
+        _kill_group(process)
+        process.wait()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with contextlib.suppress(BrokenPipeError):
+                pipe.close()
 
 
 def _death(code: int, memory_bytes: int) -> str:

@@ -49,7 +49,10 @@ class TenantFiles:
     def drop_leftovers(self) -> None:
         """Remove what a dead process left half done."""
         for left in self._incoming.iterdir():
-            left.unlink()
+            if left.is_dir():
+                shutil.rmtree(left)
+            else:
+                left.unlink()
         for folder in (self._datasets, self._volumes, self._exports, self._animations, self._meshes):
             for left in folder.glob("*.partial"):
                 left.unlink()
@@ -59,8 +62,10 @@ class TenantFiles:
         return self._incoming / f"{self._canonical(upload_id).stem}.upload"
 
     def candidate(self, upload_id: str) -> Path:
-        """Where the ingest process writes the canonical file."""
-        return self._incoming / self._canonical(upload_id).name
+        """Where the ingest process writes the canonical file: in a folder of its own, made if needed."""
+        folder = self._reading(upload_id)
+        folder.mkdir(exist_ok=True)
+        return folder / self._canonical(upload_id).name
 
     def upload(self, upload_id: str) -> Path:
         """What has come of an upload that comes in pieces; it outlives the service."""
@@ -111,9 +116,8 @@ class TenantFiles:
                 shutil.rmtree(folder, ignore_errors=True)
 
     def discard_candidate(self, upload_id: str) -> None:
-        """Remove a canonical file that was not adopted, also what a killed process left of it."""
-        for left in self._incoming.glob(f"{self.candidate(upload_id).name}*"):
-            left.unlink(missing_ok=True)
+        """Remove a canonical file that was not adopted, with all that a killed process left beside it."""
+        shutil.rmtree(self._reading(upload_id), ignore_errors=True)
 
     def adopt(self, upload_id: str) -> Path:
         """Move the checked canonical file to its place, and keep it for good.
@@ -156,6 +160,9 @@ class TenantFiles:
         if prefix == PREFIXES["job"]:
             return [self.animation(stored_id, extension) for extension in ANIMATIONS]
         return [place.get(prefix, self.dataset)(stored_id)]
+
+    def _reading(self, upload_id: str) -> Path:
+        return self._incoming / f"{self._canonical(upload_id).stem}.reading"
 
     def _canonical(self, upload_id: str) -> Path:
         place = {PREFIXES["volume"]: self.volume, PREFIXES["mesh"]: self.mesh}

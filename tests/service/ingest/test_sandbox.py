@@ -10,7 +10,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.ingest import sandbox
-from bentray_service.refusals import StorageFull
+from bentray_service.refusals import QuotaUsedUp, StorageFull
 
 LIMITS = {"memory_bytes": 4 * 1024**3, "seconds": 60.0}
 
@@ -62,6 +62,56 @@ def test_a_reader_that_hangs_is_ended_with_its_children(program, scan, tmp_path)
     status = Path("/proc", (tmp_path / "pid").read_text(), "stat")
     # Gone, or dead and not yet collected by the process that inherited it.
     assert not status.exists() or status.read_text().split()[2] == "Z"
+
+
+def test_the_size_is_told_before_the_file_is_written(scan, tmp_path):
+    told = []
+
+    def reserve(size):
+        told.append((size, (tmp_path / "out.h5").exists()))
+
+    run(scan(), tmp_path, reserve=reserve)
+    # Positions, emitters and receivers, and a travel time a pair.
+    assert told == [(16 * 2 * 8 + 2 * 16 * 8 + 16 * 16 * 8, False)]
+
+
+def test_a_size_that_is_refused_ends_the_reader_and_nothing_is_written(scan, tmp_path):
+    running = []
+
+    def reserve(size):
+        raise QuotaUsedUp("storage", f"{size} bytes", "fewer")
+
+    with pytest.raises(QuotaUsedUp):
+        run(scan(), tmp_path, reserve=reserve, started=running.append)
+    with pytest.raises(ProcessLookupError):
+        os.kill(running[0], 0)
+    assert {path.name for path in tmp_path.iterdir()} == {"scan.h5"}
+
+
+def test_temporary_files_of_a_reader_lie_beside_the_file_it_makes(program, scan, tmp_path):
+    """A reader that is killed does not remove them; the caller removes the folder."""
+    program(
+        "import tempfile, time\n"
+        "with tempfile.NamedTemporaryFile() as file:\n"
+        "    print('{\"reserve\": 1}', flush=True)\n    time.sleep(60)\n"
+    )
+    (tmp_path / "own").mkdir()
+
+    def kill(size):
+        raise QuotaUsedUp("storage", f"{size} bytes", "fewer")
+
+    with pytest.raises(QuotaUsedUp):
+        sandbox.ingest(
+            "dataset", scan(), tmp_path / "own" / "out.h5", scratch=tmp_path, reserve=kill, **LIMITS
+        )
+    assert len(list((tmp_path / "own").iterdir())) == 1
+
+
+def test_a_reader_that_says_much_before_it_fails_does_not_hang(program, scan, tmp_path, caplog):
+    program("import sys; sys.stderr.write('x' * 1_000_000); raise SystemExit(7)")
+    with pytest.raises(InvalidInput, match="exit code 7"):
+        run(scan(), tmp_path)
+    assert len(caplog.text) < 10_000
 
 
 def test_a_large_file_has_more_time(program, tmp_path):

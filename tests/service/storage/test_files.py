@@ -35,13 +35,17 @@ def test_half_done_work_is_dropped(tmp_path):
     assert kept.exists()
 
 
-def test_a_candidate_goes_with_what_a_killed_writer_left_of_it(tmp_path):
-    files = Files(tmp_path).of(LOCAL)
+def test_a_candidate_goes_with_what_a_killed_writer_left_beside_it(tmp_path):
+    root = Files(tmp_path)
+    root.prepare()
+    files = root.of(LOCAL)
     mine, other = files.candidate(new_id("dataset")), files.candidate(new_id("dataset"))
-    for path in (mine, mine.with_name(f"{mine.name}.1f.partial"), other):
+    for path in (mine, mine.with_name(f"{mine.name}.1f.partial"), mine.with_name("tmp7x.h5"), other):
         path.write_bytes(b"x")
     files.discard_candidate(mine.stem)
-    assert list(files.root.glob("incoming/*")) == [other]
+    assert list(files.root.glob("incoming/*/*")) == [other]
+    root.drop_leftovers()
+    assert not list(files.root.glob("incoming/*"))
 
 
 @pytest.mark.parametrize("what", ["dataset", "volume", "mesh"])

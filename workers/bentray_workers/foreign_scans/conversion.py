@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from bentray_kernels.acquisition import Dataset
@@ -11,7 +11,7 @@ from bentray_kernels.acquisition import Dataset
 from ..bounded_reading import refusing
 from ..dataset_copying import copy_dataset
 from ..dataset_reading import trace_type
-from ..dataset_writing import Piece, write_dataset
+from ..dataset_writing import Piece, bytes_of, write_dataset
 from ..hdf5_reading import SIGNATURE, Limits, opened
 from . import matlab5, npz
 from .arrays import Arrays
@@ -24,7 +24,12 @@ USER_BLOCK = 512
 MATLAB73 = b"MATLAB 7.3 MAT-file"
 
 
-def convert_dataset(source: Path, target: Path, limits: Limits | None = None) -> Dataset:
+def convert_dataset(
+    source: Path,
+    target: Path,
+    limits: Limits | None = None,
+    on_size: Callable[[int], None] = lambda size: None,
+) -> Dataset:
     """Check a scan and write it as a canonical file, with no more than one emission in memory.
 
     Taken are the upload format itself, MATLAB 5 and 7.3, NumPy archives, and zips of k-Wave outputs; the name
@@ -34,6 +39,7 @@ def convert_dataset(source: Path, target: Path, limits: Limits | None = None) ->
         source: of the scan.
         target: replaced whole or not touched.
         limits: of HDF5 files; None: the defaults of ``Limits``.
+        on_size: told before ``target`` is written how many bytes it will have at most, but for its headers.
 
     Returns:
         What it holds, with stand-ins for traces.
@@ -45,30 +51,31 @@ def convert_dataset(source: Path, target: Path, limits: Limits | None = None) ->
     with source.open("rb") as file:
         start = file.read(USER_BLOCK + len(SIGNATURE))
     if start.startswith(matlab5.START):
-        return _converted(matlab5.Matlab5(source), target)
+        return _converted(matlab5.Matlab5(source), target, on_size)
     if start.startswith(npz.START):
         with refusing("file", npz.WHOLE):
             archive = zipfile.ZipFile(source)
         with archive:
             many = is_kwave(archive.namelist())
-            return _converted(KWave(archive, target.parent) if many else npz.Npz(archive), target)
+            return _converted(KWave(archive, target.parent) if many else npz.Npz(archive), target, on_size)
     if start.startswith(MATLAB73) and start[USER_BLOCK:] == SIGNATURE:
         with opened(source, limits or Limits()) as reader:
-            return _converted(Matlab73(reader), target)
+            return _converted(Matlab73(reader), target, on_size)
     if start.startswith(SIGNATURE):
         with opened(source, limits or Limits()) as reader:
             # Written by h5py or another tool, for MATLAB users: no user block, and no format of ours.
             if reader.attribute("", "format") is None and _foreign(reader.names()):
-                return _converted(Matlab73(reader), target)
-    return copy_dataset(source, target, limits)
+                return _converted(Matlab73(reader), target, on_size)
+    return copy_dataset(source, target, limits, on_size)
 
 
 def _foreign(names: tuple[str, ...]) -> bool:
     return bool({"delta_tof", "element_positions", "full_dataset", "transducerPositionsXY"} & set(names))
 
 
-def _converted(arrays: Arrays, target: Path) -> Dataset:
+def _converted(arrays: Arrays, target: Path, on_size: Callable[[int], None]) -> Dataset:
     layout = layout_of(arrays)
+    on_size(bytes_of(layout.dataset))
 
     def pieces(name: str, chunk: tuple[int, ...]) -> Iterator[Piece]:
         place = layout.traces[name]
