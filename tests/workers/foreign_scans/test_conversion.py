@@ -302,7 +302,7 @@ def test_a_flipped_bit_in_an_archive_is_told_by_its_check_sum(tmp_path):
         traces_at = archive.getinfo("waveform/object.npy")
         content[traces_at.header_offset + traces_at.compress_size // 2] ^= 1
     (tmp_path / "scan.npz").write_bytes(content)
-    with pytest.raises(InvalidInput, match="waveform/object: found damaged data .*CRC"):
+    with pytest.raises(InvalidInput, match=r"waveform/object: found damaged data .*CRC"):
         convert_dataset(tmp_path / "scan.npz", tmp_path / "canonical.h5")
 
 
