@@ -1,4 +1,4 @@
-"""What tests share: their order, profiles of hypothesis, drawn figures, a PostgreSQL server."""
+"""What tests share: their order, profiles of hypothesis, drawn figures, an OpenCL device, PostgreSQL."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from hypothesis import HealthCheck, settings
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from . import postgresql
+from bentray_kernels.opencl import Session, choose
+
+from . import opencl, postgresql
 
 # `push`, which `make test` and CI use, tries the same examples every time: a change is not judged by luck.
 # `nightly`, of `make test-all`, searches at random and prints what repeats a failure (@reproduce_failure).
@@ -57,6 +59,23 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> Drawn:
 
     monkeypatch.setattr(Figure, "savefig", keep)
     return figures
+
+
+@pytest.fixture(scope="session")
+def opencl_session() -> Session:
+    """The device that passes its trial on this machine, open. Skips with the reason where none does."""
+    if opencl.refusal():
+        pytest.skip(opencl.refusal())
+    device = choose().device
+    assert device is not None
+    return Session(device)
+
+
+@pytest.fixture(autouse=True)
+def _device_for_marked_tests(request: pytest.FixtureRequest) -> None:
+    """A test marked ``opencl`` needs the device, whether it asks for the session or not."""
+    if request.node.get_closest_marker("opencl"):
+        request.getfixturevalue("opencl_session")
 
 
 @pytest.fixture(scope="session")

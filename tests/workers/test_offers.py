@@ -3,7 +3,6 @@
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.opencl import choose
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers import offers, slices
@@ -61,7 +60,7 @@ def test_a_joined_cluster_is_not_asked(fresh, monkeypatch):
         offers.resources_for(joined.client, WITH_DEVICE)
 
 
-@pytest.mark.skipif(choose().device is None, reason="no OpenCL device passes its trial here")
+@pytest.mark.opencl
 def test_a_reconstruction_runs_on_the_device_lane(fresh, scan, tmp_path):
     path = tmp_path / "scan.h5"
     write_dataset(path, scan)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TypeVar
 
-from .devices import WISH, Device, find_devices, wished
+from .devices import NONE, WISH, Device, find_devices, hidden, wished
 from .session import Session
 from .verdict import verdict_on
 
@@ -33,9 +33,18 @@ class Choice:
     device: Device | None
     refusals: tuple[str, ...]
 
+    @property
+    def reason(self) -> str:
+        """Why there is no device; empty where there is one."""
+        if self.device is not None:
+            return ""
+        if hidden():
+            return f"{WISH}={NONE} hides every device"
+        return "; ".join(self.refusals) or "this machine has no OpenCL device"
+
 
 def choose() -> Choice:
-    """The first device that passes its trial, the one of ``BENTRAY_OPENCL_DEVICE`` or GPUs first.
+    """The first device that passes its trial: the one of ``BENTRAY_OPENCL_DEVICE``, or GPUs first.
 
     Raises:
         InvalidInput: when the variable fits no device or more than one.
@@ -100,7 +109,7 @@ def _found(wish: str | None) -> Session | str:
     choice = choose()
     if choice.device is not None:
         return Session(choice.device)
-    return "; ".join(choice.refusals) or "this machine has no OpenCL device"
+    return choice.reason
 
 
 @cache

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 from ..errors import InvalidInput
+from .library import library_of, package_of
+from .platforms import platforms
+from .pocl import name_processor
 
-# The environment variable that names the device to use.
+# The environment variable that names the device to use, and its word for none.
 WISH = "BENTRAY_OPENCL_DEVICE"
+NONE = "none"
 
 
 @dataclass(frozen=True)
@@ -25,6 +30,8 @@ class Device:
         version: the OpenCL version it says; PoCL adds the processor that it compiles for.
         driver: version of the driver.
         double_precision: whether it computes in float64.
+        library: path of the driver's shared library; empty where it cannot be told.
+        package: name and version of the Python package that brought it; empty where the system did.
     """
 
     index: int
@@ -34,6 +41,8 @@ class Device:
     version: str
     driver: str
     double_precision: bool
+    library: str = ""
+    package: str = ""
 
     @property
     def label(self) -> str:
@@ -41,7 +50,10 @@ class Device:
 
 
 def find_devices() -> tuple[Device, ...]:
-    """Every OpenCL device, in the order of the platforms; empty where OpenCL is not installed."""
+    """Every OpenCL device, in the order of the platforms.
+
+    Empty where OpenCL is not installed, and where ``BENTRAY_OPENCL_DEVICE`` is ``none``.
+    """
     return tuple(_described(index, handle) for index, handle in enumerate(_handles()))
 
 
@@ -57,20 +69,28 @@ def handle_of(device: Device) -> Any:
     raise LookupError(f"{device.label} is no longer OpenCL device {device.index}")
 
 
+def hidden() -> bool:
+    """Whether ``BENTRAY_OPENCL_DEVICE`` hides every device."""
+    return os.environ.get(WISH, "").strip().lower() == NONE
+
+
 def wished(devices: Sequence[Device], wish: str | None) -> tuple[Device, ...]:
-    """The devices to try, in order: the one that ``wish`` names, else GPUs before all others.
+    """The devices to try, in order: the one that ``wish`` names, else GPUs first and processors last.
+
+    Of several drivers for one processor Intel's comes first (measured, see docs/how-to/use-a-device.md).
 
     Args:
         devices: what there is.
-        wish: an index, or a part of ``platform:device`` in any case; None or empty for no wish.
+        wish: an index, a part of ``platform:device`` in any case, or ``none``; None or empty for no wish.
 
     Raises:
         InvalidInput: when the wish fits no device or more than one; lists what there is.
     """
     if not wish:
-        ranks = {"gpu": 0, "accelerator": 1, "cpu": 2}
-        return tuple(sorted(devices, key=lambda device: ranks.get(device.kind, 3)))
+        return tuple(sorted(devices, key=_rank))
     word = wish.strip().lower()
+    if word == NONE:
+        return ()
     # A number that is no index may still be a model's: "3090".
     fitting = [device for device in devices if str(device.index) == word]
     fitting = fitting or [device for device in devices if word in device.label.lower()]
@@ -81,26 +101,36 @@ def wished(devices: Sequence[Device], wish: str | None) -> tuple[Device, ...]:
     return tuple(fitting)
 
 
+def _rank(device: Device) -> tuple[int, bool]:
+    kinds = {"gpu": 0, "accelerator": 1, "cpu": 2}
+    return kinds.get(device.kind, 3), not device.platform.startswith("Intel")
+
+
 def _handles() -> list[Any]:
+    if hidden():
+        return []
     try:
         import pyopencl as cl
     except ImportError:  # no OpenCL loader on this machine
         return []
     # "No platform" is an error in OpenCL, as is a platform without devices.
     try:
-        platforms = cl.get_platforms()
+        found = platforms()
     except cl.Error:
         return []
     handles: list[Any] = []
-    for platform in platforms:
+    for platform in found:
         with suppress(cl.Error):
             handles += platform.get_devices()
+    for handle in handles:
+        name_processor(handle)
     return handles
 
 
 def _described(index: int, handle: Any) -> Device:
     import pyopencl as cl
 
+    library = library_of(handle)
     kinds = {"gpu": cl.device_type.GPU, "accelerator": cl.device_type.ACCELERATOR, "cpu": cl.device_type.CPU}
     return Device(
         index,
@@ -110,4 +140,6 @@ def _described(index: int, handle: Any) -> Device:
         handle.version.strip(),
         handle.driver_version.strip(),
         bool(handle.double_fp_config) if "cl_khr_fp64" in handle.extensions else False,
+        library,
+        package_of(library),
     )

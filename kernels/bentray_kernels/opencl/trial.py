@@ -95,9 +95,9 @@ def _godunov(earliest: list[float], crossing: float) -> float:
 def main(arguments: list[str]) -> None:
     """Try the stages named on the command line, one line on stdout each."""
     index, label, *stages = arguments
-    device = find_devices()[int(index)]
-    if device.label != label:
-        raise SystemExit(f"device {index} is {device.label}")
+    device = next((device for device in find_devices() if device.index == int(index)), None)
+    if device is None or device.label != label:
+        raise SystemExit(f"{label} is no longer OpenCL device {index}")
     session = Session(device)
     for stage in stages:
         fault = fault_of(session, stage)

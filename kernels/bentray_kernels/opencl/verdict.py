@@ -16,6 +16,7 @@ from importlib import resources
 from pathlib import Path
 
 from .devices import Device
+from .processor import processor
 from .trial import NEEDED, STAGES, WIDTHS
 
 # A build of all kernels takes seconds; the machine may be busy with many workers starting.
@@ -106,11 +107,11 @@ def in_a_child(device: Device, stages: Sequence[str], time_out_s: float) -> tupl
 
 
 def _file(device: Device) -> Path:
-    """Where the verdict is kept; another host, driver, program or trial gives another name."""
+    """Where the verdict is kept; another driver, processor, program or trial gives another name."""
     # Hosts that share a home may have processors that differ under one generic name.
-    digest = hashlib.sha256(repr((device, platform.node())).encode())
+    digest = hashlib.sha256(repr((device, platform.machine(), sorted(processor()))).encode())
     package = resources.files(__package__)
-    for name in ("trial.py", "blocks.py", "session.py"):
+    for name in ("trial.py", "blocks.py", "session.py", "pocl.py"):
         digest.update(package.joinpath(name).read_bytes())
     for source in sorted(Path(str(package / "sources")).rglob("*.cl")):
         digest.update(source.read_bytes())

@@ -26,6 +26,7 @@ from . import (
 )
 from .endings import Commands
 from .repeated_words import SpacingInRow
+from .terminal import show_our_warnings_in_a_line
 
 __all__ = ["app", "main"]
 
@@ -74,6 +75,7 @@ def _start(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
     ] = False,
 ) -> None:
+    show_our_warnings_in_a_line()
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
 

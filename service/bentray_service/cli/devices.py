@@ -5,17 +5,19 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from .opencl_help import help_of
 from .terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from bentray_kernels.opencl import Device, Verdict
+    from bentray_kernels.opencl import Choice, Device, Verdict
 
 
 def devices(as_json: AsJson = False) -> None:
     """Try every OpenCL device of this machine and say which one the method fim-opencl uses.
 
     A device that computes wrongly, aborts or hangs is refused with the reason; where none is left, the
-    same is computed without OpenCL. The variable BENTRAY_OPENCL_DEVICE chooses one by index or name.
+    same is computed without OpenCL. GPUs are tried before processors. The variable BENTRAY_OPENCL_DEVICE
+    chooses one by index or name; "none" hides all.
 
     Example:  bentray devices --json
     """
@@ -31,7 +33,7 @@ def devices(as_json: AsJson = False) -> None:
     chosen = choice.device.index if choice.device is not None else None
     if as_json:
         rows = [_figures(device, verdict) for device, verdict in zip(found, verdicts, strict=True)]
-        print_json({"chosen": chosen, "devices": rows})
+        print_json({"chosen": chosen, "reason": choice.reason, "help": help_of(choice), "devices": rows})
         return
     if found:
         columns = ("index", "platform", "device", "kind", "driver", "verdict", "remarks")
@@ -40,7 +42,8 @@ def devices(as_json: AsJson = False) -> None:
             for d, v in zip(found, verdicts, strict=True)
         ]
         print_table("OpenCL devices", columns, cells)
-    print_lines([_summary(choice.device, bool(found))])
+        print_lines(f"device {device.index} comes from {_source(device)}" for device in found)
+    print_lines(_summary(choice, bool(found)))
 
 
 def _figures(device: Device, verdict: Verdict) -> dict[str, object]:
@@ -52,8 +55,14 @@ def _remarks(verdict: Verdict) -> str:
     return verdict.reason or (f"not needed and not used: {unneeded}" if unneeded else "")
 
 
-def _summary(device: Device | None, found: bool) -> str:
+def _source(device: Device) -> str:
+    library = device.library or "a library that cannot be told"
+    return f"{device.package}: {library}" if device.package else library
+
+
+def _summary(choice: Choice, found: bool) -> list[str]:
+    device = choice.device
     if device is not None:
-        return f"fim-opencl uses device {device.index}, {device.label}"
-    reason = "no device passed" if found else "no OpenCL device found"
-    return f"{reason}; fim-opencl computes without OpenCL, as fim"
+        return [f"fim-opencl uses device {device.index}, {device.label}"]
+    reason = "no device passed" if found else choice.reason
+    return [f"{reason}; fim-opencl computes without OpenCL, as fim", f"what helps: {help_of(choice)}"]

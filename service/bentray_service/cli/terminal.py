@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+import warnings
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated, Any, Protocol
@@ -31,6 +32,19 @@ def remark(text: str) -> None:
     """One line for the person who watches, on stderr."""
     sys.stderr.write(text + "\n")
     sys.stderr.flush()
+
+
+def show_our_warnings_in_a_line() -> None:
+    """From now on a warning of ours is a remark; those of libraries look as Python shows them."""
+    usual = warnings.showwarning
+
+    def show(message: Any, category: type[Warning], *place: Any, **more: Any) -> None:
+        if category.__module__.startswith("bentray_"):
+            remark(f"bentray: warning: {message}")
+        else:
+            usual(message, category, *place, **more)
+
+    warnings.showwarning = show
 
 
 def print_json(figures: object) -> None:

@@ -21,6 +21,7 @@ def rough_problems(seed, shape, batch):
     return speeds, rng.uniform(0.0, 1.0, (batch, len(shape))) * (np.array(shape) - 1)
 
 
+@pytest.mark.opencl
 @given(seed=st.integers(0, 2**32 - 1), shape=SHAPES, batch=st.integers(1, 5))
 @settings(max_examples=50, deadline=None)
 def test_equals_fim_and_a_batch_equals_one_by_one(seed, shape, batch):
@@ -31,6 +32,7 @@ def test_equals_fim_and_a_batch_equals_one_by_one(seed, shape, batch):
         assert np.array_equal(found, eikonal.solve(speed, 1.0, source, "fim-opencl"))
 
 
+@pytest.mark.opencl
 def test_the_front_turns_back_through_many_blocks():
     speed = np.ones((40, 40))
     speed[10::10] = 1e-3
@@ -39,6 +41,7 @@ def test_the_front_turns_back_through_many_blocks():
     assert np.allclose(tof, eikonal.solve(speed, 1.0, (0.0, 0.0), "fmm", order=1), rtol=1e-11)
 
 
+@pytest.mark.opencl
 def test_threads_share_the_device_without_mixing_problems():
     speeds, sources = rough_problems(7, (33, 30), 12)
     alone = eikonal.solve_many(speeds, 1.0, sources, "fim-opencl")
@@ -47,10 +50,12 @@ def test_threads_share_the_device_without_mixing_problems():
     assert np.array_equal(np.stack(found), alone)
 
 
+@pytest.mark.opencl
 def test_no_problems_give_no_times():
     assert eikonal.solve_many(np.ones((0, 4, 5)), 1.0, np.ones((0, 2)), "fim-opencl").shape == (0, 4, 5)
 
 
+@pytest.mark.opencl
 def test_tolerance_is_used_and_checked():
     (speed,), (source,) = rough_problems(8, (40, 40), 1)
     fine = eikonal.solve(speed, 1.0, source, "fim-opencl", tolerance=0.0)

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from bentray_kernels import eikonal
 from bentray_kernels.errors import InvalidInput
 
+from ...opencl import methods
+
 SOURCES = st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 
 
@@ -52,7 +54,11 @@ def gradient_problem(shape, place):
     return speed, spacing, exact
 
 
-@pytest.fixture(params=eikonal.methods())
+def marked(name):
+    return pytest.param(name, marks=pytest.mark.opencl if eikonal.METHODS.get(name).on_device else ())
+
+
+@pytest.fixture(params=map(marked, eikonal.methods()))
 def method(request):
     return request.param
 
@@ -108,7 +114,7 @@ def test_rough_models_give_finite_causal_times(seed, place, flat):
     shape = (7, 9) if flat else (5, 6, 4)
     speed = rough_speed(seed, shape)
     source = np.array(place[: len(shape)]) * (np.array(shape) - 1)
-    for method in eikonal.methods():
+    for method in methods():
         tof = eikonal.solve(speed, 1.0, source, method)
         assert np.isfinite(tof).all()
         assert (tof >= 0.0).all()
@@ -149,7 +155,7 @@ def test_ten_thousand_models_over_four_decades_give_times(ndim, longest):
 def test_flips_transposes_and_units_change_nothing(seed, axis, source):
     speed = smooth_speed(seed, (11, 11))
     source = np.array(source)
-    for method in eikonal.methods():
+    for method in methods():
         tof = eikonal.solve(speed, 0.1, source, method)
         mirrored = source.copy()
         mirrored[axis] = 1.0 - source[axis]
@@ -174,7 +180,7 @@ def test_slower_media_are_later(seed):
     rng = np.random.default_rng(seed)
     speed = smooth_speed(seed, (12, 12))
     slower = speed * rng.uniform(0.8, 1.0, speed.shape)
-    for method in eikonal.methods():
+    for method in methods():
         before = eikonal.solve(speed, 0.1, (0.4, 0.5), method)
         after = eikonal.solve(slower, 0.1, (0.4, 0.5), method)
         slack = 1e-12 if method in ("fsm", "fim", "fim-opencl") else 0.02 * before.max()

@@ -1,4 +1,4 @@
-"""An open device for the tests of this folder, and devices that are not there."""
+"""What the tests of this folder share: the open device by a short name, and devices that are not there."""
 
 from __future__ import annotations
 
@@ -8,17 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from bentray_kernels.opencl import Device, Session, choice, choose, verdict
+from bentray_kernels.opencl import Device, Session, choice, verdict
 
 GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True)
 
 
 @pytest.fixture(scope="session")
-def session() -> Session:
-    """The device that this machine's trial lets pass; PoCL comes with our dependencies."""
-    chosen = choose().device
-    assert chosen is not None, "no OpenCL device of this machine passes its trial: see `bentray devices`"
-    return Session(chosen)
+def session(opencl_session: Session) -> Session:
+    return opencl_session
 
 
 @pytest.fixture

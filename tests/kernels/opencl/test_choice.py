@@ -59,6 +59,7 @@ def test_a_warning_made_an_error_is_raised_each_time(verdicts, monkeypatch):
             choice.session_or_warning("fim")
 
 
+@pytest.mark.opencl
 def test_the_chosen_device_is_opened_once(fresh):
     first = choice.session_or_warning("fim")
     assert isinstance(first, Session)

@@ -53,6 +53,7 @@ def test_no_loader_is_no_device(monkeypatch):
     assert find_devices() == ()
 
 
+@pytest.mark.opencl
 def test_a_platform_without_devices_hides_no_other(monkeypatch):
     class Empty:
         def get_devices(self):
@@ -63,6 +64,7 @@ def test_a_platform_without_devices_hides_no_other(monkeypatch):
     assert len(find_devices()) > 0
 
 
+@pytest.mark.opencl
 def test_a_found_device_leads_to_its_handle_until_devices_change():
     for device in find_devices():
         assert handle_of(device).name.strip() == device.name

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from bentray_kernels.opencl import find_devices, verdict
+from bentray_kernels.opencl import verdict
 from bentray_kernels.opencl.trial import STAGES
 from bentray_kernels.opencl.verdict import Verdict, examine, in_a_child, verdict_on
 
@@ -60,8 +60,8 @@ def test_a_child_that_answers_what_was_not_asked_is_not_believed(gpu):
     assert found.reason == "double1: ended with exit code 0"
 
 
-def test_a_hanging_child_is_stopped():
-    answers, ending = in_a_child(find_devices()[0], STAGES, 0.01)
+def test_a_hanging_child_is_stopped(gpu):
+    answers, ending = in_a_child(gpu, STAGES, 0.01)
     assert answers == {}
     assert ending == "no answer in 0.01 s"
 
@@ -69,10 +69,10 @@ def test_a_hanging_child_is_stopped():
 def test_a_child_that_fails_says_why(gpu):
     answers, ending = in_a_child(gpu, STAGES, 60.0)
     assert answers == {}
-    assert ending.startswith("ended with exit code 1 (device 0 is ")
+    assert ending.startswith("ended with exit code 1 (Fast Platform:GPU 9000 is no longer")
 
 
-def test_an_aborting_child_is_survived(monkeypatch, tmp_path):
+def test_an_aborting_child_is_survived(gpu, monkeypatch, tmp_path):
     package = tmp_path / "aborting"
     package.mkdir()
     (package / "__init__.py").touch()
@@ -81,7 +81,7 @@ def test_an_aborting_child_is_survived(monkeypatch, tmp_path):
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setattr(verdict, "__package__", "aborting")
-    answers, ending = in_a_child(find_devices()[0], STAGES, 60.0)
+    answers, ending = in_a_child(gpu, STAGES, 60.0)
     assert answers == {"double1": ""}
     assert ending.startswith("ended by signal 6")
 
@@ -93,7 +93,7 @@ def test_without_double_precision_nothing_is_tried(gpu, monkeypatch, fresh):
     assert found.widths == ()
 
 
-def test_a_pass_is_remembered_on_disk_until_the_driver_changes(gpu, monkeypatch, fresh):
+def test_a_pass_is_remembered_on_disk_until_the_driver_or_the_processor_changes(gpu, monkeypatch, fresh):
     child = child_of({"double8": None})
     monkeypatch.setattr(verdict, "in_a_child", child)
     first = verdict_on(gpu)
@@ -103,7 +103,7 @@ def test_a_pass_is_remembered_on_disk_until_the_driver_changes(gpu, monkeypatch,
     assert len(child.calls) == tried
     verdict_on(replace(gpu, driver="1.2.4"))
     assert len(child.calls) == 2 * tried
-    monkeypatch.setattr("platform.node", lambda: "another host")
+    monkeypatch.setattr(verdict, "processor", lambda: frozenset({"model name: another", "avx2"}))
     verdict_on.cache_clear()
     verdict_on(gpu)
     assert len(child.calls) == 3 * tried

@@ -12,6 +12,7 @@ from bentray_kernels.splines.sampling_opencl import OpenCLSpline, fault_of, on_t
 from .every_filter import EveryFilter, rough_volume
 
 
+@pytest.mark.opencl
 class TestDouble(EveryFilter):
     tolerance = 2e-14
 
@@ -19,6 +20,7 @@ class TestDouble(EveryFilter):
         return OpenCLSpline(spline, session_or_warning(instead="Spline")).value_and_gradient(points)
 
 
+@pytest.mark.opencl
 class TestSingle(EveryFilter):
     tolerance = 2e-6
 
@@ -30,6 +32,7 @@ class TestSingle(EveryFilter):
         return there.value(points), there.gradient(points)
 
 
+@pytest.mark.opencl
 def test_many_points_are_read_in_parts(monkeypatch):
     spline = Spline(rough_volume(0, (6, 5, 7)))
     points = np.random.default_rng(0).uniform(0.0, 5.0, (50, 3))
@@ -49,6 +52,7 @@ def test_without_a_device_the_spline_itself_answers(monkeypatch):
     choice._warn_once.cache_clear()
 
 
+@pytest.mark.opencl
 def test_a_device_that_reads_wrong_is_left_with_a_warning(monkeypatch):
     spline = Spline(rough_volume(0, (6, 5)))
     right = OpenCLSpline.value_and_gradient
@@ -62,6 +66,7 @@ def test_a_device_that_reads_wrong_is_left_with_a_warning(monkeypatch):
         assert on_the_device(spline) is spline
 
 
+@pytest.mark.opencl
 def test_a_field_of_noughts_is_read_without_a_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error")

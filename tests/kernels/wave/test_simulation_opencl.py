@@ -21,6 +21,7 @@ def medium(dtype):
     return Medium.of(speed, 1e-3, 2e-7, attenuation=loss, edge_nodes=8, dtype=dtype)
 
 
+@pytest.mark.opencl
 @pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-12), (np.float32, 1e-5)])
 def test_traces_are_those_of_the_compiled_step(dtype, tolerance):
     host = medium(dtype)

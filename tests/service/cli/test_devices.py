@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable
 
 import pytest
 from typer.testing import Result
 
 from bentray_kernels import opencl
-from bentray_kernels.opencl import Choice, Device, Verdict
+from bentray_kernels.opencl import Choice, Device, OpenCLFallbackWarning, Verdict
+from bentray_service.cli import opencl_help
+from bentray_service.cli.terminal import show_our_warnings_in_a_line
 
-GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True)
-CPU = Device(1, "Slow Platform", "Processor", "cpu", "OpenCL 3.0", "3.0-rc2", True)
+GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True, "/usr/lib/libfast.so.1")
+CPU = Device(
+    1, "Slow Platform", "Processor", "cpu", "OpenCL 3.0", "3.0-rc2", True, "/site/libslow.so", "slow 3.0"
+)
 
 
 @pytest.fixture
@@ -34,7 +39,11 @@ def test_each_device_has_its_verdict_and_reason(bentray: Callable[..., Result], 
     assert "refused" in words
     assert "wrong travel" in words
     assert "double8" in words
-    assert result.stdout.splitlines()[-1] == "fim-opencl uses device 1, Slow Platform:Processor"
+    assert result.stdout.splitlines()[-3:] == [
+        "device 0 comes from /usr/lib/libfast.so.1",
+        "device 1 comes from slow 3.0: /site/libslow.so",
+        "fim-opencl uses device 1, Slow Platform:Processor",
+    ]
 
 
 def test_json_has_every_figure(bentray: Callable[..., Result], machine: None) -> None:
@@ -43,6 +52,8 @@ def test_json_has_every_figure(bentray: Callable[..., Result], machine: None) ->
     gpu, cpu = figures["devices"]
     assert (gpu["usable"], gpu["reason"]) == (False, "solve: wrong travel times in 2-D")
     assert (cpu["usable"], cpu["widths"], cpu["driver"]) == (True, [1, 2, 4], "3.0-rc2")
+    assert (cpu["library"], cpu["package"]) == ("/site/libslow.so", "slow 3.0")
+    assert (figures["reason"], figures["help"]) == ("", "")
     assert cpu["faults"] == {"double8": "ended by signal 6"}
 
 
@@ -51,8 +62,46 @@ def test_without_devices_the_way_out_is_said(
 ) -> None:
     monkeypatch.setattr(opencl, "find_devices", tuple)
     monkeypatch.setattr(opencl, "choose", lambda: Choice(None, ()))
-    assert bentray("devices").stdout == "no OpenCL device found; fim-opencl computes without OpenCL, as fim\n"
-    assert json.loads(bentray("devices", "--json").stdout) == {"chosen": None, "devices": []}
+    monkeypatch.delenv("BENTRAY_OPENCL_DEVICE", raising=False)
+    monkeypatch.setattr(opencl_help.shutil, "which", lambda name: f"/usr/bin/{name}")
+    first, second = bentray("devices").stdout.splitlines()
+    assert first == "this machine has no OpenCL device; fim-opencl computes without OpenCL, as fim"
+    assert second.startswith("what helps: ")
+    assert "apt-get install pocl-opencl-icd" in second
+    figures = json.loads(bentray("devices", "--json").stdout)
+    assert (figures["chosen"], figures["devices"]) == (None, [])
+    assert figures["help"] == second.removeprefix("what helps: ")
+
+
+@pytest.mark.parametrize(
+    ("machine", "command"),
+    [("x86_64", "-m pip install intel-opencl-rt intel-cmplr-lib-rt "), ("aarch64", "install PoCL with ")],
+)
+def test_where_all_are_refused_one_command_helps(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, machine: str, command: str
+) -> None:
+    monkeypatch.delenv("BENTRAY_OPENCL_DEVICE", raising=False)
+    monkeypatch.setattr(opencl, "find_devices", lambda: (CPU,))
+    refused = Verdict(
+        "double1: unknown target CPU 'generic'", (), {"double1": "unknown target CPU 'generic'"}
+    )
+    monkeypatch.setattr(opencl, "verdict_on", lambda device: refused)
+    monkeypatch.setattr(opencl, "choose", lambda: Choice(None, ("Slow Platform:Processor was refused",)))
+    monkeypatch.setattr(opencl_help.shutil, "which", lambda name: None)
+    monkeypatch.setattr(opencl_help.platform, "machine", lambda: machine)
+    lines = bentray("devices").stdout.splitlines()
+    assert lines[-2] == "no device passed; fim-opencl computes without OpenCL, as fim"
+    assert command in lines[-1]
+    assert "double1: unknown" in " ".join(bentray("devices").stdout.replace("│", " ").split())
+
+
+def test_hidden_devices_are_said_to_be_hidden(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BENTRAY_OPENCL_DEVICE", "none")
+    first, second = bentray("devices").stdout.splitlines()
+    assert first.startswith("BENTRAY_OPENCL_DEVICE=none hides every device; ")
+    assert second.startswith("what helps: unset BENTRAY_OPENCL_DEVICE")
 
 
 def test_a_wish_that_fits_nothing_lists_what_there_is(
@@ -62,3 +111,17 @@ def test_a_wish_that_fits_nothing_lists_what_there_is(
     result = bentray("devices")
     assert result.exit_code == 2
     assert result.stderr.startswith("bentray: BENTRAY_OPENCL_DEVICE: found 'no such device'")
+
+
+def test_that_another_method_takes_over_is_one_line_on_stderr(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    others: list[object] = []
+    monkeypatch.setattr(warnings, "showwarning", lambda message, *more: others.append(message))
+    show_our_warnings_in_a_line()
+    warnings.showwarning(
+        "no OpenCL device can be used, fim takes over", OpenCLFallbackWarning, "choice.py", 1
+    )
+    warnings.showwarning("of a library", DeprecationWarning, "library.py", 2)
+    assert capsys.readouterr().err == "bentray: warning: no OpenCL device can be used, fim takes over\n"
+    assert others == ["of a library"]

@@ -1,0 +1,66 @@
+"""Which library an OpenCL device comes from, and which Python package brought that."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Iterator
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+# The packages of the Python index that bring a driver: PoCL, and Intel's runtime for processors.
+PACKAGES = ("pocl-binary-distribution", "intel-opencl-rt")
+
+
+class _SymbolInfo(ctypes.Structure):
+    """``Dl_info`` of <dlfcn.h>."""
+
+    _fields_ = (
+        ("file", ctypes.c_char_p),
+        ("base", ctypes.c_void_p),
+        ("name", ctypes.c_char_p),
+        ("address", ctypes.c_void_p),
+    )
+
+
+def library_of(handle: Any) -> str:
+    """Path of the shared library that a ``pyopencl.Device`` belongs to; empty where it cannot be told.
+
+    Drivers that a loader finds begin each of their objects with a pointer to their table of functions
+    (cl_khr_icd); the dynamic linker knows which file the first of these functions was loaded from.
+    """
+    if not handle.int_ptr:
+        return ""
+    table = ctypes.c_void_p.from_address(handle.int_ptr).value
+    function = ctypes.c_void_p.from_address(table).value if table else None
+    found = _SymbolInfo()
+    try:
+        known = function and ctypes.CDLL(None).dladdr(ctypes.c_void_p(function), ctypes.byref(found))
+    except (OSError, AttributeError):  # a system without dladdr
+        return ""
+    return os.fsdecode(found.file) if known and found.file else ""
+
+
+@cache
+def package_of(library: str) -> str:
+    """Name and version of the Python package that a library came with; empty where it came otherwise."""
+    if library:
+        for package in PACKAGES:
+            if any(
+                file.resolve() == Path(library).resolve() for file in files_of(package, Path(library).name)
+            ):
+                return f"{package} {metadata.version(package)}"
+    return ""
+
+
+def files_of(package: str, name: str) -> Iterator[Path]:
+    """The files of that name that a package has installed; none where it is not installed."""
+    try:
+        listed = metadata.files(package) or []
+    except metadata.PackageNotFoundError:
+        return
+    for file in listed:
+        if file.name == name:
+            yield Path(str(file.locate()))

@@ -1,0 +1,97 @@
+"""Intel's runtime is added to the loader's list where its package is installed, and nothing else changes."""
+
+import os
+from pathlib import Path
+
+import pyopencl as cl
+import pytest
+
+from bentray_kernels.opencl import platforms
+
+
+class Loader:
+    """Keeps the lists that were there when it was asked, as the loader reads them at its first question."""
+
+    def __init__(self):
+        self.lists = []
+
+    def __call__(self):
+        folder = Path(os.environ["PYOPENCL_HOME"], ".libs")
+        self.lists.append({file.name: file.read_text() for file in folder.glob("*.icd")})
+        return ["a platform"]
+
+
+@pytest.fixture
+def loader(monkeypatch, tmp_path):
+    """A wheel of pyopencl with PoCL on its list, a system without drivers, and nothing asked yet."""
+    wheel = tmp_path / "pyopencl"
+    (wheel / ".libs").mkdir(parents=True)
+    (wheel / ".libs" / "pocl.icd").write_text("libpocl-1.so")
+    loader = Loader()
+    monkeypatch.setenv("PYOPENCL_HOME", str(wheel))
+    monkeypatch.setattr(cl, "get_platforms", loader)
+    monkeypatch.setattr(platforms, "SYSTEM", str(tmp_path / "vendors"))
+    for word in platforms.SYSTEM_VARIABLES:
+        monkeypatch.delenv(word, raising=False)
+    platforms._ask_first.cache_clear()
+    yield loader
+    platforms._ask_first.cache_clear()
+
+
+@pytest.fixture
+def intel(monkeypatch, tmp_path):
+    library = tmp_path / "lib" / "libintelocl.so"
+    library.parent.mkdir()
+    library.touch()
+    monkeypatch.setattr(platforms, "files_of", lambda package, name: iter([library]))
+    return library
+
+
+def test_without_the_package_the_loader_is_asked_as_it_is(loader, monkeypatch):
+    monkeypatch.setattr(platforms, "files_of", lambda package, name: iter(()))
+    assert platforms.platforms() == ["a platform"]
+    assert loader.lists == [{"pocl.icd": "libpocl-1.so"}]
+
+
+def test_with_it_the_first_question_finds_both(loader, intel, tmp_path):
+    for _ in range(2):
+        assert platforms.platforms() == ["a platform"]
+    both = {"pocl.icd": "libpocl-1.so", "intel.icd": f"{intel}\n"}
+    assert loader.lists[0] == both
+    assert both not in loader.lists[1:]
+    assert os.environ["PYOPENCL_HOME"] == str(tmp_path / "pyopencl")
+
+
+@pytest.mark.parametrize("variable", ["", *platforms.SYSTEM_VARIABLES])
+def test_the_systems_own_is_not_added_twice(loader, intel, monkeypatch, tmp_path, variable):
+    vendors = tmp_path / ("elsewhere" if variable else "vendors")
+    vendors.mkdir()
+    (vendors / "broken.icd").write_bytes(b"\xff\xfe")
+    (vendors / "intel64.icd").write_text("/opt/intel/lib/libintelocl.so.2026\n")
+    if variable:
+        monkeypatch.setenv(variable, str(vendors))
+    platforms.platforms()
+    assert loader.lists == [{"pocl.icd": "libpocl-1.so"}]
+
+
+def test_the_systems_other_drivers_do_not_matter(loader, intel, tmp_path):
+    (tmp_path / "vendors").mkdir()
+    (tmp_path / "vendors" / "nvidia.icd").write_text("libnvidia-opencl.so.1\n")
+    platforms.platforms()
+    assert "intel.icd" in loader.lists[0]
+
+
+def test_another_loader_is_left_alone(loader, intel, monkeypatch):
+    monkeypatch.delenv("PYOPENCL_HOME")
+    monkeypatch.setattr(cl, "get_platforms", list)
+    assert platforms.platforms() == []
+    assert loader.lists == []
+
+
+def test_without_a_place_for_a_list_the_loader_is_asked_as_it_is(loader, intel, monkeypatch):
+    def full(**_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(platforms.tempfile, "TemporaryDirectory", full)
+    platforms.platforms()
+    assert loader.lists == [{"pocl.icd": "libpocl-1.so"}]

@@ -1,0 +1,20 @@
+"""The OpenCL device of this machine, as tests ask for it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from bentray_kernels.eikonal import METHODS
+from bentray_kernels.opencl import choose
+
+
+@cache
+def refusal() -> str:
+    """Why no device can be used here; empty where one passes its trial."""
+    reason = choose().reason
+    return reason and f"no OpenCL device passes its trial here: {reason}"
+
+
+def methods() -> tuple[str, ...]:
+    """The Eikonal methods that run here; those on a device only where one passes."""
+    return tuple(name for name, method in METHODS.by_name.items() if not (method.on_device and refusal()))
