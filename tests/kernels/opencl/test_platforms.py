@@ -67,7 +67,7 @@ def test_the_systems_own_is_not_added_twice(loader, intel, monkeypatch, tmp_path
     vendors = tmp_path / ("elsewhere" if variable else "vendors")
     vendors.mkdir()
     (vendors / "broken.icd").write_bytes(b"\xff\xfe")
-    (vendors / "intel64.icd").write_text("/opt/intel/lib/libintelocl.so.2026\n")
+    (vendors / "intel64.icd").write_text("/usr/lib/intel/libintelocl.so.2026\n")
     if variable:
         monkeypatch.setenv(variable, str(vendors))
     platforms.platforms()
