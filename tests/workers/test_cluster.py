@@ -9,10 +9,12 @@ from urllib.parse import urlsplit
 
 import pytest
 from distributed import LocalCluster
+from distributed.security import Security
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.cluster import Cluster, open_cluster
+from bentray_workers.cluster import Cluster, identity_of, open_cluster
 from bentray_workers.lanes import RENDER
+from bentray_workers.tls import own_security
 
 from ..listening import beyond_loopback, listening, pages
 
@@ -65,6 +67,17 @@ def test_it_listens_on_loopback_only_and_shows_no_page(own):
     assert len(sockets) >= 4, "a web server each beside Dask's own ports, and they are looked at"
     assert beyond_loopback(sockets) == set()
     assert pages(sockets) == []
+
+
+def test_other_users_of_the_machine_reach_nothing(own):
+    """They reach loopback, but have no key of this process: neither plainly nor by a key of their own."""
+    own, sockets = own
+    assert own.describe()["scheduler"].startswith("tls://")
+    for host, port in sockets:
+        for protocol, security in (("tcp", Security()), ("tls", own_security())):
+            with pytest.raises(InvalidInput, match="scheduler_address"):
+                identity_of(f"{protocol}://{host}:{port}", security, 2.0)
+    assert own.client.submit(sum, [1, 2]).result() == 3
 
 
 def test_the_search_for_pages_finds_those_that_dask_shows_by_default(tmp_path):

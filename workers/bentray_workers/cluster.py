@@ -137,7 +137,7 @@ def identity_of(address: str, security: Security, timeout_s: float, workers: int
             "scheduler_address", found, "tls://host:port with certificates, else tcp://host:port"
         )
     try:
-        return asyncio.run(_identity(address, security, timeout_s, workers))
+        return asyncio.run(identity(address, security, timeout_s, workers))
     except NO_SCHEDULER as error:
         reason = f"no answer in {timeout_s:g} s" if isinstance(error, TimeoutError) else error
         raise InvalidInput(
@@ -145,7 +145,8 @@ def identity_of(address: str, security: Security, timeout_s: float, workers: int
         ) from error
 
 
-async def _identity(address: str, security: Security, timeout_s: float, workers: int) -> dict[str, Any]:
+async def identity(address: str, security: Security, timeout_s: float, workers: int) -> dict[str, Any]:
+    """As ``identity_of``, awaited; raises one of ``NO_SCHEDULER``."""
     async with asyncio.timeout(timeout_s):
         secrets = security.get_connection_args("client")
         async with rpc(address, connection_args=secrets, timeout=timeout_s) as scheduler:

@@ -22,9 +22,14 @@ SETTINGS = {
     "distributed.worker.http.routes": [],
 }
 
-# The settings of a process that has a client: a step of a refinement takes the images of many steps before
-# it, and Dask would warn from 10 MB on.
-OF_CLIENTS = {"distributed.admin.large-graph-warning-threshold": "100MB"}
+# The settings of a process that has a client, and perhaps a cluster of its own.
+OF_CLIENTS = {
+    # A step of a refinement takes the images of many steps before it, and Dask would warn from 10 MB on.
+    "distributed.admin.large-graph-warning-threshold": "100MB",
+    # A worker may be away for this long before its nanny is ended: compiling its kernels takes minutes. Dask
+    # allows 15 s, in which a worker that is killed while it starts does not return.
+    "distributed.deploy.lost-worker-timeout": "600s",
+}
 
 # Where that web server listens, since it cannot be left out: a free port of loopback.
 NO_DASHBOARD = "127.0.0.1:0"

@@ -1,4 +1,4 @@
-"""Workers of this machine that join a scheduler elsewhere, and join it again when it comes back."""
+"""Workers of this machine that join a scheduler elsewhere, again when it comes back or when they are lost."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import logging
 import signal
 import socket
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,11 @@ from distributed import Nanny
 from distributed.comm.addressing import parse_host_port
 from distributed.security import Security
 
-from .cluster import identity_of
+from .cluster import NO_SCHEDULER, identity, identity_of
 from .dask_settings import NO_DASHBOARD, ours
 from .lanes import THREADS
 from .providers import PRELOAD
+from .supervision import FIRST_PAUSE_S, LONGEST_PAUSE_S, LOOK_S, Losses
 
 # How long a worker may take to compile its kernels and to join, s.
 START_S = 600
@@ -95,10 +97,36 @@ async def _serve(asked: Joining, say: Callable[[str], None]) -> None:
 
 
 async def _work(asked: Joining, nannies: list[Any], say: Callable[[str], None]) -> None:
-    """Start the workers; ends once all of them have lost the scheduler."""
+    """Start the workers and replace those that are lost, in the list too; ends once the scheduler is gone."""
     await asyncio.gather(*nannies)
+    scheduler = await _scheduler(asked)
     say(f"{asked.workers} workers joined {asked.scheduler}; Ctrl-C stops them.")
-    await asyncio.gather(*(nanny.finished() for nanny in nannies))
+    losses, pause = Losses(), FIRST_PAUSE_S
+    while True:
+        await asyncio.sleep(LOOK_S)
+        lost = [number for number, nanny in enumerate(nannies) if losses.lost(nanny)]
+        if not lost:
+            pause = FIRST_PAUSE_S
+            continue
+        # A worker that loses its scheduler ends; so do all of them, and there is nothing to replace them for.
+        if scheduler is None or await _scheduler(asked) != scheduler:
+            return
+        say(f"{len(lost)} of {asked.workers} workers are lost; starting others.")
+        await _close([nannies[number] for number in lost])
+        for number in lost:
+            nannies[number] = _nanny(asked, number)
+        begun = await asyncio.gather(*(nannies[number] for number in lost), return_exceptions=True)
+        if any(isinstance(one, Exception) for one in begun):
+            say(f"not all of them could be started; trying again in {pause:g} s.")
+            await asyncio.sleep(pause)
+            pause = min(2.0 * pause, LONGEST_PAUSE_S)
+
+
+async def _scheduler(asked: Joining) -> str | None:
+    """What tells the scheduler from the next one at its address; None where there is none."""
+    with suppress(*NO_SCHEDULER):
+        return str((await identity(asked.scheduler, asked.security, AGAIN_S, 0))["id"])
+    return None
 
 
 def _nanny(asked: Joining, number: int) -> Any:

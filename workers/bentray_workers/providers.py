@@ -17,7 +17,8 @@ from bentray_kernels.errors import InvalidInput
 
 from .dask_settings import NO_DASHBOARD, ours
 from .lanes import OFFERED, THREADS
-from .tls import security_of
+from .supervision import SupervisedCluster
+from .tls import own_security, security_of
 
 PRELOAD = "bentray_workers.warmup"
 
@@ -55,11 +56,17 @@ class Provider(Protocol):
 
 
 def embedded(wanted: Wanted) -> Deployed:
-    """Processes of this machine; without a number one a core."""
+    """Processes of this machine; without a number one a core.
+
+    Other users of the machine can reach their ports, so what comes there must prove itself: by the given
+    certificates, else by a key that only this process and its workers know.
+    """
     count = wanted.workers if wanted.workers is not None else len(os.sched_getaffinity(0))
     if wanted.template is not None:
         raise InvalidInput("cluster_template", wanted.template, "none with an embedded cluster")
-    local: Deployed = LocalCluster(
+    secured = wanted.tls is not None or wanted.processes
+    security = own_security() if wanted.tls is None else security_of(wanted.tls)
+    local: Deployed = (SupervisedCluster if wanted.processes else LocalCluster)(
         n_workers=count,
         threads_per_worker=THREADS,
         processes=wanted.processes,
@@ -67,7 +74,8 @@ def embedded(wanted: Wanted) -> Deployed:
         dashboard_address=NO_DASHBOARD,
         scheduler_kwargs={"dashboard": False},
         preload=PRELOAD,
-        security=None if wanted.tls is None else security_of(wanted.tls),
+        # Workers in this process have no ports.
+        security=security if secured else None,
         local_directory=None if wanted.local_directory is None else str(wanted.local_directory),
     )
     return local

@@ -1,10 +1,16 @@
-"""TLS between scheduler, workers and clients: one folder with a certificate of our own authority."""
+"""TLS between scheduler, workers and clients: by the certificates of a folder, or by a new one in memory."""
 
 from __future__ import annotations
 
 import ssl
+from datetime import datetime
 from pathlib import Path
 
+from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.hashes import SHA256
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+from cryptography.x509.oid import NameOID
 from distributed.security import Security
 
 from bentray_kernels.errors import InvalidInput
@@ -12,6 +18,9 @@ from bentray_kernels.errors import InvalidInput
 AUTHORITY = "authority.pem"
 CERTIFICATE = "certificate.pem"
 KEY = "key.pem"
+
+# A key that dies with its process needs no end, and a clock that is set back must not make it invalid.
+ALWAYS = datetime(2000, 1, 1), datetime(9999, 12, 31, 23, 59, 59)
 
 
 def security_of(folder: Path | None) -> Security:
@@ -46,3 +55,25 @@ def security_of(folder: Path | None) -> Security:
         for part, name in (("cert", CERTIFICATE), ("key", KEY))
     }
     return Security(tls_ca_file=str(paths[AUTHORITY]), require_encryption=True, **roles)
+
+
+def own_security() -> Security:
+    """What only this process, and whoever it hands it to, can prove itself with: a certificate made anew.
+
+    Key and certificate stay in memory; worker processes get them through a pipe.
+    """
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "bentray-embedded")])
+    made = (
+        x509.CertificateBuilder(name, name, key.public_key(), x509.random_serial_number(), *ALWAYS)
+        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .sign(key, SHA256())
+    )
+    certificate = made.public_bytes(Encoding.PEM).decode()
+    secret = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()).decode()
+    roles = {
+        f"tls_{role}_{part}": content
+        for role in ("scheduler", "worker", "client")
+        for part, content in (("cert", certificate), ("key", secret))
+    }
+    return Security(tls_ca_file=certificate, require_encryption=True, **roles)

@@ -1,0 +1,80 @@
+"""Worker processes that are replaced until the wanted number is back, whatever has ended them."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from contextlib import suppress
+from typing import Any
+
+from distributed import LocalCluster
+from distributed.core import Status
+
+log = logging.getLogger("bentray.workers")
+
+# Between two looks at the workers, s.
+LOOK_S = 1.0
+# A nanny starts its worker again within a moment; one that has had no process for this long never will, s.
+WITHOUT_PROCESS_S = 10.0
+# Between two attempts to replace workers of which none starts, s.
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 60.0
+
+OVER = (Status.closing, Status.closed, Status.failed, Status.closing_gracefully)
+
+
+class Losses:
+    """Tells which nannies will never have a worker again."""
+
+    def __init__(self) -> None:
+        self._without_since: dict[Any, float] = {}
+
+    def lost(self, nanny: Any) -> bool:
+        """Whether a nanny has ended, or has had no worker process for ``WITHOUT_PROCESS_S``."""
+        if nanny.status in OVER:
+            return True
+        if nanny.status != Status.running or nanny.is_alive():
+            self._without_since.pop(nanny, None)
+            return False
+        return time.monotonic() - self._without_since.setdefault(nanny, time.monotonic()) > WITHOUT_PROCESS_S
+
+
+class SupervisedCluster(LocalCluster):  # type: ignore[misc] # Dask has no types
+    """A ``LocalCluster`` of processes that starts another worker for every one that is lost for good.
+
+    Dask replaces the process of a worker that dies. It does not replace a nanny: one that failed to start its
+    worker, or that Dask ended because its worker was away for longer than ``lost-worker-timeout``.
+    """
+
+    async def _start(self) -> None:
+        await super()._start()
+        self._supervisor = asyncio.create_task(self._supervise())
+
+    async def _close(self) -> None:
+        if hasattr(self, "_supervisor"):
+            self._supervisor.cancel()
+        await super()._close()
+
+    async def _supervise(self) -> None:
+        losses, pause = Losses(), FIRST_PAUSE_S
+        # The first start is not ours: whoever made the cluster is told when it fails.
+        while self.status != Status.running or set(self.worker_spec) - set(self.workers):
+            await asyncio.sleep(LOOK_S)
+        while self.status == Status.running:
+            await asyncio.sleep(LOOK_S)
+            for name in [name for name, nanny in self.workers.items() if losses.lost(nanny)]:
+                nanny = self.workers.pop(name)
+                with suppress(Exception):
+                    await nanny.close()
+            missing = len(set(self.worker_spec) - set(self.workers))
+            if not missing:
+                pause = FIRST_PAUSE_S
+                continue
+            log.warning("%d of %d workers are lost; starting others", missing, len(self.worker_spec))
+            try:
+                # A cluster that closes meanwhile waits for the start, and ends what was started.
+                await asyncio.shield(self._correct_state())
+            except Exception as error:
+                log.warning("no worker could be started (%s); trying again in %g s", error, pause)
+                await asyncio.sleep(pause)
+                pause = min(2.0 * pause, LONGEST_PAUSE_S)
