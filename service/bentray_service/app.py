@@ -50,6 +50,7 @@ from .storage.jobs import Jobs
 from .storage.keys import Keys
 from .storage.meshes import Meshes
 from .storage.open_store import open_store
+from .storage.private import private_files
 from .storage.queue import Queue
 from .storage.uploads import Uploads
 from .storage.volumes import Volumes
@@ -122,6 +123,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
 
 def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) -> Parts:
     """Open every part; ``stack`` closes what has been opened, also when a later part fails."""
+    stack.enter_context(private_files())
     files = Files(settings.data_dir)
     files.prepare()
     stack.enter_context(lock(files.root))

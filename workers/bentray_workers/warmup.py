@@ -71,6 +71,9 @@ def warm_up_tracing() -> None:
 def dask_setup(worker: Any) -> None:
     """Called by Dask in each worker that preloads this module."""
     refusal_log.install()
+    if worker.nanny is not None:
+        # In a process of its own: what its tasks write is for its user alone.
+        os.umask(0o077)
     with _one_at_a_time():
         warm_up()
         warm_up_rendering()

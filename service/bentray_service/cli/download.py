@@ -11,7 +11,7 @@ from bentray_kernels.errors import InvalidInput
 
 from .endings import service_answers
 from .paths import output_file
-from .terminal import AsJson, print_json, print_lines, progress_bar
+from .terminal import AsJson, print_json, print_lines, progress_bar, remark
 
 if TYPE_CHECKING:
     from ..client.flows import Format
@@ -20,6 +20,12 @@ if TYPE_CHECKING:
 def download(
     stored: Annotated[str, typer.Argument(metavar="ID", help="Of a scan (ds-…) or of a volume (vol-…).")],
     output: Annotated[Path, typer.Option("--output", "-o", help="File to write.")],
+    form: Annotated[
+        str | None,
+        typer.Option(
+            "--format", show_default="by the name", help="hdf5 (or h5), nifti, metaimage, mat or npy."
+        ),
+    ] = None,
     url: Annotated[str, typer.Option(help="Address of the service.")] = "http://127.0.0.1:8000",
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
@@ -35,14 +41,17 @@ def download(
         formats |= {".nii": "nifti", ".mha": "metaimage", ".mat": "mat", ".npy": "npy"}
     elif not stored.startswith("ds-"):
         raise InvalidInput("id", repr(stored), "the id of a scan (ds-…) or of a volume (vol-…)")
-    chosen = formats.get(output.suffix.lower())
+    names: dict[str, Format] = {**{one: one for one in formats.values()}, "h5": "hdf5"}
+    if form is not None and form not in names:
+        raise InvalidInput("format", repr(form), "one of " + ", ".join(names))
+    chosen = formats.get(output.suffix.lower()) if form is None else names[form]
     if chosen is None:
-        raise InvalidInput("output", output, "a name that ends in " + ", ".join(formats))
+        raise InvalidInput("output", output, "a name that ends in " + ", ".join(formats) + ", or --format")
     target = output_file(output, force=force)
 
     from ..client import Client
 
-    with service_answers(), Client(url) as client, progress_bar("Downloading") as step:
+    with service_answers(), Client(url, on_wait=remark) as client, progress_bar("Downloading") as step:
         if stored.startswith("vol-"):
             client.download(stored, chosen, target)
         else:

@@ -115,14 +115,16 @@ def _opened(data: Path | None) -> Iterator[Keys]:
     from ..storage.database import open_database
     from ..storage.files import Files
     from ..storage.keys import Keys
+    from ..storage.private import private_files
 
     settings = ServiceSettings.load(**({} if data is None else {"data_dir": data}))
-    Files(settings.data_dir).prepare()
-    database = open_database(settings.database)
-    try:
-        yield Keys(database)
-    finally:
-        database.close()
+    with private_files():
+        Files(settings.data_dir).prepare()
+        database = open_database(settings.database)
+        try:
+            yield Keys(database)
+        finally:
+            database.close()
 
 
 def _seconds(text: str) -> float:

@@ -69,6 +69,9 @@ def submit(
 ) -> None:
     """Upload a scan, reconstruct it on the service and download the result.
 
+    When the service or its database is started again meanwhile, it says so, waits up to five minutes, and
+    goes on; the job is started once.
+
     With --batch, reconstruct a folder of scans on a Dask cluster without the service. What has a sound result
     of the same file and settings is left out, so that a batch that was stopped can be given again; one that
     fails leaves the others alone and makes the exit code 1. As in:
@@ -108,7 +111,7 @@ def _submit(
 
     from ..client import Client
 
-    with service_answers(), Client(url) as client:
+    with service_answers(), Client(url, on_wait=remark) as client:
         with progress_bar("Uploading") as step:
             dataset = client.upload(source, step)
         job = client.submit(dataset["id"], settings.to_dict())

@@ -12,8 +12,9 @@ import anyio
 import httpx
 
 from . import flows
-from .errors import ClientError, NoAnswer, from_response
+from .errors import ClientError, from_response, no_answer
 from .flows import Format, Record
+from .patience import PATIENCE_S, Patience
 from .results import Result
 from .saving import saving
 from .steps import CHUNK_BYTES, Ask, Fetch, Listen, Pause, Step, settings_of
@@ -27,18 +28,26 @@ class AsyncClient:
     """As :class:`Client`; use it with ``async with``.
 
     Args:
-        url, key, timeout_s, poll_s: as of ``Client``.
+        url, key, timeout_s, poll_s, patience_s, on_wait: as of ``Client``.
 
     Raises:
         InvalidInput: for a ``url`` that is no web address.
     """
 
     def __init__(
-        self, url: str, *, key: str | None = None, timeout_s: float = 300.0, poll_s: float = 0.3
+        self,
+        url: str,
+        *,
+        key: str | None = None,
+        timeout_s: float = 300.0,
+        poll_s: float = 0.3,
+        patience_s: float = PATIENCE_S,
+        on_wait: Callable[[str], None] | None = None,
     ) -> None:
         settings = settings_of(url, key, timeout_s)
         self.url: str = settings["base_url"]
         self._poll_s = poll_s
+        self._patience = Patience(patience_s, on_wait)
         self._http = httpx.AsyncClient(**settings, transport=httpx.AsyncHTTPTransport(retries=2))
 
     async def __aenter__(self) -> Self:
@@ -117,6 +126,7 @@ class AsyncClient:
         await self._run(flows.delete(stored_id))
 
     async def _run(self, flow: Generator[Step, Any, T]) -> T:
+        flow = self._patience.through(flow)
         answer: Any = None
         error: ClientError | None = None
         async with AsyncExitStack() as streams:
@@ -158,7 +168,7 @@ class AsyncClient:
             line = await anext(listening[step.path], None)
         except httpx.TransportError as error:
             del listening[step.path]
-            raise NoAnswer(f"no answer from {self.url}: {error}") from error
+            raise no_answer(self.url, error) from error
         if line is None:
             del listening[step.path]
         return line
@@ -172,7 +182,7 @@ class AsyncClient:
                     raise from_response(response)
                 yield response
         except httpx.TransportError as error:
-            raise NoAnswer(f"no answer from {self.url}: {error}") from error
+            raise no_answer(self.url, error) from error
 
 
 async def _awaited(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:

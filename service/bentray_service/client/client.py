@@ -12,8 +12,9 @@ from typing import Any, Self, TypeVar
 import httpx
 
 from . import flows
-from .errors import ClientError, NoAnswer, from_response
+from .errors import ClientError, from_response, no_answer
 from .flows import Format, Record
+from .patience import PATIENCE_S, Patience
 from .results import Result
 from .saving import saving
 from .steps import CHUNK_BYTES, Ask, Fetch, Listen, Pause, Step, settings_of
@@ -33,17 +34,29 @@ class Client:
         key: an API key, where the service asks for one.
         timeout_s: how long an answer may take.
         poll_s: how often a job is looked at where its events do not come through.
+        patience_s: how long to go on asking a service that has answered before and is away now, as when it or
+            its database is started again. Only what is safe to repeat is repeated: looking, downloading,
+            uploading, and starting a job, which has a key of its own. 0 gives up at once.
+        on_wait: called with a line when such waiting begins and when it is over.
 
     Raises:
         InvalidInput: for a ``url`` that is no web address.
     """
 
     def __init__(
-        self, url: str, *, key: str | None = None, timeout_s: float = 300.0, poll_s: float = 0.3
+        self,
+        url: str,
+        *,
+        key: str | None = None,
+        timeout_s: float = 300.0,
+        poll_s: float = 0.3,
+        patience_s: float = PATIENCE_S,
+        on_wait: Callable[[str], None] | None = None,
     ) -> None:
         settings = settings_of(url, key, timeout_s)
         self.url: str = settings["base_url"]
         self._poll_s = poll_s
+        self._patience = Patience(patience_s, on_wait)
         self._http = httpx.Client(**settings, transport=httpx.HTTPTransport(retries=2))
 
     def __enter__(self) -> Self:
@@ -135,6 +148,7 @@ class Client:
         self._run(flows.delete(stored_id))
 
     def _run(self, flow: Generator[Step, Any, T]) -> T:
+        flow = self._patience.through(flow)
         answer: Any = None
         error: ClientError | None = None
         with ExitStack() as streams:
@@ -173,7 +187,7 @@ class Client:
             line = next(listening[step.path], None)
         except httpx.TransportError as error:
             del listening[step.path]
-            raise NoAnswer(f"no answer from {self.url}: {error}") from error
+            raise no_answer(self.url, error) from error
         if line is None:
             del listening[step.path]
         return line
@@ -187,4 +201,4 @@ class Client:
                     raise from_response(response)
                 yield response
         except httpx.TransportError as error:
-            raise NoAnswer(f"no answer from {self.url}: {error}") from error
+            raise no_answer(self.url, error) from error

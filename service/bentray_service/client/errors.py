@@ -15,6 +15,7 @@ class ClientError(Exception):
         field, found, accepted: from the problem, or None.
         problem: the whole problem, empty when there was none.
         upload: the id of the upload that was broken off; ``upload(…, resume=…)`` goes on with it.
+        retry_after_s: how long the service asks to wait before the next attempt, s, or None.
     """
 
     def __init__(
@@ -27,10 +28,25 @@ class ClientError(Exception):
         self.found: str | None = self.problem.get("found")
         self.accepted: str | None = self.problem.get("accepted")
         self.upload: str | None = None
+        self.retry_after_s: float | None = None
 
 
 class NoAnswer(ClientError):  # noqa: N818 - names what happened, to whoever tries again
-    """The connection could not be made, or broke."""
+    """The connection could not be made, or broke.
+
+    Attributes:
+        sent: whether the service may have got the request.
+    """
+
+    def __init__(self, message: str, *, sent: bool = True) -> None:
+        super().__init__(message)
+        self.sent = sent
+
+
+def no_answer(url: str, error: httpx.TransportError) -> NoAnswer:
+    """The error of a connection that failed."""
+    refused = isinstance(error, httpx.ConnectError | httpx.ConnectTimeout)
+    return NoAnswer(f"no answer from {url}: {error}", sent=not refused)
 
 
 def from_problem(problem: dict[str, Any], status: int | None = None) -> ClientError:
@@ -42,7 +58,11 @@ def from_problem(problem: dict[str, Any], status: int | None = None) -> ClientEr
 def from_response(response: httpx.Response) -> ClientError:
     """The error of an answer that is not a success."""
     if response.headers.get("content-type", "").startswith("application/problem+json"):
-        return from_problem(response.json(), response.status_code)
-    return ClientError(
-        f"{response.url} answered {response.status_code}, and not as Bentray does", response.status_code
-    )
+        error = from_problem(response.json(), response.status_code)
+    else:
+        words = f"{response.url} answered {response.status_code}, and not as Bentray does"
+        error = ClientError(words, response.status_code)
+    wait = response.headers.get("retry-after", "")
+    if wait.isdecimal():
+        error.retry_after_s = float(wait)
+    return error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import uuid
 from collections.abc import Generator, Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -13,28 +14,33 @@ from .steps import Ask, Fetch, Step
 from .uploading import PLACES, OnBytes
 
 Record = dict[str, Any]
-Format = Literal["hdf5", "nifti", "metaimage", "mat", "npy"]
+Format = Literal["hdf5", "h5", "nifti", "metaimage", "mat", "npy"]
 
 PREFIXES = {"ds": "dataset", "vol": "volume", "mesh": "mesh"}
 
 
 def record(method: str, path: str, **options: Any) -> Generator[Step, Any, Record]:
     """The JSON that one request gives."""
-    return dict((yield Ask(method, path, options)).json())
+    return dict((yield Ask(method, path, options, repeatable=method == "GET")).json())
 
 
 def submit(dataset_id: str, settings: Mapping[str, Any] | None) -> Generator[Step, Any, Record]:
     asked = {"kind": "reconstruction", "dataset": dataset_id, "settings": dict(settings or {})}
-    return (yield from record("POST", "/v1/jobs", json=asked))
+    return (yield from _job(asked))
 
 
 def simulate(settings: Mapping[str, Any] | None) -> Generator[Step, Any, Record]:
-    asked = {"kind": "simulation", "settings": dict(settings or {})}
-    return (yield from record("POST", "/v1/jobs", json=asked))
+    return (yield from _job({"kind": "simulation", "settings": dict(settings or {})}))
+
+
+def _job(asked: Record) -> Generator[Step, Any, Record]:
+    """Start a job; its key makes sure that it is one, however often the request has to be sent."""
+    options = {"json": asked, "headers": {"Idempotency-Key": str(uuid.uuid4())}}
+    return dict((yield Ask("POST", "/v1/jobs", options, repeatable=True)).json())
 
 
 def picture(path: str, how: Mapping[str, str | float]) -> Generator[Step, Any, bytes]:
-    return bytes((yield Ask("GET", path, {"params": dict(how)})).content)
+    return bytes((yield Ask("GET", path, {"params": dict(how)}, repeatable=True)).content)
 
 
 def download(volume_id: str, kind: Format, target: Path) -> Generator[Step, Any, Path]:

@@ -28,12 +28,16 @@ class Ask:
         method, path: of the service.
         options: as ``httpx`` takes them: ``params``, ``json``, ``headers``.
         body: makes the chunks of the body.
+        repeatable: whether the service does nothing twice when the request comes again.
+        until: when to stop repeating it, by ``time.monotonic``; None for no such time.
     """
 
     method: str
     path: str
     options: Mapping[str, Any] = field(default_factory=dict)
     body: Callable[[], Iterator[bytes]] | None = None
+    repeatable: bool = False
+    until: float | None = None
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The flow of an upload: small files in one request, larger ones by tus, over broken connections."""
+"""The flow of an upload: by tus, over broken connections, and stored once however often it is sent."""
 
 from __future__ import annotations
 
@@ -18,11 +18,8 @@ Kind = Literal["dataset", "volume", "mesh"]
 Record = dict[str, Any]
 OnBytes = Callable[[int, int], None]
 
-# Where each kind goes in one request.
+# Where each kind is found.
 PLACES: Mapping[str, str] = {"dataset": "/v1/datasets", "volume": "/v1/volumes", "mesh": "/v1/meshes"}
-
-# Larger ones go in pieces: less than this is sent again quickly.
-ONE_REQUEST_BYTES = 32 * 2**20
 
 # How often in a row a connection may break without a byte getting through, and the pauses between, s.
 TRIES = 6
@@ -31,7 +28,6 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 15.0
 FIRST_LOOK_S, LONGEST_LOOK_S = 0.05, 1.0
 
 TUS = {"Tus-Resumable": "1.0.0"}
-OCTETS = {"Content-Type": "application/octet-stream"}
 PIECE = {"Content-Type": "application/offset+octet-stream"}
 
 
@@ -45,10 +41,6 @@ def upload(
         total = path.stat().st_size
     except OSError as error:
         raise _unreadable(path, error) from error
-    if resume is None and total <= ONE_REQUEST_BYTES:
-        options = {"headers": {**OCTETS, "Content-Length": str(total)}, "params": dict(said)}
-        body = _chunks(path, 0, total, on_progress)
-        return dict((yield Ask("POST", PLACES[kind], options, body)).json())
     if resume is None:
         place = yield from _begin(total, {"filename": path.name, **said, "kind": kind})
     else:
@@ -64,7 +56,8 @@ def upload(
 def _begin(total: int, said: Mapping[str, str]) -> Generator[Step, Any, str]:
     metadata = ",".join(f"{name} {base64.b64encode(text.encode()).decode()}" for name, text in said.items())
     headers = {**TUS, "Upload-Length": str(total), "Upload-Metadata": metadata}
-    answer = yield Ask("POST", "/v1/uploads", {"headers": headers})
+    # One that is begun twice is forgotten, and ends by itself.
+    answer = yield Ask("POST", "/v1/uploads", {"headers": headers}, repeatable=True)
     return httpx.URL(answer.headers["Location"]).path
 
 
@@ -73,7 +66,7 @@ def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Ge
     failures, reached, pause = 0, -1, FIRST_PAUSE_S
     while True:
         try:
-            there = yield Ask("HEAD", place, {"headers": TUS})
+            there = yield Ask("HEAD", place, {"headers": TUS}, repeatable=True)
             offset, length = int(there.headers["Upload-Offset"]), int(there.headers["Upload-Length"])
             if length != total:
                 raise ClientError(f"{path} has {total} bytes; the upload at {place} is one of {length}")
@@ -86,7 +79,7 @@ def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Ge
             return
         except ClientError as error:
             # Locked: the service has not noticed yet that the connection before is gone.
-            if not isinstance(error, NoAnswer) and error.status not in (408, 409, 423, 502, 503, 504):
+            if not isinstance(error, NoAnswer) and error.status not in (408, 409, 423, 500, 502, 503, 504):
                 raise
             failures += 1
             if failures == TRIES:
@@ -99,9 +92,9 @@ def _read(place: str) -> Generator[Step, Any, Record]:
     """Wait until the service has read the upload."""
     pause = FIRST_LOOK_S
     while True:
-        record = (yield Ask("GET", place)).json()
+        record = (yield Ask("GET", place, repeatable=True)).json()
         if record["state"] == "done":
-            return dict((yield Ask("GET", record["links"]["result"])).json())
+            return dict((yield Ask("GET", record["links"]["result"], repeatable=True)).json())
         if record["state"] == "refused":
             raise from_problem(record["problem"])
         yield Pause(pause)

@@ -24,7 +24,7 @@ def wait(
     deadline = None if timeout_s is None else time.monotonic() + timeout_s
     place, broken = f"/v1/jobs/{job_id}", 0
     while True:
-        job: Record = (yield Ask("GET", place)).json()
+        job: Record = (yield Ask("GET", place, repeatable=True, until=deadline)).json()
         if on_progress is not None:
             on_progress(job)
         if job["state"] == "succeeded":
@@ -40,6 +40,8 @@ def wait(
             try:
                 if not (yield from _news(f"{place}/events", max(poll_s, min(SILENCE_S, left)), deadline)):
                     broken += 1
+                else:
+                    broken = 0
                 continue
             except ClientError:
                 broken += 1

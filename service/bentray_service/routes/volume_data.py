@@ -32,11 +32,11 @@ def volume_data(
     service: Service,
     tenant: CallerTenant,
     format: Annotated[  # noqa: A002 - the name of the query parameter
-        Literal["hdf5", "nifti", "metaimage", "mat", "npy"],
+        Literal["hdf5", "h5", "nifti", "metaimage", "mat", "npy"],
         Query(
-            description="hdf5: everything; mat: every image and the grid for MATLAB (version 5); npy: the "
-            "values alone, speed in m/s; nifti and metaimage (.mha): these with spacing and origin in mm, "
-            "for even spacing."
+            description="hdf5 or h5: everything; mat: every image and the grid for MATLAB (version 5); npy: "
+            "the values alone, speed in m/s; nifti and metaimage (.mha): these with spacing and origin in "
+            "mm, for even spacing."
         ),
     ] = "hdf5",
 ) -> Response:
@@ -48,8 +48,8 @@ def volume_data(
     files = service.files.of(tenant)
     # For other formats too: what is made of a volume stays as long as it does.
     path: Path = service.files.store.bring(files.volume(volume["id"]))
-    seed = repr((volume["id"], volume["created"], format))
-    if format == "hdf5":
+    seed = repr((volume["id"], volume["created"], "hdf5" if format == "h5" else format))
+    if format in ("hdf5", "h5"):
         return download(request, path, seed, HDF5)
     chosen = FORMATS[format]
     uploaded = "job_id" not in volume

@@ -13,6 +13,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.atomic import sync
 
 from .local_store import LocalStore
+from .private import close_to_others
 from .store import Store
 from .tenant_files import KINDS, TenantFiles
 from .tenants import LOCAL, Tenant, checked_tenant
@@ -38,14 +39,16 @@ class Files:
         self.audit = self.root / "audit"
 
     def prepare(self) -> None:
-        """Make the folders.
+        """Make the folders, and close them to other users of this machine.
 
         Raises:
-            InvalidInput: when the folder cannot be made or written.
+            InvalidInput: when the folder cannot be made or written, or others would still reach it.
         """
         try:
+            self.root.mkdir(mode=0o700, parents=True, exist_ok=True)
+            close_to_others(self.root)
             for folder in (self._tenants, self.scratch, self.audit):
-                folder.mkdir(parents=True, exist_ok=True)
+                folder.mkdir(mode=0o700, exist_ok=True)
         except OSError as error:
             raise InvalidInput(
                 "data_dir", f"{self.root} ({error.strerror})", "a folder that can be written"

@@ -19,7 +19,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     found: list[Any] = []
 
     class StandIn:
-        def __init__(self, url: str) -> None:
+        def __init__(self, url: str, on_wait: Callable[[str], None]) -> None:
             found.append(url)
 
         def __enter__(self) -> StandIn:
@@ -49,6 +49,17 @@ def test_a_scan_and_a_volume(bentray: Callable[..., Result], tmp_path: Path, ask
         assert result.stdout.splitlines() == [str(tmp_path / name)]
     told = [one for one in asked if not str(one).startswith("http")]
     assert (asked[0], told) == ("http://lab:1", [SCAN, (VOLUME, "nifti"), (VOLUME, "metaimage")])
+
+
+def test_a_format_by_its_name(bentray: Callable[..., Result], tmp_path: Path, asked: list[Any]) -> None:
+    for form in ("h5", "hdf5", "npy"):
+        result = bentray("download", VOLUME, "-o", tmp_path / f"image-{form}", "--format", form)
+        assert result.exit_code == 0
+    told = [one for one in asked if not str(one).startswith("http")]
+    assert told == [(VOLUME, "hdf5"), (VOLUME, "hdf5"), (VOLUME, "npy")]
+    refused = bentray("download", SCAN, "-o", tmp_path / "scan", "--format", "npy")
+    assert refused.exit_code == 2
+    assert "format: found 'npy'; accepted: one of hdf5, h5" in refused.stderr
 
 
 @pytest.mark.parametrize(

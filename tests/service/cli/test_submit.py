@@ -22,7 +22,7 @@ class StandIn:
     asked: ClassVar[list[Any]] = []
     scan: ClassVar[Path]
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, on_wait: Callable[[str], None]) -> None:
         self.asked.append(url)
 
     def __enter__(self) -> StandIn:

@@ -27,8 +27,7 @@ def large(scan):
 
 
 @pytest.fixture(autouse=True)
-def in_pieces(monkeypatch):
-    monkeypatch.setattr(uploading, "ONE_REQUEST_BYTES", 100_000)
+def without_delay(monkeypatch):
     monkeypatch.setattr(uploading, "FIRST_PAUSE_S", 0.01)
     monkeypatch.setattr(uploading, "LONGEST_PAUSE_S", 0.05)
 
@@ -85,7 +84,7 @@ def test_another_file_is_no_continuation(serve, large, scan, monkeypatch):
 
 
 def test_a_line_that_carries_nothing_ends_the_upload(serve, large):
-    with cutting(serve(), [2000] * 1000) as proxy, Client(proxy.url) as client:
+    with cutting(serve(), [2000] * 1000) as proxy, Client(proxy.url, patience_s=1.0) as client:
         with pytest.raises(ClientError, match="no answer"):
             client.upload(large)
         assert proxy.made < 100
@@ -107,7 +106,7 @@ def test_too_large_is_told_before_a_byte_is_sent(serve, large):
     assert (refused.value.status, refused.value.field) == (413, "Upload-Length")
 
 
-def test_volumes_and_meshes_too_in_one_request_and_in_pieces(serve, tmp_path):
+def test_volumes_too(serve, tmp_path):
     np.save(tmp_path / "small.npy", np.ones((4, 4, 4), np.float32))
     np.save(tmp_path / "large.npy", np.ones((40, 40, 40), np.float32))
     with Client(serve()) as client:
@@ -141,3 +140,10 @@ def test_tuspy_interoperates_also_over_a_broken_line(serve, large):
     assert again.offset == large.stat().st_size
     with Client(url) as client:
         assert client.upload(large, resume=place.rpartition("/")[2])["sha256"] == digest(large)
+
+
+def test_an_empty_file_is_refused(serve, tmp_path):
+    (tmp_path / "empty.h5").touch()
+    with Client(serve()) as client, pytest.raises(ClientError) as refused:
+        client.upload(tmp_path / "empty.h5")
+    assert refused.value.status == 422

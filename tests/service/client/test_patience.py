@@ -1,0 +1,206 @@
+"""Patience: what is safe to repeat is repeated while the service is away, and only that, and not for ever."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bentray_service.client import AsyncClient, Client, ClientError, flows, patience, uploading
+from bentray_service.client.errors import NoAnswer
+from bentray_service.client.patience import Patience
+from bentray_service.client.steps import Ask, Fetch, Pause
+
+from .cutting_proxy import cutting
+
+LOOK = Ask("GET", "/v1/jobs/job-1", repeatable=True)
+CANCEL = Ask("POST", "/v1/jobs/job-1/cancel")
+GONE, REFUSED = NoAnswer("gone"), NoAnswer("refused", sent=False)
+
+
+def answered(status: int, retry_after_s: float | None = None) -> ClientError:
+    error = ClientError(f"status {status}", status)
+    error.retry_after_s = retry_after_s
+    return error
+
+
+class Walk:
+    """A client whose answers are given, and whose clock only pauses move."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, seconds: float = 300.0) -> None:
+        self.now, self.pauses, self.told = 1000.0, [], list[str]()
+        monkeypatch.setattr(patience, "time", SimpleNamespace(monotonic=lambda: self.now))
+        self._patience = Patience(seconds, self.told.append)
+        self.ask(LOOK, "first")
+
+    def ask(self, step: Any, *answers: Any) -> Any:
+        """The value of a step that gets these answers, errors among them."""
+
+        def flow() -> Any:
+            return (yield step)
+
+        walk, left, answer = self._patience.through(flow()), iter(answers), None
+        try:
+            while True:
+                asked = walk.throw(answer) if isinstance(answer, Exception) else walk.send(answer)
+                answer = None
+                if isinstance(asked, Pause):
+                    self.now += asked.seconds
+                    self.pauses.append(asked.seconds)
+                else:
+                    assert asked is step
+                    answer = next(left, GONE)
+        except StopIteration as end:
+            assert next(left, None) is None, "an answer was not asked for"
+            return end.value
+
+
+@pytest.fixture
+def walk(monkeypatch: pytest.MonkeyPatch) -> Walk:
+    return Walk(monkeypatch)
+
+
+def test_it_waits_longer_each_time_and_says_so_once(walk: Walk) -> None:
+    away = [REFUSED, GONE, answered(502), answered(503), answered(504), answered(500)]
+    assert walk.ask(LOOK, *away, "here") == "here"
+    assert walk.pauses == [0.5, 1.0, 2.0, 4.0, 8.0, 15.0]
+    assert walk.told == ["refused; trying again for up to 300 s.", "The service answers again."]
+
+
+def test_it_waits_as_long_as_the_service_asks(walk: Walk) -> None:
+    walk.ask(LOOK, answered(503, 5.0), "here")
+    assert walk.pauses == [5.0]
+
+
+def test_it_ends(walk: Walk) -> None:
+    with pytest.raises(NoAnswer, match="gone"):
+        walk.ask(LOOK)
+    assert 280.0 < sum(walk.pauses) <= 300.0
+    with pytest.raises(ClientError, match="500"):
+        walk.ask(LOOK, *[answered(500)] * patience.MOST_ERRORS)
+
+
+def test_a_wait_with_an_end_of_its_own_ends_there(walk: Walk) -> None:
+    with pytest.raises(NoAnswer):
+        walk.ask(Ask("GET", "/", repeatable=True, until=walk.now + 10.0))
+    assert sum(walk.pauses) <= 10.0
+
+
+def test_a_service_that_never_answered_is_given_up_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    flow = Patience(300.0, told.append).through(flows.record("GET", "/v1/jobs/job-1"))
+    assert isinstance(next(flow), Ask)
+    with pytest.raises(NoAnswer, match="refused"):
+        flow.throw(REFUSED)
+    assert told == []
+
+
+@pytest.mark.parametrize("error", [GONE, answered(500), answered(503)])
+def test_what_might_be_done_twice_is_not_repeated_once_it_was_sent(walk: Walk, error: ClientError) -> None:
+    with pytest.raises(ClientError):
+        walk.ask(CANCEL, error)
+    assert walk.pauses == []
+    assert walk.ask(CANCEL, REFUSED, REFUSED, "cancelled") == "cancelled"
+
+
+@pytest.mark.parametrize("status", [401, 404, 409, 413, 422, 429, 501])
+def test_a_refusal_is_no_absence(walk: Walk, status: int) -> None:
+    with pytest.raises(ClientError):
+        walk.ask(LOOK, answered(status))
+    assert walk.pauses == []
+
+
+def test_a_download_begins_again(walk: Walk, tmp_path: Path) -> None:
+    walk.ask(Fetch("/v1/volumes/vol-1/data", {}, tmp_path / "v.h5"), GONE, answered(503), None)
+    assert len(walk.pauses) == 2
+
+
+def test_a_job_has_one_key_however_often_it_is_sent() -> None:
+    step = next(flows.submit("ds-1", None))
+    assert isinstance(step, Ask)
+    assert step.repeatable
+    other = next(flows.submit("ds-1", None))
+    assert isinstance(other, Ask)
+    assert step.options["headers"]["Idempotency-Key"] != other.options["headers"]["Idempotency-Key"]
+
+
+@pytest.fixture
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(patience, "FIRST_PAUSE_S", 0.05)
+
+
+def test_a_job_whose_answer_was_lost_is_started_once(
+    serve: Callable[..., str], scan: Callable[..., Path], work: Any, soon: None
+) -> None:
+    """The service gets the request; the connection breaks before the answer."""
+    url = serve()
+    with Client(url) as client:
+        dataset = client.upload(scan())["id"]
+    cuts = [1_000]
+    told: list[str] = []
+    with cutting(url, cuts) as proxy, Client(proxy.url, on_wait=told.append) as client:
+        with pytest.raises(ClientError, match="nothing with this id"):
+            client.job("job-" + 20 * "0")
+        # As long as it takes to pass the cut.
+        jobs = [client.submit(dataset, {"nodes": 16, "sweeps": 1})["id"] for _ in range(4)]
+    assert cuts == []
+    assert told[1:] == ["The service answers again."]
+    with Client(url) as client:
+        listed = {client.wait(job)["id"] for job in jobs}
+    assert len(listed) == 4
+    with Client(url) as client:
+        answer = client._http.get("/v1/jobs").json()
+    assert {job["id"] for job in answer["jobs"]} == listed
+
+
+def test_an_upload_is_stored_once_wherever_the_line_breaks(
+    serve: Callable[..., str], scan: Callable[..., Path], soon: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(uploading, "FIRST_PAUSE_S", 0.05)
+    url, source = serve(), scan()
+    size = source.stat().st_size
+    # In the creation, in the middle of the piece, and after it.
+    cuts = [400, 400 + size // 2, 1200 + size]
+    with cutting(url, cuts) as proxy, Client(proxy.url) as client:
+        with pytest.raises(ClientError, match="nothing with this id"):
+            client.job("job-" + 20 * "0")
+        record = client.upload(source)
+    assert cuts == []
+    assert record["bytes"] == size
+    with Client(url) as client:
+        assert len(client._http.get("/v1/datasets").json()["datasets"]) == 1
+
+
+def test_so_it_is_asynchronously(serve: Callable[..., str], scan: Callable[..., Path], soon: None) -> None:
+    async def call(url: str, told: list[str]) -> str:
+        async with AsyncClient(url, on_wait=told.append) as client:
+            with pytest.raises(ClientError, match="nothing with this id"):
+                await client.job("job-" + 20 * "0")
+            dataset = (await client.upload(scan()))["id"]
+            return str((await client.submit(dataset))["id"])
+
+    url, told = serve(), list[str]()
+    cuts = [scan().stat().st_size + 1_000]
+    with cutting(url, cuts) as proxy:
+        assert asyncio.run(call(proxy.url, told)).startswith("job-")
+    assert cuts == []
+
+
+def test_no_patience_gives_up_at_once(serve: Callable[..., str], soon: None) -> None:
+    with cutting(serve(), [400] * 1000) as proxy, Client(proxy.url, patience_s=0.0) as client:
+        for _ in range(10):
+            with pytest.raises(ClientError):
+                client.job("job-" + 20 * "0")
+        assert proxy.made < 40
+
+
+def test_h5_is_hdf5(serve: Callable[..., str], scan: Callable[..., Path], work: Any, tmp_path: Path) -> None:
+    with Client(serve()) as client:
+        job = client.wait(client.submit(client.upload(scan())["id"], {"nodes": 16, "sweeps": 1})["id"])
+        one, other = (client.download(job["volume"], name, tmp_path / name) for name in ("hdf5", "h5"))
+    assert np.array_equal(np.fromfile(one, np.uint8), np.fromfile(other, np.uint8))
