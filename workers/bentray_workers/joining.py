@@ -16,6 +16,7 @@ from distributed import Nanny
 from distributed.comm.addressing import parse_host_port
 from distributed.security import Security
 
+from . import heartbeat
 from .cluster import NO_SCHEDULER, identity, identity_of
 from .dask_settings import NO_DASHBOARD, ours
 from .lanes import THREADS
@@ -142,7 +143,7 @@ def _nanny(asked: Joining, number: int) -> Any:
         host=asked.host or own_address(asked.scheduler),
         name=name,
         security=asked.security,
-        preload=PRELOAD,
+        preload=[PRELOAD, heartbeat.__name__],
         dashboard=False,
         dashboard_address=NO_DASHBOARD,
         # One process that cannot join must not wait for ever: all of them try again together.

@@ -98,7 +98,7 @@ def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path)
         there = reconstruct(cluster.client, scan_file, settings)
     np.testing.assert_array_equal(there.speed, reconstruct(None, scan_file, settings).speed)
 
-    assert check_worker(machine.address) is None
+    wait_until(lambda: check_worker(machine.address) is None)
     sockets = listening(machine.worker.pid)
     assert (beyond_loopback(sockets), pages(sockets)) == (set(), [])
 
@@ -116,6 +116,7 @@ def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path)
     assert machine.worker.wait(30) == 0
     psutil.wait_procs(family, timeout=10)
     assert [process for process in family if process.is_running()] == []
+    assert (check_worker(machine.address) or "").endswith("none yet")
     assert machine.worker.stdout is not None
     assert json.loads(machine.worker.stdout.readline()) == {
         "scheduler": machine.address,
