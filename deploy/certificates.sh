@@ -1,10 +1,17 @@
 #!/bin/sh
-# Make a certificate authority and one certificate for scheduler, workers and clients: certificates.sh FOLDER [DAYS]
+# Make a certificate authority and one certificate for scheduler, workers and clients:
+#   certificates.sh [--containers] FOLDER [DAYS]
 #
+# With --containers the account inside of a container can read them too: the folder alone keeps others out.
 # FOLDER/authority-key.pem signs further certificates: keep it off the cluster. Each machine gets the other
 # three files. Whoever holds them may run code on every worker.
 set -eu
-folder=${1:?usage: certificates.sh FOLDER [DAYS]}
+containers=
+if [ "${1:-}" = --containers ]; then
+  containers=yes
+  shift
+fi
+folder=${1:?usage: certificates.sh [--containers] FOLDER [DAYS]}
 days=${2:-365}
 umask 077
 mkdir -p "$folder"
@@ -21,4 +28,8 @@ openssl req -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -subj "/CN=bentra
 openssl x509 -req -in request.pem -CA authority.pem -CAkey authority-key.pem -CAcreateserial -days "$days" \
   -out certificate.pem 2>/dev/null
 rm -f request.pem authority.srl
+if [ -n "$containers" ]; then
+  chmod 700 .
+  chmod 444 authority.pem certificate.pem key.pem
+fi
 echo "$folder: authority.pem, certificate.pem and key.pem for every machine; keep authority-key.pem to yourself"

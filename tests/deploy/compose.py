@@ -10,14 +10,29 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "docker-compose.yml"
+TLS = ROOT / "deploy" / "tls.yml"
 
 # ${NAME:-default}; our file gives every variable a default.
 VARIABLE = re.compile(r"\$\{(\w+):-([^}]*)\}")
 
 
-def read() -> dict[str, Any]:
-    """The whole file, with the default of every variable in its place."""
+def read(*overrides: Path) -> dict[str, Any]:
+    """The whole file with the default of every variable in its place, and on top of it the overrides."""
     found: dict[str, Any] = yaml.safe_load(VARIABLE.sub(r"\2", FILE.read_text()))
+    for path in overrides:
+        found = _merged(found, yaml.safe_load(VARIABLE.sub(r"\2", path.read_text())))
+    return found
+
+
+def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    """As compose merges: mappings key by key, secrets one after the other, all else is replaced."""
+    found = dict(below)
+    for name, value in above.items():
+        known = below.get(name)
+        if isinstance(value, dict) and isinstance(known, dict):
+            found[name] = _merged(known, value)
+        else:
+            found[name] = [*known, *value] if name == "secrets" and isinstance(known, list) else value
     return found
 
 

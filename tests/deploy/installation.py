@@ -29,11 +29,12 @@ class Installation:
 
     Args:
         folder: for the volume ``data``, scratch files, the password and logs.
+        overrides: compose files on top of docker-compose.yml.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *overrides: Path) -> None:
         self.folder = folder
-        self.services: dict[str, Any] = compose.read()["services"]
+        self.services: dict[str, Any] = compose.read(*overrides)["services"]
         password = folder / "database-password"
         subprocess.run([str(compose.ROOT / "deploy" / "secrets.sh"), str(folder)], check=True)
         owner = self.services["database"]["environment"]
@@ -51,10 +52,12 @@ class Installation:
             "database:5432": f"127.0.0.1:{self.database.port}",
             "/run/secrets/database-password": str(password),
             "/run/secrets/first-key": str(folder / "first-key"),
+            "/run/secrets": str(folder / "tls"),
             "0.0.0.0": "127.0.0.1",
         }
         self._whole = {
             "8786": str(self.ports["scheduler"]),
+            "--port=8786": f"--port={self.ports['scheduler']}",
             "8000": str(self.ports["service"]),
             "/data": str(folder / "data"),
             "/tmp": str(folder / "scratch"),

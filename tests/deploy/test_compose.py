@@ -46,8 +46,25 @@ def test_a_compose_client_takes_it(tmp_path: Path) -> None:
     for name in ("docker-compose.yml", "deploy"):
         source = compose.ROOT / name
         (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / name)
-    done = subprocess.run([*words, "config", "-q"], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    for files in ([], ["-f", "docker-compose.yml", "-f", "deploy/tls.yml"]):
+        command = [*words, *files, "config", "-q"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+
+def test_with_tls_nothing_is_said_in_the_clear_and_all_else_stays(file: dict[str, Any]) -> None:
+    secured = compose.read(compose.TLS)
+    for name in OURS:
+        part, before = secured["services"][name], file["services"][name]
+        assert "tcp://" not in str(part)
+        assert set(part["secrets"]) - set(before.get("secrets", [])) == {
+            "authority.pem",
+            "certificate.pem",
+            "key.pem",
+        }
+        for unchanged in ("networks", "read_only", "cap_drop", "security_opt", "mem_limit"):
+            assert part[unchanged] == before[unchanged]
+    assert secured["services"]["database"] == file["services"]["database"]
 
 
 def test_only_the_service_is_published_and_on_loopback(file: dict[str, Any]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 
 from bentray_kernels.tomography import Settings
 from bentray_service.client import Client
+from bentray_service.healthcheck import check_scheduler
 from bentray_workers.dataset_file import write_dataset
 from bentray_workers.reconstruction_file import read_reconstruction
 from bentray_workers.simulation import SimulationSettings, simulate
@@ -19,6 +21,7 @@ from bentray_workers.slices import reconstruct
 
 from .. import postgresql
 from ..listening import beyond_loopback, listening, pages
+from . import compose
 from .installation import PARTS, Installation
 
 pytestmark = [
@@ -91,6 +94,22 @@ def test_it_works_again_after_a_part_was_killed(installation: Installation, scan
         assert client.wait(job["id"])["state"] == "succeeded", installation.log("service")
         again = client.submit(client.upload(scan)["id"], QUICK.to_dict())
         assert client.wait(again["id"])["state"] == "succeeded"
+
+
+def test_with_certificates_the_parts_speak_tls_alone(tmp_path: Path, scan: Path) -> None:
+    subprocess.run([str(compose.ROOT / "deploy" / "certificates.sh"), str(tmp_path / "tls")], check=True)
+    secured = Installation(tmp_path, compose.TLS)
+    try:
+        for part in PARTS:
+            secured.start(part)
+            secured.wait_for(part)
+        address = f"127.0.0.1:{secured.ports['scheduler']}"
+        assert check_scheduler(f"tcp://{address}") is not None, "nobody is answered without TLS"
+        with Client(secured.url, key=secured.key) as client:
+            job = client.submit(client.upload(scan)["id"], QUICK.to_dict())
+            assert client.wait(job["id"])["state"] == "succeeded", secured.log("service")
+    finally:
+        secured.close()
 
 
 def wait_until(so: Callable[[], Any]) -> None:
