@@ -26,7 +26,7 @@ from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.phantoms.surfaces import sphere
 from bentray_kernels.tomography import Settings, reconstruct
 
-from . import refusal_log
+from . import compiling, refusal_log
 from .field_scenes import camera_of, scene_of
 from .field_view import FieldView
 from .refraction import strip
@@ -71,6 +71,7 @@ def warm_up_tracing() -> None:
 def dask_setup(worker: Any) -> None:
     """Called by Dask in each worker that preloads this module."""
     refusal_log.install()
+    compiling.announce()
     if worker.nanny is not None:
         # In a process of its own: what its tasks write is for its user alone.
         os.umask(0o077)

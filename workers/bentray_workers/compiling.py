@@ -1,0 +1,53 @@
+"""Notice of what numba compiles because its cache holds nothing for this processor and these sources."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]
+from numba.core import event
+
+log = logging.getLogger("bentray.compiling")
+
+KIND = "numba:compile"
+
+
+class _Listener(event.Listener):  # type: ignore[misc]
+    """Notes the name of each kernel that is compiled; those that the cache has make no event."""
+
+    def __init__(self) -> None:
+        self.kernels: list[str] = []
+
+    def on_start(self, event: Any) -> None:
+        function = event.data["dispatcher"].py_func
+        self.kernels.append(f"{function.__module__}.{function.__qualname__}")
+
+    def on_end(self, event: Any) -> None:
+        return
+
+
+class _Announcer(_Listener):
+    def on_start(self, event: Any) -> None:
+        if not self.kernels:
+            log.warning(
+                "Compiling kernels for this processor (%s), which the cache does not hold: minutes, once.",
+                get_host_cpu_name(),
+            )
+        super().on_start(event)
+
+
+@cache
+def announce() -> None:
+    """From now on, the first kernel that this process compiles is said in the log."""
+    event.register(KIND, _Announcer())
+
+
+@contextmanager
+def compiled_kernels() -> Iterator[list[str]]:
+    """The kernels that are compiled while the context is open."""
+    with event.install_listener(KIND, _Listener()) as listener:
+        yield listener.kernels
