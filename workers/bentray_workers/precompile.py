@@ -82,8 +82,9 @@ def digitised(scan: Dataset) -> Dataset:
     traces = scan.waveform
     assert traces is not None
     assert traces.water is not None
-    step = float(np.abs(traces.water).max()) / np.iinfo(np.int16).max
-    both = [(one / step).round().astype(np.int16) for one in (traces.object, traces.water)]
+    pair = (traces.object, traces.water)
+    step = max(float(np.abs(one).max()) for one in pair) / np.iinfo(np.int16).max
+    both = [(one / step).round().astype(np.int16) for one in pair]
     return replace(scan, waveform=Waveform(both[0], both[1], scale=step))
 
 
