@@ -11,16 +11,28 @@ from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
 from ..splines import refined
+from .fast_marching import high_accuracy_fast_marching
 from .fast_sweeping import Sweeper
+from .heap import DONE
+from .out_of_order import (
+    LENGTH,
+    SEED,
+    UNSETTLED,
+    WAIT,
+    Front,
+    correct,
+    nothing_waiting,
+    settle_earlier,
+    wait,
+)
 from .problem import Medium, PointSource
-from .updates import factored_update
+from .updates import TIE, factored_update
 
 # The order of arrival is all that the first-order times are for; they need not settle to rounding.
 ORDER_TOLERANCE = 1e-3
 
 # First-order times order the nodes near the source badly, and all that follow inherit it. So where the speed
-# varies by no more than CONTRAST within RADIUS nodes, straight lines give the times there; elsewhere, and
-# where straight lines contradict the sweeps, the times of one factored pass order a second.
+# varies by no more than CONTRAST within RADIUS nodes, straight lines give the times there.
 RADIUS = 8
 CONTRAST = 1.5
 
@@ -32,9 +44,9 @@ def accurate(problem: PointSource, *, supersample: int = 1) -> Floats:
     """Factored second-order travel time without a heap.
 
     Fast sweeping gives the order in which the front arrives, a counting sort puts the nodes into that
-    order, and a pass of the update of ``hafmm`` follows it. A node that the order put before an earlier
-    neighbour is updated again as soon as that neighbour is settled. The accuracy is the heap's, but for media
-    whose speed varies over several decades.
+    order, and a pass of the update of ``hafmm`` follows it. Nodes that the order put before an earlier
+    neighbour are settled again in their turn: see ``out_of_order``. So every node is later than its earliest
+    neighbour, and the times are those of ``hafmm``, up to its own error where speeds differ tenfold.
 
     Args:
         problem: the checked problem.
@@ -53,31 +65,19 @@ def accurate(problem: PointSource, *, supersample: int = 1) -> Floats:
         every = (slice(None, None, supersample),) * problem.slowness.ndim
         return np.ascontiguousarray(accurate(_supersampled(problem, int(supersample)))[every])
     seeds, times = problem.seeds()
-    squares = problem.reference_squares()
-    limit = 4.0 * (problem.source_slowness() * problem.spacing) ** 2
-
-    def passed(first: Floats) -> tuple[Floats, bool]:
-        return _pass(
-            _by_arrival(first, problem.slowness.size),
-            problem.padded_slowness,
-            problem.strides,
-            problem.spacing,
-            squares,
-            limit,
-            seeds,
-            times,
-        )
-
-    near = problem.surroundings(RADIUS, CONTRAST)
-    if near is not None:
-        time, complete = passed(_first_order(problem, *near))
-        if complete:
-            return problem.interior(time)
-    time, _ = passed(_first_order(problem, seeds, times))
-    again, complete = passed(time)
-    # Times that tie but for rounding can be out of order too.
-    time = again if complete else time
-    return problem.interior(time)
+    first = _first_order(problem, *(problem.surroundings(RADIUS, CONTRAST) or (seeds, times)))
+    time, complete = _pass(
+        _by_arrival(first, problem.slowness.size),
+        problem.padded_slowness,
+        problem.strides,
+        problem.spacing,
+        problem.reference_squares(),
+        4.0 * (problem.source_slowness() * problem.spacing) ** 2,
+        problem.least_factor(),
+        seeds,
+        times,
+    )
+    return problem.interior(time) if complete else high_accuracy_fast_marching(problem)
 
 
 def _supersampled(problem: PointSource, times: int) -> PointSource:
@@ -137,34 +137,43 @@ def _pass(
     spacing: float,
     squares: Floats,
     limit: float,
+    least: float,
     seeds: Ints,
     seed_times: Floats,
 ) -> tuple[Floats, bool]:
-    """Times of all nodes, and True; False where the order puts a node before all of its neighbours."""
+    """Times of all nodes, and True; False where more nodes came out of order than there are."""
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
-    # The seeds lie within the source's cell.
-    near = 0.25 * len(strides) * limit
     settled = np.full(slowness.size, math.inf)
     tau = np.ones(slowness.size)
+    front = Front(steps, spacing, slowness, squares, tau, settled, limit, least)
+    waiting = nothing_waiting(slowness.size)
+    place, numbers = waiting.place, waiting.numbers
     for k in range(seeds.size):
+        place[seeds[k]] = SEED
         settled[seeds[k]] = seed_times[k]
         if squares[seeds[k]] > 0.0:
             tau[seeds[k]] = seed_times[k] / math.sqrt(squares[seeds[k]])
     for node in order:
-        if settled[node] < math.inf:
+        if settled[node] < math.inf or (numbers[WAIT] > 0 and place[node] > DONE):
             continue
-        time = factored_update(node, steps, spacing, slowness, squares, tau, settled, limit)
+        time = factored_update(node, steps, spacing, slowness, squares, tau, settled, limit, least)
+        if numbers[LENGTH] > 0:
+            time = settle_earlier(node, time, front, waiting)
         if time == math.inf:
-            return settled, False
+            # The order puts it before all of its neighbours.
+            wait(node, waiting)
+            continue
         settled[node] = time
         tau[node] = time / math.sqrt(squares[node])
+        later = time * (1.0 + TIE)
+        wrong = numbers[WAIT] > 0
         for axis in range(len(strides)):
             for neighbour in (node - steps[axis], node + steps[axis]):
-                # It came too soon in the order, for this node is earlier and upwind of it.
-                if time < settled[neighbour] < math.inf and squares[neighbour] > near:
-                    settled[neighbour] = factored_update(
-                        neighbour, steps, spacing, slowness, squares, tau, settled, limit
-                    )
-                    tau[neighbour] = settled[neighbour] / math.sqrt(squares[neighbour])
-    return settled, True
+                wrong |= later < settled[neighbour] < math.inf
+        if wrong:
+            correct(node, front, waiting)
+            if numbers[UNSETTLED] > slowness.size:
+                return settled, False
+    settle_earlier(-1, math.inf, front, waiting)
+    return settled, numbers[UNSETTLED] <= slowness.size

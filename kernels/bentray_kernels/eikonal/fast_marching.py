@@ -71,6 +71,7 @@ def high_accuracy_fast_marching(problem: PointSource, *, stop_at: ArrayLike | No
         problem.spacing,
         problem.reference_squares(),
         4.0 * (problem.source_slowness() * problem.spacing) ** 2,
+        problem.least_factor(),
         seeds,
         times,
         awaited(problem, stop_at),
@@ -135,6 +136,7 @@ def _march_factored(
     spacing: float,
     squares: Floats,
     limit: float,
+    least: float,
     seeds: Ints,
     seed_times: Floats,
     goals: Ints,
@@ -165,7 +167,9 @@ def _march_factored(
                     if place[neighbour] == DONE:
                         continue
                     # A neighbour more can make the time later: it replaces what fewer neighbours gave.
-                    trial = factored_update(neighbour, steps, spacing, slowness, squares, tau, settled, limit)
+                    trial = factored_update(
+                        neighbour, steps, spacing, slowness, squares, tau, settled, limit, least
+                    )
                     length = change(heap, keys, place, length, neighbour, trial)
         reached = passed(goals, place, reached)
         if 0 < goals.size == reached:

@@ -58,6 +58,11 @@ class Medium:
         """Flat slowness with a border of one node, whose value is never used."""
         return np.pad(self.slowness, 1, constant_values=1.0).ravel()
 
+    @cached_property
+    def least_slowness(self) -> float:
+        """Of all nodes, s/m."""
+        return float(self.slowness.min())
+
     def source(self, position: ArrayLike) -> PointSource:
         """The problem of a source at ``position``, (ndim,), m.
 
@@ -132,6 +137,10 @@ class PointSource:
     def source_slowness(self) -> float:
         """Slowness at the source, multilinear between its cell's nodes, s/m."""
         return float(sum(weight * self.slowness[node] for node, weight in self._cell))
+
+    def least_factor(self) -> float:
+        """The lowest slowness over that at the source: by how much T can be below T0 at most."""
+        return self.medium.least_slowness / self.source_slowness()
 
     def seeds(self) -> tuple[Ints, Floats]:
         """Nodes of the source's cell: flat padded indices and travel times along straight lines, s.

@@ -18,6 +18,12 @@ TIE = 1e-12
 # A source on the next line of nodes is not beside a node, whichever way the squares of its times round.
 ON_LINE = 1e-6
 
+# Whichever way a front comes in, even from a source in the next cell, a node is later than its earliest
+# neighbour by √2 − 1 of the crossing time in 2-D, √3 − √2 in 3-D, or more. Second differences across a kink
+# can fall below it; the factored update takes at least this, a little less.
+RISE_2D = 0.4
+RISE_3D = 0.3
+
 # An axis of the plain scheme: T at the base of the difference, its weight, time of the nearest neighbour.
 PlainAxis = tuple[float, float, float]
 
@@ -101,8 +107,7 @@ def factored_axis(
     # h·s0²·x from the squares of T0 either side, exactly: no coordinates need to be kept.
     difference = squares[node + stride] - squares[node - stride]
     if first == math.inf:
-        beside = abs(difference) < limit * (1.0 - ON_LINE)
-        return (abs(difference) * curl if beside else 0.0), 0.0, math.inf, 0
+        return _across(abs(difference), curl, limit), 0.0, math.inf, 0
     offset = -stride if left <= right else stride
     along = difference if left <= right else -difference
     second = settled[node + 2 * offset]
@@ -111,6 +116,12 @@ def factored_axis(
     near = tau[node + offset]
     shift = 2.0 * near - 0.5 * tau[node + 2 * offset] if second <= first else near
     return weight + along * curl, -shift, first, offset
+
+
+@kernel(inline="always")
+def _across(difference: float, curl: float, limit: float) -> float:
+    """Slope of an axis that has no neighbour upwind; ``difference`` is that of T0² either side."""
+    return difference * curl if difference < limit * (1.0 - ON_LINE) else 0.0
 
 
 @kernel(inline="always")
@@ -123,6 +134,7 @@ def factored_update(
     tau: Floats,
     settled: Floats,
     limit: float,
+    least: float,
 ) -> float:
     """Travel time of one node with T = T0·τ, T0 the time in the source's own slowness.
 
@@ -134,6 +146,7 @@ def factored_update(
     Args:
         squares: T0² of every node, border included, s².
         limit: 4·(source slowness·spacing)²; a source nearer than the spacing differs by less.
+        least: lowest slowness of the grid over that at the source, which is the least possible τ.
     """
     square = squares[node]
     inverse = 1.0 / square
@@ -164,9 +177,11 @@ def factored_update(
         ):
             first = a if a[2] <= b[2] else b
             first = c if c[2] < first[2] else first
-            # No time is later than straight from the earliest neighbour at the slower of the two nodes.
-            return float(min(base * factor, first[2] + max(local, spacing * slowness[node + first[3]])))
-    return _factored_fewer(a, b, c, node, spacing, slowness, base, local, rhs)
+            beside = spacing * slowness[node + first[3]]
+            return _possible(base * factor, first[2], local, beside, strides[2] != 0, base * least)
+    return _factored_fewer(
+        a, b, c, node, spacing, slowness, squares, base, local, rhs, limit, strides[2] != 0, least
+    )
 
 
 @kernel(inline="always")
@@ -177,11 +192,15 @@ def _factored_fewer(
     node: int,
     spacing: float,
     slowness: Floats,
+    squares: Floats,
     base: float,
     local: float,
     rhs: float,
+    limit: float,
+    space: bool,
+    least: float,
 ) -> float:
-    """The update where an axis has no neighbour or must be dropped."""
+    """The update where an axis has no neighbour or must be dropped, which comes to the same."""
     if b[2] < a[2]:
         a, b = b, a
     if c[2] < b[2]:
@@ -192,10 +211,13 @@ def _factored_fewer(
     mixed = a[0] * a[1]
     shifts = a[1] * a[1] - rhs
     # Axes beside the source turn the front even without a neighbour.
-    if b[2] == math.inf:
-        slopes += b[0] * b[0]
-    if c[2] == math.inf:
-        slopes += c[0] * c[0]
+    curl = 0.25 / squares[node]
+    across_b = b[0]
+    if b[2] < math.inf:
+        across_b = _across(abs(squares[node + b[3]] - squares[node - b[3]]), curl, limit)
+    across_c = c[0]
+    if c[2] < math.inf:
+        across_c = _across(abs(squares[node + c[3]] - squares[node - c[3]]), curl, limit)
     factor = -1.0
     if c[2] < math.inf:
         factor = factored_root(
@@ -207,9 +229,14 @@ def _factored_fewer(
         )
         if a[0] * factor + a[1] < 0.0 or b[0] * factor + b[1] < 0.0 or c[0] * factor + c[1] < 0.0:
             factor = -1.0
+    slopes_c = slopes + across_c * across_c
     if factor < 0.0 and b[2] < math.inf:
-        factor = factored_root(slopes + b[0] * b[0], mixed + b[0] * b[1], shifts + b[1] * b[1], b[2], base)
+        factor = factored_root(slopes_c + b[0] * b[0], mixed + b[0] * b[1], shifts + b[1] * b[1], b[2], base)
         if a[0] * factor + a[1] < 0.0 or b[0] * factor + b[1] < 0.0:
+            factor = -1.0
+    if factor < 0.0:
+        factor = factored_root(slopes_c + across_b * across_b, mixed, shifts, a[2], base)
+        if a[0] * factor + a[1] < 0.0:
             factor = -1.0
     if factor < 0.0:
         factor = factored_root(slopes, mixed, shifts, a[2], base)
@@ -218,7 +245,23 @@ def _factored_fewer(
     beside = spacing * slowness[node + a[3]]
     if factor < 0.0:
         return float(a[2] + 0.5 * (local + beside))
-    return float(min(base * factor, a[2] + max(local, beside)))
+    return _possible(base * factor, a[2], local, beside, space, base * least)
+
+
+@kernel(inline="always")
+def _possible(time: float, first: float, local: float, beside: float, space: bool, soonest: float) -> float:
+    """A time limited to what is possible for a wave.
+
+    Args:
+        time: of the update, s.
+        first: time of the earliest neighbour, s.
+        local, beside: crossing times of the node and of that neighbour, s; straight from the neighbour at the
+            slower of the two is the latest.
+        space: whether there are three axes.
+        soonest: straight from the source at the highest speed of the grid, s.
+    """
+    rise = (RISE_3D if space else RISE_2D) * min(local, beside)
+    return float(max(soonest, first + rise, min(time, first + max(local, beside))))
 
 
 @kernel(inline="always")
