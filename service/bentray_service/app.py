@@ -41,6 +41,8 @@ from .routes import (
     volumes,
 )
 from .settings import ServiceSettings
+from .storage.checked_store import CheckedStore
+from .storage.checksums import Checksums
 from .storage.database import open_database
 from .storage.datasets import Datasets
 from .storage.deletion import Deletion
@@ -131,7 +133,11 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
     files.drop_leftovers()
     database = open_database(settings.database)
     stack.callback(database.close)
-    store = open_store(settings.storage_url, files.root, database, settings.cache_bytes)
+    store = CheckedStore(
+        open_store(settings.storage_url, files.root, database, settings.cache_bytes),
+        files.root,
+        Checksums(database),
+    )
     files = Files(settings.data_dir, store)
     door = Door(settings, Keys(database))
     if cluster is None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
+from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.settings import Settings
 from bentray_workers import field_picture, picture_tasks, planning, refraction, simulation_planning
 from bentray_workers.asked_simulation import AskedSimulation
@@ -92,11 +93,12 @@ class Compute:
 
     def refraction_png(self, path: Path, view: RefractionView) -> bytes:
         """A volume or reconstruction file as glass; raises as ``slice_png`` does."""
-        return self._finished(refraction.submit(self.client, self._bring(path), view, RENDER_PRIORITY))
+        return self._finished(refraction.submit(self.client, self._bring(path), view, RENDER_PRIORITY), path)
 
     def field_png(self, folder: Path, view: FieldView) -> bytes:
         """A scene with a geometry field; raises as ``slice_png`` does."""
-        return self._finished(field_picture.submit(self.client, self._bring(folder), view, RENDER_PRIORITY))
+        begun = field_picture.submit(self.client, self._bring(folder), view, RENDER_PRIORITY)
+        return self._finished(begun, folder)
 
     def field_map_png(self, folder: Path, what: str) -> bytes:
         """The geometry image of a field, as ``bentray_workers.field_picture.map_png``."""
@@ -104,7 +106,7 @@ class Compute:
 
     def quality(self, path: Path, picker: str) -> dict[str, Any]:
         """The examination of a dataset file, see ``bentray_workers.quality``; raises as ``slice_png``."""
-        return dict(self._done(self._begun(quality_report, path, {"picker": picker})))
+        return dict(self._done(self._begun(quality_report, path, {"picker": picker}), path))
 
     def quality_png(self, path: Path, picker: str) -> bytes:
         """The page about it."""
@@ -112,24 +114,29 @@ class Compute:
 
     def mesh_volume(self, path: Path, iso: float | None, step: int, target: Path) -> dict[str, Any]:
         """The iso-surface of a volume as a mesh file; as ``bentray_workers.isosurface_mesh.mesh_volume``."""
-        return dict(self._done(self._begun(mesh_volume, path, {"iso": iso, "step": step, "target": target})))
+        how = {"iso": iso, "step": step, "target": target}
+        return dict(self._done(self._begun(mesh_volume, path, how), path))
 
     def _drawn(self, draw: Callable[..., bytes], path: Path, how: dict[str, Any]) -> bytes:
-        return self._finished(self._begun(draw, path, how))
+        return self._finished(self._begun(draw, path, how), path)
 
     def _begun(self, task: Callable[..., Any], path: Path, how: dict[str, Any]) -> Any:
         place = {"resources": RENDER, "priority": RENDER_PRIORITY}
         return self.client.submit(task, self._bring(path), **how, pure=False, **place)
 
-    def _finished(self, future: Any) -> bytes:
-        return bytes(self._done(future))
+    def _finished(self, future: Any, path: Path) -> bytes:
+        return bytes(self._done(future, path))
 
-    def _done(self, future: Any) -> Any:
+    def _done(self, future: Any, path: Path) -> Any:
         try:
             return future.result(timeout=RENDER_SECONDS)
         except TimeoutError:
             raise Busy(
                 "workers", f"no answer in {RENDER_SECONDS:g} s", "another try, or more workers"
             ) from None
+        except (InvalidInput, OSError):
+            # What is deleted or damaged meanwhile is told as that, not as a worker sees it.
+            self._bring(path)
+            raise
         finally:
             future.release()

@@ -88,6 +88,8 @@ class Kind:
 PROBLEMS: Mapping[type[Exception], Kind] = {
     InvalidInput: Kind(422, "invalid-input", "A value cannot be used"),
     refusals.UnknownId: Kind(404, "unknown-id", "There is nothing with this id"),
+    refusals.Deleted: Kind(404, "deleted", "It has been deleted"),
+    refusals.Damaged: Kind(500, "stored-data-damaged", "What was stored has changed on the disk"),
     refusals.WrongMediaType: Kind(415, "wrong-media-type", "The media type is not accepted"),
     refusals.EmptyBody: Kind(422, "empty-body", "The request has no body"),
     refusals.TooLarge: Kind(413, "too-large", "The body is too large"),

@@ -23,6 +23,27 @@ class UnknownId(InvalidInput):
         return InvalidInput, (self.field, self.value, self.accepted)
 
 
+class Deleted(InvalidInput, FileNotFoundError):
+    """It was deleted while the request was on its way."""
+
+    def __init__(self, name: str) -> None:
+        InvalidInput.__init__(self, "id", f"{name}, which has been deleted", "the id of something that exists")
+
+    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
+        return InvalidInput, (self.field, self.value, self.accepted)
+
+
+class Damaged(InvalidInput):
+    """What lies on the disk is not what was stored."""
+
+    def __init__(self, name: str, found: str) -> None:
+        accepted = "the bytes that were stored: restore its file from a backup, or delete it and make it anew"
+        super().__init__("stored data", f"{name}, {found}", accepted)
+
+    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
+        return InvalidInput, (self.field, self.value, self.accepted)
+
+
 class WrongMediaType(InvalidInput):
     """The Content-Type of the request is not one that the route takes."""
 

@@ -8,7 +8,6 @@ import shutil
 import threading
 from collections.abc import Callable
 from concurrent.futures import CancelledError
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from bentray_workers.slices import Cancelled
 
 from ..compute import Compute
 from ..logs import about
-from ..refusals import DatabaseAway, StorageAway
+from ..refusals import Damaged, DatabaseAway, StorageAway
 from ..storage.files import Files
 from ..storage.queue import LEASE_S, Queue
 from ..storage.schema import ENDED
@@ -158,9 +157,14 @@ class Runner:
         target = kind.target(files, job)
         try:
             source = self._files.store.bring(kind.source(files, job))
-            with suppress(FileNotFoundError):
+            try:
                 # Another job may have made the same, and a kind may then take it as it is.
                 self._files.store.bring(target)
+            except FileNotFoundError:
+                pass
+            except Damaged:
+                # It is made again.
+                self._files.store.remove([target])
             result = kind.run(
                 Task(
                     client=self._compute.client,

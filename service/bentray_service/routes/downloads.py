@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from starlette.types import Receive, Scope, Send
 
 from ..errors import described
-from ..refusals import NoSuchPart
+from ..refusals import Deleted, NoSuchPart
 
 # One part; of several at once, or of a form that nobody knows, the whole file is sent, as RFC 9110 allows.
 ONE_PART = re.compile(r"bytes=(\d*)-(\d*)")
@@ -41,24 +42,51 @@ def download(request: Request, path: Path, seed: str, media_type: str, name: str
 
     Raises:
         NoSuchPart: for a part beyond the end.
+        Deleted: when there is none any more.
     """
-    state = path.stat()
-    told = f"{seed}/{path.name}/{state.st_mtime_ns}/{state.st_size}"
-    tag = f'"{hashlib.sha256(told.encode()).hexdigest()[:32]}"'
-    headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
-    known = request.headers.get("if-none-match")
-    if known is not None and (tag in known or known.strip() == "*"):
-        return Response(status_code=304, headers=headers)
-    kind = FileResponse if _part_asked_for(request, tag, state.st_size) else Whole
-    return kind(path, headers=headers, media_type=media_type, filename=name or path.name, stat_result=state)
+    try:
+        # From now on it is open: one that is deleted meanwhile is sent to its end.
+        file = path.open("rb")
+    except FileNotFoundError as error:
+        raise Deleted(path.name.partition(".")[0]) from error
+    answer: Response | None = None
+    try:
+        state = os.fstat(file.fileno())
+        told = f"{seed}/{path.name}/{state.st_mtime_ns}/{state.st_size}"
+        tag = f'"{hashlib.sha256(told.encode()).hexdigest()[:32]}"'
+        headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
+        known = request.headers.get("if-none-match")
+        if known is not None and (tag in known or known.strip() == "*"):
+            return Response(status_code=304, headers=headers)
+        whole = not _part_asked_for(request, tag, state.st_size)
+        answer = OpenFile(file, whole, headers, media_type, name or path.name)
+        return answer
+    finally:
+        if answer is None:
+            file.close()
 
 
-class Whole(FileResponse):
-    """A file that is sent whole, whatever part the request names."""
+class OpenFile(FileResponse):
+    """A file that is open, also one without a name any more; closed once it is sent."""
+
+    def __init__(
+        self, file: BinaryIO, whole: bool, headers: dict[str, str], media_type: str, name: str
+    ) -> None:
+        """Args:
+        file: to send.
+        whole: whether all of it is sent, whatever part the request names.
+        headers, media_type, name: of the answer.
+        """
+        # Opened by this name, each answer has a place of its own in it.
+        path, state = f"/proc/self/fd/{file.fileno()}", os.fstat(file.fileno())
+        super().__init__(path, headers=headers, media_type=media_type, filename=name, stat_result=state)
+        self._file = file
+        self._whole = whole
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        headers = [(name, value) for name, value in scope["headers"] if name != b"range"]
-        await super().__call__({**scope, "headers": headers}, receive, send)
+        headers = [one for one in scope["headers"] if not (self._whole and one[0] == b"range")]
+        with self._file:
+            await super().__call__({**scope, "headers": headers}, receive, send)
 
 
 def _part_asked_for(request: Request, tag: str, size: int) -> bool:

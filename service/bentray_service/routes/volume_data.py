@@ -7,7 +7,10 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 
+from bentray_kernels.errors import InvalidInput
+
 from ..errors import described
+from ..refusals import UnknownId
 from ..storage.exports import FORMATS, exported
 from ..wiring import CallerTenant, Service
 from .downloads import download, download_of
@@ -53,6 +56,19 @@ def volume_data(
         return download(request, path, seed, HDF5)
     chosen = FORMATS[format]
     uploaded = "job_id" not in volume
-    made = exported(path, files.export(volume["id"], chosen.extension), chosen, uploaded=uploaded)
+    target = files.export(volume["id"], chosen.extension)
+    try:
+        made = exported(path, target, chosen, uploaded=uploaded)
+    except (InvalidInput, OSError):
+        # What is deleted meanwhile is told as that.
+        service.files.store.bring(path)
+        raise
     name = f"{volume['id']}-{'values' if uploaded else 'speed'}.{chosen.extension}"
-    return download(request, made, seed, chosen.media_type, name)
+    answer = download(request, made, seed, chosen.media_type, name)
+    try:
+        service.volumes.get(tenant, volume["id"])
+    except UnknownId:
+        # Made after its files were removed: nobody else would remove it.
+        target.unlink(missing_ok=True)
+        raise
+    return answer

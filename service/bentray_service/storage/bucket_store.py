@@ -94,6 +94,11 @@ class BucketStore:
                 del self._coming[path]
         return path
 
+    def again(self, path: Path) -> bool:
+        self._cache.clear([path])
+        self.bring(path)
+        return True
+
     def remove(self, paths: Collection[Path]) -> None:
         if fault := self.fault():
             raise StorageAway(fault)

@@ -1,13 +1,15 @@
-"""Deleting what is stored, with all that was made of it: the files first, then the rows."""
+"""Deleting what is stored, with all that was made of it: the rows first, then the files."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Collection, Iterator
 from typing import NamedTuple
 
 from sqlalchemy import ColumnElement, Connection, Table, delete, or_, select, update
 
-from ..refusals import InUse, StorageAway, UnknownId
+from ..refusals import DatabaseAway, InUse, StorageAway, UnknownId
+from .checksums import forget
 from .database import Database
 from .files import Files
 from .ids import checked
@@ -18,11 +20,14 @@ from .schema import (
     geometry_fields,
     jobs,
     meshes,
+    too_old,
     uploaded_volumes,
     uploads,
     volumes,
 )
 from .tenants import Tenant
+
+log = logging.getLogger("bentray.storage")
 
 
 class Stored(NamedTuple):
@@ -40,7 +45,8 @@ class Deletion:
     made it, its turntables and its exports, a mesh with its jobs and their fields. A mesh made of a volume
     stays.
 
-    A death on the way leaves rows whose files are gone, and deleting once more finishes it.
+    Whoever reads a file meanwhile has it open, or finds neither file nor row. A death on the way leaves
+    files that no row knows; see ``Orphans``.
     """
 
     def __init__(self, database: Database, files: Files) -> None:
@@ -53,7 +59,7 @@ class Deletion:
         Raises:
             UnknownId: when the tenant has no such one.
             InUse: when a job that needs it is not at its end; nothing is deleted then.
-            StorageAway: when the files cannot be removed now; the rows stay then.
+            StorageAway: when files cannot be removed now; nothing is deleted then.
         """
         name = checked(stored.what, stored.id)
         if fault := self._files.store.fault():
@@ -69,8 +75,11 @@ class Deletion:
             gone |= _of(connection, stored.tenant, jobs.c.volume_id.in_(results))
             self._refuse_unfinished(connection, stored, gone)
             fields = _fields(connection, stored.tenant, name, gone)
-            self._files.of(stored.tenant).remove([name, *results, *fields, *gone])
             _forget(connection, stored.tenant, {name, *results}, fields, gone)
+        try:
+            self._files.of(stored.tenant).remove([name, *results, *fields, *gone])
+        except (StorageAway, DatabaseAway, OSError):
+            log.warning("files of %s stay until they are found as orphans", stored.id, exc_info=True)
 
     def older_than(self, time: float) -> Iterator[Stored]:
         """What every tenant has from before a time, in seconds since 1970."""
@@ -142,6 +151,8 @@ def _forget(
     """Delete the rows, those that point at others first."""
     mine = geometry_fields.c.tenant == tenant, geometry_fields.c.id.in_(fields)
     connection.execute(delete(geometry_fields).where(*mine))
+    forget(connection, tenant, {*names, *fields, *gone})
+    connection.execute(delete(too_old).where(too_old.c.tenant == tenant, too_old.c.id.in_(names)))
     connection.execute(delete(events).where(events.c.job_id.in_(gone)))
     connection.execute(delete(volumes).where(volumes.c.id.in_(names)))
     connection.execute(delete(jobs).where(jobs.c.id.in_(gone)))

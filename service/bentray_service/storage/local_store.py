@@ -25,6 +25,9 @@ class LocalStore:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
         return path
 
+    def again(self, path: Path) -> bool:
+        return False
+
     def remove(self, paths: Collection[Path]) -> None:
         for path in paths:
             if path.is_dir():

@@ -248,12 +248,14 @@ keys = Table(
 bucket_mark = Table("bucket_mark", metadata, Column("database", String(32), primary_key=True))
 
 # What a file held when it was written, or, of one from before version 4, when it was first read. Of a folder
-# it is the digest of its files. ``path`` is relative to the tenant's folder.
+# it is the digest of its files. The id is that of the dataset, the volume, the mesh, the field or the job of the
+# turntable; the path begins in the tenant's folder.
 checksums = Table(
     "checksums",
     metadata,
     Column("tenant", String(64), primary_key=True),
-    Column("path", String(100), primary_key=True),
+    Column("id", String(32), primary_key=True),
+    Column("path", String(100), nullable=False),
     Column("bytes", BigInteger, nullable=False),
     Column("sha256", String(64), nullable=False),
     Column("noted", Float, nullable=False),

@@ -29,6 +29,13 @@ class Store(Protocol):
             StorageAway: when it cannot be fetched now.
         """
 
+    def again(self, path: Path) -> bool:
+        """Let another copy lie at ``path`` in place of one that is damaged; whether there is one.
+
+        Raises:
+            FileNotFoundError, StorageAway: as ``bring``.
+        """
+
     def remove(self, paths: Collection[Path]) -> None:
         """Remove things everywhere; those that are not there are passed over.
 

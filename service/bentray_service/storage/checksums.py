@@ -1,0 +1,69 @@
+"""The rows of checksums: what every stored file held when it was written."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Collection
+from typing import Any
+
+from sqlalchemy import Connection, delete, insert, select, update
+
+from .database import Database
+from .digests import Digest
+from .schema import checksums
+from .tenants import Tenant
+
+Row = dict[str, Any]
+
+
+class Checksums:
+    """A row for each thing that is stored, by its tenant and its id."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def note(self, tenant: Tenant, name: str, path: str, found: Digest, *, as_written: bool) -> None:
+        """Store what a thing holds, in place of what it held before.
+
+        Args:
+            tenant: whose it is.
+            name: its id.
+            path: in the tenant's folder, as ``volumes/vol-0123456789abcdef0123.h5``.
+            found: what is in it.
+            as_written: whether that is known to be as it was written.
+        """
+        now: Row = {"path": path, "bytes": found.bytes, "sha256": found.sha256, "noted": time.time()}
+        now |= {"as_written": as_written, "damaged": None}
+        with self._database.write() as connection:
+            mine = checksums.c.tenant == tenant, checksums.c.id == name
+            if not connection.execute(update(checksums).where(*mine).values(**now)).rowcount:
+                connection.execute(insert(checksums).values(tenant=tenant, id=name, **now))
+
+    def get(self, tenant: Tenant, name: str) -> Row | None:
+        """The row of a thing; None of one that has none, as from before version 4 or deleted."""
+        mine = select(checksums).where(checksums.c.tenant == tenant, checksums.c.id == name)
+        with self._database.read() as connection:
+            row = connection.execute(mine).mappings().one_or_none()
+        return None if row is None else dict(row)
+
+    def all(self) -> list[Row]:
+        """Every tenant's."""
+        with self._database.read() as connection:
+            found = connection.execute(select(checksums).order_by(checksums.c.tenant, checksums.c.path))
+            return [dict(row) for row in found.mappings()]
+
+    def damaged(self, tenant: Tenant, name: str, since: float | None) -> None:
+        """Say since when a thing holds something else, in s since 1970; None: it is as it was."""
+        mine = checksums.c.tenant == tenant, checksums.c.id == name
+        with self._database.write() as connection:
+            connection.execute(update(checksums).where(*mine).values(damaged=since))
+
+    def forget(self, tenant: Tenant, names: Collection[str]) -> None:
+        """Delete the rows of things with these ids."""
+        with self._database.write() as connection:
+            forget(connection, tenant, names)
+
+
+def forget(connection: Connection, tenant: Tenant, names: Collection[str]) -> None:
+    """The same in the transaction of the caller."""
+    connection.execute(delete(checksums).where(checksums.c.tenant == tenant, checksums.c.id.in_(names)))
