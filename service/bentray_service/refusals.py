@@ -23,11 +23,11 @@ class UnknownId(InvalidInput):
         return InvalidInput, (self.field, self.value, self.accepted)
 
 
-class Deleted(InvalidInput, FileNotFoundError):
+class Deleted(InvalidInput, FileNotFoundError):  # noqa: N818 - a refusal, like the others
     """It was deleted while the request was on its way."""
 
     def __init__(self, name: str) -> None:
-        InvalidInput.__init__(self, "id", f"{name}, which has been deleted", "the id of something that exists")
+        InvalidInput.__init__(self, "id", f"{name}, which has been deleted", "an id of what is there")
 
     def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
         return InvalidInput, (self.field, self.value, self.accepted)

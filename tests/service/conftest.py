@@ -97,6 +97,8 @@ class FakeWork:
         self.hold = threading.Event()
         self.hold.set()
         self.error: Exception | None = None
+        # Of one node, in place of its speed.
+        self.spoil: float | None = None
         self.stages = 1
         self.trials: tuple[Trial, ...] = ()
 
@@ -128,6 +130,8 @@ class FakeWork:
             raise self.error
         x = np.linspace(-1.0, 1.0, settings.nodes)
         speed = 1500.0 + 40.0 * (x[:, None] ** 2 + 0.5 * x[None, :] < 0.3)
+        if self.spoil is not None:
+            speed[0, 0] = self.spoil
         return Reconstruction(
             speed=speed,
             coverage=np.ones_like(speed),

@@ -9,8 +9,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
 
+import numpy as np
 from pydantic import TypeAdapter
 
+from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.advice import told
 from bentray_kernels.tomography.result import Progress, Reconstruction
 from bentray_kernels.tomography.settings import Settings
@@ -95,6 +97,10 @@ class ReconstructionKind:
         result = slices.reconstruct(
             task.client, task.source, settings, task.on_progress, task.stop, task.work_dir, task.on_saved
         )
+        if not np.isfinite(result.speed).all():
+            found = f"no finite speed at {np.count_nonzero(~np.isfinite(result.speed))} nodes"
+            accepted = "settings by which it converges: a smaller relaxation or a larger penalty_strength"
+            raise InvalidInput("settings", found, accepted)
         write_reconstruction(task.target, result)
         return {"id": task.target.stem, **_describe(result), "bytes": task.target.stat().st_size}
 

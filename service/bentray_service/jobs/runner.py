@@ -20,7 +20,7 @@ from bentray_workers.slices import Cancelled
 
 from ..compute import Compute
 from ..logs import about
-from ..refusals import Damaged, DatabaseAway, StorageAway
+from ..refusals import Damaged, DatabaseAway, DatabaseFull, StorageAway
 from ..storage.files import Files
 from ..storage.queue import LEASE_S, Queue
 from ..storage.schema import ENDED
@@ -36,6 +36,8 @@ log = logging.getLogger("bentray.jobs")
 IDLE_SECONDS = 1.0
 # How long a job may take to notice that the service leaves.
 STOP_SECONDS = 30.0
+# How often the database may refuse the end of a job.
+REFUSALS = 3
 # How long a result waits for a store that is away, before it is tried again.
 STORE_SECONDS = 5.0
 # How often leases are renewed, and those of dead services looked for.
@@ -180,34 +182,38 @@ class Runner:
             self._keep(target, reporter)
         except Cancelled:
             if not reporter.lost:
-                self._settle(lambda: self._stopped(job_id, files, reporter))
+                self._settle(job_id, lambda: self._stopped(job_id, files, reporter))
         except AWAY as error:
             log.warning("%s waits for its workers: %s", job_id, error)
             self._settle(
-                lambda: self._queue.release(job_id, "the workers were away; it goes on when they are back")
+                job_id,
+                lambda: self._queue.release(job_id, "the workers were away; it goes on when they are back"),
             )
             self._leaving.wait(IDLE_SECONDS)
         except DatabaseAway as error:
             log.warning("%s waits for the database: %s", job_id, error)
             self._settle(
-                lambda: self._queue.release(job_id, "the database was away; it goes on when it is back")
+                job_id,
+                lambda: self._queue.release(job_id, "the database was away; it goes on when it is back"),
             )
         except StorageAway as error:
             log.warning("%s waits for the storage: %s", job_id, error)
             self._settle(
-                lambda: self._queue.release(job_id, "the storage was away; it goes on when it is back")
+                job_id,
+                lambda: self._queue.release(job_id, "the storage was away; it goes on when it is back"),
             )
         except Exception as error:
             if isinstance(error, OSError) and error.errno in FULL and not self._has_room():
                 log.warning("%s waits for room on the disk", job_id)
                 self._settle(
-                    lambda: self._queue.release(job_id, "the disk is full; it goes on once there is room")
+                    job_id,
+                    lambda: self._queue.release(job_id, "the disk is full; it goes on once there is room"),
                 )
                 return
             problem = explain(job_id, error).model_dump(exclude_none=True)
-            self._settle(lambda: self._failed(job_id, files, reporter, problem))
+            self._settle(job_id, lambda: self._failed(job_id, files, reporter, problem))
         else:
-            self._settle(lambda: self._succeeded(job_id, files, reporter, kind, result, target))
+            self._settle(job_id, lambda: self._succeeded(job_id, files, reporter, kind, result, target))
 
     def _keep(self, target: Path, reporter: Reporter) -> None:
         """Keep a result for good before a row tells of it, however long the store is away.
@@ -255,13 +261,25 @@ class Runner:
             self._queue.cancelled(job_id)
         files.drop_work(job_id)
 
-    def _settle(self, write_the_end: Callable[[], None]) -> None:
-        """Write the end of a job, as often as it takes: it would count as running for ever otherwise."""
+    def _settle(self, job_id: str, write_the_end: Callable[[], None]) -> None:
+        """Write the end of a job, for as long as the database is away: it would count as running otherwise.
+
+        An end that the database does not take although it is there will not be taken later either; the job
+        fails by it.
+        """
+        refused = 0
         while True:
             try:
                 return write_the_end()
+            except (DatabaseAway, DatabaseFull):
+                if self._leaving.wait(IDLE_SECONDS):
+                    raise
             except SQLAlchemyError as error:
-                if not isinstance(error, DatabaseAway):
-                    log.exception("the end of a job could not be stored; trying again in %g s", IDLE_SECONDS)
+                refused += 1
+                log.exception("the end of %s is refused by the database", job_id)
+                if refused >= REFUSALS:
+                    problem = explain(job_id, error).model_dump(exclude_none=True)
+                    self._queue.fail(job_id, problem)
+                    return None
                 if self._leaving.wait(IDLE_SECONDS):
                     raise

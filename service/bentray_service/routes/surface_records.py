@@ -59,20 +59,20 @@ class FieldSizes(BaseModel):
 
 
 class FieldErrors(BaseModel):
-    """How far things are from what they stand for; distances in edges of the unit cube."""
+    """How far things are from what they stand for; distances in edges of the unit cube, null where none is."""
 
     image_rms: float = Field(description="Rms distance of the geometry image from the surface, either way.")
     image_greatest: float = Field(description="Its greatest distance.")
     conformal: bool = Field(description="Whether the layout of the geometry image keeps angles.")
-    median_quasi_conformal: float = Field(
+    median_quasi_conformal: float | None = Field(
         description="1 where a face keeps its angles; of half the faces less."
     )
     area_stretch: float = Field(description="How unevenly the layout scales areas; 1 is evenly.")
-    lookup_wrong: float = Field(description="Share of rays whose hit or miss accurate lookups tell wrong.")
-    lookup_median: float = Field(
+    lookup_wrong: float | None = Field(description="Share of rays whose hit or miss accurate lookups tell wrong.")
+    lookup_median: float | None = Field(
         description="Distance of accurate lookups from the exact place, half of them."
     )
-    lookup_99: float = Field(description="The same, 99 of 100.")
+    lookup_99: float | None = Field(description="The same, 99 of 100.")
 
 
 class FieldSeconds(BaseModel):

@@ -13,9 +13,9 @@ from ..refusals import DatabaseAway
 # The service answers requests by 40 threads: some are left for what needs no database.
 MOST_AT_ONCE = 32
 # How long one more waits for a place, s: all of them have ended by then while the database is well.
-PLACE_SECONDS = 0.5
+PLACE_SECONDS = 2.0
 # Once a transaction has taken so long, s, the database is slow, and only so many may wait for it.
-SLOW_SECONDS = 1.0
+SLOW_SECONDS = 2.0
 MOST_WHILE_SLOW = 8
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import logging
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -145,13 +147,29 @@ def _engine(address: str, pragmas: tuple[str, ...], *, patient: bool = True) -> 
         for pragma in ("journal_mode=WAL", "synchronous=FULL", *pragmas):
             connection.execute(f"PRAGMA {pragma}")
 
-    engine = create_engine(address, **_options(address))
+    engine = create_engine(address, json_serializer=_json, **_options(address))
     if engine.dialect.name == "sqlite":
         event.listen(engine, "connect", configure_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
     elif engine.driver == "psycopg" and patient:
         event.listen(engine, "do_connect", _connect_patiently)
     return engine
+
+
+def _json(value: Any) -> str:
+    """As JSON that every database takes: null for NaN and infinity."""
+    try:
+        return json.dumps(value, allow_nan=False)
+    except ValueError:
+        return json.dumps(_finite(value), allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _finite(inside) for name, inside in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(inside) for inside in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _connect_patiently(_dialect: object, _record: object, words: list[Any], how: dict[str, Any]) -> Any:

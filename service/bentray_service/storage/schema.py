@@ -248,8 +248,8 @@ keys = Table(
 bucket_mark = Table("bucket_mark", metadata, Column("database", String(32), primary_key=True))
 
 # What a file held when it was written, or, of one from before version 4, when it was first read. Of a folder
-# it is the digest of its files. The id is that of the dataset, the volume, the mesh, the field or the job of the
-# turntable; the path begins in the tenant's folder.
+# it is the digest of its files. The id is that of the dataset, the volume, the mesh, the field or the job of
+# the turntable; the path begins in the tenant's folder.
 checksums = Table(
     "checksums",
     metadata,

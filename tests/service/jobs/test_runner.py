@@ -3,10 +3,11 @@
 import errno
 import time
 
+import numpy as np
 import pytest
 from distributed.client import FutureCancelledError
 from distributed.comm import CommClosedError
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import DataError, OperationalError
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.storage.queue import Queue
@@ -156,3 +157,28 @@ def test_a_full_queue_is_a_429(start, uploaded, submitted, until, work):
     assert (answer.status_code, answer.json()["type"]) == (429, "/problems/queue-full")
     assert int(answer.headers["Retry-After"]) > 0
     work.hold.set()
+
+
+def test_an_end_that_the_database_never_takes_fails_the_job(
+    start, uploaded, submitted, until, work, monkeypatch
+):
+    monkeypatch.setattr("bentray_service.jobs.runner.IDLE_SECONDS", 0.05)
+    http = start(jobs_at_once=1)
+
+    def refused(*given):
+        raise DataError("insert", {}, Exception("invalid input syntax for type json"))
+
+    dataset = uploaded(http)
+    with monkeypatch.context() as patch:
+        patch.setattr(http.app.state.parts.queue, "succeed", refused)
+        done = until(http, submitted(http, dataset)["id"])
+    assert (done["state"], done["error"]["type"]) == ("failed", "/problems/internal")
+    assert until(http, submitted(http, dataset)["id"])["state"] == "succeeded", "the slot is free again"
+
+
+def test_an_image_that_is_not_finite_is_refused(start, uploaded, submitted, until, work):
+    http = start()
+    work.spoil = np.nan
+    done = until(http, submitted(http, uploaded(http))["id"])
+    assert (done["state"], done["error"]["field"]) == ("failed", "settings")
+    assert "no finite speed at 1 nodes" in done["error"]["found"]

@@ -30,7 +30,7 @@ def test_few_once_the_oldest_has_taken_long():
     with ExitStack() as stack:
         for _ in range(MOST_WHILE_SLOW):
             stack.enter_context(door())
-        clock.now = 1.5
+        clock.now = 2.5
         with pytest.raises(DatabaseAway, match="8 requests that wait for a slow database"):
             stack.enter_context(door())
     with door():

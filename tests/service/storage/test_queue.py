@@ -1,6 +1,7 @@
 """The queue: jobs claimed in order and by turns, their states, leases and ends."""
 
 import threading
+import math
 import time
 
 import pytest
@@ -177,3 +178,20 @@ def test_a_job_on_a_volume_ends_without_one(jobs, queue, database):
     assert queue.state(job["id"]) == "succeeded"
     with pytest.raises(UnknownId):
         Volumes(database).get(LOCAL, volume_of(job["id"]))
+
+
+def test_a_result_with_numbers_that_json_has_not_is_null_there(jobs, queue, dataset, database):
+    job = jobs.add(LOCAL, "reconstruction", {"weight": math.inf}, dataset)
+    queue.claim()
+    result = volume(job["id"])
+    result |= {"speed_range_mps": [math.nan, 1500.0], "provenance": {"fit": {"rms": -math.inf, "n": 3}}}
+    queue.progress(job["id"], 1, 2, [{"residual_rms_s": math.nan}])
+    assert queue.succeed(job["id"], result)
+    row = jobs.get(LOCAL, job["id"])
+    assert (row["state"], row["settings"], row["history"]) == (
+        "succeeded",
+        {"weight": None},
+        [{"residual_rms_s": None}],
+    )
+    kept = Volumes(database).get(LOCAL, volume_of(job["id"]))
+    assert (kept["speed_range_mps"], kept["provenance"]) == ([None, 1500.0], {"fit": {"rms": None, "n": 3}})

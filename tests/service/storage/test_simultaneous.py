@@ -7,11 +7,19 @@ from threading import Barrier
 import pytest
 
 from bentray_service.refusals import Finished, InUse, KeyReused, UnknownId
+from bentray_service.storage import admission
 from bentray_service.storage.deletion import Deletion, Stored
 from bentray_service.storage.files import Files
 from bentray_service.storage.tenants import LOCAL
 
 AT_ONCE = 50
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """More threads than a service has, on a machine that may be slow, are not to be sent away here."""
+    monkeypatch.setattr(admission, "MOST_AT_ONCE", AT_ONCE)
+    monkeypatch.setattr(admission, "SLOW_SECONDS", 60.0)
 
 
 def at_once(ask):
