@@ -41,6 +41,7 @@ from .routes import (
     volumes,
 )
 from .settings import ServiceSettings
+from .storage.ages import Ages
 from .storage.checked_store import CheckedStore
 from .storage.checksums import Checksums
 from .storage.database import open_database
@@ -51,7 +52,9 @@ from .storage.geometry_fields import GeometryFields
 from .storage.jobs import Jobs
 from .storage.keys import Keys
 from .storage.meshes import Meshes
+from .storage.observed_time import ObservedTime
 from .storage.open_store import open_store
+from .storage.orphans import Orphans
 from .storage.private import private_files
 from .storage.queue import Queue
 from .storage.uploads import Uploads
@@ -139,6 +142,8 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
         Checksums(database),
     )
     files = Files(settings.data_dir, store)
+    orphans = Orphans(files, database, keeps=settings.storage_url is None)
+    orphans.begin()
     door = Door(settings, Keys(database))
     if cluster is None:
         cluster = stack.enter_context(
@@ -173,7 +178,17 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
     reader = UploadReader(pieces, files, stores, limits, settings.upload_keep_s)
     reader.start()
     stack.callback(reader.stop)
-    housekeeper = Housekeeper(pieces, files, deletion, hold, settings.keep_days)
+    housekeeper = Housekeeper(
+        pieces,
+        files,
+        deletion,
+        hold,
+        Ages(database),
+        ObservedTime(database),
+        orphans,
+        settings.keep_days,
+        settings.upload_keep_s,
+    )
     housekeeper.start()
     stack.callback(housekeeper.stop)
     return Parts(

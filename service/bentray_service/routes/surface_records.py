@@ -59,7 +59,7 @@ class FieldSizes(BaseModel):
 
 
 class FieldErrors(BaseModel):
-    """How far things are from what they stand for; distances in edges of the unit cube, null where none is."""
+    """How far things are from what they stand for, in edges of the unit cube; null where nothing was met."""
 
     image_rms: float = Field(description="Rms distance of the geometry image from the surface, either way.")
     image_greatest: float = Field(description="Its greatest distance.")
@@ -68,7 +68,9 @@ class FieldErrors(BaseModel):
         description="1 where a face keeps its angles; of half the faces less."
     )
     area_stretch: float = Field(description="How unevenly the layout scales areas; 1 is evenly.")
-    lookup_wrong: float | None = Field(description="Share of rays whose hit or miss accurate lookups tell wrong.")
+    lookup_wrong: float | None = Field(
+        description="Share of rays whose hit or miss accurate lookups tell wrong."
+    )
     lookup_median: float | None = Field(
         description="Distance of accurate lookups from the exact place, half of them."
     )

@@ -25,6 +25,8 @@ class Known:
             for table in (datasets, uploaded_volumes, volumes, meshes, geometry_fields, jobs):
                 rows = connection.execute(select(table.c.tenant, table.c.id))
                 found |= {(row.tenant, row.id) for row in rows}
+            coming = select(uploads.c.tenant, uploads.c.id)
+            found |= {(row.tenant, row.id) for row in connection.execute(coming)}
             coming = select(uploads.c.tenant, uploads.c.result_id).where(uploads.c.state == "reading")
             return found | {(row.tenant, row.result_id) for row in connection.execute(coming)}
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import secrets
 from pathlib import Path
-
-from sqlalchemy import insert, select
 
 from bentray_kernels.errors import InvalidInput
 
@@ -13,7 +10,7 @@ from ..refusals import StorageAway
 from .database import Database
 from .known import Known
 from .local_store import LocalStore
-from .schema import bucket_mark
+from .marking import mark_of
 from .store import Store
 
 FIELD = "BENTRAY_STORAGE_URL"
@@ -40,7 +37,7 @@ def open_store(url: str | None, root: Path, database: Database, cache_bytes: int
     except ImportError as error:
         found = f"{url}, without the module {error.name}"
         raise InvalidInput(FIELD, found, "an address once bentray[s3] is installed") from error
-    bucket, mark = Bucket(url), _mark(database)
+    bucket, mark = Bucket(url), mark_of(database)
     try:
         told = bucket.told(MARK)
         if told is None and next(bucket.listed(), None) is not None:
@@ -54,13 +51,3 @@ def open_store(url: str | None, root: Path, database: Database, cache_bytes: int
         found = f"{url} ({error.value})"
         raise InvalidInput(FIELD, found, "a bucket that can be read and written") from error
     return BucketStore(root, bucket, mark, Known(database), cache_bytes)
-
-
-def _mark(database: Database) -> str:
-    """What tells this database from all others; made when first asked for."""
-    with database.write() as connection:
-        found = connection.execute(select(bucket_mark.c.database)).scalar_one_or_none()
-        if found is None:
-            found = secrets.token_hex(16)
-            connection.execute(insert(bucket_mark).values(database=found))
-        return str(found)

@@ -149,6 +149,17 @@ class TenantFiles:
                     else:
                         path.unlink(missing_ok=True)
 
+    def drop(self, path: Path) -> None:
+        """Remove one file or folder below this one.
+
+        Raises:
+            StorageAway: when it cannot be removed now.
+        """
+        if path.parent.name in KEPT:
+            self._store.remove([path])
+        else:
+            path.unlink(missing_ok=True)
+
     def bytes_used(self) -> int:
         """The size of all of it, bytes, wherever it is kept; raises StorageAway where that cannot be told."""
         return self._store.bytes_used(self.root)

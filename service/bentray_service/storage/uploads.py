@@ -76,9 +76,13 @@ class Uploads:
         """Every tenant's uploads that are not whole, as far as was noticed."""
         return self._where(uploads.c.state == "receiving")
 
-    def expired(self) -> list[Row]:
-        """Every tenant's uploads whose time is over, but for those that are being read."""
-        return self._where(uploads.c.state != "reading", uploads.c.expires < time.time())
+    def expired(self, now: float) -> list[Row]:
+        """Every tenant's uploads whose time is over, but for those that are being read.
+
+        Args:
+            now: s since 1970.
+        """
+        return self._where(uploads.c.state != "reading", uploads.c.expires < now)
 
     def keep(self, upload_id: str, keep_s: float) -> float:
         """Something came: keep it that much longer, s. Returns when it goes."""

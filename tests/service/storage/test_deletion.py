@@ -6,8 +6,10 @@ import pytest
 from sqlalchemy import func, insert, select, update
 
 from bentray_service.housekeeping import DAY_S, Housekeeper
+from bentray_service.ingest.append import Hold
 from bentray_service.refusals import InUse, UnknownId
 from bentray_service.storage import schema
+from bentray_service.storage.ages import Ages
 from bentray_service.storage.database import open_database
 from bentray_service.storage.datasets import Datasets
 from bentray_service.storage.deletion import Deletion, Stored
@@ -16,7 +18,10 @@ from bentray_service.storage.geometry_fields import GeometryFields
 from bentray_service.storage.ids import new_id, volume_of
 from bentray_service.storage.jobs import Jobs
 from bentray_service.storage.meshes import Meshes
+from bentray_service.storage.observed_time import ObservedTime
+from bentray_service.storage.orphans import Orphans
 from bentray_service.storage.tenants import LOCAL, Tenant
+from bentray_service.storage.uploads import Uploads
 from bentray_service.storage.volumes import Volumes
 
 OTHER = Tenant("other")
@@ -213,16 +218,103 @@ def test_old_data_go_and_young_data_stay(shelf):
         for table in (schema.datasets, schema.uploaded_volumes, schema.meshes):
             aged = update(table).where(table.c.id != young)
             connection.execute(aged.values(created=time.time() - 31 * DAY_S))
-    keeper = Housekeeper(NoUploads(), shelf.files, shelf.deletion, None, None)
-    keeper.sweep()
+    clocks = Clocks()
+    keeper = housekeeper(shelf, clocks, None)
+    for _ in range(3):
+        keeper.sweep()
+        clocks.pass_by(DAY_S)
     assert shelf.rows()["datasets"] == 3
-    Housekeeper(NoUploads(), shelf.files, shelf.deletion, None, 30.0).sweep()
+    keeper = housekeeper(shelf, clocks)
+    keeper.sweep()
+    assert shelf.rows()["datasets"] == 3, "it is marked first"
+    clocks.pass_by(DAY_S)
+    keeper.sweep()
     assert shelf.left() == sorted([f"{young}.h5", f"{needed}.h5"])
-    assert shelf.rows() == {"datasets": 2, "jobs": 1, "events": 1}
+    assert shelf.rows() == {"datasets": 2, "jobs": 1, "events": 1, "too_old": 1}, "the one that is needed"
     for gone in (volume, mesh):
         assert not any(gone in name for name in shelf.left())
 
 
-class NoUploads:
-    def expired(self):
-        return []
+def test_a_clock_that_is_wrong_for_a_while_deletes_nothing(shelf, caplog):
+    shelf.dataset()
+    clocks = Clocks()
+    keeper = housekeeper(shelf, clocks)
+    keeper.sweep()
+    clocks.wall += 31 * DAY_S
+    for _ in range(3):
+        clocks.pass_by(60.0)
+        keeper.sweep()
+    assert shelf.rows() == {"datasets": 1, "too_old": 1}
+    assert "was set by +2678400 s" in caplog.text
+    clocks.wall -= 31 * DAY_S
+    clocks.pass_by(60.0)
+    keeper.sweep()
+    assert "was set by -2678400 s" in caplog.text
+    assert shelf.rows() == {"datasets": 1}
+    for _ in range(3):
+        clocks.pass_by(DAY_S)
+        keeper.sweep()
+    assert shelf.rows() == {"datasets": 1}
+
+
+def test_a_day_of_starts_and_stops_is_counted_without_the_time_between(shelf):
+    shelf.dataset()
+    clocks = Clocks()
+    clocks.wall += 31 * DAY_S
+    for hour in range(24):
+        keeper = housekeeper(shelf, clocks)
+        keeper.sweep()
+        assert shelf.rows()["datasets"] == 1, hour
+        clocks.pass_by(3600.0)
+        keeper.sweep()
+        # Nobody looks for a month.
+        clocks.wall += 31 * DAY_S
+        clocks.steady = 0.0
+    assert "datasets" not in shelf.rows()
+
+
+def test_an_upload_that_ends_by_a_wrong_clock_stays(shelf):
+    clocks = Clocks()
+    uploads = Uploads(shelf.database)
+    row = uploads.add(LOCAL, "dataset", 9, {}, "", DAY_S)
+    keeper = housekeeper(shelf, clocks, None, uploads)
+    keeper.sweep()
+    clocks.wall += 31 * DAY_S
+    clocks.pass_by(60.0)
+    keeper.sweep()
+    assert uploads.get(LOCAL, row["id"])["state"] == "receiving"
+    clocks.pass_by(DAY_S)
+    keeper.sweep()
+    with pytest.raises(UnknownId):
+        uploads.get(LOCAL, row["id"])
+
+
+class Clocks:
+    """The time of day and the monotonic clock."""
+
+    def __init__(self):
+        self.wall, self.steady = time.time(), 0.0
+
+    def __call__(self):
+        return self.wall, self.steady
+
+    def pass_by(self, seconds):
+        self.wall += seconds
+        self.steady += seconds
+
+
+def housekeeper(shelf, clocks, keep_days=30.0, uploads=None):
+    observed = ObservedTime(shelf.database, lambda: clocks.steady)
+    orphans = Orphans(shelf.files, shelf.database, keeps=True)
+    return Housekeeper(
+        uploads or Uploads(shelf.database),
+        shelf.files,
+        shelf.deletion,
+        Hold(),
+        Ages(shelf.database),
+        observed,
+        orphans,
+        keep_days,
+        DAY_S,
+        clocks,
+    )

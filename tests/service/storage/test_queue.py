@@ -1,7 +1,7 @@
 """The queue: jobs claimed in order and by turns, their states, leases and ends."""
 
-import threading
 import math
+import threading
 import time
 
 import pytest
