@@ -11,7 +11,7 @@ from typing import Any
 from ..errors import InvalidInput
 from .library import library_of, package_of
 from .platforms import platforms
-from .pocl import name_processor
+from .pocl import prepare
 
 # The environment variable that names the device to use, and its word for none.
 WISH = "BENTRAY_OPENCL_DEVICE"
@@ -123,7 +123,7 @@ def _handles() -> list[Any]:
         with suppress(cl.Error):
             handles += platform.get_devices()
     for handle in handles:
-        name_processor(handle)
+        prepare(handle)
     return handles
 
 

@@ -1,4 +1,4 @@
-"""PoCL as pip brings it, told the name of a processor that its compiler knows.
+"""PoCL as pip brings it: the name of a processor that its compiler knows, and a linker where there is none.
 
 The newest PoCL of the Python index, 3.0-rc2 of 2022, asks its LLVM 14 for the processor's name, but chooses
 its library of built-in functions by the processor's features. Where the two disagree it fails. A processor
@@ -6,11 +6,17 @@ newer than LLVM 14 (AMD family 26) is called ``generic``, which its own compiler
 promises less than its features (AMD family 25 with AVX-512) gets functions compiled for wider registers than
 their callers: vectors of 8 doubles end the process, those of 16 are wrong. Later releases take the name from
 the chosen library. The same is done here for that one build, in the record that it keeps of its device.
+
+PoCL also starts the system's linker once a kernel, with the libraries of a C compiler. A system without them
+(a slim container) gets the linker in ``link/``, by the variable in which PoCL's compiler looks for programs.
 """
 
 from __future__ import annotations
 
 import ctypes
+import os
+import shutil
+import sys
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
@@ -38,10 +44,37 @@ BUILT_FOR = (
 )
 
 
-def name_processor(handle: Any) -> None:
-    """Write the name into a device of that build before its first program; leave all others as they are."""
-    if Path(library_of(handle)).name != BUILD:
-        return
+# What the system needs to link a kernel beside the program ``ld``, as patterns of files.
+SYSTEM_LIBRARIES = (("usr/lib*/gcc/*/*/libgcc.a",), ("usr/lib*/libc.so", "usr/lib/*/libc.so"))
+
+# Where the compiler looks for ``ld`` first, and which Python our ``ld`` starts.
+PROGRAMS, PYTHON = "COMPILER_PATH", "BENTRAY_PYTHON"
+
+
+def prepare(handle: Any) -> None:
+    """Make a device of that build ready for its first program; leave all others as they are."""
+    if Path(library_of(handle)).name == BUILD:
+        _name_processor(handle)
+        if not system_links():
+            _offer_linker()
+
+
+def system_links(root: Path = Path("/")) -> bool:
+    """Whether the system has a linker and what PoCL has it link."""
+    found = (any(any(root.glob(pattern)) for pattern in patterns) for patterns in SYSTEM_LIBRARIES)
+    return shutil.which("ld") is not None and all(found)
+
+
+def _offer_linker() -> None:
+    ours = str(Path(__file__).parent / "link")
+    folders = [folder for folder in os.environ.get(PROGRAMS, "").split(os.pathsep) if folder]
+    if ours not in folders:
+        # What the user has set comes first.
+        os.environ[PROGRAMS] = os.pathsep.join([*folders, ours])
+        os.environ[PYTHON] = sys.executable
+
+
+def _name_processor(handle: Any) -> None:
     name = processor_name(processor())
     field = ctypes.c_char_p.from_address(handle.int_ptr + NAME_OFFSET)
     # The version, made before, ends with the name that was found first.

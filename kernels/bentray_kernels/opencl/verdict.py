@@ -111,7 +111,7 @@ def _file(device: Device) -> Path:
     # Hosts that share a home may have processors that differ under one generic name.
     digest = hashlib.sha256(repr((device, platform.machine(), sorted(processor()))).encode())
     package = resources.files(__package__)
-    for name in ("trial.py", "blocks.py", "session.py", "pocl.py"):
+    for name in ("trial.py", "blocks.py", "session.py", "pocl.py", "link/shared_library.py"):
         digest.update(package.joinpath(name).read_bytes())
     for source in sorted(Path(str(package / "sources")).rglob("*.cl")):
         digest.update(source.read_bytes())

@@ -1,5 +1,6 @@
-"""pip's PoCL on a processor that its compiler does not know: wrong as it comes, right once told a name."""
+"""pip's PoCL on a processor newer than its compiler and a system without a linker: right once prepared."""
 
+import os
 import platform
 import subprocess
 import sys
@@ -8,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from bentray_kernels.opencl import pocl
 from bentray_kernels.opencl.library import files_of
-from bentray_kernels.opencl.pocl import BUILD, BUILT_FOR, name_processor, processor_name
+from bentray_kernels.opencl.pocl import BUILD, BUILT_FOR, prepare, processor_name
 from bentray_kernels.opencl.processor import processor
 
 ON_X86 = sys.platform == "linux" and platform.machine() == "x86_64"
@@ -23,7 +25,7 @@ import ctypes, struct, sys
 from bentray_kernels.opencl import devices, trial
 from bentray_kernels.opencl.session import Session
 
-library, name = sys.argv[1], sys.argv[2] == "named"
+library, how = sys.argv[1:]
 libc = ctypes.CDLL(None)
 asked = ctypes.cast(ctypes.CDLL(library).pocl_get_llvm_cpu_name, ctypes.c_void_p).value
 text = ctypes.create_string_buffer(b"generic")
@@ -33,8 +35,8 @@ code = b"\\x48\\xbf" + struct.pack("<Q", ctypes.addressof(text))
 code += b"\\x48\\xb8" + struct.pack("<Q", copy) + b"\\xff\\xe0"
 assert libc.mprotect(ctypes.c_void_p(asked & -4096), ctypes.c_size_t(8192), 7) == 0
 ctypes.memmove(asked, code, len(code))
-if not name:
-    devices.name_processor = lambda handle: None
+if how == "as it comes":
+    devices.prepare = lambda handle: None
 (device,) = [d for d in devices.find_devices() if d.library == library]
 assert device.version.endswith("-generic")
 session = Session(device)
@@ -73,23 +75,47 @@ def test_other_devices_are_left_alone():
     class Handle:
         int_ptr = 0
 
-    name_processor(Handle())
+    prepare(Handle())
+
+
+def test_a_system_links_with_ld_and_the_libraries_of_a_compiler(tmp_path, monkeypatch):
+    folders = tmp_path / "usr/lib64/gcc/x86_64-redhat-linux/14", tmp_path / "usr/lib/x86_64-linux-gnu"
+    monkeypatch.setattr(pocl.shutil, "which", lambda name: f"/usr/bin/{name}")
+    assert not pocl.system_links(tmp_path)
+    for folder, name in zip(folders, ("libgcc.a", "libc.so"), strict=True):
+        folder.mkdir(parents=True)
+        (folder / name).touch()
+    assert pocl.system_links(tmp_path)
+    monkeypatch.setattr(pocl.shutil, "which", lambda name: None)
+    assert not pocl.system_links(tmp_path)
+
+
+def test_our_linker_is_offered_after_what_the_user_has_set(monkeypatch):
+    monkeypatch.setenv("COMPILER_PATH", "/usr/local/cross")
+    monkeypatch.setenv("BENTRAY_PYTHON", "")
+    for _ in range(2):
+        pocl._offer_linker()
+    first, ours = os.environ["COMPILER_PATH"].split(":")
+    assert first == "/usr/local/cross"
+    assert os.access(Path(ours, "ld"), os.X_OK)
 
 
 @pytest.mark.opencl
 @pytest.mark.skipif(not ON_X86, reason="pip has PoCL for x86-64 alone")
-@pytest.mark.parametrize("how", ["as it comes", "named"])
-def test_a_processor_that_llvm_does_not_know(how, tmp_path, monkeypatch):
+@pytest.mark.parametrize("how", ["as it comes", "prepared"])
+def test_a_processor_that_llvm_does_not_know_and_no_linker(how, tmp_path, monkeypatch):
     (library,) = files_of("pocl-binary-distribution", BUILD)
-    # Nothing that another run has built, and pip's PoCL alone.
+    # Nothing that another run has built, and no program but Python.
     monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("COMPILER_PATH", raising=False)
     done = subprocess.run(
         [sys.executable, "-c", UNKNOWN_PROCESSOR, str(Path(library)), how],
         capture_output=True,
         text=True,
         timeout=120,
     )
-    if how == "named":
+    if how == "prepared":
         assert done.returncode == 0, done.stderr
         assert done.stdout.splitlines() == [f"{stage} right" for stage in ("double1", "solve", "double16")]
     else:
