@@ -48,9 +48,8 @@ def package_of(library: str) -> str:
     """Name and version of the Python package that a library came with; empty where it came otherwise."""
     if library:
         for package in PACKAGES:
-            if any(
-                file.resolve() == Path(library).resolve() for file in files_of(package, Path(library).name)
-            ):
+            found = files_of(package, Path(library).name)
+            if any(file.resolve() == Path(library).resolve() for file in found):
                 return f"{package} {metadata.version(package)}"
     return ""
 
@@ -63,4 +62,4 @@ def files_of(package: str, name: str) -> Iterator[Path]:
         return
     for file in listed:
         if file.name == name:
-            yield Path(str(file.locate()))
+            yield Path(os.path.normpath(file.locate()))
