@@ -94,6 +94,10 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.EmptyBody: Kind(422, "empty-body", "The request has no body"),
     refusals.TooLarge: Kind(413, "too-large", "The body is too large"),
     refusals.TooSlow: Kind(408, "too-slow", "The body came too slowly"),
+    refusals.TinyChunks: Kind(400, "tiny-chunks", "The body comes in too many small chunks"),
+    refusals.MalformedRequest: Kind(400, "malformed-request", "The request is no HTTP"),
+    refusals.HeadTooLarge: Kind(431, "head-too-large", "The head of the request is too long"),
+    refusals.TooManyConnections: Kind(503, "too-many-connections", "Too many connections are open"),
     refusals.WrongProtocol: Kind(412, "wrong-protocol", "The upload protocol is another"),
     refusals.WrongOffset: Kind(409, "wrong-offset", "The upload stands elsewhere"),
     refusals.Locked: Kind(423, "locked", "Another request is at work on it"),
@@ -107,6 +111,7 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.NotLetIn: Kind(401, "not-let-in", "A key is needed"),
     refusals.NotAllowed: Kind(403, "not-allowed", "This is not allowed"),
     refusals.TooOften: Kind(429, "too-often", "Too many requests"),
+    refusals.TooManyStreams: Kind(429, "too-many-streams", "Too many event streams are open"),
     refusals.QuotaUsedUp: Kind(507, "quota-used-up", "The tenant stores as much as it may"),
     refusals.NoSuchPart: Kind(416, "no-such-part", "The part of the file is not there"),
     refusals.NoAnimation: Kind(404, "no-animation", "The job has no animation"),
@@ -116,6 +121,15 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.Busy: Kind(503, "busy", "No worker was free in time"),
     refusals.NotReady: Kind(503, "not-ready", "The service cannot work now"),
 }
+# What may go well after a while.
+LATER = (
+    refusals.Busy,
+    refusals.DatabaseAway,
+    refusals.QueueFull,
+    refusals.StorageAway,
+    refusals.TooManyConnections,
+    refusals.TooManyStreams,
+)
 INVALID_REQUEST = Kind(422, "invalid-request", "The request is not as it should be")
 UNREADABLE = Kind(400, "unreadable-body", "The body cannot be read")
 NOT_FOUND = Kind(404, "not-found", "There is nothing at this address")
@@ -198,10 +212,10 @@ def _refused(request: Request, error: Exception) -> Response:
     return refused(error, request.url.path)
 
 
-def refused(error: InvalidInput, path: str) -> Response:
+def refused(error: InvalidInput, path: str | None) -> Response:
     """The answer that says what an :class:`InvalidInput` (or a refusal) says."""
     headers: dict[str, str] = {}
-    if isinstance(error, refusals.Busy | refusals.QueueFull | refusals.StorageAway | refusals.DatabaseAway):
+    if isinstance(error, LATER):
         headers["Retry-After"] = RETRY_AFTER
     if isinstance(error, refusals.TooOften):
         headers["Retry-After"] = str(math.ceil(error.wait_s))
@@ -209,9 +223,6 @@ def refused(error: InvalidInput, path: str) -> Response:
         headers["WWW-Authenticate"] = 'Bearer realm="bentray"'
     if isinstance(error, refusals.NoSuchPart):
         headers["Content-Range"] = f"bytes */{error.size}"
-    if isinstance(error, refusals.TooSlow):
-        # The rest of the body is not waited for.
-        headers["Connection"] = "close"
     return _respond(from_exception(error, path), headers)
 
 

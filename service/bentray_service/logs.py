@@ -6,7 +6,9 @@ import json
 import logging
 import re
 import sys
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from datetime import UTC, datetime
@@ -24,6 +26,10 @@ _SECRETS = (
 # Where Dask shows a traceback for what it still had to say when a connection closed, as at each stop. What is
 # lost with a connection, others tell.
 CLOSED = "distributed.batched"
+
+# Loggers of what any client can bring about as often as it likes.
+PROVOKED = ("bentray.connections", "uvicorn.error", "asyncio")
+SELDOM_S = 60.0
 
 
 @contextmanager
@@ -89,11 +95,40 @@ class _Stderr(logging.Handler):
             self.handleError(record)
 
 
+class Seldom(logging.Filter):
+    """Lets each kind of line through once in ``SELDOM_S``, with the number of those that were held back."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
+        self._clock = clock
+        self._lock = threading.Lock()
+        # By logger, level and words, oldest first: when it was let through, and how many were not since.
+        self._known: dict[tuple[str, int, str], tuple[float, int]] = {}
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        key, now = (record.name, record.levelno, str(record.msg)), self._clock()
+        with self._lock:
+            at, held = self._known.get(key, (-SELDOM_S, 0))
+            if now - at < SELDOM_S:
+                self._known[key] = at, held + 1
+                return False
+            self._known.pop(key, None)
+            self._known[key] = now, 0
+            for old, (then, _) in list(self._known.items()):
+                if now - then < 2 * SELDOM_S:
+                    break
+                del self._known[old]
+        if held:
+            record.msg, record.args = f"{record.getMessage()} (and {held} times since it was last said)", ()
+        return True
+
+
 @contextmanager
 def configured(form: Literal["text", "json"]) -> Iterator[None]:
     """In the block every logger of this process writes to stderr, in one form.
 
-    As words, what a person should know of; as JSON also a line for each request. Enter it once all that has
+    As words, what a person should know of; as JSON also a line for each request. What clients can bring about
+    at will is told once a minute. Enter it once all that has
     handlers of its own, as Dask does, is imported.
     """
     handler = _Stderr()
@@ -109,9 +144,14 @@ def configured(form: Literal["text", "json"]) -> Iterator[None]:
     if form == "json":
         own.setLevel(logging.INFO)
     closed.setLevel(logging.WARNING)
+    seldom, provoked = Seldom(), [logging.getLogger(name) for name in PROVOKED]
+    for logger in provoked:
+        logger.addFilter(seldom)
     try:
         yield
     finally:
+        for logger in provoked:
+            logger.removeFilter(seldom)
         for logger, handlers, propagate, level in before:
             logger.handlers[:], logger.propagate = handlers, propagate
             logger.setLevel(level)

@@ -63,6 +63,22 @@ class TooSlow(InvalidInput):
     """The body hardly comes."""
 
 
+class TinyChunks(InvalidInput):
+    """The body comes in chunks so small that most of the work is with them."""
+
+
+class MalformedRequest(InvalidInput):
+    """What came is no HTTP."""
+
+
+class HeadTooLarge(InvalidInput):
+    """The head of the request is too long."""
+
+
+class TooManyConnections(InvalidInput):
+    """So many connections are open that this one cannot be served."""
+
+
 class WrongProtocol(InvalidInput):
     """The request does not speak the version of the upload protocol that the service does."""
 
@@ -117,6 +133,10 @@ class TooOften(InvalidInput):
     def __init__(self, field: str, value: str, accepted: str, wait_s: float) -> None:
         super().__init__(field, value, accepted)
         self.wait_s = wait_s
+
+
+class TooManyStreams(InvalidInput):
+    """So many event streams are open that no more are taken for now."""
 
 
 class QuotaUsedUp(InvalidInput):

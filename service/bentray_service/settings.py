@@ -98,6 +98,12 @@ class ServiceSettings(BaseSettings):
         pattern=r"^[A-Za-z0-9-]+$",
         description="Header in which such a proxy names the user, who is a tenant.",
     )
+    connections_per_address: int | None = Field(
+        None,
+        ge=1,
+        description="Connections that one client address may have open, trusted proxies apart; without it a "
+        "quarter of all that there are descriptors for, which are 4096 at most.",
+    )
     requests_per_minute: int = Field(
         1200, ge=0, description="Requests of a tenant, where keys or a proxy are used; 0: any number."
     )

@@ -14,12 +14,13 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-import uvicorn
 
 from bentray_kernels.tomography.result import Progress, Reconstruction, Sweep, Trial
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.app import create_app
 from bentray_service.settings import ServiceSettings
+from bentray_service.web.listening import Listening
+from bentray_service.web.server import Server
 from bentray_workers import slices
 
 with warnings.catch_warnings():
@@ -249,12 +250,13 @@ def until() -> Callable[..., dict[str, Any]]:
 @pytest.fixture
 def serve(tmp_path: Path, cluster: FakeCluster) -> Iterator[Callable[..., str]]:
     """Start the service behind a real socket; returns its address."""
-    running: list[tuple[uvicorn.Server, threading.Thread]] = []
+    running: list[tuple[Server, threading.Thread]] = []
 
     def go(**settings: Any) -> str:
-        app = create_app(ServiceSettings(data_dir=tmp_path / "served", **settings), cluster)
-        server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="warning", lifespan="on"))
-        thread = threading.Thread(target=server.run, daemon=True)
+        given = ServiceSettings(data_dir=tmp_path / "served", **settings)
+        server, listening = Server(create_app(given, cluster), given), Listening()
+        listening.bind(("127.0.0.1", 0))
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
         thread.start()
         running.append((server, thread))
         deadline = time.monotonic() + PATIENCE_S
@@ -262,7 +264,7 @@ def serve(tmp_path: Path, cluster: FakeCluster) -> Iterator[Callable[..., str]]:
             assert thread.is_alive()
             assert time.monotonic() < deadline
             time.sleep(0.02)
-        return f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+        return f"http://127.0.0.1:{listening.getsockname()[1]}"
 
     yield go
     for server, thread in running:

@@ -109,3 +109,35 @@ def test_requests_and_jobs_can_be_followed_and_no_key_is_told(start, uploaded, s
     failed = next(one for one in told if "a fault" in one.get("error", ""))
     assert failed["job"] == job["id"]
     assert all("\t" not in one.get("request", "") for one in told)
+
+
+def test_what_clients_bring_about_is_told_once_a_minute(capsys):
+    now = [0.0]
+    seldom = logs.Seldom(lambda: now[0])
+
+    def passes(words, *given, name="asyncio", level=logging.WARNING):
+        record = logging.LogRecord(name, level, __file__, 1, words, given, None)
+        return record.getMessage() if seldom.filter(record) else None
+
+    assert passes("connection %d was lost", 1) == "connection 1 was lost"
+    assert [passes("connection %d was lost", k) for k in range(1000)] == 1000 * [None]
+    assert passes("something else") == "something else"
+    now[0] = 61.0
+    assert (
+        passes("connection %d was lost", 2) == "connection 2 was lost (and 1000 times since it was last said)"
+    )
+    assert passes("connection %d was lost", 3) is None
+    # What is not said any more is not kept either.
+    now[0] = 500.0
+    assert passes("a third") == "a third"
+    assert len(seldom._known) == 1
+
+
+def test_only_in_the_service_and_only_of_those(capsys):
+    with logs.configured("text"):
+        for _ in range(3):
+            logging.getLogger("bentray.connections").warning("too many")
+            logging.getLogger("bentray.jobs").warning("a job")
+    written = capsys.readouterr().err
+    assert (written.count("too many"), written.count("a job")) == (1, 3)
+    assert not logging.getLogger("bentray.connections").filters

@@ -81,13 +81,15 @@ def serve(
 
 
 def _listen(host: str, port: int) -> socket.socket:
+    from ..web.listening import Listening
+
     # The socket is bound here and handed on, so that a busy port is found before any worker starts
     # and port 0 is known by its real number.
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     except (socket.gaierror, UnicodeError) as error:
         raise InvalidInput("host", repr(host), "an address of this machine, as 127.0.0.1") from error
-    listening = socket.socket(family, kind, protocol)
+    listening = Listening(family, kind, protocol)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind(address)
@@ -102,16 +104,14 @@ def _listen(host: str, port: int) -> socket.socket:
 
 
 def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> None:
-    import uvicorn
-
     from .. import logs
     from ..app import create_app
-    from ..web.heads import HeadInTime
+    from ..web.server import Server
 
     host, port = listening.getsockname()[:2]
     url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
 
-    class Announcing(uvicorn.Server):
+    class Announcing(Server):
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)
             if self.started and as_json:
@@ -127,17 +127,7 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
 
     made = create_app(settings)
     app = _Starting(made)
-    # Whether a proxy is believed is for the door to say, by who really called.
-    config = uvicorn.Config(
-        app,
-        http=HeadInTime,
-        log_config=None,
-        log_level="warning",
-        access_log=False,
-        proxy_headers=False,
-        lifespan="on",
-    )
-    server = Announcing(config)
+    server = Announcing(app, settings)
     # Uvicorn ends the process when the application cannot start; here the reason has the last word.
     with suppress(SystemExit), logs.configured(settings.log_format):
         server.run(sockets=[listening])

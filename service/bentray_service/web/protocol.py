@@ -1,0 +1,101 @@
+"""HTTP as the service speaks it: patient with bodies, not with silence, and with a bound on connections."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
+
+from ..errors import refused
+from ..refusals import TooManyConnections
+from .connections import Connections
+from .unread_bodies import ClosesUnread, last
+
+# In which so much of an answer must be taken, or its rest: who does not read holds a file open.
+ANSWER_S = 60.0
+LEAST_BYTES = 64 * 1024
+
+SHORT = ("/health/live", "/health/ready")
+JOB = "/v1/jobs/job-"
+
+
+class BoundedProtocol(ClosesUnread):
+    """One connection, which is counted."""
+
+    _spare = False
+    _stuck: asyncio.TimerHandle | None = None
+
+    def __init__(self, connections: Connections, *given: Any, **named: Any) -> None:
+        super().__init__(*given, **named)
+        self._counted = connections
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Count it."""
+        super().connection_made(transport)
+        self._spare = self._counted.add(self, self.client[0] if self.client else "")
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Count it no more."""
+        self._counted.remove(self)
+        self.resume_writing()
+        super().connection_lost(exc)
+
+    def drop(self) -> None:
+        """Close it: another needs its place."""
+        self.transport.abort()
+
+    def on_response_complete(self) -> None:
+        """Silent, unless a further request is there."""
+        super().on_response_complete()
+        if not self.answering():
+            self._counted.silent(self)
+
+    def pause_writing(self) -> None:
+        """The client does not take what is sent as fast as it is made."""
+        super().pause_writing()
+        self._stuck = self.loop.call_later(ANSWER_S, self._look_again, self._left())
+
+    def resume_writing(self) -> None:
+        """It has taken it."""
+        if self._stuck is not None:
+            self._stuck.cancel()
+            self._stuck = None
+        super().resume_writing()
+
+    def _left(self) -> int:
+        return self.transport.get_write_buffer_size()
+
+    def _look_again(self, before: int) -> None:
+        left = self._left()
+        if before - left < LEAST_BYTES:
+            self.transport.abort()
+        else:
+            self._stuck = self.loop.call_later(ANSWER_S, self._look_again, left)
+
+    def _start_asgi_task(self, cycle: RequestResponseCycle, app: Any) -> None:
+        self._counted.busy(self)
+        super()._start_asgi_task(cycle, self._only_short(app) if self._spare else app)
+
+    def _only_short(self, app: Any) -> Any:
+        most = self._counted.limits
+
+        async def answer(scope: Any, receive: Any, send: Any) -> None:
+            async def send_last(message: Any) -> None:
+                if message["type"] == "http.response.start":
+                    message = last(message)
+                await send(message)
+
+            if _short(scope["method"], scope["path"]):
+                await app(scope, receive, send_last)
+                return
+            found = f"more than {most.of_address} of your address, or {most.most} in all"
+            error = TooManyConnections("connections", found, "fewer, each used again; see Retry-After")
+            await refused(error, scope["path"])(scope, receive, send_last)
+
+        return answer
+
+
+def _short(method: str, path: str) -> bool:
+    """Whether it is answered at once: how the service is, and how a job is."""
+    return method == "GET" and (path in SHORT or (path.startswith(JOB) and "/" not in path[len(JOB) :]))
