@@ -19,11 +19,13 @@ from . import __version__, errors
 from .access.audit import Audit
 from .access.door import Door
 from .access.guard import Guard
+from .access.key_watch import KeyWatch
 from .compute import Cluster, Compute
 from .housekeeping import Housekeeper
 from .ingest.append import Hold
 from .ingest.canonical import Limits
 from .ingest.reader import Store, UploadReader
+from .jobs.feed import Feed
 from .jobs.runner import Runner
 from .metrics import Metrics
 from .routes import (
@@ -91,7 +93,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         stack = ExitStack()
         try:
-            app.state.parts = await run_in_threadpool(_open, settings, cluster, stack)
+            app.state.parts = await run_in_threadpool(_open, settings, cluster, stack, app.state.leaving)
             app.state.metrics.watch(app.state.parts)
             app.state.ingest_limiter = anyio.CapacityLimiter(uploads.INGESTS_AT_ONCE)
             yield
@@ -126,7 +128,9 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     return app
 
 
-def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) -> Parts:
+def _open(
+    settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack, leaving: threading.Event
+) -> Parts:
     """Open every part; ``stack`` closes what has been opened, also when a later part fails."""
     stack.enter_context(private_files())
     files = Files(settings.data_dir)
@@ -209,5 +213,7 @@ def _open(settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack) 
         compute=compute,
         runner=runner,
         door=door,
+        key_watch=KeyWatch(Keys(database)),
+        feed=Feed(Jobs(database), leaving.is_set),
         audit=Audit(files.audit),
     )

@@ -10,10 +10,12 @@ from fastapi import Depends, Request
 from .access.audit import Audit
 from .access.caller import Caller
 from .access.door import Door
+from .access.key_watch import KeyWatch
 from .compute import Compute
 from .housekeeping import Housekeeper
 from .ingest.append import Hold
 from .ingest.reader import UploadReader
+from .jobs.feed import Feed
 from .jobs.runner import Runner
 from .settings import ServiceSettings
 from .storage.database import Database
@@ -50,6 +52,8 @@ class Parts:
     compute: Compute
     runner: Runner
     door: Door
+    key_watch: KeyWatch
+    feed: Feed
     audit: Audit
 
 

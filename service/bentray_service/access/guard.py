@@ -15,6 +15,7 @@ from bentray_kernels.errors import InvalidInput
 from ..errors import refused
 from ..wiring import Parts
 from .caller import Caller
+from .key_watch import answer_while_valid
 
 log = logging.getLogger("bentray.access")
 
@@ -36,13 +37,19 @@ class Guard:
             await self.app(scope, receive, send)
             return
         seen = _Seen(scope)
+        caller = None
         try:
             if not _public(scope["path"]):
-                scope.setdefault("state", {})["caller"] = await run_in_threadpool(_let_in, scope, seen)
+                caller = await run_in_threadpool(_let_in, scope, seen)
+                scope.setdefault("state", {})["caller"] = caller
         except InvalidInput as error:
             await refused(error, scope["path"])(scope, receive, seen.sending(send))
         else:
-            await self.app(scope, seen.receiving(receive), seen.sending(send))
+            given = scope, seen.receiving(receive), seen.sending(send)
+            if caller is not None and caller.how == "key":
+                await answer_while_valid(self.app, *given, _parts(scope).key_watch, caller.who)
+            else:
+                await self.app(*given)
         finally:
             seen.tell()
 

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
-import anyio
-from fastapi import APIRouter, Header, Request
+from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
-from starlette.concurrency import run_in_threadpool
+from starlette.types import Receive, Scope, Send
 
 from ..errors import described
-from ..storage.jobs import Jobs
+from ..jobs.feed import Feed, WatchedJob
 from ..storage.schema import ENDED
 from ..storage.tenants import Tenant
 from ..wiring import CallerTenant, Service
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
-# How often the database is asked.
-INTERVAL_SECONDS = 0.5
 # A comment after so much silence keeps proxies from closing the connection.
 SILENCE_SECONDS = 15.0
 
@@ -32,43 +29,57 @@ MEDIA_TYPE = "text/event-stream"
 @router.get(
     "/{job_id}/events",
     response_class=StreamingResponse,
-    responses={200: {"content": {MEDIA_TYPE: {}}, "description": "The events."}, **described(404, 422)},
+    responses={200: {"content": {MEDIA_TYPE: {}}, "description": "The events."}, **described(404, 422, 429)},
 )
 def job_events(
     job_id: str,
-    request: Request,
     service: Service,
     tenant: CallerTenant,
     last_event_id: Annotated[
         int, Header(ge=0, le=2**63 - 1, description="Only later events; a browser sends it by itself.")
     ] = 0,
-) -> StreamingResponse:
+) -> Response:
     """What happens to a job, as it happens; it ends with the job.
 
     Events `state` are the changes of its state, each with an id that only grows; between them events
-    `progress`, without an id, tell how far it is.
+    `progress`, without an id, tell how far it is. A tenant may have 64 such streams open; a further one is
+    refused with 429.
     """
     service.jobs.get(tenant, job_id)
-    leaving = request.app.state.leaving
-    stream = _stream(service.jobs, tenant, job_id, last_event_id, leaving.is_set)
-    return StreamingResponse(stream, media_type=MEDIA_TYPE, headers={"Cache-Control": "no-store"})
+    return _Stream(service.feed, tenant, job_id, last_event_id)
 
 
-async def _stream(
-    jobs: Jobs, tenant: Tenant, job_id: str, last: int, leaving: Callable[[], bool]
-) -> AsyncIterator[str]:
+class _Stream(Response):
+    """The answer; its place among the streams is taken when it begins and given back however it ends."""
+
+    def __init__(self, feed: Feed, tenant: Tenant, job_id: str, last: int) -> None:
+        super().__init__(media_type=MEDIA_TYPE)
+        self._feed = feed
+        self._of = tenant, job_id
+        self._last = last
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        with self._feed.watch(*self._of) as job:
+            told = _told(self._feed, job, self._last)
+            stream = StreamingResponse(told, media_type=MEDIA_TYPE, headers={"Cache-Control": "no-store"})
+            await stream(scope, receive, send)
+
+
+async def _told(feed: Feed, job: WatchedJob, last: int) -> AsyncIterator[str]:
     told: dict[str, Any] = {}
     spoken = time.monotonic()
-    while not leaving():
-        # The job first: an event that comes in between is told next time, never left out at the end.
-        job = await run_in_threadpool(jobs.get, tenant, job_id)
+    while not feed.leaving() and not job.gone:
         said = []
-        for event in await run_in_threadpool(jobs.events, tenant, job_id, after=last):
-            last = event["number"]
-            at = datetime.fromtimestamp(event["time"], UTC).isoformat()
-            said.append(_event("state", {"state": event["state"], "note": event["note"], "time": at}, last))
-        progress = {"done": job["done"], "total": job["total"], "phase": job["phase"] or ""}
-        if job["state"] == "running" and job["total"] and progress != told:
+        for event in job.events:
+            if event["number"] > last:
+                last = event["number"]
+                at = datetime.fromtimestamp(event["time"], UTC).isoformat()
+                said.append(
+                    _event("state", {"state": event["state"], "note": event["note"], "time": at}, last)
+                )
+        row = job.row or {"state": "", "done": 0, "total": 0, "phase": ""}
+        progress = {"done": row["done"], "total": row["total"], "phase": row["phase"] or ""}
+        if row["state"] == "running" and row["total"] and progress != told:
             said.append(_event("progress", progress))
             told = progress
         if not said and time.monotonic() - spoken > SILENCE_SECONDS:
@@ -76,10 +87,10 @@ async def _stream(
         if said:
             spoken = time.monotonic()
             yield "".join(said)
-        elif job["state"] in ENDED:
+        elif row["state"] in ENDED:
             return
-        if job["state"] not in ENDED:
-            await anyio.sleep(INTERVAL_SECONDS)
+        else:
+            await job.news(SILENCE_SECONDS)
 
 
 def _event(name: str, data: dict[str, Any], number: int | None = None) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -21,6 +21,8 @@ from .schema import ENDED, jobs
 from .tenants import Tenant
 
 Row = dict[str, Any]
+
+BATCH = 500
 
 
 class Jobs:
@@ -147,6 +149,40 @@ class Jobs:
         with self._database.read() as connection:
             return [dict(row) for row in connection.execute(mine).mappings()]
 
+    def news(self, known: Mapping[str, int]) -> tuple[dict[str, Row], dict[str, list[Row]]]:
+        """How jobs are, and their events after those that are known, whoever's they are.
+
+        Args:
+            known: by the id of each job the number of its last event that is known; 0 where none is.
+
+        Returns:
+            the jobs that there are, by id, with ``state``, ``done``, ``total`` and ``phase``; and, of those
+            that have new ones, the events, oldest first.
+        """
+        found: dict[str, Row] = {}
+        events: dict[str, list[Row]] = {}
+        table = schema.events
+        # The jobs first: an event that comes in between is told next time, never left out at the end.
+        for ids in _batches(list(known)):
+            with self._database.read() as connection:
+                columns = jobs.c.id, jobs.c.state, jobs.c.done, jobs.c.total, jobs.c.phase
+                rows = connection.execute(select(*columns).where(jobs.c.id.in_(ids))).mappings()
+                found.update({row["id"]: dict(row) for row in rows})
+                last = (
+                    select(table.c.job_id, func.max(table.c.number))
+                    .where(table.c.job_id.in_(ids))
+                    .group_by(table.c.job_id)
+                )
+                newer = [job for job, number in connection.execute(last) if number > known[job]]
+                if not newer:
+                    continue
+                least = min(known[job] for job in newer)
+                query = select(table).where(table.c.job_id.in_(newer), table.c.number > least)
+                for row in connection.execute(query.order_by(table.c.number)).mappings():
+                    if row["number"] > known[row["job_id"]]:
+                        events.setdefault(row["job_id"], []).append(dict(row))
+        return found, events
+
     def request_cancel(self, tenant: Tenant, job_id: str) -> Row:
         """Ask a job to stop: a queued one ends at once, a running one when it next looks.
 
@@ -165,6 +201,12 @@ class Jobs:
             change(connection, job_id, ("queued",), "cancelled", finished=time.time())
             change(connection, job_id, ("running",), "cancelling")
         return self.get(tenant, job_id)
+
+
+def _batches(ids: list[str]) -> Iterator[list[str]]:
+    """Not more at a time than any database takes in one query."""
+    for begin in range(0, len(ids), BATCH):
+        yield ids[begin : begin + BATCH]
 
 
 def _of_key(connection: Connection, tenant: Tenant, key: str) -> Row | None:

@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import insert, select, update
+from sqlalchemy import insert, or_, select, update
 from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
 from bentray_kernels.errors import InvalidInput
@@ -68,6 +68,14 @@ class Keys:
         if row["used"] is None or now - row["used"] > USED_S:
             self._note(token.id, now)
         return dict(row)
+
+    def ended(self, key_ids: Sequence[str]) -> list[str]:
+        """Those of some keys that are not valid any more."""
+        query = select(keys.c.id).where(
+            keys.c.id.in_(key_ids), or_(keys.c.revoked.is_not(None), keys.c.expires <= time.time())
+        )
+        with self._database.read() as connection:
+            return list(connection.execute(query).scalars())
 
     def all(self, tenant: Tenant | None = None) -> list[Row]:
         """Every key, or those of one tenant, oldest first."""

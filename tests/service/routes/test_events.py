@@ -2,15 +2,20 @@
 
 import json
 import threading
+import time
+from contextlib import ExitStack
 
+import httpx
 import pytest
+from sqlalchemy.exc import OperationalError
 
+from bentray_service.jobs import feed
 from bentray_service.routes import events
 
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(events, "INTERVAL_SECONDS", 0.01)
+    monkeypatch.setattr(feed, "INTERVAL_SECONDS", 0.01)
 
 
 def parsed(text):
@@ -71,6 +76,91 @@ def test_a_wrong_place_is_refused(start, uploaded, submitted, work, last):
     job = submitted(http, uploaded(http))
     answer = http.get(f"/v1/jobs/{job['id']}/events", headers={"Last-Event-ID": last})
     assert (answer.status_code, answer.json()["field"]) == (422, "last-event-id")
+
+
+def test_all_streams_share_one_look_at_the_database(start, uploaded, submitted, until, work, monkeypatch):
+    http = start()
+    parts, looks, threads = http.app.state.parts, [], set()
+    news = parts.jobs.__class__.news
+
+    def counted(self, known):
+        looks.append(set(known))
+        threads.add(threading.get_ident())
+        return news(self, known)
+
+    monkeypatch.setattr(feed, "INTERVAL_SECONDS", 0.2)
+    monkeypatch.setattr("bentray_service.storage.jobs.Jobs.news", counted)
+    work.hold.clear()
+    dataset = uploaded(http)
+    jobs = [submitted(http, dataset)["id"] for _ in range(3)]
+    until(http, jobs[0], "running")
+    before, begun, told = len(looks), time.monotonic(), {}
+    listeners = [
+        threading.Thread(target=lambda n=n: told.update({n: http.get(f"/v1/jobs/{jobs[n % 3]}/events").text}))
+        for n in range(30)
+    ]
+    for one in listeners:
+        one.start()
+    wait_until(lambda: any(len(known) == 3 for known in looks))
+    time.sleep(0.6)
+    work.hold.set()
+    for one in listeners:
+        one.join(20.0)
+    seconds = time.monotonic() - begun
+    # Not one each: as many as one would need, and a few for those who came in between.
+    assert len(looks) - before <= seconds / 0.05 + 5
+    assert {len(known) for known in looks} <= {1, 2, 3}
+    ends = {json.loads(parsed(text)[-1]["data"])["state"] for text in told.values()}
+    assert (len(told), ends) == (30, {"succeeded"})
+
+
+def test_streams_are_bounded_for_a_tenant_and_in_all(serve, monkeypatch, uploaded, submitted, until, work):
+    monkeypatch.setattr(feed, "OF_TENANT", 3)
+    work.hold.clear()
+    url = serve()
+    with httpx.Client(base_url=url, timeout=20.0) as http, ExitStack() as stack:
+        job = submitted(http, uploaded(http))
+        place = f"/v1/jobs/{job['id']}/events"
+        streams = [stack.enter_context(http.stream("GET", place)) for _ in range(3)]
+        assert [one.status_code for one in streams] == [200, 200, 200]
+        refused = http.get(place)
+        assert (refused.status_code, refused.json()["type"]) == (429, "/problems/too-many-streams")
+        assert int(refused.headers["retry-after"]) > 0
+        assert f"GET /v1/jobs/{job['id']}" in refused.json()["accepted"]
+        streams[0].close()
+        monkeypatch.setattr(feed, "IN_ALL", 3)
+        wait_until(lambda: opens(http, place))
+        work.hold.set()
+
+
+def opens(http, place):
+    with http.stream("GET", place) as answer:
+        return answer.status_code == 200
+
+
+def wait_until(happened):
+    deadline = time.monotonic() + 20.0
+    while not happened():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_a_database_that_is_away_ends_no_stream(start, uploaded, submitted, until, work, monkeypatch):
+    http = start()
+    work.hold.clear()
+    job = submitted(http, uploaded(http))
+    until(http, job["id"], "running")
+    news, failures = http.app.state.parts.jobs.__class__.news, iter(range(5))
+
+    def fails_at_first(self, known):
+        if next(failures, None) is not None:
+            raise OperationalError("SELECT", {}, Exception("database is locked"))
+        work.hold.set()
+        return news(self, known)
+
+    monkeypatch.setattr("bentray_service.storage.jobs.Jobs.news", fails_at_first)
+    told = parsed(http.get(f"/v1/jobs/{job['id']}/events").text)
+    assert json.loads(told[-1]["data"])["state"] == "succeeded"
 
 
 def test_no_such_job(start, work):

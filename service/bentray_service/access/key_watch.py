@@ -1,0 +1,116 @@
+"""What is under way for a key ends when the key does: one look at the database a second, for all requests."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import anyio
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from ..errors import refused
+from ..refusals import NotLetIn
+from ..storage.keys import Keys
+
+log = logging.getLogger("bentray.access")
+
+INTERVAL_SECONDS = 1.0
+
+EVENTS = b"text/event-stream"
+
+
+class KeyWatch:
+    """Knows which requests each key has under way, and ends them once it is revoked or has expired.
+
+    A revocation is a row of the database, for another process makes it. Most requests are answered before
+    it is looked at for the first time.
+    """
+
+    def __init__(self, keys: Keys) -> None:
+        self._keys = keys
+        self._under_way: dict[str, set[Callable[[], None]]] = {}
+        self._looking: asyncio.Task[None] | None = None
+
+    @contextmanager
+    def during(self, key_id: str, end: Callable[[], None]) -> Iterator[None]:
+        """In the block ``end`` is called, at most once, if the key ends."""
+        self._under_way.setdefault(key_id, set()).add(end)
+        if self._looking is None:
+            self._looking = asyncio.create_task(self._look())
+        try:
+            yield
+        finally:
+            mine = self._under_way.get(key_id, set())
+            mine.discard(end)
+            if not mine:
+                self._under_way.pop(key_id, None)
+
+    async def _look(self) -> None:
+        # A thread of its own, which nothing else can hold.
+        limiter = anyio.CapacityLimiter(1)
+        try:
+            while True:
+                await asyncio.sleep(INTERVAL_SECONDS)
+                if not self._under_way:
+                    return
+                try:
+                    ended = await anyio.to_thread.run_sync(
+                        self._keys.ended, list(self._under_way), limiter=limiter
+                    )
+                except SQLAlchemyError as error:
+                    log.warning("whether keys were revoked could not be read: %s", error)
+                    continue
+                for key_id in ended:
+                    for end in self._under_way.pop(key_id, set()):
+                        end()
+        finally:
+            self._looking = None
+
+
+async def answer_while_valid(
+    app: ASGIApp, scope: Scope, receive: Receive, send: Send, watch: KeyWatch, key_id: str
+) -> None:
+    """Answer a request of a key until the answer, or the key, comes to its end.
+
+    Before the answer has begun, it is 401 then. A stream of events ends; of any other answer the connection
+    is broken off, so that a part of a file is not taken for the whole.
+    """
+    cancelling = anyio.CancelScope()
+    ended = begun = events = replaced = complete = False
+    refusal = NotLetIn("Authorization", "a key that was revoked or expired meanwhile", "a valid key")
+
+    def end() -> None:
+        nonlocal ended
+        ended = True
+        if begun:
+            cancelling.cancel()
+
+    async def receive_while_valid() -> Message:
+        message = await receive()
+        if ended and not begun:
+            raise refusal
+        return message
+
+    async def send_while_valid(message: Message) -> None:
+        nonlocal begun, events, replaced, complete
+        if message["type"] == "http.response.start":
+            if ended:
+                replaced = True
+                await refused(refusal, scope["path"])(scope, receive, send)
+                cancelling.cancel()
+                return
+            begun = True
+            types = [value for name, value in message["headers"] if name.lower() == b"content-type"]
+            events = any(value.startswith(EVENTS) for value in types)
+        elif not replaced:
+            complete = not message.get("more_body", False)
+        if not replaced:
+            await send(message)
+
+    with watch.during(key_id, end), cancelling:
+        await app(scope, receive_while_valid, send_while_valid)
+    if begun and events and not complete:
+        await send({"type": "http.response.body", "body": b"", "more_body": False})
