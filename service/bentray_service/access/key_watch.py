@@ -12,7 +12,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ..errors import refused
-from ..refusals import NotLetIn
+from ..refusals import DatabaseAway, NotLetIn
 from ..storage.keys import Keys
 
 log = logging.getLogger("bentray.access")
@@ -60,7 +60,7 @@ class KeyWatch:
                     ended = await anyio.to_thread.run_sync(
                         self._keys.ended, list(self._under_way), limiter=limiter
                     )
-                except SQLAlchemyError as error:
+                except (SQLAlchemyError, DatabaseAway) as error:
                     log.warning("whether keys were revoked could not be read: %s", error)
                     continue
                 for key_id in ended:

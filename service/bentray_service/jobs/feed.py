@@ -12,7 +12,7 @@ from typing import Any
 import anyio
 from sqlalchemy.exc import SQLAlchemyError
 
-from ..refusals import TooManyStreams
+from ..refusals import DatabaseAway, TooManyStreams
 from ..storage.jobs import Jobs
 from ..storage.tenants import Tenant
 
@@ -121,7 +121,7 @@ class Feed:
                 }
                 try:
                     found, events = await anyio.to_thread.run_sync(self._jobs.news, known, limiter=limiter)
-                except SQLAlchemyError as error:
+                except (SQLAlchemyError, DatabaseAway) as error:
                     log.warning("jobs that are watched could not be read: %s", error)
                 else:
                     for job_id, one in watched.items():
