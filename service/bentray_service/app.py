@@ -28,6 +28,8 @@ from .ingest.reader import Store, UploadReader
 from .jobs.feed import Feed
 from .jobs.runner import Runner
 from .metrics import Metrics
+from .pictures import Pictures
+from .readiness import Readiness
 from .routes import (
     access,
     datasets,
@@ -97,6 +99,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
             app.state.metrics.watch(app.state.parts)
             app.state.ingest_limiter = anyio.CapacityLimiter(uploads.INGESTS_AT_ONCE)
             yield
+            await app.state.parts.pictures.close()
         finally:
             await run_in_threadpool(stack.close)
 
@@ -195,6 +198,11 @@ def _open(
     )
     housekeeper.start()
     stack.callback(housekeeper.stop)
+    pictures = Pictures(cluster, store.bring)
+    stack.callback(pictures.stop)
+    threads: dict[str, Runner | UploadReader] = {"runner": runner, "reader": reader}
+    readiness = Readiness(database, files, compute, threads, settings.min_free_bytes)
+    stack.callback(readiness.stop)
     return Parts(
         settings=settings,
         database=database,
@@ -211,9 +219,11 @@ def _open(
         housekeeper=housekeeper,
         geometry_fields=GeometryFields(database),
         compute=compute,
+        pictures=pictures,
         runner=runner,
         door=door,
         key_watch=KeyWatch(Keys(database)),
         feed=Feed(Jobs(database), leaving.is_set),
         audit=Audit(files.audit),
+        readiness=readiness,
     )

@@ -17,6 +17,8 @@ from .ingest.append import Hold
 from .ingest.reader import UploadReader
 from .jobs.feed import Feed
 from .jobs.runner import Runner
+from .pictures import Pictures
+from .readiness import Readiness
 from .settings import ServiceSettings
 from .storage.database import Database
 from .storage.datasets import Datasets
@@ -50,11 +52,13 @@ class Parts:
     reader: UploadReader
     housekeeper: Housekeeper
     compute: Compute
+    pictures: Pictures
     runner: Runner
     door: Door
     key_watch: KeyWatch
     feed: Feed
     audit: Audit
+    readiness: Readiness
 
 
 def parts_of(request: Request) -> Parts:
@@ -67,11 +71,20 @@ def caller_of(request: Request) -> Caller:
     return cast(Caller, request.state.caller)
 
 
-def _tenant(request: Request) -> Tenant:
+# Coroutines, for FastAPI gives every plain function a thread of the pool that all requests share.
+async def _service(request: Request) -> Parts:
+    return parts_of(request)
+
+
+async def _caller(request: Request) -> Caller:
+    return caller_of(request)
+
+
+async def _tenant(request: Request) -> Tenant:
     return caller_of(request).tenant
 
 
-Service = Annotated[Parts, Depends(parts_of)]
-Asking = Annotated[Caller, Depends(caller_of)]
+Service = Annotated[Parts, Depends(_service)]
+Asking = Annotated[Caller, Depends(_caller)]
 # Whose request it is; every query takes it.
 CallerTenant = Annotated[Tenant, Depends(_tenant)]

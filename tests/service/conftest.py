@@ -38,6 +38,10 @@ class FakeFuture:
 
     def __init__(self, value: Any) -> None:
         self._value = value
+        self.status = "error" if isinstance(value, Exception) else "finished"
+
+    def add_done_callback(self, tell: Callable[[FakeFuture], None]) -> None:
+        tell(self)
 
     def result(self, timeout: float) -> Any:
         if isinstance(self._value, Exception):
@@ -67,6 +71,8 @@ class FakeCluster:
         return self
 
     def submit(self, task: Callable[..., Any], *given: Any, **how: Any) -> FakeFuture:
+        # Which worker it is does not matter here.
+        del how["workers"]
         self.submitted.append(dict(how))
         for name in ("resources", "priority", "pure"):
             how.pop(name)
@@ -192,8 +198,8 @@ def start(tmp_path: Path, cluster: FakeCluster) -> Iterator[Callable[..., TestCl
     with ExitStack() as stack:
 
         def go(folder: str = "data", **settings: Any) -> TestClient:
-            given = ServiceSettings(data_dir=tmp_path / folder, **settings)
-            app = create_app(given, settings.pop("cluster", cluster))
+            own = settings.pop("cluster", cluster)
+            app = create_app(ServiceSettings(data_dir=tmp_path / folder, **settings), own)
             return stack.enter_context(
                 TestClient(app, base_url="http://localhost", raise_server_exceptions=False)
             )

@@ -138,7 +138,7 @@ def test_a_task_has_about_a_second_of_work(view, rows):
 @pytest.mark.parametrize("rays", [2**19, 200])
 def test_on_a_cluster(cluster, path, rays, monkeypatch):
     monkeypatch.setattr(strips, "TASK_RAYS", rays)
-    png = refraction.submit(cluster.client, path, SMALL, 0).result(timeout=60)
+    png = strips.submit(cluster.client, refraction.tasks_of(path, SMALL), 0).result(timeout=60)
     image = whole(path, SMALL).image
     assert (colours_of(png) != image).any(axis=-1).mean() < 0.005
 
@@ -150,7 +150,7 @@ def test_a_picture_does_not_wait_for_reconstructions(cluster, path):
         for _ in range(8)
     ]
     started = time.monotonic()
-    refraction.submit(cluster.client, path, SMALL, 10).result(timeout=60)
+    strips.submit(cluster.client, refraction.tasks_of(path, SMALL), 10).result(timeout=60)
     waited, left = time.monotonic() - started, [future.done() for future in busy]
     for future in busy:
         future.cancel()
@@ -160,4 +160,6 @@ def test_a_picture_does_not_wait_for_reconstructions(cluster, path):
 
 def test_what_the_worker_refuses_arrives_in_words(cluster, path):
     with pytest.raises(InvalidInput, match="the range of the volume"):
-        refraction.submit(cluster.client, path, replace(SMALL, iso=(9.0,)), 0).result(timeout=60)
+        strips.submit(cluster.client, refraction.tasks_of(path, replace(SMALL, iso=(9.0,))), 0).result(
+            timeout=60
+        )

@@ -12,9 +12,10 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.splines import Spline
 from bentray_workers import scene_cache
+from bentray_workers.kept import Kept
 from bentray_workers.reconstruction_file import write_reconstruction
 from bentray_workers.refraction_view import RefractionView
-from bentray_workers.scene_cache import Kept, check_size, scene_at, stored_shape
+from bentray_workers.scene_cache import check_size, scene_at, stored_shape
 from bentray_workers.volume_file import Volume, write_volume
 
 from .reconstructions import made

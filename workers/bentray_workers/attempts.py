@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from distributed import Client, Future, KilledWorker
 
+from .kept import leave_room
 from .lanes import RECONSTRUCTION
 
 # How often a call may see its workers die while it runs.
@@ -96,6 +97,7 @@ def _futures(arguments: Iterable[Any]) -> Iterator[Future]:
 
 def watched(marker: Path, function: Callable[..., Any], *arguments: Any) -> Any:
     """Task: a call, with a file that is there as long as it runs."""
+    leave_room()
     marker.touch()
     try:
         return function(*arguments)

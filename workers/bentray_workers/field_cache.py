@@ -21,7 +21,7 @@ from .field_scenes import scene_of
 from .field_tasks import FACE_BYTES
 from .field_view import FieldView
 from .geometry_image_file import read_geometry_image
-from .scene_cache import Kept
+from .kept import Kept
 
 # What a process keeps; tables are maps of files and count as none.
 KEPT_BYTES = 2 * 2**30

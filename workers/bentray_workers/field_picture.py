@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from distributed import Client, Future
-
 from bentray_kernels.geometry_field.tracing import TraceSettings, trace
 from bentray_kernels.refraction.supersampling import averaged
 
 from . import strips
+from .abandoned import look_out
 from .field_cache import world_at
 from .field_files import FieldFiles
 from .field_scenes import camera_of
@@ -33,7 +32,7 @@ def strip_image(folder: Path, view: FieldView, first: int, last: int) -> Colours
         eye=LOOKUPS[view.eye],
     )
     camera = part_of(camera_of(view), first / view.height, last / view.height)
-    return averaged(trace(world_at(folder, view), camera, settings), view.rays)
+    return averaged(trace(world_at(folder, view), camera, settings, look_out()), view.rays)
 
 
 def picture_png(folder: Path, view: FieldView) -> bytes:
@@ -41,9 +40,9 @@ def picture_png(folder: Path, view: FieldView) -> bytes:
     return png_of(strip_image(folder, view, 0, view.height))
 
 
-def submit(client: Client, folder: Path, view: FieldView, priority: int) -> Future:
-    """Start a picture of the field in a folder on a cluster; see ``strips.submit``."""
-    return strips.submit(client, picture_png, strip_image, folder, view, priority)
+def tasks_of(folder: Path, view: FieldView) -> strips.Tasks:
+    """The picture of the field in a folder as tasks for a cluster."""
+    return strips.tasks_of(picture_png, strip_image, folder, view)
 
 
 def map_png(folder: Path, what: str) -> bytes:

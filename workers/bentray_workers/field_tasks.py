@@ -32,8 +32,8 @@ from .field_files import (
 )
 from .field_settings import FieldSettings, check_faces
 from .geometry_image_file import GeometryMaps, write_geometry_image
+from .kept import Kept
 from .mesh_file import load_mesh
-from .scene_cache import Kept
 
 # Entries of the inner table, 4 bytes each.
 MOST_INNER = 2**28

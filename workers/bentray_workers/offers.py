@@ -18,13 +18,18 @@ from .planning import Offer, lane_of
 
 def offers_of(client: Client) -> tuple[Offer, ...]:
     """Of every worker that is connected now."""
-    return tuple(
-        Offer(
+    return tuple(offers_by_address(client).values())
+
+
+def offers_by_address(client: Client) -> dict[str, Offer]:
+    """The same by the worker's address."""
+    return {
+        address: Offer(
             int(worker.get("memory_limit") or 0),
             tuple(lane for lane, amount in worker.get("resources", {}).items() if amount > 0),
         )
-        for worker in connected_workers(client).values()
-    )
+        for address, worker in connected_workers(client).items()
+    }
 
 
 def prepared_offers(client: Client, settings: Settings) -> tuple[Offer, ...]:

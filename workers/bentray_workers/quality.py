@@ -14,6 +14,7 @@ from bentray_kernels.acquisition.quality import Report, examine_slices
 from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.errors import InvalidInput
 
+from .abandoned import look_out
 from .dataset_file import Limits, read_dataset
 from .dataset_reading import NUMERIC, TRACES
 from .hdf5_reading import opened
@@ -112,12 +113,18 @@ def _slices(path: Path, whole: Dataset) -> Iterator[Dataset]:
 
 def quality_report(path: Path, picker: str) -> dict[str, Any]:
     """Task: the report alone."""
-    return examine_file(path, picker, largest_bytes=LARGEST_BYTES).report
+    return _waited_for(path, picker).report
 
 
 def quality_page(path: Path, picker: str) -> bytes:
     """Task: the page alone."""
-    return examine_file(path, picker, largest_bytes=LARGEST_BYTES).page
+    return _waited_for(path, picker).page
+
+
+def _waited_for(path: Path, picker: str) -> Quality:
+    """An examination that ends early when nobody waits for it any more."""
+    check = look_out()
+    return examine_file(path, picker, lambda done, total: check(), LARGEST_BYTES)
 
 
 def _check_size(path: Path, largest_bytes: int) -> None:

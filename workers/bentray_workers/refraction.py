@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from distributed import Client, Future
 
 from bentray_kernels.arrays import Floats
 from bentray_kernels.refraction import (
@@ -28,6 +27,7 @@ from bentray_kernels.refraction import (
 from bentray_kernels.refraction.supersampling import averaged
 
 from . import strips
+from .abandoned import look_out
 from .images.backdrop_card import backdrop_card
 from .images.png import Colours, png_of
 from .refraction_view import RefractionView
@@ -67,9 +67,9 @@ def strip_image(path: Path, view: RefractionView, first: int, last: int) -> Colo
     return strip(scene_at(path, view), view, first, last).image
 
 
-def submit(client: Client, path: Path, view: RefractionView, priority: int) -> Future:
-    """Start a picture of a file on a cluster; see ``strips.submit``."""
-    return strips.submit(client, picture_png, strip_image, path, view, priority)
+def tasks_of(path: Path, view: RefractionView) -> strips.Tasks:
+    """The picture of a file as tasks for a cluster."""
+    return strips.tasks_of(picture_png, strip_image, path, view)
 
 
 def strip(scene: Scene, view: RefractionView, first: int, last: int, card: Colours | None = None) -> Strip:
@@ -99,7 +99,7 @@ def strip(scene: Scene, view: RefractionView, first: int, last: int, card: Colou
         fresnel=view.fresnel,
         seed=top,
     )
-    picture = render(scene, camera, _backdrop(scene, view, card), settings)
+    picture = render(scene, camera, _backdrop(scene, view, card), settings, pause=look_out())
     position = picture.position_m.reshape(rows, view.times, view.width, view.times, 2).mean(axis=(1, 3))
     return Strip(picture.image[own], position[own])
 

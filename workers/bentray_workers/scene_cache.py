@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from threading import Lock
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.refraction import Layers, Scene
 from bentray_kernels.refraction.scene import range_at_nodes
 from bentray_kernels.splines import Spline
 
+from .abandoned import look_out
 from .bounded_reading import LARGEST_BYTES
 from .hdf5_reading import Limits, opened
+from .kept import Kept
 from .refraction_view import RefractionView, check_even
 from .volume_file import Volume
 from .volume_reading import import_volume
@@ -31,35 +31,6 @@ BORDER = 6
 MOST_BUILDING_BYTES = 8 * 2**30
 # What a process keeps of them.
 KEPT_BYTES = 4 * 2**30
-
-
-class Kept:
-    """Values by key, the least lately used ones dropped to stay below so many bytes.
-
-    A value is made with the lock held: two tasks that want the same large one must not make it twice.
-    """
-
-    def __init__(self, most_bytes: int) -> None:
-        self._most = most_bytes
-        self._values: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
-        self._lock = Lock()
-
-    def get(self, key: Hashable, size: int, make: Callable[[], Any]) -> Any:
-        """The value of ``key``, made if it is not there; ``size`` bytes are made free before."""
-        with self._lock:
-            if key in self._values:
-                self._values.move_to_end(key)
-                return self._values[key][0]
-            while self._values and self.held() + size > self._most:
-                self._values.popitem(last=False)
-            value = make()
-            if size <= self._most:
-                self._values[key] = value, size
-            return value
-
-    def held(self) -> int:
-        """Bytes of all values."""
-        return sum(size for _, size in self._values.values())
 
 
 class Source(NamedTuple):
@@ -116,6 +87,7 @@ def scene_at(path: Path, view: RefractionView) -> Scene:
         source,
         needed_bytes(shape, SPLINE_BYTES),
         lambda: filtered_of(import_volume(path), view.filter, view.smoothing),
+        needed_bytes(shape, BUILDING_BYTES),
     )
     layers = view.filtered_within(*filtered.range).layers()
     # The octree and its box know iso-values and surroundings alone, so that another glass costs nothing.
@@ -123,6 +95,8 @@ def scene_at(path: Path, view: RefractionView) -> Scene:
         (source, layers.isos, layers.surroundings),
         needed_bytes(shape, SCENE_BYTES),
         lambda: build(filtered, layers),
+        # The spline is kept already.
+        needed_bytes(shape, BUILDING_BYTES - SPLINE_BYTES),
     )
     return replace(scene, layers=layers)
 
@@ -148,4 +122,4 @@ def filtered_of(volume: Volume, filter_name: str, smoothing: float) -> Filtered:
 
 def build(filtered: Filtered, layers: Layers) -> Scene:
     """The scene, with the middle of the volume at 0."""
-    return Scene.build(filtered.spline, layers, filtered.spacing_m)
+    return Scene.build(filtered.spline, layers, filtered.spacing_m, pause=look_out())

@@ -21,8 +21,12 @@ from .atomic import replacing, write_bytes
 from .connected import connected_workers
 from .driving import IN_FLIGHT, Cancelled, finished
 from .lanes import RENDER
-from .refraction import submit
+from .offers import offers_by_address
+from .picture_cost import placed, refraction_bytes
+from .refraction import tasks_of
 from .refraction_view import RefractionView
+from .scene_cache import stored_shape
+from .strips import submit
 
 FORMATS = ("zip", "apng")
 MOST_FRAMES = 720
@@ -101,12 +105,13 @@ def turn(
     drawn = len(frames) - len(waiting)
     running: dict[Future, Path] = {}
     window = IN_FLIGHT * max(1, len(connected_workers(client)))
+    where = placed(refraction_bytes(stored_shape(path), turntable), offers_by_address(client))
     on_progress(Progress(drawn, len(frames)))
     try:
         while waiting or running:
             while waiting and len(running) < window:
                 number, frame = waiting.popleft()
-                running[submit(client, path, turntable.frame(number), PRIORITY)] = frame
+                running[submit(client, tasks_of(path, turntable.frame(number)), PRIORITY, where)] = frame
             for future in finished(client, list(running)):
                 write_bytes(running.pop(future), future.result())
                 drawn += 1

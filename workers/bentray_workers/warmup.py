@@ -26,7 +26,7 @@ from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.phantoms.surfaces import sphere
 from bentray_kernels.tomography import Settings, reconstruct
 
-from . import compiling, refusal_log
+from . import compiling, kept, refusal_log
 from .field_scenes import camera_of, scene_of
 from .field_view import FieldView
 from .refraction import strip
@@ -75,6 +75,7 @@ def dask_setup(worker: Any) -> None:
     if worker.nanny is not None:
         # In a process of its own: what its tasks write is for its user alone.
         os.umask(0o077)
+        kept.limit(int(worker.memory_manager.memory_limit or 0))
     with _one_at_a_time():
         warm_up()
         warm_up_rendering()

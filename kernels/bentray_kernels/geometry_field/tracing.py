@@ -7,7 +7,7 @@ is left at the last depth sees the environment.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -66,19 +66,23 @@ class TraceSettings:
                 raise InvalidInput(name, getattr(self, name), "one of " + ", ".join(WAYS))
 
 
-def trace(world: World, camera: Camera, settings: TraceSettings) -> Colours:
+def trace(
+    world: World, camera: Camera, settings: TraceSettings, pause: Callable[[], None] = lambda: None
+) -> Colours:
     """A picture, (rows, columns, 3) 8-bit RGB.
 
     Args:
         world: ``world_of`` a scene.
         camera: ``refraction.perspective`` or ``orthographic``.
         settings: the rest.
+        pause: called before every strip, maybe in another thread; what it raises ends the picture.
     """
     image = np.empty((settings.rows, settings.columns, 3), dtype=np.uint8)
     views = camera.origin, camera.direction
     ways = WAYS[settings.eye], WAYS[settings.way]
 
     def strip(rows: slice) -> None:
+        pause()
         _trace_rows(world, views[0], views[1], *ways, settings.depth, rows.start, image.shape[0], image[rows])
 
     with ThreadPoolExecutor(settings.threads) as pool:

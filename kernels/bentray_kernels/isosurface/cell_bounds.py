@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,9 @@ BOUNDS = ("bmcc", "accc", "accc-subcells", "bernstein", "ccc")
 
 # Parts of a cell along each axis in "accc-subcells".
 DIVISIONS = 2
+
+# Cells along x that are bounded between two pauses.
+LAYERS = 4
 
 # float32 keeps 2⁻²⁴ of a number; twice that for the casting and again for the rounding of the field itself.
 OUTWARD = 2.0**-22
@@ -45,7 +48,9 @@ class CellRanges(NamedTuple):
         return int(np.count_nonzero((self.low <= iso) & (self.high >= iso)))
 
 
-def cell_ranges(spline: Spline, isos: Sequence[float], bound: str) -> CellRanges:
+def cell_ranges(
+    spline: Spline, isos: Sequence[float], bound: str, pause: Callable[[], None] = lambda: None
+) -> CellRanges:
     """Bound the field in every cell; no cell with one of the iso-values is ever missed.
 
     This holds for fields within the range of float32, in which the bounds are kept; ``Scene.build`` refuses
@@ -59,6 +64,7 @@ def cell_ranges(spline: Spline, isos: Sequence[float], bound: str) -> CellRanges
         isos: iso-values.
         bound: "bmcc", "accc", "accc-subcells", "bernstein" (the hull of the cell's polynomial) or "ccc" (its
             exact range; slow, kept as the reference).
+        pause: called before every few layers of cells; what it raises ends the work.
 
     Raises:
         InvalidInput: no such bound.
@@ -70,20 +76,22 @@ def cell_ranges(spline: Spline, isos: Sequence[float], bound: str) -> CellRanges
     low, high = _outward(wide[0], -1.0), _outward(wide[1], 1.0)
     ranges = CellRanges(low, high, np.zeros_like(low))
     divisions = DIVISIONS if bound == "accc-subcells" else 1
-    _refine(
-        spline.coefficients,
-        spline.pad + weights.first,
-        np.asarray(isos, dtype=np.float64),
-        BOUNDS.index(bound),
-        product_ranges(weights, divisions),
-        (weights.control(0), weights.control(1), weights.control(2)),
-        len(weights.powers),
-        length(weights.nodes),
-        length(len(weights.powers) * (weights.degree + 1)),
-        length(weights.degree + 1),
-        weights.total(),
-        ranges,
-    )
+    for x in range(0, len(low), LAYERS):
+        pause()
+        _refine(
+            spline.coefficients[x:],
+            spline.pad + weights.first,
+            np.asarray(isos, dtype=np.float64),
+            BOUNDS.index(bound),
+            product_ranges(weights, divisions),
+            (weights.control(0), weights.control(1), weights.control(2)),
+            len(weights.powers),
+            length(weights.nodes),
+            length(len(weights.powers) * (weights.degree + 1)),
+            length(weights.degree + 1),
+            weights.total(),
+            CellRanges(*(part[x : x + LAYERS] for part in ranges)),
+        )
     return ranges
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -91,6 +91,7 @@ def render(
     backdrop: Backdrop,
     settings: RenderSettings,
     caster: OpenCLCaster | None = None,
+    pause: Callable[[], None] = lambda: None,
 ) -> Picture:
     """Cast one ray a pixel, or more, and colour each by where it ends on the backdrop.
 
@@ -101,6 +102,7 @@ def render(
         settings: the rest.
         caster: follows the rays of this scene on an OpenCL device, ``caster_opencl.on_the_device``; None for
             this CPU.
+        pause: called before every tile, maybe in another thread; what it raises ends the picture.
     """
     times = settings.degree if settings.supersampling == "real" else 1
     rows, columns = times * settings.rows, times * settings.columns
@@ -113,6 +115,7 @@ def render(
     follow, at_once = (cast, TILE_ROWS) if caster is None else (caster.cast, rows)
 
     def tile(part: slice) -> None:
+        pause()
         filled = traced.part(part)
         follow(medium, search, (camera.origin, camera.direction), places[part], settings.depth, filled)
         locate(backdrop, filled.point, filled.direction, plane[part], where[part])

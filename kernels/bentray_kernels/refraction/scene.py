@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,6 +89,7 @@ class Scene:
         spacing_m: float | Sequence[float] = 1.0,
         centre_m: Sequence[float] = (0.0, 0.0, 0.0),
         bound: str = "bernstein",
+        pause: Callable[[], None] = lambda: None,
     ) -> Scene:
         """Bound the cells and build the octree.
 
@@ -97,7 +98,7 @@ class Scene:
             layers: iso-values within the volume's range, and refractive indices.
             spacing_m: between nodes, one for all axes or one each, m.
             centre_m: where the middle of the volume lies, m.
-            bound: as in ``isosurface.cell_ranges``.
+            bound, pause: as in ``isosurface.cell_ranges``.
 
         Raises:
             InvalidInput: for a volume not in space or beyond the range of float32, an iso-value that the
@@ -112,7 +113,7 @@ class Scene:
         spacing = np.broadcast_to(np.asarray(spacing_m, dtype=np.float64), 3).copy()
         if not ((spacing > 0.0) & np.isfinite(spacing)).all():
             raise InvalidInput("spacing_m", spacing.tolist(), "finite distances > 0 m")
-        cells = cell_ranges(spline, layers.isos, bound)
+        cells = cell_ranges(spline, layers.isos, bound, pause)
         octree = octree_of(cells, layers.isos)
         for bit, iso in enumerate(layers.isos):
             if not octree.masks[-1] >> bit & 1:

@@ -30,7 +30,9 @@ def download_of(*media_types: str) -> dict[int | str, dict[str, Any]]:
     }
 
 
-def download(request: Request, path: Path, seed: str, media_type: str, name: str | None = None) -> Response:
+def download(
+    request: Request, path: Path, seed: str, media_type: str, name: str | None = None, tag: str | None = None
+) -> Response:
     """A file, the part of it that was asked for, or 304 where the client has it.
 
     Args:
@@ -39,6 +41,7 @@ def download(request: Request, path: Path, seed: str, media_type: str, name: str
         seed: what tells the content from all others; the tag follows from it and from the file's own age.
         media_type: of the file.
         name: that the client is to give it; None: its own.
+        tag: of the content where it is known already.
 
     Raises:
         NoSuchPart: for a part beyond the end.
@@ -52,18 +55,42 @@ def download(request: Request, path: Path, seed: str, media_type: str, name: str
     answer: Response | None = None
     try:
         state = os.fstat(file.fileno())
-        told = f"{seed}/{path.name}/{state.st_mtime_ns}/{state.st_size}"
-        tag = f'"{hashlib.sha256(told.encode()).hexdigest()[:32]}"'
-        headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
-        known = request.headers.get("if-none-match")
-        if known is not None and (tag in known or known.strip() == "*"):
-            return Response(status_code=304, headers=headers)
+        tag = tag or _tag_of(state, path, seed)
+        if (known := unchanged(request, tag)) is not None:
+            return known
+        headers = headers_of(tag)
         whole = not _part_asked_for(request, tag, state.st_size)
         answer = OpenFile(file, whole, headers, media_type, name or path.name)
         return answer
     finally:
         if answer is None:
             file.close()
+
+
+def tag_of(path: Path, seed: str) -> str:
+    """The tag of a file, or of what is made of it alone; ``seed`` and errors as of ``download``."""
+    try:
+        return _tag_of(path.stat(), path, seed)
+    except FileNotFoundError as error:
+        raise Deleted(path.name.partition(".")[0]) from error
+
+
+def unchanged(request: Request, tag: str) -> Response | None:
+    """The answer to a client that has it, or None."""
+    known = request.headers.get("if-none-match")
+    if known is not None and (tag in known or known.strip() == "*"):
+        return Response(status_code=304, headers=headers_of(tag))
+    return None
+
+
+def headers_of(tag: str) -> dict[str, str]:
+    """What each answer says of the file."""
+    return {"ETag": tag, "Cache-Control": "private, no-cache"}
+
+
+def _tag_of(state: os.stat_result, path: Path, seed: str) -> str:
+    told = f"{seed}/{path.name}/{state.st_mtime_ns}/{state.st_size}"
+    return f'"{hashlib.sha256(told.encode()).hexdigest()[:32]}"'
 
 
 class OpenFile(FileResponse):

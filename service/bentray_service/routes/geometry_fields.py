@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
+from starlette.concurrency import run_in_threadpool
 
 from ..asked_view import AskedFieldView
 from ..errors import described
@@ -35,33 +36,39 @@ def show_field(field_id: str, service: Service, tenant: CallerTenant) -> FieldRe
 
 @router.head("/{field_id}/image.png", include_in_schema=False)
 @router.get("/{field_id}/image.png", response_class=Response, responses=PICTURE)
-def image_png(
+async def image_png(
     field_id: str, request: Request, service: Service, tenant: CallerTenant, view: AskedFieldView
 ) -> Response:
     """A scene with the mesh as mirror, glass or clay, its rays answered by the field, traced by a worker.
 
     HEAD gives the tag at once, without drawing, so Content-Length is absent.
     """
-    field = service.geometry_fields.get(tenant, field_id)
+    field = await run_in_threadpool(service.geometry_fields.get, tenant, field_id)
     folder = service.files.of(tenant).field(field["id"])
-    return picture(request, field, view.plain(), lambda: service.compute.field_png(folder, view))
+    return await picture(
+        request, field, view.plain(), lambda: service.pictures.field_png(tenant, field, folder, view)
+    )
 
 
 @router.head("/{field_id}/geometry-image.png", include_in_schema=False)
 @router.get("/{field_id}/geometry-image.png", response_class=Response, responses=PICTURE)
-def geometry_image_png(field_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
+async def geometry_image_png(
+    field_id: str, request: Request, service: Service, tenant: CallerTenant
+) -> Response:
     """The geometry image: places of the surface as colours, over its layout on the unit square."""
-    return _map(field_id, request, service, tenant, "positions")
+    return await _map(field_id, request, service, tenant, "positions")
 
 
 @router.head("/{field_id}/normal-map.png", include_in_schema=False)
 @router.get("/{field_id}/normal-map.png", response_class=Response, responses=PICTURE)
-def normal_map_png(field_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
+async def normal_map_png(field_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
     """The normal map: the same with the directions of the normals."""
-    return _map(field_id, request, service, tenant, "normals")
+    return await _map(field_id, request, service, tenant, "normals")
 
 
-def _map(field_id: str, request: Request, service: Parts, tenant: Tenant, what: str) -> Response:
-    field = service.geometry_fields.get(tenant, field_id)
+async def _map(field_id: str, request: Request, service: Parts, tenant: Tenant, which: str) -> Response:
+    field = await run_in_threadpool(service.geometry_fields.get, tenant, field_id)
     folder = service.files.of(tenant).field(field["id"])
-    return picture(request, field, {"map": what}, lambda: service.compute.field_map_png(folder, what))
+    return await picture(
+        request, field, {"map": which}, lambda: service.pictures.field_map_png(tenant, field, folder, which)
+    )

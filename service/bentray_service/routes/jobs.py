@@ -154,6 +154,7 @@ def start_job(
     else:
         volume = service.volumes.get(tenant, asked.volume)
         check_renderable(volume)
+        service.compute.check_turntable(volume["shape"], asked.settings)
         read = {"volume_id": volume["id"]}
         settings = asked.settings.within(*volume["value_range"]).plain()
     most = service.settings.max_queued_jobs

@@ -7,6 +7,7 @@ import math
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response, status
+from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.isosurface_mesh import MOST_STEP, check_nodes
@@ -17,7 +18,7 @@ from ..storage.deletion import Stored
 from ..storage.ids import new_id
 from ..wiring import Asking, CallerTenant, Service
 from .bodies import only
-from .pictures import check_renderable
+from .pictures import check_renderable, while_connected
 from .surface_records import MeshList, MeshRecord, mesh_record
 from .uploads import body_of, take_in
 
@@ -86,8 +87,9 @@ def delete_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> None:
     status_code=status.HTTP_201_CREATED,
     responses=described(404, 422, 429, 503, 507),
 )
-def mesh_of_volume(
+async def mesh_of_volume(
     volume_id: str,
+    request: Request,
     response: Response,
     service: Service,
     tenant: CallerTenant,
@@ -98,7 +100,7 @@ def mesh_of_volume(
     step: Annotated[int, Query(ge=1, le=MOST_STEP, description="Take every so many nodes: fewer faces.")] = 1,
 ) -> MeshRecord:
     """Make a mesh of a volume's iso-surface: the largest piece of it, closed at the faces of the volume."""
-    volume = service.volumes.get(tenant, volume_id)
+    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     check_renderable(volume)
     check_nodes(volume["shape"], step)
     low, high = volume["value_range"]
@@ -106,17 +108,21 @@ def mesh_of_volume(
     if iso is not None and not (math.isfinite(iso) and low <= iso < high):
         raise InvalidInput("iso", iso, f"{low:g} to less than {high:g}, the range of the volume")
     mesh_id, files = new_id("mesh"), service.files.of(tenant)
-    check_room(files, service.settings.max_tenant_bytes)
+    await run_in_threadpool(check_room, files, service.settings.max_tenant_bytes)
     service.door.check_render(caller)
-    try:
-        made = files.candidate(mesh_id)
-        summary = service.compute.mesh_volume(files.volume(volume["id"]), iso, step, made)
+    path, made = files.volume(volume["id"]), files.candidate(mesh_id)
+
+    def store(summary: dict[str, Any]) -> dict[str, Any]:
         content = files.adopt(mesh_id).read_bytes()
+        digest = hashlib.sha256(content).hexdigest()
+        told = summary | {"title": volume["title"], "volume_id": volume["id"]}
+        return service.meshes.add(tenant, mesh_id, size=len(content), sha256=digest, summary=told)
+
+    try:
+        work = service.pictures.mesh_volume(tenant, volume, path, iso, step, made)
+        row = await run_in_threadpool(store, await while_connected(request, work))
     finally:
         files.discard_candidate(mesh_id)
-    summary |= {"title": volume["title"], "volume_id": volume["id"]}
-    digest = hashlib.sha256(content).hexdigest()
-    row = service.meshes.add(tenant, mesh_id, size=len(content), sha256=digest, summary=summary)
     record = mesh_record(row)
     response.headers["Location"] = record.links["self"]
     return record

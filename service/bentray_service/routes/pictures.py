@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any, TypeVar
 
 from fastapi import Request, Response
+from starlette.requests import ClientDisconnect
 
 from bentray_workers.refraction_view import check_even
 from bentray_workers.scene_cache import check_size
@@ -14,6 +16,8 @@ from bentray_workers.scene_cache import check_size
 from .. import __version__
 from ..errors import described
 from ..wiring import caller_of, parts_of
+
+Made = TypeVar("Made")
 
 # What a route that gives a picture may answer.
 PICTURE: dict[int | str, dict[str, Any]] = {
@@ -33,8 +37,8 @@ def check_renderable(volume: Mapping[str, Any]) -> None:
     check_size(volume["shape"])
 
 
-def picture(
-    request: Request, volume: Mapping[str, Any], how: Mapping[str, Any], draw: Callable[[], bytes]
+async def picture(
+    request: Request, volume: Mapping[str, Any], how: Mapping[str, Any], draw: Callable[[], Awaitable[bytes]]
 ) -> Response:
     """A PNG with its tag, or 304 where the client has it.
 
@@ -42,7 +46,7 @@ def picture(
         request: what is asked. HEAD is answered without drawing, so without Content-Length.
         volume: its row.
         how: all that the picture depends on beside it.
-        draw: makes the picture; called where it is needed.
+        draw: makes the picture; called where it is needed, and given up when the client leaves.
     """
     known = request.headers.get("if-none-match")
     seed = repr((__version__, volume["id"], volume["created"], sorted(how.items())))
@@ -57,4 +61,31 @@ def picture(
         del answer.headers["content-length"]
         return answer
     parts_of(request).door.check_render(caller_of(request))
-    return Response(draw(), media_type="image/png", headers=headers)
+    return Response(await while_connected(request, draw()), media_type="image/png", headers=headers)
+
+
+async def while_connected(request: Request, work: Awaitable[Made]) -> Made:
+    """What the work makes; it is cancelled when the client leaves.
+
+    Args:
+        request: whose body has been read, or has none.
+        work: that waits on the cluster.
+
+    Raises:
+        ClientDisconnect: when nobody is left to read the answer.
+    """
+    making, leaving = asyncio.ensure_future(work), asyncio.ensure_future(_left(request))
+    try:
+        await asyncio.wait((making, leaving), return_when=asyncio.FIRST_COMPLETED)
+        if making.done():
+            return making.result()
+        raise ClientDisconnect
+    finally:
+        for one in (making, leaving):
+            one.cancel()
+        await asyncio.gather(making, leaving, return_exceptions=True)
+
+
+async def _left(request: Request) -> None:
+    while (await request.receive())["type"] != "http.disconnect":
+        """The empty body of the request."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
+from starlette.concurrency import run_in_threadpool
 
 from ..asked_view import AskedView
 from ..wiring import CallerTenant, Service
@@ -13,7 +14,7 @@ router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
 
 @router.head("/{volume_id}/refraction.png", include_in_schema=False)
 @router.get("/{volume_id}/refraction.png", response_class=Response, responses=PICTURE)
-def refraction_png(
+async def refraction_png(
     volume_id: str,
     request: Request,
     service: Service,
@@ -25,8 +26,10 @@ def refraction_png(
     Works for volumes in space with even spacing, reconstructed or uploaded. HEAD gives the tag at once,
     without drawing, so Content-Length is absent.
     """
-    volume = service.volumes.get(tenant, volume_id)
+    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     check_renderable(volume)
     view = view.within(*volume["value_range"])
     path = service.files.of(tenant).volume(volume["id"])
-    return picture(request, volume, view.plain(), lambda: service.compute.refraction_png(path, view))
+    return await picture(
+        request, volume, view.plain(), lambda: service.pictures.refraction_png(tenant, volume, path, view)
+    )

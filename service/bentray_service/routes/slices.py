@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import Annotated, Any, Literal, cast
 
 from fastapi import APIRouter, Depends, Query, Request, Response
+from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.images.look import COLORMAPS, COLOUR_VALUE, LEAST_FRAMED, LEAST_SIZE, MOST_SIZE, Look
@@ -19,7 +20,7 @@ router = APIRouter()
 COLOUR_SCHEMA = cast("dict[str, Any]", COLOUR_VALUE.schema)
 
 
-def asked_look(
+async def asked_look(
     colormap: Annotated[
         str, Query(max_length=40, description="One of " + ", ".join(COLORMAPS) + ".")
     ] = "viridis",
@@ -45,7 +46,7 @@ def asked_look(
 
 @router.head("/{volume_id}/slice.png", include_in_schema=False)
 @router.get("/{volume_id}/slice.png", response_class=Response, responses=PICTURE)
-def slice_png(
+async def slice_png(
     volume_id: str,
     request: Request,
     service: Service,
@@ -75,18 +76,17 @@ def slice_png(
 
     HEAD gives the tag at once, without drawing, so Content-Length is absent.
     """
-    volume = service.volumes.get(tenant, volume_id)
+    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     check_plane(volume["shape"], volume["spacing_m"], axis, index)
     for name, value in (("low", low), ("high", high)):
         if value is not None:
             COLOUR_VALUE.check(name, value)
     how: dict[str, Any] = {"axis": axis, "index": index, "low": low, "high": high, **asdict(look)}
-    path = service.files.of(tenant).volume(volume["id"])
     if "job_id" in volume:
         if quantity == "value":
             raise InvalidInput("quantity", "'value'", "speed, coverage, attenuation or recovery")
         how["quantity"] = quantity or "speed"
-        return picture(request, volume, how, lambda: service.compute.slice_png(path, **how))
-    if quantity not in (None, "value"):
+    elif quantity not in (None, "value"):
         raise InvalidInput("quantity", repr(quantity), "value: this volume was uploaded")
-    return picture(request, volume, how, lambda: service.compute.volume_slice_png(path, **how))
+    path = service.files.of(tenant).volume(volume["id"])
+    return await picture(request, volume, how, lambda: service.pictures.slice_png(tenant, volume, path, how))

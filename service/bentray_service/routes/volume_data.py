@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
+from starlette.concurrency import run_in_threadpool
 
-from bentray_kernels.errors import InvalidInput
+from bentray_workers.volume_export import FORMATS
 
+from .. import __version__
 from ..errors import described
 from ..refusals import UnknownId
-from ..storage.exports import FORMATS, exported
-from ..wiring import CallerTenant, Service
-from .downloads import download, download_of
+from ..wiring import CallerTenant, Service, caller_of, parts_of
+from .downloads import download, download_of, headers_of, tag_of, unchanged
+from .pictures import while_connected
 
 HDF5 = "application/x-hdf5"
 
@@ -26,10 +27,10 @@ router = APIRouter()
     response_class=Response,
     responses={
         **download_of(HDF5, *sorted({one.media_type for one in FORMATS.values()})),
-        **described(404, 422, 503),
+        **described(404, 422, 429, 503, 507),
     },
 )
-def volume_data(
+async def volume_data(
     volume_id: str,
     request: Request,
     service: Service,
@@ -45,30 +46,44 @@ def volume_data(
 ) -> Response:
     """The volume as a file.
 
-    A download that broke off goes on with Range, and If-Range with the ETag of the first answer.
+    A download that broke off goes on with Range, and If-Range with the ETag of the first answer. Formats
+    other than hdf5 are made by a worker when first asked for; HEAD makes none, so that Content-Length is
+    absent until then.
     """
-    volume = service.volumes.get(tenant, volume_id)
+    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     files = service.files.of(tenant)
     # For other formats too: what is made of a volume stays as long as it does.
-    path: Path = service.files.store.bring(files.volume(volume["id"]))
+    path = await run_in_threadpool(service.files.store.bring, files.volume(volume["id"]))
     seed = repr((volume["id"], volume["created"], "hdf5" if format == "h5" else format))
     if format in ("hdf5", "h5"):
         return download(request, path, seed, HDF5)
     chosen = FORMATS[format]
-    uploaded = "job_id" not in volume
-    target = files.export(volume["id"], chosen.extension)
+    # The same volume gives the same bytes, so what it is made of tells one file from all others.
+    tag = tag_of(path, repr((__version__, seed)))
+    if (answer := unchanged(request, tag)) is not None:
+        return answer
+    name = f"{volume['id']}-{'speed' if 'job_id' in volume else 'values'}.{chosen.extension}"
+    made = files.export(volume["id"], chosen.extension)
+    if not made.exists():
+        if request.method == "HEAD":
+            return _not_made(tag, chosen.media_type, name)
+        parts_of(request).door.check_render(caller_of(request))
+        await while_connected(request, service.pictures.export(tenant, volume, path, made, format))
+    answer = download(request, made, seed, chosen.media_type, name, tag)
     try:
-        made = exported(path, target, chosen, uploaded=uploaded)
-    except (InvalidInput, OSError):
-        # What is deleted meanwhile is told as that.
-        service.files.store.bring(path)
-        raise
-    name = f"{volume['id']}-{'values' if uploaded else 'speed'}.{chosen.extension}"
-    answer = download(request, made, seed, chosen.media_type, name)
-    try:
-        service.volumes.get(tenant, volume["id"])
+        await run_in_threadpool(service.volumes.get, tenant, volume["id"])
     except UnknownId:
         # Made after its files were removed: nobody else would remove it.
-        target.unlink(missing_ok=True)
+        made.unlink(missing_ok=True)
         raise
+    return answer
+
+
+def _not_made(tag: str, media_type: str, name: str) -> Response:
+    """What is known of a file before it is made."""
+    headers = {**headers_of(tag), "Accept-Ranges": "bytes"}
+    answer = Response(media_type=media_type, headers=headers)
+    answer.headers["Content-Disposition"] = f'attachment; filename="{name}"'
+    # That of the empty body; the file's is not known yet.
+    del answer.headers["content-length"]
     return answer

@@ -1,6 +1,10 @@
 """/health: it tells the truth."""
 
+import threading
+
 from sqlalchemy import text
+
+from bentray_service import readiness
 
 
 def faults(answer):
@@ -43,3 +47,24 @@ def test_uploads_that_nobody_reads(start):
 def test_several_faults_are_all_named(start, cluster):
     cluster.workers = 0
     assert faults(start(min_free_bytes=2**62).get("/health/ready")) == ["disk", "workers"]
+
+
+def test_a_part_that_hangs_is_named_in_time(start, monkeypatch):
+    monkeypatch.setattr(readiness, "WITHIN_S", 0.2)
+    http, going_on, looks = start(), threading.Event(), []
+
+    def probe():
+        looks.append(1)
+        assert going_on.wait(20.0)
+
+    monkeypatch.setattr(http.app.state.parts.database, "probe", probe)
+    for _ in range(3):
+        answer = http.get("/health/ready")
+        assert faults(answer) == ["database"]
+        assert answer.json()["errors"][0]["found"] == "no answer in 0.2 s"
+        assert http.get("/health/live").status_code == 200
+    # However many ask, one thread looks.
+    assert len(looks) == 1
+    going_on.set()
+    monkeypatch.undo()
+    assert http.get("/health/ready").status_code == 200

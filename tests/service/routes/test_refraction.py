@@ -11,7 +11,7 @@ from PIL import Image
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography.result import Reconstruction
-from bentray_service import compute
+from bentray_service import pictures
 from bentray_service.app import create_app
 from bentray_service.settings import ServiceSettings
 from bentray_service.storage.ids import new_id
@@ -273,7 +273,7 @@ def test_a_picture_beside_reconstructions(tmp_path):
 
 
 def test_a_picture_that_no_worker_takes_is_503(tmp_path, monkeypatch):
-    monkeypatch.setattr(compute, "RENDER_SECONDS", 0.3)
+    monkeypatch.setattr(pictures, "RENDER_SECONDS", 0.3)
     with open_cluster(workers=1, processes=False) as cluster:
         app = create_app(ServiceSettings(data_dir=tmp_path / "data"), cluster)
         with TestClient(app, base_url="http://localhost") as http:

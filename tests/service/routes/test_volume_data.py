@@ -1,11 +1,20 @@
 """/v1/volumes/{id}/data: every format, and downloads that break off and go on."""
 
 import io
+import multiprocessing
+import tracemalloc
+from concurrent.futures import ProcessPoolExecutor
 
 import h5py
 import numpy as np
 import pytest
 from scipy.io import loadmat
+
+from bentray_service.storage.ids import new_id
+from bentray_service.storage.tenants import LOCAL
+from bentray_workers.volume_file import Volume, write_volume
+
+from ..conftest import FakeCluster, FakeFuture
 
 STREAM = {"Content-Type": "application/octet-stream"}
 FORMATS = {"hdf5": "h5", "nifti": "nii", "metaimage": "mha", "mat": "mat", "npy": "npy"}
@@ -70,6 +79,67 @@ def test_a_broken_download_goes_on(http, request, kind, asked):
     assert (head.headers["etag"], head.headers["content-length"]) == (tag, str(size))
     known = http.get(here, headers={"If-None-Match": tag})
     assert (known.status_code, known.content, known.headers["etag"]) == (304, b"", tag)
+
+
+@pytest.mark.parametrize("asked", ["nifti", "metaimage", "mat", "npy"])
+def test_the_head_of_a_file_that_is_not_made_makes_none(http, upload, cluster, asked):
+    here, begun = f"{upload}?format={asked}", len(cluster.submitted)
+    head = http.head(here)
+    assert (head.status_code, head.content) == (200, b"")
+    assert "content-length" not in head.headers
+    tag = head.headers["etag"]
+    assert http.head(here, headers={"If-None-Match": tag}).status_code == 304
+    assert len(cluster.submitted) == begun
+    whole = http.get(here)
+    same = ("etag", "content-type", "content-disposition", "cache-control", "accept-ranges")
+    assert {name: whole.headers[name] for name in same} == {name: head.headers[name] for name in same}
+    assert http.head(here).headers["content-length"] == str(len(whole.content))
+    # Made once, in the render lane.
+    assert len(cluster.submitted) == begun + 1
+    assert cluster.submitted[-1]["resources"] == {"render": 1}
+
+
+class OtherProcess(FakeCluster):
+    """Tasks run in another process, as those of a worker do."""
+
+    def __init__(self, pool):
+        super().__init__()
+        self.pool = pool
+
+    def submit(self, task, *given, **how):
+        for name in ("workers", "resources", "priority", "pure"):
+            how.pop(name)
+        return FakeFuture(self.pool.submit(task, *given, **how).result())
+
+
+@pytest.mark.slow
+def test_files_are_not_made_in_the_memory_of_the_service(start):
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        http = start(cluster=OtherProcess(pool))
+        parts, volume_id = http.app.state.parts, new_id("volume")
+        values = np.zeros((200, 200, 200), np.float32)
+        write_volume(parts.files.of(LOCAL).volume(volume_id), Volume.of(values, (1e-3,) * 3))
+        summary = {
+            "title": "large",
+            "shape": list(values.shape),
+            "spacing_m": [1e-3] * 3,
+            "origin_m": [0.0] * 3,
+            "value_range": [0.0, 0.0],
+        }
+        parts.volumes.add(LOCAL, volume_id, size=values.nbytes, sha256="0" * 64, summary=summary)
+        del values
+        for asked in ("npy", "nifti", "metaimage", "mat"):
+            here = f"/v1/volumes/{volume_id}/data?format={asked}"
+            tracemalloc.start()
+            try:
+                # A part of it, for the test's own client holds whatever comes.
+                answer = http.get(here, headers={"Range": "bytes=-100"})
+                _, peak = tracemalloc.get_traced_memory()
+            finally:
+                tracemalloc.stop()
+            assert answer.status_code == 206
+            assert int(answer.headers["content-range"].rpartition("/")[2]) > 32_000_000
+            assert peak < 8 * 2**20
 
 
 def test_formats_have_tags_of_their_own(http, result):

@@ -1,4 +1,4 @@
-"""A volume in other file formats, made once and kept."""
+"""A volume in other file formats: what each holds, and the task that writes one."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bentray_workers.atomic import replacing
-from bentray_workers.mat_writing import write_mat
-from bentray_workers.metaimage_writing import write_metaimage
-from bentray_workers.nifti_writing import write_nifti
-from bentray_workers.reconstruction_file import IMAGES, read_reconstruction
-from bentray_workers.volume_file import read_volume
+from .atomic import replacing
+from .hdf5_reading import Limits, opened
+from .mat_writing import write_mat
+from .metaimage_writing import write_metaimage
+from .nifti_writing import write_nifti
+from .reconstruction_file import IMAGES, read_reconstruction
+from .volume_file import FORMAT, read_volume
 
 
 @dataclass(frozen=True)
@@ -46,21 +47,21 @@ class Format:
     write: Callable[[Path, Content], None]
 
 
-def exported(volume: Path, target: Path, file_format: Format, *, uploaded: bool) -> Path:
-    """A volume in another format; made when first asked for.
+def export_volume(volume: Path, *, target: Path, name: str) -> None:
+    """Task: write a volume or reconstruction file in another format.
 
     Args:
         volume: its file.
-        target: the file to make.
-        file_format: of ``FORMATS``.
-        uploaded: whether it was; else it is a reconstruction.
+        target: the file to make, replaced whole.
+        name: a key of ``FORMATS``.
 
     Raises:
         InvalidInput: naming ``volume``, for what the format cannot tell.
+        OSError: where the folder cannot be written to or the disk is full.
     """
-    if not target.exists():
-        file_format.write(target, _uploaded(volume) if uploaded else _reconstructed(volume))
-    return target
+    with opened(volume, Limits()) as reader:
+        uploaded = reader.text("", "format") == FORMAT
+    FORMATS[name].write(target, _uploaded(volume) if uploaded else _reconstructed(volume))
 
 
 def _uploaded(volume: Path) -> Content:

@@ -1,0 +1,259 @@
+"""Pictures beside other requests: they hold no thread, take turns, end with their client, fit a worker."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager
+
+import httpx
+import numpy as np
+import pytest
+
+from bentray_kernels.phantoms import ONE_HOLE, sampled
+from bentray_service.app import create_app
+from bentray_service.settings import ServiceSettings
+from bentray_service.storage.ids import new_id
+from bentray_service.storage.tenants import Tenant
+from bentray_workers.volume_file import Volume, write_volume
+
+from .conftest import FakeCluster
+
+SMALL = {"width": 32, "height": 24, "iso": 0.5}
+# More than the threads that requests share.
+MANY = 45
+PATIENCE_S = 90.0
+
+
+class Held:
+    """A task that ends when the test says so."""
+
+    def __init__(self, cluster, work):
+        self._done = cluster.pool.submit(self._run, cluster, work)
+        self.released = False
+
+    def _run(self, cluster, work):
+        assert cluster.gate.wait(PATIENCE_S)
+        return work()
+
+    @property
+    def status(self):
+        return "error" if self._done.exception() else "finished"
+
+    def add_done_callback(self, tell):
+        self._done.add_done_callback(lambda _: tell(self))
+
+    def result(self, timeout):
+        return self._done.result(timeout)
+
+    def release(self):
+        self.released = True
+
+
+class HeldCluster(FakeCluster):
+    """Tasks wait while the gate is shut."""
+
+    def __init__(self):
+        super().__init__()
+        self.gate = threading.Event()
+        self.pool = ThreadPoolExecutor(4)
+        self.futures, self.names = [], []
+
+    def submit(self, task, *given, **how):
+        for name in ("workers", "resources", "priority", "pure"):
+            how.pop(name)
+        self.names.append(task.__name__)
+        self.futures.append(Held(self, lambda: task(*given, **how)))
+        return self.futures[-1]
+
+
+def put(parts, tenant, values, shape=None):
+    """A volume as an upload leaves it; its row may tell of another shape."""
+    volume, volume_id = Volume.of(values, (1e-3,) * 3), new_id("volume")
+    path = parts.files.of(tenant).volume(volume_id)
+    write_volume(path, volume)
+    nodes = int(np.prod(shape or values.shape))
+    summary = {
+        "title": "a ball",
+        "shape": list(shape or values.shape),
+        "spacing_m": [1e-3] * 3,
+        "origin_m": [0.0] * 3,
+        "value_range": list(volume.range()),
+    }
+    parts.volumes.add(tenant, volume_id, size=4 * nodes, sha256="0" * 64, summary=summary)
+    return f"/v1/volumes/{volume_id}"
+
+
+@pytest.fixture
+def held():
+    made = HeldCluster()
+    yield made
+    made.gate.set()
+    made.pool.shutdown()
+
+
+@asynccontextmanager
+async def service(folder, cluster):
+    """The application, clients of two tenants, and the address of a volume of each."""
+    settings = ServiceSettings(data_dir=folder, trusted_proxies="127.0.0.1", renders_per_minute=0)
+    app = create_app(settings, cluster)
+    async with app.router.lifespan_context(app):
+        transport = httpx.ASGITransport(app, client=("127.0.0.1", 1))
+        async with (
+            httpx.AsyncClient(
+                transport=transport, base_url="http://localhost", headers={"X-Forwarded-User": "anna"}
+            ) as anna,
+            httpx.AsyncClient(
+                transport=transport, base_url="http://localhost", headers={"X-Forwarded-User": "bert"}
+            ) as bert,
+        ):
+            who = [(await one.get("/v1/access")).json()["tenant"] for one in (anna, bert)]
+            there = [put(app.state.parts, Tenant(name), sampled(ONE_HOLE, 12)) for name in who]
+            yield app, (anna, there[0]), (bert, there[1])
+
+
+async def until(happens):
+    async with asyncio.timeout(PATIENCE_S):
+        while not happens():
+            await asyncio.sleep(0.01)
+
+
+def test_pictures_hold_no_thread_that_others_need(tmp_path, held):
+    async def go():
+        async with service(tmp_path, held) as (app, (anna, here), (bert, there)):
+            asked = [
+                asyncio.create_task(
+                    anna.get(f"{here}/refraction.png", params={**SMALL, "index": 1.1 + k / 100})
+                )
+                for k in range(MANY)
+            ]
+            await until(lambda: held.futures)
+            async with asyncio.timeout(PATIENCE_S):
+                assert (await bert.get("/health/live")).status_code == 200
+                assert (await bert.get("/health/ready")).status_code == 200
+                assert (await bert.get("/v1/access")).status_code == 200
+                assert (await bert.head(f"{there}/slice.png")).status_code == 200
+            # One worker has one task; the others have not been handed out.
+            assert len(held.futures) == 1
+            late = asyncio.create_task(bert.get(f"{there}/slice.png"))
+            await until(lambda: len(app.state.parts.pictures.waiting()) == 2)
+            held.gate.set()
+            assert (await late).status_code == 200
+            # Only the one that had begun already came before.
+            assert held.names[:2] == ["picture_png", "volume_slice_png"]
+            answers = await asyncio.gather(*asked)
+            assert {answer.status_code for answer in answers} == {200}
+
+    asyncio.run(go())
+
+
+def test_too_many_pictures_are_refused_with_the_time_to_come_again(tmp_path, held):
+    async def go():
+        async with service(tmp_path, held) as (_, (anna, here), (bert, there)):
+            large = {**SMALL, "width": 4096, "height": 4096}
+            asked = [
+                asyncio.create_task(
+                    anna.get(f"{here}/refraction.png", params={**large, "index": 1.1 + k / 100})
+                )
+                for k in range(20)
+            ]
+            await until(lambda: sum(task.done() for task in asked) >= 19)
+            refused = [task.result() for task in asked if task.done()]
+            assert {answer.status_code for answer in refused} == {429}
+            assert refused[0].json()["field"] == "pictures"
+            assert 1 <= int(refused[0].headers["retry-after"]) <= 60
+            late = asyncio.create_task(bert.get(f"{there}/slice.png", params={"frame": False}))
+            for task in asked:
+                task.cancel()
+            await asyncio.gather(*asked, return_exceptions=True)
+            held.gate.set()
+            assert (await late).status_code == 200
+
+    asyncio.run(go())
+
+
+def test_a_picture_ends_with_its_client(tmp_path, held):
+    async def go():
+        async with service(tmp_path, held) as (app, (anna, here), _):
+            gone, came = asyncio.Event(), asyncio.Event()
+
+            async def receive():
+                if not came.is_set():
+                    came.set()
+                    return {"type": "http.request", "body": b"", "more_body": False}
+                await gone.wait()
+                return {"type": "http.disconnect"}
+
+            async def send(message):
+                """Nobody reads it."""
+
+            scope = {
+                "type": "http",
+                "method": "GET",
+                "path": f"{here}/slice.png",
+                "raw_path": f"{here}/slice.png".encode(),
+                "query_string": b"",
+                "headers": [(b"host", b"localhost"), (b"x-forwarded-user", b"anna")],
+                "client": ("127.0.0.1", 1),
+                "server": ("localhost", 80),
+                "scheme": "http",
+                "root_path": "",
+                "http_version": "1.1",
+                "asgi": {"version": "3.0"},
+            }
+            asked = asyncio.create_task(app(scope, receive, send))
+            await until(lambda: held.futures)
+            assert not held.futures[0].released
+            gone.set()
+            await asked
+            assert held.futures[0].released
+            # Its worker is free for the next one.
+            held.gate.set()
+            assert (await anna.get(f"{here}/slice.png")).status_code == 200
+
+    asyncio.run(go())
+
+
+def test_what_takes_too_long_is_refused_with_the_size_that_does_not(tmp_path, held):
+    async def go():
+        async with service(tmp_path, held) as (_, (anna, here), _):
+            query = {**SMALL, "width": 4096, "height": 4096, "depth": 256}
+            answer = await anna.get(f"{here}/refraction.png", params=query)
+            body = answer.json()
+            assert (answer.status_code, body["field"]) == (422, "width, height, depth")
+            assert "a job of kind `refraction`" in body["accepted"]
+            assert not held.futures
+
+    asyncio.run(go())
+
+
+@pytest.mark.parametrize(
+    "what", ["refraction.png?iso=0.5", "slice.png", "data?format=npy", "data?format=nifti"]
+)
+def test_what_no_worker_can_hold_is_refused_before_it_begins(start, cluster, what):
+    """Workers of half a GiB, and a volume of 150 MiB."""
+    http = start()
+    cluster.memory_bytes = 2**29 + 2**28
+    shape = (340, 340, 340)
+    here = put(http.app.state.parts, Tenant("local"), sampled(ONE_HOLE, 12), shape)
+    answer = http.get(f"{here}/{what}")
+    body = answer.json()
+    assert (answer.status_code, body["type"]) == (422, "/problems/invalid-input"), body
+    assert "bytes of a worker" in body["found"]
+    assert "at most 241591910 bytes" in body["accepted"]
+    assert not cluster.submitted
+    asked = {"kind": "refraction", "volume": here.rpartition("/")[2], "settings": {"iso": [0.5]}}
+    refused = http.post("/v1/jobs", json=asked)
+    assert (refused.status_code, refused.json()["field"]) == (422, "volume")
+
+
+def test_a_large_picture_has_its_worker_to_itself(start, cluster):
+    http = start()
+    cluster.memory_bytes = 2**30
+    here = put(http.app.state.parts, Tenant("local"), sampled(ONE_HOLE, 12), (180, 180, 180))
+    assert http.get(f"{here}/refraction.png", params=SMALL).status_code == 200
+    assert cluster.submitted[-1]["resources"] == {"render": 1, "recon": 1}
+    small = put(http.app.state.parts, Tenant("local"), sampled(ONE_HOLE, 12))
+    assert http.get(f"{small}/refraction.png", params=SMALL).status_code == 200
+    assert cluster.submitted[-1]["resources"] == {"render": 1}
