@@ -95,7 +95,9 @@ def in_a_child(device: Device, stages: Sequence[str], time_out_s: float) -> tupl
             ending = f"no answer in {time_out_s:g} s"
         out.seek(0)
         errors.seek(0)
-        last = (errors.read().strip().splitlines() or [""])[-1].strip()
+        said = errors.read().strip().splitlines() or [""]
+        # A compiler's error, which drivers follow with remarks, tells more than the last line.
+        last = ([line for line in said if "error:" in line.lower()] or said)[-1].strip()
         answers: Answers = {}
         for line in out.read().splitlines():
             try:

@@ -72,6 +72,20 @@ def test_a_child_that_fails_says_why(gpu):
     assert ending.startswith("ended with exit code 1 (Fast Platform:GPU 9000 is no longer")
 
 
+def test_a_compilers_error_is_the_reason_and_not_what_follows_it(gpu, monkeypatch, tmp_path):
+    package = tmp_path / "refusing"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "trial.py").write_text(
+        "raise SystemExit(\"error: unknown target CPU 'generic'\\nDevice failed to build\\n(options: -DREAL)\")"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(verdict, "__package__", "refusing")
+    answers, ending = in_a_child(gpu, STAGES, 60.0)
+    assert answers == {}
+    assert ending == "ended with exit code 1 (error: unknown target CPU 'generic')"
+
+
 def test_an_aborting_child_is_survived(gpu, monkeypatch, tmp_path):
     package = tmp_path / "aborting"
     package.mkdir()
