@@ -77,7 +77,7 @@ def test_a_compilers_error_is_the_reason_and_not_what_follows_it(gpu, monkeypatc
     package.mkdir()
     (package / "__init__.py").touch()
     (package / "trial.py").write_text(
-        "raise SystemExit(\"error: unknown target CPU 'generic'\\nDevice failed to build\\n(options: -DREAL)\")"
+        "raise SystemExit(\"error: unknown target CPU 'generic'\\nDevice failed\\n(options: -DREAL)\")"
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setattr(verdict, "__package__", "refusing")
