@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import math
@@ -198,6 +199,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(RequestValidationError, _invalid_request)
     app.add_exception_handler(ClientDisconnect, _gone)
     app.add_exception_handler(HTTPException, _http)
+    app.add_exception_handler(OSError, _of_the_system)
     app.add_exception_handler(Exception, _unexpected)
 
 
@@ -224,6 +226,14 @@ def refused(error: InvalidInput, path: str | None) -> Response:
     if isinstance(error, refusals.NoSuchPart):
         headers["Content-Range"] = f"bytes */{error.size}"
     return _respond(from_exception(error, path), headers)
+
+
+def _of_the_system(request: Request, error: Exception) -> Response:
+    """A full disk, whatever was to be written; all else is unexpected."""
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        full = refusals.StorageFull("disk", "no space left", "another try, once there is room")
+        return refused(full, request.url.path)
+    raise error
 
 
 def _not_ready(request: Request, error: Exception) -> Response:
