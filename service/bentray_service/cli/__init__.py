@@ -22,6 +22,7 @@ from . import (
     serve,
     simulate,
     submit,
+    verify,
     worker,
 )
 from .endings import Commands
@@ -54,6 +55,7 @@ for command in (
     geometry_field.geometry_field,
     devices.devices,
     audit.audit,
+    verify.verify,
 ):
     app.command()(command)
 app.command(cls=SpacingInRow)(render.render)

@@ -140,8 +140,9 @@ class Runner:
             except DatabaseAway:
                 # The thread must outlive it; that it is away is in the log already, once.
                 pass
-            except SQLAlchemyError:
-                log.exception("the database refused; trying again in %g s", IDLE_SECONDS)
+            except Exception:
+                # Whatever it is, as a full disk: the slot would be lost for good.
+                log.exception("a job could not be taken or ended; trying again in %g s", IDLE_SECONDS)
             with self._wake:
                 self._wake.wait(IDLE_SECONDS)
 

@@ -75,6 +75,11 @@ class Orphans:
         self.remove(found)
         self._stamp()
 
+    def accept(self) -> None:
+        """Remove all of them, whatever the folder was used with before: somebody asked for it."""
+        self.remove(self.found())
+        self._stamp()
+
     def sweep(self, stop: Callable[[], bool]) -> None:
         """Remove what has been without a row for ``SAFE_S``; call it now and then."""
         if not self._agreed:

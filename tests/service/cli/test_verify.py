@@ -1,0 +1,70 @@
+"""`bentray verify`: names what is damaged, gives checksums to what has none, removes what no row knows."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from typer.testing import Result
+
+from bentray_service.storage.checked_store import CheckedStore
+from bentray_service.storage.checksums import Checksums
+from bentray_service.storage.database import open_database
+from bentray_service.storage.datasets import Datasets
+from bentray_service.storage.files import Files
+from bentray_service.storage.ids import new_id
+from bentray_service.storage.local_store import LocalStore
+from bentray_service.storage.tenants import LOCAL
+
+Run = Callable[..., Result]
+SUMMARY = {"title": "", "source": "", "license": "", "dimension": 2, "elements": 3, "ntx": 3, "nrx": 3}
+SUMMARY |= {"slices": 1, "has_traces": False, "has_travel_times": True, "has_truth": False}
+
+
+@pytest.fixture
+def stored(tmp_path: Path) -> tuple[Path, Path, Path]:
+    """A file with a checksum, one from before there were any, and one without a row."""
+    with closing(open_database(f"sqlite:///{tmp_path / 'bentray.sqlite'}")) as database:
+        files = Files(tmp_path, CheckedStore(LocalStore(), tmp_path, Checksums(database)))
+        files.prepare()
+        paths = [files.of(LOCAL).dataset(new_id("dataset")) for _ in range(3)]
+        for path in paths:
+            path.write_bytes(b"what a scan holds")
+        for path in paths[:2]:
+            summary = {**SUMMARY, "water_speed_mps": 1500.0}
+            Datasets(database).add(LOCAL, path.stem, size=1, sha256="", summary=summary)
+        files.store.publish(paths[0])
+    return paths[0], paths[1], paths[2]
+
+
+def test_sound_first_seen_and_orphan(bentray: Run, tmp_path: Path, stored: tuple[Path, Path, Path]) -> None:
+    found = []
+    for _ in range(2):
+        result = bentray("verify", "--data", tmp_path, "--json")
+        assert result.exit_code == 0, result.stderr
+        found.append(json.loads(result.stdout)["counts"])
+    assert found == [{"sound": 1, "first seen": 1, "orphan": 1}, {"sound": 2, "orphan": 1}]
+    result = bentray("verify", "--data", tmp_path, "--remove-orphans")
+    assert result.exit_code == 0, result.stderr
+    assert [path.exists() for path in stored] == [True, True, False]
+
+
+@pytest.mark.parametrize("spoil", ["flip", "cut", "missing"])
+def test_damage_is_named_until_it_is_restored(
+    bentray: Run, tmp_path: Path, stored: tuple[Path, Path, Path], spoil: str
+) -> None:
+    path = stored[0]
+    content = path.read_bytes()
+    if spoil == "missing":
+        path.unlink()
+    else:
+        path.write_bytes(content[:-1] + b"?" if spoil == "flip" else content[:3])
+    result = bentray("verify", "--data", tmp_path)
+    assert result.exit_code == 1
+    assert result.stderr.endswith("bentray: 1 of 3 stored things are damaged\n")
+    assert f"damaged: local datasets/{path.name}" in result.stdout
+    path.write_bytes(content)
+    assert bentray("verify", "--data", tmp_path).exit_code == 0
