@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from bentray_kernels.tomography.result import Progress
+from bentray_kernels.tomography.result import Progress, Sweep
 
 from ..refusals import DatabaseAway
 from ..storage.queue import Queue
@@ -19,6 +19,8 @@ from .kinds import finite
 log = logging.getLogger("bentray.jobs")
 
 INTERVAL_SECONDS = 0.3
+# Of how many sweeps the record of a job tells at most; the file of the result has all of them.
+MOST_SWEEPS = 500
 
 
 class Reporter:
@@ -47,7 +49,9 @@ class Reporter:
     def report(self, progress: Progress) -> None:
         """Keep the newest progress; write it when the last write is long enough ago."""
         self._pending = progress
-        if self._clock() - self._written < INTERVAL_SECONDS:
+        # A long history is a long record to write.
+        wait = INTERVAL_SECONDS * (1.0 + min(len(progress.history), MOST_SWEEPS) / 100.0)
+        if self._clock() - self._written < wait:
             return
         try:
             self.flush()
@@ -64,7 +68,8 @@ class Reporter:
         kept = self._pending
         self._written = self._clock()
         history: list[dict[str, Any]] = [
-            {**asdict(sweep), "residual_rms_s": finite(sweep.residual_rms_s)} for sweep in kept.history
+            {**asdict(sweep), "residual_rms_s": finite(sweep.residual_rms_s)}
+            for sweep in thinned(kept.history)
         ]
         self._queue.progress(self._job_id, kept.done, kept.total, history, kept.phase)
         self._pending = None
@@ -95,3 +100,11 @@ class Reporter:
             except SQLAlchemyError:
                 log.warning("whether %s is cancelled could not be read", self._job_id, exc_info=True)
         return self._stopped
+
+
+def thinned(history: Sequence[Sweep]) -> Sequence[Sweep]:
+    """At most ``MOST_SWEEPS`` of a history, evenly, with the first and the last."""
+    if len(history) <= MOST_SWEEPS:
+        return history
+    last = len(history) - 1
+    return [history[k * last // (MOST_SWEEPS - 1)] for k in range(MOST_SWEEPS)]

@@ -121,7 +121,9 @@ class JobRecord(BaseModel):
     )
     advice: str | None = Field(description="What method auto chose and why, once it has.")
     progress: ProgressRecord
-    history: list[SweepRecord]
+    history: list[SweepRecord] = Field(
+        description="Sweeps so far; of very many an even choice with the first and the last."
+    )
     volume: str | None = Field(
         description="Of a reconstruction its result, once there is one; of a refraction what it shows."
     )

@@ -20,8 +20,8 @@ class Finding(NamedTuple):
 
     Attributes:
         tenant, path: whose it is, and where it lies in the tenant's folder.
-        state: ``sound``, ``damaged``, ``first seen`` of one that had no checksum, or ``orphan`` of one without
-            a row.
+        state: ``sound``, ``damaged``, ``first seen`` of one that had no checksum, or ``orphan`` of one that
+            no row knows.
         found: of a damaged one, in words.
     """
 

@@ -1,5 +1,7 @@
 """The reporter: a few writes a second, and the last report always."""
 
+import json
+
 from sqlalchemy.exc import OperationalError
 
 from bentray_kernels.tomography.result import Progress, Sweep
@@ -108,3 +110,22 @@ def test_a_job_that_another_service_runs_is_left():
     jobs.now = None
     assert reporter.stop()
     assert reporter.lost
+
+
+def test_the_record_of_a_long_job_does_not_grow():
+    jobs, clock = FakeJobs(), Clock()
+    reporter = Reporter(jobs, "job", lambda: False, clock)
+    history = tuple(Sweep(index, 1, 1e-6, 8) for index in range(30_000))
+    for count in (1, 499, 500, 501, 30_000):
+        clock.now += 10.0
+        reporter.report(Progress(count, 600_001, history[:count]))
+        told = [sweep["slice"] for sweep in jobs.written[-1][2]]
+        assert len(told) == min(count, 500)
+        assert (told[0], told[-1]) == (0, count - 1)
+    assert told == sorted(set(told))
+    assert len(json.dumps(jobs.written[-1][2])) < 150_000
+    written = len(jobs.written)
+    for _ in range(10):
+        clock.now += 0.3
+        reporter.report(Progress(count, 600_001, history))
+    assert len(jobs.written) - written == 1, "a long record is written more seldom"
