@@ -37,8 +37,10 @@ SAMPLING_HZ = Range(1e3, 1e11, unit="Hz")
 FREQUENCY_HZ = Range(1e3, 1e10, unit="Hz")
 ATTENUATION_NP_M = Range(0.0, 1e6, unit="Np/m")
 LOG_RATIO_NP = Range(-1e3, 1e3, unit="Np")
+TEMPERATURE_C = Range(-50.0, 150.0, unit="°C")
 # Of pressures in any unit: their squares and sums stay numbers.
 PRESSURE = Range(-1e30, 1e30)
+SCALE = Range(1e-30, 1e30)
 
 # What is counted along the axes of an array of a scan, from the last axis on; (name, range).
 Counts = tuple[tuple[str, Range], ...]
@@ -54,15 +56,13 @@ COUNTED: dict[str, Counts] = {
     "waveform/water": (("samples", SAMPLES),),
 }
 # Of arrays over pairs, and over nodes, the product of all axes (of traces, of all but the last) is bounded.
-OVER_PAIRS = frozenset(
-    {
-        *(f"traveltime/{name}" for name in ("tof_s", "delta_tof_s", "sigma_s")),
-        *(f"waveform/{name}" for name in ("object", "water", "object_scale", "water_scale")),
-        "amplitude/log_ratio_np",
-        "mask/valid",
-    }
+OVER_PAIRS = (
+    *(f"traveltime/{name}" for name in ("tof_s", "delta_tof_s", "sigma_s")),
+    "amplitude/log_ratio_np",
+    "mask/valid",
+    *(f"waveform/{name}" for name in ("object", "water", "object_scale", "water_scale")),
 )
-OVER_NODES = frozenset({"mask/roi", "truth/sound_speed_mps", "truth/attenuation_np_m"})
+OVER_NODES = ("mask/roi", "truth/sound_speed_mps", "truth/attenuation_np_m")
 
 
 def check_size(place: str, shape: Sequence[int], shown: str = "") -> None:
@@ -77,6 +77,9 @@ def check_size(place: str, shape: Sequence[int], shown: str = "") -> None:
         InvalidInput: naming the array, the number and the limit.
     """
     counts = [*COUNTED.get(place, ())]
+    if len(counts) == 1 and place not in OVER_PAIRS:
+        # A list may come as a row or a column.
+        shape = (math.prod(shape),)
     for (what, within), count in zip(counts, reversed(shape), strict=False):
         if count > within.most:
             raise InvalidInput(shown or place, f"{count} {what}", f"at most {within.most} {what}")

@@ -9,7 +9,8 @@ from typing import Any, Protocol
 from bentray_kernels.tomography.settings import Settings
 from bentray_workers import picture_cost, planning, simulation_planning
 from bentray_workers.asked_simulation import AskedSimulation
-from bentray_workers.dataset_summary import summary_of
+from bentray_workers.dataset_counts import DatasetCounts
+from bentray_workers.dataset_summary import counts_in
 from bentray_workers.offers import offers_of, prepared_offers
 from bentray_workers.refraction_view import RefractionView
 
@@ -46,8 +47,14 @@ class Compute:
         except (OSError, TimeoutError):
             return 0
 
-    def plan(self, path: Path, settings: Settings) -> dict[str, Any]:
-        """How a dataset file would be reconstructed by the workers that are connected now.
+    def plan(self, counts: dict[str, Any] | None, path: Path, settings: Settings) -> dict[str, Any]:
+        """How a dataset would be reconstructed by the workers that are connected now.
+
+        Args:
+            counts: what ``dataset_record.record_of`` keeps of it; None for one from before they were kept,
+                whose file is read then.
+            path: of its file.
+            settings: of the reconstruction.
 
         Raises:
             InvalidInput: for tasks that none of them can hold, or a lane that none offers.
@@ -57,7 +64,8 @@ class Compute:
         except (OSError, TimeoutError):
             # The scheduler is gone; the job waits until it is back, on workers of which nothing is known.
             offers = ()
-        return planning.plan(summary_of(self._bring(path), settings), settings, offers).to_dict()
+        known = counts_in(self._bring(path)) if counts is None else DatasetCounts(**counts)
+        return planning.plan(known.summary(settings), settings, offers).to_dict()
 
     def plan_simulation(self, asked: AskedSimulation) -> dict[str, Any]:
         """The same of a simulation."""

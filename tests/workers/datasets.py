@@ -20,7 +20,12 @@ def maybe(strategy):
 def datasets(draw) -> Dataset:
     ndim = draw(st.sampled_from([2, 3]))
     elements = draw(st.integers(3, 6))
-    position = draw(hnp.arrays(np.float64, (elements, ndim), elements=st.floats(-0.2, 0.2)))
+    # A ring with its elements out of place by up to a tenth of its radius.
+    angle = 2.0 * np.pi * np.arange(elements) / elements
+    ring = np.column_stack((np.cos(angle), np.sin(angle), np.zeros(elements)))[:, :ndim]
+    position = draw(st.floats(0.05, 0.2)) * (
+        ring + draw(hnp.arrays(np.float64, (elements, ndim), elements=st.floats(-0.1, 0.1)))
+    )
     index = st.lists(st.integers(0, elements - 1), min_size=1, max_size=6).map(
         lambda v: np.array(v, dtype=np.int64)
     )
@@ -40,6 +45,9 @@ def datasets(draw) -> Dataset:
         waveform = Waveform(
             received, water, draw(st.floats(1e-12, 1e3)), draw(over_pairs(times)), draw(over_pairs(times))
         )
+    water_speed = draw(st.floats(1300.0, 1700.0))
+    distance = np.linalg.norm(position[tx][:, None] - position[rx][None], axis=-1)
+    absolute = draw(over_pairs(times))
     delta = draw(over_pairs(times))
     if waveform is None and delta is None:
         delta = np.full(pairs, np.nan)
@@ -57,10 +65,10 @@ def datasets(draw) -> Dataset:
         element_position_m=position,
         tx=tx,
         rx=rx,
-        water_speed_mps=draw(st.floats(1300.0, 1700.0)),
+        water_speed_mps=water_speed,
         # A file with a speed alone is read with the temperature that follows from it.
         water_temperature_c=draw(st.floats(0.0, 90.0)),
-        tof_s=draw(over_pairs(times)),
+        tof_s=None if absolute is None else absolute + distance / water_speed,
         delta_tof_s=delta,
         sigma_s=draw(over_pairs(st.floats(1e-10, 1e-6) | st.just(float("nan")))),
         log_ratio_np=draw(over_pairs(times)),

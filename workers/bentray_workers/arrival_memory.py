@@ -38,15 +38,20 @@ def parts_of(emissions: int, trace_samples: int) -> list[range]:
         emissions: of one slice.
         trace_samples: of all traces of one emission.
     """
-    step = max(1, CALL_SAMPLES // max(trace_samples, 1))
+    step = emissions_a_call(trace_samples)
     return [range(k, min(k + step, emissions)) for k in range(0, emissions, step)]
+
+
+def emissions_a_call(trace_samples: int) -> int:
+    """Of how many emissions a call reads the traces, at most."""
+    return max(1, CALL_SAMPLES // max(trace_samples, 1))
 
 
 def arrival_tasks(traces: Traces | None, slices: int, settings: Settings) -> int:
     """Calls of a scan whose times are read; see ``first_arrivals``."""
     if traces is None:
         return 0
-    parts = len(parts_of(traces.emissions, traces.receivers * traces.samples))
+    parts = -(-traces.emissions // emissions_a_call(traces.receivers * traces.samples))
     examined = slices * (parts + 1) if settings.examine else 0
     return examined + (slices * (parts + 1) + 1) * (1 + settings.guided_rounds)
 

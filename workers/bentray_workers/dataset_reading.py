@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,12 +17,16 @@ from bentray_kernels.acquisition import (
     speed_from_temperature,
     temperature_from_speed,
 )
+from bentray_kernels.acquisition.plausibility import check_plausible
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import COUNTED, OVER_NODES, OVER_PAIRS, check_size
 
 from .dataset_format import FORMAT, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
 from .hdf5_reading import Limits, Reader, opened
 
 NUMERIC = "iuf"
+# Arrays whose number of rows, pairs or nodes is held against its limit before anything is read.
+SIZED = (*(place for place in COUNTED if place not in OVER_PAIRS), *OVER_PAIRS, *OVER_NODES)
 TRACES = "int16 or float32 traces over (ntx, nrx, nt)"
 
 
@@ -36,7 +41,7 @@ def read_dataset(path: Path, *, traces: bool = True, limits: Limits | None = Non
 
     Raises:
         InvalidInput: naming the first field that is missing or wrong by its path in the file (``file``
-            for the file as a whole), what was found and what is accepted.
+            for the file as a whole), what was found and what is accepted; and as ``check_plausible``.
     """
     with opened(Path(path), limits or Limits()) as reader:
         return dataset_of(reader, _waveform if traces else None)
@@ -45,6 +50,8 @@ def read_dataset(path: Path, *, traces: bool = True, limits: Limits | None = Non
 def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) -> Dataset:
     """What an open file holds; ``waveform`` reads its traces, if there are any. See ``read_dataset``."""
     _check_format(reader)
+    for place in SIZED:
+        check_size(place, _shape(reader, place))
     speed, temperature = _water(reader)
     position = _floats(reader, "geometry/element_position_m", "(elements, 2 or 3) numbers in m")
     if position is None:
@@ -52,6 +59,14 @@ def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) ->
     dimension = reader.number("", "dimension", "2 or 3")
     if dimension is not None and position.ndim == 2 and dimension != position.shape[1]:
         raise InvalidInput("@dimension", f"{dimension:g}", f"{position.shape[1]}, as element_position_m has")
+    tx, rx = _indices(reader, "acquisition/tx"), _indices(reader, "acquisition/rx")
+    slices = _floats(reader, "slice/z_m", "(nz,) numbers in m")
+    pairs = (*(() if slices is None else slices.shape[:1]), *tx.shape[:1], *rx.shape[:1])
+    for place in (*PAIR_ARRAYS, "mask/valid"):
+        # Before they are read: they are by far the largest.
+        shape = _shape(reader, place)
+        if 0 < math.prod(pairs) < math.prod(shape):
+            raise InvalidInput(place, f"shape {shape}", f"shape {pairs}")
     fields: dict[str, Any] = {
         name: _floats(reader, place, "numbers over (ntx, nrx)") for place, name in PAIR_ARRAYS.items()
     }
@@ -63,10 +78,10 @@ def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) ->
             "neither travel times nor traces",
             "traveltime/delta_tof_s, traveltime/tof_s or waveform/object",
         )
-    return Dataset(
+    dataset = Dataset(
         element_position_m=position,
-        tx=_indices(reader, "acquisition/tx"),
-        rx=_indices(reader, "acquisition/rx"),
+        tx=tx,
+        rx=rx,
         water_speed_mps=speed,
         water_temperature_c=temperature,
         element_normal=_floats(reader, "geometry/element_normal", "numbers, one row an element"),
@@ -75,12 +90,20 @@ def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) ->
         wavelet=_floats(reader, "acquisition/wavelet", "(nt,) numbers"),
         valid=_flags(reader, "mask/valid", "booleans over (ntx, nrx)"),
         roi=_flags(reader, "mask/roi", "an image of booleans"),
-        slice_z_m=_floats(reader, "slice/z_m", "(nz,) numbers in m"),
+        slice_z_m=slices,
         picker=reader.text("traveltime", "picker") or "",
         waveform=waveform(reader) if waveform is not None and traces_in(reader) else None,
         truth=_truth(reader),
         **fields,
     )
+    check_plausible(dataset)
+    return dataset
+
+
+def _shape(reader: Reader, place: str) -> tuple[int, ...]:
+    """Of an array as the file declares it; () where it is absent, or one number."""
+    found = reader.checked(place, "iufb", "an array of numbers")
+    return () if found is None else tuple(found.shape)
 
 
 def _check_format(reader: Reader) -> None:

@@ -11,7 +11,10 @@ LONGEST_TEXT = 200
 
 
 def record_of(dataset: Dataset) -> dict[str, Any]:
-    """By the names that the service keeps it under."""
+    """By the names that the service keeps it under; ``counts`` is what plans are made of."""
+    # It loads the plan's own modules, which the service has and a reader of volumes does not need.
+    from .dataset_counts import DatasetCounts
+
     return {
         "title": text(dataset.title),
         "source": text(dataset.source),
@@ -25,6 +28,7 @@ def record_of(dataset: Dataset) -> dict[str, Any]:
         "has_travel_times": dataset.picked,
         "has_truth": dataset.truth is not None,
         "water_speed_mps": float(dataset.water_speed_mps),
+        "counts": DatasetCounts.of(dataset).to_dict(),
     }
 
 

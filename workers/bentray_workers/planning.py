@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from bentray_kernels.eikonal.registry import METHODS
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import WIDTH_M
 from bentray_kernels.tomography.advice import CANDIDATES
 from bentray_kernels.tomography.chains import BATCH
 from bentray_kernels.tomography.settings import DEVIATION, LEAST_NODES, Settings
@@ -104,9 +105,11 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[Offer]) -> Plan:
         offers: the connected workers; none says nothing, for some may come.
 
     Raises:
-        InvalidInput: for a lane that no connected worker offers, and for a task that none can hold: ``nodes``
-            with the bytes found and accepted.
+        InvalidInput: for a lane that no connected worker offers, for a task that none can hold (``nodes``
+            with the bytes found and accepted), and for an array of no width, taken in before that was
+            refused.
     """
+    _check_extent(scan)
     lane: Lane = "opencl" if lane_of(settings) == "opencl" else "recon"
     fitting = [offer for offer in offers if lane in offer.lanes]
     if offers and not fitting:
@@ -151,6 +154,12 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[Offer]) -> Plan:
         state_bytes(shape, settings),
         _why(scan, settings, decomposition, lane, tasks, (name, size), offers, able),
     )
+
+
+def _check_extent(scan: Summary) -> None:
+    WIDTH_M.check("geometry/element_position_m", scan.width_m)
+    if not scan.height_m <= WIDTH_M.most:
+        raise InvalidInput("slice/z_m", f"slices over {scan.height_m:.4g} m", f"at most {WIDTH_M.most:g} m")
 
 
 def lane_of(settings: Settings) -> Lane:

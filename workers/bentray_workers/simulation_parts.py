@@ -59,6 +59,13 @@ def parts_of(settings: Simulated) -> list[Part]:
     ]
 
 
+def count_of(settings: Simulated) -> int:
+    """How many parts there are, without making any."""
+    if isinstance(settings, WaveSimulationSettings):
+        return settings.emissions
+    return settings.scans * -(-settings.emitters // emitters_a_task(settings))
+
+
 def folder_of(work_dir: Path) -> Path:
     """Where the parts of a job are; those of other kernels than the present ones are in another folder."""
     version = "".join(digest(module)[:6] for module in MODULES)

@@ -13,7 +13,7 @@ from .asked_simulation import AskedSimulation
 from .hdf5_reading import Limits
 from .planning import Offer
 from .simulation_effort import costly_setting, cpu_seconds, result_bytes, task_bytes
-from .simulation_parts import parts_of
+from .simulation_parts import count_of
 from .task_memory import MIB
 
 # A file of its own for each part, and each read again: more than this no disk is glad of.
@@ -70,7 +70,7 @@ def plan_simulation(asked: AskedSimulation, offers: Sequence[Offer]) -> Simulati
         field = costly_setting(settings, name)
         found = f"{getattr(settings, field):g}, for which a task ({name}) takes {largest} bytes"
         raise InvalidInput(field, found, f"settings whose tasks take at most {room:.0f} bytes")
-    tasks = len(parts_of(settings)) + 1
+    tasks = count_of(settings) + 1
     if tasks > MOST_TASKS:
         raise InvalidInput("elements", f"{settings.elements}, {tasks} tasks", f"at most {MOST_TASKS} tasks")
     able = [offer for offer in fitting if offer.task_bytes >= largest]

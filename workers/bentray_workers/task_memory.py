@@ -15,7 +15,7 @@ from bentray_kernels.tomography.chains import BATCH
 from bentray_kernels.tomography.problem import MARGIN_NODES
 from bentray_kernels.tomography.settings import DEVIATION, Settings
 
-from .arrival_memory import arrival_call_bytes, parts_of, settle_bytes
+from .arrival_memory import arrival_call_bytes, emissions_a_call, settle_bytes
 from .wave_memory import Traces
 
 REAL = 8
@@ -155,7 +155,8 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         found |= arrival_call_bytes(scan.traces, scan.pairs, settings)
         if settings.guided_rounds and scan.traces is not None:
             # The rays of each of its emissions through the image that guides it.
-            part = len(parts_of(scan.traces.emissions, scan.traces.receivers * scan.traces.samples)[0])
+            part = emissions_a_call(scan.traces.receivers * scan.traces.samples)
+            part = min(part, scan.traces.emissions)
             found["read"] += field + 2 * image + 2 * rows_bytes(scan, settings, part * scan.traces.receivers)
     elif scan.period and settings.examine:
         found["settle"] = settle_bytes(scan.pairs // scan.slices)

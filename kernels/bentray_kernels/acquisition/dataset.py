@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import MISSING, dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
+from ..limits import ATTENUATION_NP_M, FREQUENCY_HZ, SAMPLING_HZ, SPEED_MPS, TEMPERATURE_C, TIME_S, check_size
+from ..ranges import check_ranges, ranged
 from . import rules
 from .truth import Truth
 from .waveform import Waveform
@@ -18,7 +20,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-PLAUSIBLE_SPEED_MPS = (200.0, 10_000.0)
+POSITION = "geometry/element_position_m"
 ARRAY_TYPES = ("ring", "rings", "free")
 
 
@@ -46,7 +48,7 @@ class Dataset:
     element_position_m: Floats
     tx: Ints
     rx: Ints
-    water_speed_mps: float
+    water_speed_mps: float = ranged(MISSING, SPEED_MPS, place="water@sound_speed_mps")
     tof_s: Floats | None = None
     delta_tof_s: Floats | None = None
     sigma_s: Floats | None = None
@@ -60,18 +62,20 @@ class Dataset:
     wavelet: Floats | None = None
     array_type: str = "ring"
     radius_m: float | None = None
-    center_frequency_hz: float | None = None
-    sampling_rate_hz: float | None = None
-    t0_s: float = 0.0
-    water_temperature_c: float | None = None
-    water_attenuation_np_m: float | None = None
-    amplitude_frequency_hz: float | None = None
+    center_frequency_hz: float | None = ranged(None, FREQUENCY_HZ, place="acquisition@center_frequency_hz")
+    sampling_rate_hz: float | None = ranged(None, SAMPLING_HZ, place="acquisition@sampling_rate_hz")
+    t0_s: float = ranged(0.0, TIME_S, place="acquisition@t0_s")
+    water_temperature_c: float | None = ranged(None, TEMPERATURE_C, place="water@temperature_c")
+    water_attenuation_np_m: float | None = ranged(None, ATTENUATION_NP_M, place="water@attenuation_np_m")
+    amplitude_frequency_hz: float | None = ranged(None, FREQUENCY_HZ, place="amplitude@frequency_hz")
     picker: str = ""
     title: str = ""
     source: str = ""
     license: str = field(default="")
 
     def __post_init__(self) -> None:
+        for place, shape in self.shapes().items():
+            check_size(place, shape)
         position = self.element_position_m
         if position.ndim != 2 or position.shape[1] not in (2, 3) or len(position) < 3:
             raise InvalidInput(
@@ -98,11 +102,7 @@ class Dataset:
                     f"{index[wrong[0]]} at position {wrong[0]}",
                     f"element indices from 0 to {len(position) - 1}",
                 )
-        low, high = PLAUSIBLE_SPEED_MPS
-        if not low <= self.water_speed_mps <= high:
-            raise InvalidInput(
-                "water@sound_speed_mps", self.water_speed_mps, f"a speed from {low:g} to {high:g} m/s"
-            )
+        check_ranges(self)
         self._check_description()
         self._check_pairs()
 
@@ -114,18 +114,7 @@ class Dataset:
         if self.element_normal is not None:
             rules.shape("geometry/element_normal", self.element_normal, self.element_position_m.shape)
             rules.finite("geometry/element_normal", self.element_normal)
-        for name, value, unit in (
-            ("geometry@radius_m", self.radius_m, "m"),
-            ("acquisition@center_frequency_hz", self.center_frequency_hz, "Hz"),
-            ("acquisition@sampling_rate_hz", self.sampling_rate_hz, "Hz"),
-            ("amplitude@frequency_hz", self.amplitude_frequency_hz, "Hz"),
-        ):
-            rules.positive(name, value, unit)
-        if not np.isfinite(self.t0_s):
-            raise InvalidInput("acquisition@t0_s", self.t0_s, "a finite time in s")
-        alpha = self.water_attenuation_np_m
-        if alpha is not None and not 0.0 <= alpha < np.inf:
-            raise InvalidInput("water@attenuation_np_m", alpha, "a finite number >= 0 Np/m")
+        rules.positive("geometry@radius_m", self.radius_m, "m")
         if self.wavelet is not None:
             if self.wavelet.ndim != 1 or self.wavelet.size == 0:
                 raise InvalidInput("acquisition/wavelet", f"shape {self.wavelet.shape}", "(nt,), not empty")
@@ -164,6 +153,25 @@ class Dataset:
                 raise InvalidInput(
                     "acquisition@sampling_rate_hz", "nothing", "a rate in Hz > 0, since there are traces"
                 )
+
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shapes of the arrays that are there, by their place in the upload format."""
+        traces, truth = self.waveform, self.truth
+        arrays = {
+            POSITION: self.element_position_m,
+            "geometry/element_normal": self.element_normal,
+            "acquisition/tx": self.tx,
+            "acquisition/rx": self.rx,
+            "acquisition/wavelet": self.wavelet,
+            "slice/z_m": self.slice_z_m,
+            "traveltime/tof_s": self.tof_s,
+            "traveltime/delta_tof_s": self.delta_tof_s,
+            "mask/valid": self.valid,
+            "mask/roi": self.roi,
+            "waveform/object": None if traces is None else traces.object,
+            "truth/sound_speed_mps": None if truth is None else truth.sound_speed_mps,
+        }
+        return {place: array.shape for place, array in arrays.items() if array is not None}
 
     @property
     def slices(self) -> int:

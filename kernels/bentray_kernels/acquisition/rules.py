@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
+from ..ranges import Range
 
 
 def shape(name: str, array: NDArray[Any], expected: tuple[int, ...]) -> None:
@@ -35,6 +36,22 @@ def positive_or_nan(name: str, array: NDArray[Any]) -> None:
         ~(np.isnan(array) | (array > 0.0) & np.isfinite(array)),
         "values > 0, NaN for missing ones",
     )
+
+
+def within_or_nan(name: str, array: NDArray[Any], within: Range) -> None:
+    """Every value lies in a range, or is NaN for a missing one."""
+    if array.size == 0:
+        return
+    # Without an array of flags where all is well: pairs may be hundreds of millions.
+    if all(
+        np.isnan(end) or within.holds(end)
+        for end in (np.fmin.reduce(array, None), np.fmax.reduce(array, None))
+    ):
+        return
+    wrong = ~np.isnan(array) & ~((array >= within.least) & (array <= within.most))
+    if within.above:
+        wrong |= array == within.least
+    _refuse(name, array, wrong, f"{within.words}, NaN for missing ones")
 
 
 def positive(name: str, value: float | None, unit: str) -> None:

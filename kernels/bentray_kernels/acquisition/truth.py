@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
+from ..limits import PLACE_M, SPACING_M, TRUE_SPEED_MPS
 from . import rules
 
 Floats = NDArray[np.float64]
@@ -30,12 +31,12 @@ class Truth:
                 "truth/sound_speed_mps", f"shape {speed.shape}", "(nx, ny) or (nx, ny, nz), none 0"
             )
         rules.positive_or_nan("truth/sound_speed_mps", speed)
-        if len(self.spacing_m) != ndim or not all(0.0 < step < np.inf for step in self.spacing_m):
-            raise InvalidInput(
-                "truth@spacing_m", self.spacing_m, f"{ndim} finite numbers > 0 m, or one for all axes"
-            )
-        if len(self.origin_m) != ndim or not np.isfinite(self.origin_m).all():
-            raise InvalidInput("truth@origin_m", self.origin_m, f"{ndim} finite numbers in m")
+        rules.within_or_nan("truth/sound_speed_mps", speed, TRUE_SPEED_MPS)
+        if len(self.spacing_m) != ndim or not all(map(SPACING_M.holds, self.spacing_m)):
+            accepted = f"{ndim} times {SPACING_M.words}, or one for all axes"
+            raise InvalidInput("truth@spacing_m", self.spacing_m, accepted)
+        if len(self.origin_m) != ndim or not all(map(PLACE_M.holds, self.origin_m)):
+            raise InvalidInput("truth@origin_m", self.origin_m, f"{ndim} times {PLACE_M.words}")
         if self.attenuation_np_m is not None:
             rules.shape("truth/attenuation_np_m", self.attenuation_np_m, speed.shape)
             rules.no_infinity("truth/attenuation_np_m", self.attenuation_np_m)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
+from ..limits import SCALE
 from . import rules
 
 Floats = NDArray[np.float64]
@@ -31,8 +32,8 @@ class Waveform:
     water_scale: Floats | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.scale) and self.scale != 0.0):
-            raise InvalidInput("waveform@scale", self.scale, "a finite number other than 0")
+        if not SCALE.holds(abs(self.scale)):
+            raise InvalidInput("waveform@scale", self.scale, f"in size {SCALE.words}")
         if self.object.ndim not in (3, 4) or 0 in self.object.shape:
             raise InvalidInput(
                 "waveform/object",

@@ -6,9 +6,9 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal
 
 from ..acquisition import PICKERS
-from ..acquisition.dataset import PLAUSIBLE_SPEED_MPS
 from ..eikonal import methods
 from ..errors import InvalidInput
+from ..limits import SPEED_MPS
 from ..ranges import Range, check_ranges, ranged
 
 METHODS = ("sart", "gauss-newton", "auto", "waveform")
@@ -221,7 +221,7 @@ def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:
 
 
 def _speeds(name: str, pair: tuple[float, float]) -> None:
-    slowest, fastest = PLAUSIBLE_SPEED_MPS
+    slowest, fastest = SPEED_MPS.least, SPEED_MPS.most
     if len(pair) != 2 or not slowest <= pair[0] < pair[1] <= fastest:
         accepted = f"(lowest, highest) in m/s, {slowest:g} <= lowest < highest <= {fastest:g}"
         raise InvalidInput(name, tuple(pair), accepted)

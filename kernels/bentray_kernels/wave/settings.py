@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from ..acquisition.dataset import PLAUSIBLE_SPEED_MPS
 from ..errors import InvalidInput
+from ..limits import SPEED_MPS
 from .misfits import Measure, measure
 from .simulation import Unknown
 
@@ -133,7 +133,7 @@ class WaveSettings:
             raise InvalidInput("bands", "none", "at least one band")
         measure(self.misfit)
         low, high = self.speed_bounds_mps
-        least, most = PLAUSIBLE_SPEED_MPS
+        least, most = SPEED_MPS.least, SPEED_MPS.most
         if not least <= low < high <= most:
             raise InvalidInput(
                 "speed_bounds_mps", self.speed_bounds_mps, f"{least:g} <= lowest < highest <= {most:g} m/s"

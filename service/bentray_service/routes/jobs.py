@@ -139,7 +139,7 @@ def start_job(
         read = {"dataset_id": dataset["id"]}
         settings = asked.settings.to_dict()
         path = service.files.of(tenant).dataset(dataset["id"])
-        plan = service.compute.plan(path, asked.settings)
+        plan = service.compute.plan(dataset["counts"], path, asked.settings)
     elif isinstance(asked, SimulationRequest):
         read, settings = {}, asked.settings.plain()
         plan = service.compute.plan_simulation(asked.settings)

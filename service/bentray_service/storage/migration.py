@@ -127,6 +127,7 @@ def _to_4(connection: Connection) -> None:
     """Files have checksums, and what is too old is marked before it goes."""
     connection.execute(text("ALTER TABLE about ADD COLUMN observed_s FLOAT NOT NULL DEFAULT 0"))
     connection.execute(text("ALTER TABLE about ADD COLUMN begun INTEGER NOT NULL DEFAULT 0"))
+    connection.execute(text("ALTER TABLE datasets ADD COLUMN counts JSON"))
     for new in (schema.checksums, schema.too_old):
         new.create(connection)
 

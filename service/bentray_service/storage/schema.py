@@ -64,6 +64,8 @@ datasets = Table(
     Column("has_travel_times", Boolean, nullable=False),
     Column("has_truth", Boolean, nullable=False),
     Column("water_speed_mps", Float, nullable=False),
+    # What plans are made of; none of one from before version 4.
+    Column("counts", JSON(none_as_null=True)),
     # The simulation that made it; no key, for jobs point at datasets already.
     Column("job_id", String(32)),
     _tenant(),

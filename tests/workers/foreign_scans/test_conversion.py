@@ -104,13 +104,18 @@ def test_traces_of_matlab_come_through(tmp_path, write):
 def test_matlab_5_stores_whole_numbers_small_and_in_either_byte_order(tmp_path, order):
     """Doubles that are whole numbers are stored as bytes, which scipy does not write."""
     values = np.arange(ELEMENTS * ELEMENTS) % 200
+    every = (2, np.arange(ELEMENTS, dtype="u1").tobytes())
     elements = b"".join(
-        _element(order, name, shape, "f8", data)
-        for name, shape, data in (
-            ("delta_tof", (ELEMENTS, ELEMENTS), (2, values.astype("u1").tobytes())),
+        _element(order, name, shape, kind, data)
+        for name, shape, kind, data in (
+            ("log_ratio_np", (ELEMENTS, ELEMENTS), "f8", (2, values.astype("u1").tobytes())),
+            ("delta_tof_s", (ELEMENTS, ELEMENTS), "f8", (2, bytes(ELEMENTS * ELEMENTS))),
+            ("tx", (ELEMENTS,), "i4", every),
+            ("rx", (ELEMENTS,), "i4", every),
             (
-                "element_positions",
+                "element_position_m",
                 (ELEMENTS, 2),
+                "f8",
                 (9, positions().T.astype(order + "f8").tobytes()),
             ),
         )
@@ -118,14 +123,14 @@ def test_matlab_5_stores_whole_numbers_small_and_in_either_byte_order(tmp_path, 
     header = b"MATLAB 5.0 MAT-file".ljust(124) + (b"\x00\x01IM" if order == "<" else b"\x01\x00MI")
     (tmp_path / "scan.mat").write_bytes(header + elements)
     _, dataset = converted(tmp_path, tmp_path / "scan.mat")
-    np.testing.assert_array_equal(dataset.delta_tof_s, values.reshape(ELEMENTS, ELEMENTS).T)
+    np.testing.assert_array_equal(dataset.log_ratio_np, values.reshape(ELEMENTS, ELEMENTS).T)
 
 
 def _element(order: str, name: str, shape: tuple[int, ...], kind: str, data: tuple[int, bytes]) -> bytes:
     def part(number: int, content: bytes) -> bytes:
         return struct.pack(order + "II", number, len(content)) + content + b"\x00" * (-len(content) % 8)
 
-    flags = part(6, struct.pack(order + "II", {"f8": 6, "struct": 2, "cell": 1}[kind], 0))
+    flags = part(6, struct.pack(order + "II", {"f8": 6, "i4": 12, "struct": 2, "cell": 1}[kind], 0))
     dims = part(5, struct.pack(order + f"{len(shape)}i", *shape))
     body = flags + dims + part(1, name.encode()) + part(*data)
     return struct.pack(order + "II", 14, len(body)) + body

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import COUNTED, OVER_PAIRS, check_size
 
 # Of an array that is read whole, and of one row of an array that is read in rows.
 LARGEST_WHOLE = 256 * 2**20
@@ -19,6 +20,12 @@ LARGEST_ROW = 256 * 2**20
 LARGEST_TOTAL = 32 * 2**30
 
 MOST_AXES = 4
+
+# What stands where in the upload format, by names without their groups and by those of others.
+PLACES = {place.rpartition("/")[2]: place for place in (*COUNTED, *OVER_PAIRS)} | {
+    "element_positions": "geometry/element_position_m",
+    "delta_tof": "traveltime/delta_tof_s",
+}
 
 
 class Arrays(Protocol):
@@ -53,12 +60,13 @@ def small(arrays: Arrays, name: str, accepted: str) -> NDArray[Any] | None:
     """An array as its user wrote it, axes in the user's order; None where it is absent.
 
     Raises:
-        InvalidInput: naming it, where it is not numbers or too large to be read whole.
+        InvalidInput: naming it, where it is not numbers, or larger than any scan's.
     """
     found = arrays.declared(name)
     if found is None:
         return None
     shape, dtype = found
+    check_size(PLACES.get(name, name), shape[::-1] if arrays.reversed_axes else shape, name)
     size = math.prod(shape) * dtype.itemsize
     if size > LARGEST_WHOLE:
         raise InvalidInput(name, f"shape {shape}, {size} bytes", accepted)

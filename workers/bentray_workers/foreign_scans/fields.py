@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -79,13 +80,15 @@ def indices(arrays: Arrays, name: str) -> NDArray[np.int64]:
 
 def number(arrays: Arrays, place: str) -> float | None:
     name = there(arrays, place)
+    found = arrays.declared(name)
+    # Before it is read, for it may be large.
+    if found is not None and math.prod(found[0]) != 1:
+        raise InvalidInput(name, f"shape {found[0]}", "one finite number")
     array = small(arrays, name, "one number")
     if array is None:
         return None
-    if array.size != 1 or not np.isfinite(array).all():
-        raise InvalidInput(
-            name, f"shape {array.shape}" if array.size != 1 else array.ravel()[0], "one finite number"
-        )
+    if not np.isfinite(array).all():
+        raise InvalidInput(name, array.ravel()[0], "one finite number")
     return float(array.ravel()[0])
 
 

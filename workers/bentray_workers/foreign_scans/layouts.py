@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.acquisition.plausibility import check_plausible
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import check_size
 
 from ..dataset_format import NUMBERS, PAIR_ARRAYS
 from .arrays import Arrays, small
 from .fields import declared, indices, number, stand_in, there, truth, wanted, water
-
-# Elements further from the origin than this were written in mm.
-LARGEST_M = 10.0
 
 # Samples of a time axis may be off even steps by this part of a step.
 UNEVEN = 0.01
@@ -67,6 +66,8 @@ def _delta_tof(arrays: Arrays) -> Layout:
 
 def _full_dataset(arrays: Arrays) -> Layout:
     """``time``, ``transducerPositionsXY`` (2×N) and ``full_dataset`` (Nt×Nrx×Ntx), all emitting in turn."""
+    count = max(declared(arrays, "transducerPositionsXY")[0], default=0)
+    check_size("geometry/element_position_m", (count, 2), "transducerPositionsXY")
     position = wanted(arrays, "transducerPositionsXY", "(2, N) numbers in m")
     if position.ndim != 2 or position.shape[0] != 2:
         raise InvalidInput("transducerPositionsXY", f"shape {position.shape}", "(2, N) numbers in m")
@@ -143,12 +144,6 @@ def _made(
 ) -> Dataset:
     """The dataset, with what the file says of water, frequency and truth."""
     position = np.ascontiguousarray(position, dtype=np.float64)
-    if np.isfinite(position).all() and np.abs(position).max(initial=0.0) > LARGEST_M:
-        raise InvalidInput(
-            there(arrays, "geometry/element_position_m"),
-            f"elements {np.abs(position).max():.4g} m from the origin",
-            f"positions in m, at most {LARGEST_M:g} m",
-        )
     speed, temperature, assumed = water(arrays)
     numbers = {name: number(arrays, f"{place}/{leaf}") for place, leaf, _, name in NUMBERS}
     waveform = None
@@ -167,7 +162,7 @@ def _made(
             ),
         )
     known = numbers | fields
-    return Dataset(
+    dataset = Dataset(
         element_position_m=position,
         tx=tx,
         rx=rx,
@@ -178,3 +173,5 @@ def _made(
         source=f"from {arrays.kind}{assumed}",
         **{name: value for name, value in known.items() if value is not None},
     )
+    check_plausible(dataset)
+    return dataset

@@ -1,0 +1,155 @@
+"""Whether the numbers of a scan can be in SI units: its width, and its times over the distances of pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Flags, Floats
+from ..errors import InvalidInput
+from ..limits import (
+    DEVIATION_S,
+    LOG_RATIO_NP,
+    PLACE_M,
+    PRESSURE,
+    RADIUS_M,
+    TIME_S,
+    WIDTH_M,
+)
+from . import rules
+from .dataset import POSITION, Dataset
+
+# Of sound on most pairs: fat has 1,400 m/s, bone 4,000; a straight path through both lies between.
+BULK_MPS = (300.0, 6_000.0)
+
+# A scan is plausible where at least this part of its pairs is: single picks may be wrong by anything.
+MOST_PAIRS = 0.5
+
+# Pairs nearer than this part of the array's width are left out, for picks of neighbours are often wrong.
+NEAR = 0.1
+
+# Slices, emitters and receivers that are looked at, evenly spread: more would tell the same.
+LOOKED_AT = (8, 128, 512)
+
+# The width that most arrays have, m, which decides between units that are both possible.
+USUAL_M = 0.2
+
+LENGTHS = {"cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "km": 1e3}
+TIMES = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
+
+
+def check_plausible(dataset: Dataset) -> None:
+    """Refuse a scan whose lengths or times are in another unit, or that no scanner could have recorded.
+
+    Traces are not looked at: they may still lie in their file.
+
+    Raises:
+        InvalidInput: naming the field, what was found, and the unit that it is likely to be in.
+    """
+    _check_places(dataset)
+    for place, times in (
+        ("traveltime/tof_s", dataset.tof_s),
+        ("traveltime/delta_tof_s", dataset.delta_tof_s),
+    ):
+        if times is not None:
+            _check_times(dataset, place, times)
+            rules.within_or_nan(place, times, TIME_S)
+    for place, values, within in (
+        ("traveltime/sigma_s", dataset.sigma_s, DEVIATION_S),
+        ("amplitude/log_ratio_np", dataset.log_ratio_np, LOG_RATIO_NP),
+        ("geometry/element_normal", dataset.element_normal, PRESSURE),
+        ("acquisition/wavelet", dataset.wavelet, PRESSURE),
+    ):
+        if values is not None:
+            rules.within_or_nan(place, values, within)
+
+
+def _check_places(dataset: Dataset) -> None:
+    position = dataset.element_position_m
+    # Halves, so that the largest numbers have a difference.
+    width = 2.0 * float(np.ptp(0.5 * position, axis=0).max())
+    if not WIDTH_M.holds(width):
+        raise InvalidInput(
+            POSITION, f"an array {width:.4g} m wide", f"{WIDTH_M.words}{_length_hint(width, 'positions')}"
+        )
+    rules.within_or_nan(POSITION, position, PLACE_M)
+    if dataset.radius_m is not None and not RADIUS_M.holds(dataset.radius_m):
+        hint = _length_hint(2.0 * dataset.radius_m, "radius")
+        raise InvalidInput("geometry@radius_m", f"{dataset.radius_m:.4g}", f"{RADIUS_M.words}{hint}")
+    if dataset.slice_z_m is not None:
+        height = 2.0 * float(np.ptp(0.5 * dataset.slice_z_m))
+        if height > WIDTH_M.most:
+            accepted = f"at most {WIDTH_M.most:g} m{_length_hint(height, 'heights')}"
+            raise InvalidInput("slice/z_m", f"slices over {height:.4g} m", accepted)
+        rules.within_or_nan("slice/z_m", dataset.slice_z_m, PLACE_M)
+
+
+def _length_hint(width: float, what: str) -> str:
+    """The unit in which a width would be nearest to that of most arrays, in words."""
+    found = {unit: width * factor for unit, factor in LENGTHS.items() if WIDTH_M.holds(width * factor)}
+    if not found:
+        return ""
+    unit = min(found, key=lambda name: abs(np.log(found[name] / USUAL_M)))
+    verb = "looks" if what == "radius" else "look"
+    this = "this" if what == "radius" else "these"
+    return f"; {this} {what} {verb} like {unit}: write m"
+
+
+def _check_times(dataset: Dataset, place: str, times: Floats) -> None:
+    """Hold times against the distances of their pairs."""
+    looked = _looked_at(dataset, times)
+    distance, in_water = looked.distance, looked.distance / dataset.water_speed_mps
+    if not distance.size:
+        return
+    offset = in_water if place == "traveltime/delta_tof_s" else np.zeros_like(in_water)
+
+    def plausible(factor: float) -> bool:
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            speed = distance / (offset + factor * looked.times)
+        return bool(np.mean((speed >= BULK_MPS[0]) & (speed <= BULK_MPS[1])) >= MOST_PAIRS)
+
+    if plausible(1.0):
+        return
+    low, high = BULK_MPS
+    middle = np.argsort(looked.times)[looked.times.size // 2]
+    found = (
+        f"{looked.times[middle]:.4g} s between elements {distance[middle]:.3g} m apart, as most pairs have"
+    )
+    accepted = f"times in s of sound that runs at {low:g} to {high:g} m/s between them{_time_hint(plausible)}"
+    raise InvalidInput(place, found, accepted)
+
+
+def _time_hint(plausible: Callable[[float], bool]) -> str:
+    for unit, factor in TIMES.items():
+        if plausible(factor):
+            return f"; these times look like {unit}: write s"
+    return ""
+
+
+class _Looked:
+    """Pairs with times that are looked at: distances, m, and times, s, of each."""
+
+    def __init__(self, distance: Floats, times: Floats) -> None:
+        self.distance = distance
+        self.times = times
+
+
+def _looked_at(dataset: Dataset, times: Floats) -> _Looked:
+    stacked = times if times.ndim == 3 else times[None]
+    z, e, r = (_spread(count, most) for count, most in zip(stacked.shape, LOOKED_AT, strict=True))
+    place = dataset.element_position_m
+    offset = place[dataset.tx[e]][:, None, :] - place[dataset.rx[r]][None, :, :]
+    distance = np.broadcast_to(np.linalg.norm(offset, axis=-1), (len(z), len(e), len(r)))
+    some = stacked[np.ix_(z, e, r)]
+    known: Flags = np.isfinite(some) & (distance > NEAR * distance.max(initial=0.0))
+    if dataset.valid is not None:
+        valid = dataset.valid if dataset.valid.ndim == 3 else dataset.valid[None]
+        known &= valid[np.ix_(z, e, r)]
+    return _Looked(distance[known], some[known])
+
+
+def _spread(count: int, most: int) -> NDArray[np.intp]:
+    """At most so many indices, evenly spread over all."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))

@@ -1,0 +1,112 @@
+"""What is larger than any scan is refused before it is read; plans are made without opening a file."""
+
+import math
+import tracemalloc
+
+import h5py
+import numpy as np
+import pytest
+
+from bentray_kernels.limits import ELEMENTS, EMISSIONS, SAMPLES, SLICES
+from bentray_service.ingest.child import convert
+
+HDF5 = {"Content-Type": "application/x-hdf5"}
+
+
+def packed(place, shape, dtype="f8", chunk=None):
+    """A change that puts an array of zeros there, packed well: it is large only once it is read."""
+
+    def change(file):
+        if place in file:
+            del file[place]
+        chunks = chunk or (min(shape[0], 2**22 // math.prod(shape[1:])), *shape[1:])
+        made = file.create_dataset(place, shape, dtype, compression="gzip", chunks=chunks)
+        # One chunk, as often as it is needed: to pack them all would take longer than to refuse them.
+        made[: chunks[0]] = np.zeros((), dtype)
+        mask, raw = made.id.read_direct_chunk((0,) * len(shape))
+        for k in range(0, shape[0], chunks[0]):
+            made.id.write_direct_chunk((k, *(0,) * (len(shape) - 1)), raw, mask)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("place", "shape", "said"),
+    [
+        ("geometry/element_position_m", (2**27, 2), f"134217728 elements.*at most {ELEMENTS.most}"),
+        ("geometry/element_normal", (2**25, 2), f"33554432 elements.*at most {ELEMENTS.most}"),
+        ("acquisition/tx", (2**25,), f"33554432 emissions.*at most {EMISSIONS.most}"),
+        ("acquisition/rx", (70_000,), f"70000 receivers.*at most {EMISSIONS.most}"),
+        ("slice/z_m", (5000,), f"5000 slices.*at most {SLICES.most}"),
+        ("acquisition/wavelet", (2**24,), f"16777216 samples.*at most {SAMPLES.most}"),
+        ("mask/valid", (2**20, 1024), "1073741824 pairs.*at most 536870912"),
+    ],
+)
+def test_it_is_refused_by_its_name_its_number_and_the_limit(scan, tmp_path, place, shape, said):
+    path = scan(packed(place, shape, "i4" if place in ("acquisition/tx", "mask/valid") else "f8"))
+    assert path.stat().st_size < 4 * 2**20
+    tracemalloc.start()
+    try:
+        answer = convert("dataset", path, tmp_path / "out.h5", {})
+        # HDF5 reads by itself, but into arrays of NumPy, which are counted.
+        assert tracemalloc.get_traced_memory()[1] < 8 * 2**20
+    finally:
+        tracemalloc.stop()
+    error = answer["error"]
+    assert error["field"] == place
+    found, accepted = said.split(".*")
+    assert error["found"].startswith(found)
+    assert error["accepted"].startswith(accepted)
+    assert not (tmp_path / "out.h5").exists()
+
+
+def test_an_array_that_its_pairs_have_no_room_for_is_not_read(scan, tmp_path):
+    path = scan(packed("traveltime/delta_tof_s", (4096, 4096), chunk=(512, 4096)))
+    error = convert("dataset", path, tmp_path / "out.h5", {})["error"]
+    assert error == {
+        "field": "traveltime/delta_tof_s",
+        "found": "shape (4096, 4096)",
+        "accepted": "shape (16, 16)",
+    }
+
+
+def test_a_job_is_planned_without_its_file(start, uploaded, submitted, work, monkeypatch):
+    http = start()
+    dataset = uploaded(http)
+
+    def opened(*_):
+        raise AssertionError("the file was opened")
+
+    monkeypatch.setattr(h5py, "File", opened)
+    plan = submitted(http, dataset)["plan"]
+    assert plan["tasks"] > 0
+    monkeypatch.undo()
+    # Of one from before counts were kept the file is read.
+    with http.app.state.parts.datasets._database.write() as connection:
+        connection.exec_driver_sql("UPDATE datasets SET counts = NULL")
+    assert submitted(http, dataset)["plan"] == plan
+
+
+def test_a_scan_of_all_elements_in_one_place_or_of_none_is_refused(start, scan):
+    http = start()
+
+    def change(value):
+        def spoil(file):
+            file["geometry/element_position_m"][...] = value
+
+        return spoil
+
+    for value in (0.0, 0.05, 1e300, -1e308, 5e-324, np.nan):
+        answer = http.post("/v1/datasets", content=scan(change(value)).read_bytes(), headers=HDF5)
+        assert answer.status_code == 422, answer.text
+        assert answer.json()["field"] == "geometry/element_position_m"
+
+
+@pytest.mark.parametrize("rate", [1e300, 1e-300, 5e-324, -1e6, 25.0])
+def test_a_sampling_rate_that_nothing_has_is_refused(scan, tmp_path, rate):
+    def change(file):
+        file["acquisition"].attrs["sampling_rate_hz"] = rate
+
+    error = convert("dataset", scan(change), tmp_path / "out.h5", {})["error"]
+    assert error["field"] == "acquisition@sampling_rate_hz"
+    assert error["accepted"].endswith("Hz")
