@@ -141,7 +141,7 @@ def lone(place, accepted="three"):
         (lone("nan 1 0", "3"), "not finite"),
         (lone("inf 1 0", "3"), "not finite"),
         (lone("2 0 0", "3"), "1 without area"),
-        (b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "vertices: found shape|damaged"),
+        (b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "vertices: found 'v 0 0' in line 1"),
         (b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "an STL of words without its end"),
         (exported("stl")[:-1], r"or a binary STL of \d+ bytes, where its header means \d+"),
         (b"OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n", "faces: found none|damaged"),

@@ -90,8 +90,8 @@ def test_lines_may_end_as_on_windows(tmp_path):
         (PLAIN + "kinds: RGB-color domain domain\n", "kinds"),
         (PLAIN + 'units: "inch" "inch" "inch"\n', "units"),
         (PLAIN + 'spacings: 1 1 1\nunits: "mm" "mm" "inch"\n', "units"),
-        (PLAIN + "spacings: 0 1 1\n", "spacing_m"),
-        (PLAIN + "spacings: nan nan nan\n", "spacing_m"),
+        (PLAIN + "spacings: 0 1 1\n", "spacings"),
+        (PLAIN + "spacings: nan nan nan\n", "spacings"),
         ("nonsense\n", "file"),
     ],
 )

@@ -20,6 +20,8 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.defects import SoundMesh, sound
 
 from .bounded_reading import refusing
+from .gltf_checks import check_gltf
+from .obj_checks import check_obj
 from .off_checks import HEADERS, check_off
 
 ACCEPTED = "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB"
@@ -74,6 +76,8 @@ def read_mesh(data: bytes) -> ReadMesh:
         data = _without_looks(data, kind)
     if kind == "off":
         check_off(data)
+    if kind == "obj":
+        check_obj(data)
     with _whole(kind):
         loaded = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False)
         mesh = loaded.to_mesh()
@@ -140,7 +144,9 @@ def _without_looks(data: bytes, kind: str) -> bytes:
         scene = json.loads(text)
         outside = [buffer["uri"] for buffer in scene.get("buffers", []) if not _inside(buffer)]
         if outside:
-            raise InvalidInput("buffers/uri", repr(outside[0][:80]), "data within the file")
+            # Its name could be that of any file of this machine; it is not repeated.
+            raise InvalidInput("buffers/uri", "data in another file", "data within the file")
+        check_gltf(scene, len(data), MOST_FACES)
         kept = json.dumps(_stripped(scene)).encode()
     if kind == "gltf":
         return kept

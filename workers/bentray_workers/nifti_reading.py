@@ -53,6 +53,7 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
             raise InvalidInput("file", f"packed content of another kind ({start[:8]!r})", "NIfTI")
         try:
             header: Any = kind(start[:size], check=False)
+            _check_numbers(header)
             header.check_fix(_unheard)
             dtype, shape = header.get_data_dtype(), tuple(int(n) for n in header.get_data_shape())
             slope, intercept = header.get_slope_inter()
@@ -74,8 +75,21 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
                 values = values * np.float32(slope) + np.float32(intercept)
         values, affine = turned(values, affine, "affine")
         scale = UNITS_M["mm" if unit == "unknown" else unit]
-        spacing = scale * np.linalg.norm(affine[:3, :3], axis=0)
+        with np.errstate(over="ignore"):
+            spacing = scale * np.linalg.norm(affine[:3, :3], axis=0)
         return Volume.of(values, spacing.tolist(), (scale * affine[:3, 3]).tolist(), _text(header["descrip"]))
+
+
+def _check_numbers(header: Any) -> None:
+    """Refuse numbers that nibabel would put right by guesses of its own."""
+    for name in ("scl_slope", "scl_inter"):
+        # NaN is how nibabel itself writes that there is none.
+        if np.isinf(header[name]):
+            raise InvalidInput(name, float(header[name]), "a finite number")
+    steps = header["pixdim"][1:4]
+    placed = header["sform_code"] != 0 or header["qform_code"] != 0
+    if not placed and (steps == 0.0).any():
+        raise InvalidInput("pixdim", [float(step) for step in steps], "distances other than 0")
 
 
 def _affine(header: Any) -> Floats:

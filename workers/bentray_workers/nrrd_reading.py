@@ -39,6 +39,10 @@ NRRD_TYPES = {
 }
 
 
+# What a header says of values that do not follow it.
+ELSEWHERE = ("data file", "datafile", "byte skip", "byteskip", "line skip", "lineskip")
+
+
 def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
     """The volume in an NRRD file with its values after the header; raises InvalidInput for anything else.
 
@@ -57,12 +61,10 @@ def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
     accepted = "a whole NRRD file in three dimensions"
     with refusing("file", accepted):
         header: Any = nrrd.read_header(start[: min(ends)].splitlines(keepends=True))
-        # A data file beside the header could be any file of this machine.
-        for field in ("data file", "datafile", "byte skip", "byteskip", "line skip", "lineskip"):
-            if header.get(field):
-                raise InvalidInput(
-                    field, repr(header[field])[:80], "values in the same file, after the header"
-                )
+        # A data file beside the header could be any file of this machine; its name is not repeated.
+        for field in ELSEWHERE:
+            if field in header:
+                raise InvalidInput(field, "values elsewhere", "values in the same file, after the header")
         kinds = set(header.get("kinds", ())) - {"domain", "space", "none", "???"}
         if kinds:
             raise InvalidInput("kinds", ", ".join(sorted(kinds)), "domain or space along each axis")
@@ -71,6 +73,8 @@ def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
             raise InvalidInput("type", repr(header["type"]), "a type of numbers")
         dtype = dtype.newbyteorder(">" if header.get("endian") == "big" else "<")
         shape = tuple(int(n) for n in header["sizes"])
+        if header["dimension"] != len(shape):
+            raise InvalidInput("dimension", header["dimension"], f"{len(shape)}, as many as there are sizes")
         count = declared("sizes", shape, dtype, check)
         file.seek(min(ends))
         encoding = header["encoding"]
@@ -85,7 +89,8 @@ def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
             raise InvalidInput("encoding", repr(encoding), "raw or gzip")
         values = np.frombuffer(data, dtype).reshape(shape, order="F")
         values, affine = turned(values, _affine(header), "space directions")
-        steps = np.linalg.norm(affine[:3, :3], axis=0)
+        with np.errstate(over="ignore"):
+            steps = np.linalg.norm(affine[:3, :3], axis=0)
         return Volume.of(values, steps.tolist(), affine[:3, 3].tolist(), str(header.get("content", "")))
 
 
@@ -97,7 +102,10 @@ def _affine(header: Any) -> Floats:
     affine = np.eye(4)
     directions = header.get("space directions")
     if directions is None:
-        affine[:3, :3] = np.diag(np.multiply(header.get("spacings", [1.0] * 3), _metres(own or space)))
+        spacings = header.get("spacings", [1.0] * 3)
+        if len(spacings) != 3 or not all(0.0 < step < np.inf for step in spacings):
+            raise InvalidInput("spacings", list(spacings), "three finite distances above 0")
+        affine[:3, :3] = np.diag(np.multiply(spacings, _metres(own or space)))
     else:
         affine[:3, :3] = (directions * around).T
     affine[:3, 3] = np.multiply(header.get("space origin", [0.0] * 3), around)

@@ -13,6 +13,8 @@ from bentray_kernels.errors import InvalidInput
 
 # Cosine between two axes; rounding of headers leaves far less.
 MOST_SHEAR = 1e-3
+# Squares of longer steps leave the range of numbers; no grid has them.
+LARGEST = 1e100
 
 
 def turned(values: NDArray[Any], affine: Floats, field: str) -> tuple[NDArray[Any], Floats]:
@@ -28,8 +30,11 @@ def turned(values: NDArray[Any], affine: Floats, field: str) -> tuple[NDArray[An
     """
     from nibabel.orientations import apply_orientation, inv_ornt_aff, io_orientation
 
+    # NaN is not below anything.
+    if values.ndim != 3 or not (np.abs(affine) < LARGEST).all():
+        return values, affine
     lengths = np.linalg.norm(affine[:3, :3], axis=0)
-    if values.ndim != 3 or not (np.isfinite(affine).all() and lengths.all()):
+    if not lengths.all():
         return values, affine
     axes = affine[:3, :3] / lengths
     cosine = float(np.abs(axes.T @ axes - np.eye(3)).max())

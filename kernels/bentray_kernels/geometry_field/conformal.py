@@ -121,8 +121,10 @@ class Disk:
         source[self.boundary] += turning
         # Inside −K remains, at the boundary k̃ − k.
         scale = np.concatenate(([0.0], self._neumann.solve(source[1:])))[self.boundary]
-        lengths = self.side_lengths * np.exp(0.5 * (scale + np.roll(scale, -1)))
-        return self._drawn(turning, lengths * (self.side_lengths.sum() / lengths.sum()))
+        # Of needles the layout is no number; who draws it leaves it then.
+        with np.errstate(over="ignore", invalid="ignore"):
+            lengths = self.side_lengths * np.exp(0.5 * (scale + np.roll(scale, -1)))
+            return self._drawn(turning, lengths * (self.side_lengths.sum() / lengths.sum()))
 
     def isometric_layout(self) -> Floats:
         """The flat layout that keeps the lengths of the boundary, (vertices, 2), without a second solver."""

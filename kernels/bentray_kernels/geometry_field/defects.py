@@ -13,6 +13,9 @@ from .mesh import TriangleMesh
 from .opening import cut_open
 from .topology import components, edges_of, side_ends, topology_of
 
+# Height of a triangle over its longest side: angles of thinner ones are lost in every computation with them.
+THINNEST = 1e-9
+
 
 @dataclass(frozen=True)
 class SoundMesh:
@@ -59,9 +62,13 @@ def sound(vertices: Floats, faces: NDArray[np.integer]) -> SoundMesh:
     joined = inverse.reshape(-1, 3)
     origin = first[used]
     mesh = TriangleMesh(vertices[origin], joined.astype(np.int32))
-    flat = int(_flat(mesh).sum())
+    thin = _thinness(mesh)
+    flat, needles = int((thin == 0.0).sum()), int((thin < THINNEST).sum())
     if flat:
         raise InvalidInput("faces", f"{flat} without area", "triangles whose corners are not on one line")
+    if needles:
+        accepted = f"triangles as high as {THINNEST:g} of their longest side or higher"
+        raise InvalidInput("faces", f"{needles} needles without height", accepted)
     oriented, turned = _turned_alike(joined)
     topology = topology_of(oriented)
     pieces = int(topology.pieces.max()) + 1
@@ -106,13 +113,14 @@ def _plain(vertices: Floats, faces: Ints) -> None:
         raise InvalidInput("vertices", f"a box of {span:g}", "a longest side between 1e-60 and 1e60")
 
 
-def _flat(mesh: TriangleMesh) -> NDArray[np.bool_]:
-    """(faces,) whether the height over the longest side is lost in the rounding of the places."""
+def _thinness(mesh: TriangleMesh) -> Floats:
+    """(faces,) height over the longest side; 0 where it is lost in the rounding of the places."""
     corners = mesh.corners
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1).max(axis=1)
     rounding = np.finfo(np.float64).eps * np.abs(mesh.vertices).max()
-    height = 2.0 * np.linalg.norm(mesh.face_normals, axis=1) / np.where(longest > 0.0, longest, 1.0)
-    return np.asarray(height <= 4.0 * rounding)
+    longest = np.where(longest > 0.0, longest, 1.0)
+    height = 2.0 * np.linalg.norm(mesh.face_normals, axis=1) / longest
+    return np.asarray(np.where(height <= 4.0 * rounding, 0.0, height / longest))
 
 
 def _turned_alike(faces: Ints) -> tuple[Ints, int]:

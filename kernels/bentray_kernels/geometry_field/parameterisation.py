@@ -50,6 +50,10 @@ class Parameterisation:
     quasi_conformal: Floats
 
 
+# Longest side of a face that counts beside the unit cube: tables keep places in float32.
+LEAST_SIDE = 1e-8
+
+
 def parameterise(mesh: TriangleMesh) -> Parameterisation:
     """Cut a surface to a disk and lay it out on the unit square, conformally and without folds.
 
@@ -62,9 +66,27 @@ def parameterise(mesh: TriangleMesh) -> Parameterisation:
 
     Raises:
         InvalidInput: for several pieces, for fans that touch in a vertex alone, for edges of three faces, for
-            faces without area.
+            faces without area, for faces that are lost beside the whole, and for triangles too thin for any
+            layout.
     """
-    mesh = mesh.in_unit_cube()
+    try:
+        found = _parameterised(mesh.in_unit_cube())
+    except RuntimeError as error:
+        # SuperLU says so of the matrix of angles that are all 0 or π.
+        if "singular" not in str(error):
+            raise
+        raise _too_thin() from None
+    if not (math.isfinite(found.area_stretch) and np.isfinite(found.quasi_conformal).all()):
+        raise _too_thin()
+    return found
+
+
+def _too_thin() -> InvalidInput:
+    accepted = "triangles that are less thin; remesh the surface with sides of one length"
+    return InvalidInput("mesh", "triangles too thin to be laid out", accepted)
+
+
+def _parameterised(mesh: TriangleMesh) -> Parameterisation:
     topology = _checked(mesh)
     cutter = Cutter(mesh, topology)
     cut = cutter.first()
@@ -86,7 +108,8 @@ def parameterise(mesh: TriangleMesh) -> Parameterisation:
         if end is None or number == MOST_ENDS:
             break
         cut = cutter.grown(cut, end.vertex)
-    assert best is not None
+    if best is None:
+        raise _too_thin()
     return _laid_out(mesh, areas, *best)
 
 
@@ -104,6 +127,11 @@ def _checked(mesh: TriangleMesh) -> Topology:
     touching = int(fans.max()) + 1 - len(np.unique(topology.faces))
     if touching > 0:
         raise InvalidInput("faces", f"{touching} vertices where fans of faces touch", "none")
+    longest = np.linalg.norm(np.roll(mesh.corners, -1, axis=1) - mesh.corners, axis=-1).max(axis=1)
+    lost = int((longest < LEAST_SIDE).sum())
+    if lost:
+        accepted = f"sides of {LEAST_SIDE:g} of the whole mesh or more"
+        raise InvalidInput("mesh", f"{lost} faces that are lost beside the whole", accepted)
     flat = (np.linalg.norm(mesh.face_normals, axis=1) == 0.0).sum()
     if flat:
         raise InvalidInput("faces", f"{flat} without area", "none")

@@ -84,7 +84,7 @@ def test_a_hostile_mesh_is_refused_by_name(meshes, name):
 
 
 @pytest.mark.parametrize("name", hostile_meshes.TAKEN)
-def test_a_scene_in_circles_is_read_once(meshes, name):
+def test_a_scene_is_read_once(meshes, name):
     assert meshes[name].answer["ok"]["faces"] == 1
 
 

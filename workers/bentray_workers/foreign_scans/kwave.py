@@ -26,6 +26,7 @@ from ..bounded_reading import refusing as refusing_zip
 from ..hdf5_reading import Limits, Reader, opened, refusing
 from .arrays import LARGEST_ROW, LARGEST_TOTAL, LARGEST_WHOLE
 from .npz import Npz
+from .zip_checks import WHOLE, check_zip
 
 GEOMETRY = "geometry.npz"
 OUTPUT = re.compile(r"(object|water)/[^/]+\.(h5|hdf5)")
@@ -59,9 +60,9 @@ class KWave:
     def __init__(self, archive: zipfile.ZipFile, scratch: Path) -> None:
         self._zip = archive
         self._scratch = scratch
-        names = [member.filename for member in archive.infolist()]
-        if len(names) > MOST_OUTPUTS:
-            raise InvalidInput("file", f"{len(names)} members", f"at most {MOST_OUTPUTS}")
+        with refusing_zip("file", WHOLE):
+            check_zip(archive, MOST_OUTPUTS)
+        names = archive.namelist()
         if GEOMETRY not in names:
             raise InvalidInput(GEOMETRY, "nothing", "positions, tx and rx beside the outputs of k-Wave")
         self._outputs = {
@@ -138,6 +139,9 @@ class KWave:
             data = file.read(most + 1)
         if len(data) > most:
             raise InvalidInput(name, f"more than {most} bytes unpacked", f"at most {most}")
+        told = self._zip.getinfo(name).file_size
+        if len(data) != told:
+            raise InvalidInput(name, f"{len(data)} bytes, of which the directory says {told}", WHOLE)
         return data
 
 

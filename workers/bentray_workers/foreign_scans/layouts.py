@@ -17,6 +17,7 @@ from bentray_kernels.limits import check_size
 from ..dataset_format import NUMBERS, PAIR_ARRAYS
 from .arrays import Arrays, small
 from .fields import declared, indices, number, stand_in, there, truth, wanted, water
+from .zip_checks import plain_name
 
 # Samples of a time axis may be off even steps by this part of a step.
 UNEVEN = 0.01
@@ -40,7 +41,7 @@ def layout_of(arrays: Arrays) -> Layout:
     for marks, layout in LAYOUTS:
         if marks & names:
             return layout(arrays)
-    shown = ", ".join(sorted(names)[:8]) or "none"
+    shown = ", ".join(sorted(filter(plain_name, names))[:8]) or "none"
     raise InvalidInput(
         "file",
         f"{arrays.kind} with the arrays {shown}"[:160],

@@ -15,13 +15,11 @@ from bentray_kernels.errors import InvalidInput
 from ..bounded_reading import LONGEST_HEADER, at_end, refusing
 from ..npy_headers import PARSING
 from .arrays import check_declared, check_row
+from .zip_checks import PACKING, check_zip
 
 START = b"PK\x03\x04"
 SUFFIX = ".npy"
 MOST_MEMBERS = 1000
-
-# Deflate packs at best 1032 times.
-PACKING = 1100.0
 
 WHOLE = "a whole .npz of plain arrays"
 
@@ -42,12 +40,10 @@ class Npz:
     def __init__(self, archive: zipfile.ZipFile | IO[bytes]) -> None:
         with refusing("file", WHOLE):
             self._zip = archive if isinstance(archive, zipfile.ZipFile) else zipfile.ZipFile(archive)
-        found = self._zip.infolist()
-        if len(found) > MOST_MEMBERS:
-            raise InvalidInput("file", f"{len(found)} members", f"at most {MOST_MEMBERS}")
+            check_zip(self._zip, MOST_MEMBERS)
         self._members = {
             member.filename.removesuffix(SUFFIX): member
-            for member in found
+            for member in self._zip.infolist()
             if member.filename.endswith(SUFFIX)
         }
 
@@ -65,7 +61,7 @@ class Npz:
         with refusing(name, WHOLE), self._open(name) as file:
             shape, fortran, dtype = self._header(name, file)
             data = _exactly(name, file, math.prod(shape) * dtype.itemsize)
-            at_end(file)
+            self._check_end(name, file)
             flat = np.frombuffer(data, dtype=dtype)
             return flat.reshape(shape[::-1]).T if fortran else flat.reshape(shape)
 
@@ -81,14 +77,18 @@ class Npz:
                     data = _exactly(name, file, math.prod(shape[1:]) * dtype.itemsize)
                 yield np.frombuffer(data, dtype=dtype).reshape(shape[1:])
             with refusing(name, WHOLE):
-                at_end(file)
+                self._check_end(name, file)
 
     def _open(self, name: str) -> IO[bytes]:
         with refusing(name, WHOLE):
-            member = self._members[name]
-            if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) or member.flag_bits & 1:
-                raise InvalidInput(name, "another packing, or a password", "numpy.savez or savez_compressed")
-            return self._zip.open(member)
+            return self._zip.open(self._members[name])
+
+    def _check_end(self, name: str, file: IO[bytes]) -> None:
+        """See that the values end where the member does, by its bytes and by the directory."""
+        at_end(file)
+        told = self._members[name].file_size
+        if file.tell() != told:
+            raise InvalidInput(name, f"{file.tell()} bytes, of which the directory says {told}", WHOLE)
 
     def _header(self, name: str, file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
         version = np.lib.format.read_magic(file)

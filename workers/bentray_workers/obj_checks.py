@@ -1,0 +1,36 @@
+"""OBJ held against what a face and a vertex are; the first line that is neither is told by its number."""
+
+from __future__ import annotations
+
+import re
+
+from bentray_kernels.errors import InvalidInput
+
+# A line that is shown in a refusal is cut to this.
+SHOWN = 60
+
+# Lines that go on after a backslash; faces of fewer than three corners; vertices of fewer than three numbers.
+CONTINUED = re.compile(rb"\\[ \t]*\r?\n")
+SHORT_FACE = re.compile(rb"^[ \t]*f(?:[ \t]+[^\s#]+){0,2}[ \t]*(?:#.*)?\r?$", re.MULTILINE)
+SHORT_VERTEX = re.compile(rb"^[ \t]*v(?:[ \t]+[^\s#]+){0,2}[ \t]*(?:#.*)?\r?$", re.MULTILINE)
+
+
+def check_obj(data: bytes) -> None:
+    """Refuse an OBJ with a face of fewer than three corners, which readers leave out, or with half a vertex.
+
+    Args:
+        data: the whole file.
+
+    Raises:
+        InvalidInput: ``faces`` or ``vertices``, with the line.
+    """
+    text = CONTINUED.sub(b" ", data)
+    for field, pattern, accepted in (
+        ("vertices", SHORT_VERTEX, "three numbers, x y z"),
+        ("faces", SHORT_FACE, "three corners or more"),
+    ):
+        found = pattern.search(text)
+        if found is not None:
+            line = text.count(b"\n", 0, found.start()) + 1
+            shown = found[0].strip()[:SHOWN].decode(errors="replace")
+            raise InvalidInput(field, f"{shown!r} in line {line}", accepted)
