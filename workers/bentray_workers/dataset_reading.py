@@ -62,7 +62,8 @@ def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) ->
     tx, rx = _indices(reader, "acquisition/tx"), _indices(reader, "acquisition/rx")
     slices = _floats(reader, "slice/z_m", "(nz,) numbers in m")
     pairs = (*(() if slices is None else slices.shape[:1]), *tx.shape[:1], *rx.shape[:1])
-    for place in (*PAIR_ARRAYS, "mask/valid"):
+    # Lists that are none are refused below.
+    for place in (*PAIR_ARRAYS, "mask/valid") if tx.ndim == rx.ndim == 1 else ():
         # Before they are read: they are by far the largest.
         shape = _shape(reader, place)
         if 0 < math.prod(pairs) < math.prod(shape):

@@ -73,9 +73,9 @@ def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
             raise InvalidInput("type", repr(header["type"]), "a type of numbers")
         dtype = dtype.newbyteorder(">" if header.get("endian") == "big" else "<")
         shape = tuple(int(n) for n in header["sizes"])
+        count = declared("sizes", shape, dtype, check)
         if header["dimension"] != len(shape):
             raise InvalidInput("dimension", header["dimension"], f"{len(shape)}, as many as there are sizes")
-        count = declared("sizes", shape, dtype, check)
         file.seek(min(ends))
         encoding = header["encoding"]
         if encoding == "raw":
@@ -104,7 +104,9 @@ def _affine(header: Any) -> Floats:
     if directions is None:
         spacings = header.get("spacings", [1.0] * 3)
         if len(spacings) != 3 or not all(0.0 < step < np.inf for step in spacings):
-            raise InvalidInput("spacings", list(spacings), "three finite distances above 0")
+            raise InvalidInput(
+                "spacings", [float(step) for step in spacings], "three finite distances above 0"
+            )
         affine[:3, :3] = np.diag(np.multiply(spacings, _metres(own or space)))
     else:
         affine[:3, :3] = (directions * around).T

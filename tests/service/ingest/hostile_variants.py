@@ -35,8 +35,8 @@ NRRDS: dict[str, tuple[bytes, str]] = {
         f"sizes {told}": (nrrd(sizes=told), "sizes")
         for told in ("-3 -4 5", "0 4 5", "3 4 1000000000", "3 4 99999999999999999999", "1 12 5")
     },
-    "two sizes": (nrrd(sizes="12 5"), "dimension"),
-    "four sizes": (nrrd(sizes="3 4 5 1"), "dimension"),
+    "two sizes": (nrrd(sizes="12 5"), "sizes"),
+    "four sizes": (nrrd(sizes="3 4 5 1"), "sizes"),
     "sizes of words": (nrrd(sizes="a b c"), "file"),
     **{
         f"spacings {told}": (nrrd(f"spacings: {told}"), "spacings")

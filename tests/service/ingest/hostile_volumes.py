@@ -140,7 +140,7 @@ REFUSED: dict[str, tuple[bytes, Given, str]] = {
     "a declared NRRD bomb": (nrrd(encoding="gzip", sizes="3 4 4000000000", values=b""), {}, "sizes"),
     "a header of NRRD without an end": (b"NRRD0004\n" + b"# nothing\n" * 200_000, {}, "file"),
     "an unknown unit": (nrrd("spacings: 1 1 1", 'units: "ell" "ell" "ell"'), {}, "units"),
-    "spacings that are none": (nrrd("spacings: nan nan nan"), {}, "spacing_m"),
+    "spacings that are none": (nrrd("spacings: nan nan nan"), {}, "spacings"),
     "endless directions": (
         nrrd("space: LPS", "space directions: (inf,0,0) (0,1,0) (0,0,1)"),
         {},
