@@ -7,7 +7,6 @@ from collections.abc import AsyncIterator
 from contextlib import ExitStack, asynccontextmanager
 from typing import Any
 
-import anyio
 from fastapi import Depends, FastAPI
 from fastapi.security import HTTPBearer
 from fastapi.staticfiles import StaticFiles
@@ -20,11 +19,14 @@ from .access.audit import Audit
 from .access.door import Door
 from .access.guard import Guard
 from .access.key_watch import KeyWatch
+from .access.quota import Quota
 from .compute import Cluster, Compute
 from .housekeeping import Housekeeper
 from .ingest.append import Hold
 from .ingest.canonical import Limits
+from .ingest.fair_queue import FairQueue, readers_at_once
 from .ingest.reader import Store, UploadReader
+from .ingest.upload_limits import UploadLimits
 from .jobs.feed import Feed
 from .jobs.runner import Runner
 from .metrics import Metrics
@@ -41,7 +43,6 @@ from .routes import (
     pages,
     refraction,
     tus,
-    uploads,
     volumes,
 )
 from .settings import ServiceSettings
@@ -97,7 +98,6 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
         try:
             app.state.parts = await run_in_threadpool(_open, settings, cluster, stack, app.state.leaving)
             app.state.metrics.watch(app.state.parts)
-            app.state.ingest_limiter = anyio.CapacityLimiter(uploads.INGESTS_AT_ONCE)
             yield
             await app.state.parts.pictures.close()
         finally:
@@ -151,6 +151,8 @@ def _open(
     files = Files(settings.data_dir, store)
     orphans = Orphans(files, database, keeps=settings.storage_url is None)
     orphans.begin()
+    quota = Quota(database, settings.max_tenant_bytes)
+    quota.begin(files, alone=settings.database_url is None)
     door = Door(settings, Keys(database))
     if cluster is None:
         cluster = stack.enter_context(
@@ -182,7 +184,10 @@ def _open(
         "mesh": Meshes(database),
     }
     limits = Limits(settings.ingest_memory_bytes, settings.ingest_seconds, files.scratch)
-    reader = UploadReader(pieces, files, stores, limits, settings.upload_keep_s)
+    ingest_queue = FairQueue(readers_at_once(settings.ingest_memory_bytes))
+    ingest_queue.start()
+    stack.callback(ingest_queue.stop)
+    reader = UploadReader(pieces, files, stores, limits, settings.upload_keep_s, ingest_queue, quota)
     reader.start()
     stack.callback(reader.stop)
     housekeeper = Housekeeper(
@@ -190,6 +195,7 @@ def _open(
         files,
         deletion,
         hold,
+        quota,
         Ages(database),
         ObservedTime(database),
         orphans,
@@ -213,6 +219,9 @@ def _open(
         volumes=Volumes(database),
         meshes=Meshes(database),
         uploads=pieces,
+        quota=quota,
+        upload_limits=UploadLimits(),
+        ingest_queue=ingest_queue,
         deletion=deletion,
         hold=hold,
         reader=reader,

@@ -10,7 +10,8 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from .ingest.append import Hold
+from .access.quota import Quota
+from .ingest.append import Hold, remove
 from .refusals import DatabaseAway, InUse, Locked, StorageAway, UnknownId
 from .storage.ages import Aged, Ages
 from .storage.deletion import Deletion, Stored
@@ -51,6 +52,7 @@ class Housekeeper:
         files: Files,
         deletion: Deletion,
         hold: Hold,
+        quota: Quota,
         ages: Ages,
         observed: ObservedTime,
         orphans: Orphans,
@@ -61,6 +63,7 @@ class Housekeeper:
         """Args:
         uploads, files, deletion, orphans: what it works on.
         hold: of an upload, so that none vanishes under whoever writes to it.
+        quota: whose reservations are renewed as long as this process lives.
         ages, observed: what tells since when something is too old.
         keep_days: how long datasets, volumes and meshes are kept; None: until they are deleted.
         upload_keep_s: how long an upload is kept after something came, s.
@@ -70,6 +73,7 @@ class Housekeeper:
         self._files = files
         self._deletion = deletion
         self._hold = hold
+        self._quota = quota
         self._ages = ages
         self._observed = observed
         self._orphans = orphans
@@ -91,6 +95,7 @@ class Housekeeper:
         tidied = -TIDY_SECONDS
         while True:
             try:
+                self._quota.renew()
                 self.sweep()
                 if time.monotonic() - tidied >= TIDY_SECONDS:
                     self._files.store.tidy(self._leaving.is_set)
@@ -151,5 +156,5 @@ class Housekeeper:
         """
         if row["state"] == "reading":
             raise InUse("upload", f"{row['id']}, which is being read", "one that is not")
-        self._files.of(Tenant(row["tenant"])).upload(row["id"]).unlink(missing_ok=True)
+        remove(self._files.of(Tenant(row["tenant"])).upload(row["id"]))
         self._uploads.remove(row["id"])

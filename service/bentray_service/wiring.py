@@ -11,10 +11,13 @@ from .access.audit import Audit
 from .access.caller import Caller
 from .access.door import Door
 from .access.key_watch import KeyWatch
+from .access.quota import Quota
 from .compute import Compute
 from .housekeeping import Housekeeper
 from .ingest.append import Hold
+from .ingest.fair_queue import FairQueue
 from .ingest.reader import UploadReader
+from .ingest.upload_limits import UploadLimits
 from .jobs.feed import Feed
 from .jobs.runner import Runner
 from .pictures import Pictures
@@ -47,6 +50,9 @@ class Parts:
     meshes: Meshes
     geometry_fields: GeometryFields
     uploads: Uploads
+    quota: Quota
+    upload_limits: UploadLimits
+    ingest_queue: FairQueue
     deletion: Deletion
     hold: Hold
     reader: UploadReader

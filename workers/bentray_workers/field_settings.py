@@ -16,6 +16,15 @@ from .asked_fields import asked, check
 # Of the meshes that are laid out by one task; its time grows a little faster than they do.
 MOST_FACES = 300_000
 
+# Of the tables: a face and a fraction; a face.
+OUTER_ENTRY_BYTES, INNER_ENTRY_BYTES = 8, 4
+# Of the geometry image: a position, a normal, a colour and whether it is valid.
+PIXEL_BYTES = 37
+# Of the chart: corners and a vertex with its place on the square, each face with vertices of its own at
+# worst; and for each face its point.
+FACE_BYTES = 3 * (4 + 24 + 16) + 8
+HEADER_BYTES = 64 * 2**10
+
 # Changed whenever the same mesh and settings give other tables.
 VERSION = 1
 
@@ -57,6 +66,17 @@ class FieldSettings:
     def plain(self) -> dict[str, Any]:
         """Its fields as JSON has them."""
         return asdict(self)
+
+    def largest_bytes(self, faces: int) -> int:
+        """Of the files of a field, at most.
+
+        Args:
+            faces: of the mesh.
+        """
+        outer: int = (6 * self.samples**2) ** 2 * OUTER_ENTRY_BYTES
+        points = min(faces, 6 * self.divisions**3)
+        inner = points * 6 * self.inner_samples**2 * INNER_ENTRY_BYTES
+        return outer + inner + self.image_size**2 * PIXEL_BYTES + faces * FACE_BYTES + HEADER_BYTES
 
     def content(self, mesh: str) -> str:
         """SHA-256 that names the field of a mesh under these settings.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,9 @@ MOST_NODES = 2**26
 # Edges of the grid that the surface cuts; it has some eight triangles for each.
 MOST_CROSSINGS = 75_000
 MOST_STEP = 32
+# Of an edge that is cut, not packed: eight triangles, and as many vertices at worst.
+EDGE_BYTES = 8 * (3 * 4 + 3 * 8)
+HEADER_BYTES = 64 * 2**10
 
 
 def check_nodes(shape: tuple[int, ...], step: int) -> None:
@@ -33,6 +38,12 @@ def check_nodes(shape: tuple[int, ...], step: int) -> None:
         raise InvalidInput("step", step, f"a whole number from 1 to {MOST_STEP}")
     if np.prod(shape, dtype=np.int64) > MOST_NODES:
         raise InvalidInput("volume", f"shape {tuple(shape)}", f"at most {MOST_NODES} nodes")
+
+
+def largest_bytes(shape: Sequence[int], step: int) -> int:
+    """Bytes that the mesh of a volume of this shape takes at most."""
+    nodes = math.prod(-(-n // step) for n in shape)
+    return min(MOST_CROSSINGS, len(shape) * nodes) * EDGE_BYTES + HEADER_BYTES
 
 
 def mesh_volume(path: Path, iso: float | None, step: int, target: Path) -> dict[str, Any]:

@@ -15,6 +15,9 @@ from bentray_kernels.tomography.chains import BATCH
 from bentray_kernels.tomography.settings import DEVIATION, LEAST_NODES, Settings
 
 from .arrival_memory import arrival_tasks
+from .checkpoints import KEPT
+from .dataset_format import PAIR_ARRAYS
+from .reconstruction_file import IMAGES
 from .task_memory import (
     MIB,
     REAL,
@@ -37,6 +40,9 @@ WARM_BYTES = 384 * MIB
 
 # Dask gives a worker no task while it holds more than this part of its limit.
 USABLE = 0.8
+
+# What a result and a checkpoint say beside their images.
+RECORD_BYTES = 64 * 2**10
 
 # Nodes that an emitter's rays cross in half a second of SART, on a core of 2020; only tells how many tasks.
 NODES_IN_A_TASK = 1.5e7
@@ -73,6 +79,7 @@ class Plan:
             process keeps of the dataset.
         field_bytes, rows_bytes, state_bytes: of a travel time while it is made; of all rows of an image; of
             what comes back between two calls.
+        stored_bytes: on disk while it runs, at most: the result, and the checkpoints beside it.
         why: all of it in a sentence.
     """
 
@@ -84,6 +91,7 @@ class Plan:
     field_bytes: int
     rows_bytes: int
     state_bytes: int
+    stored_bytes: int
     why: str
 
     @property
@@ -152,6 +160,7 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[Offer]) -> Plan:
         max(field_bytes(shape, way.front) for way in ways),
         max(rows_bytes(scan, way, rays_of(scan, way)) for way in ways),
         state_bytes(shape, settings),
+        _stored_bytes(scan, settings, shape),
         _why(scan, settings, decomposition, lane, tasks, (name, size), offers, able),
     )
 
@@ -215,6 +224,14 @@ def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
         each = passes * math.ceil(emitters / batch)
     each += (parts + 1) * (bool(settings.attenuation and scan.amplitudes) + settings.resolution_check)
     return problems * each + 1
+
+
+def _stored_bytes(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
+    """As if nothing could be packed: all images of the result, checkpoints, and what is picked in traces."""
+    problems = 1 if settings.decomposition == "volume" else scan.slices
+    picked = len(PAIR_ARRAYS) * REAL * scan.pairs if scan.traces_bytes else 0
+    each = len(IMAGES) * REAL * math.prod(shape) + KEPT * state_bytes(shape, settings) + RECORD_BYTES
+    return problems * each + picked
 
 
 def _advice(scan: Summary, settings: Settings, room: float) -> str:

@@ -32,6 +32,8 @@ FORMATS = ("zip", "apng")
 MOST_FRAMES = 720
 # Of all frames; the packer of an APNG holds most of them at once.
 MOST_PIXELS = 2**27
+# Of a pixel that is not packed, and of what a picture and its entry in an archive say beside pixels.
+PIXEL_BYTES, PICTURE_BYTES = 4, 4096
 # Below a picture that somebody waits for.
 PRIORITY = 0
 
@@ -65,6 +67,11 @@ class Turntable(RefractionView):
             raise InvalidInput(
                 "frames", f"{self.frames}, {pixels} pixels in all", f"at most {MOST_PIXELS} pixels"
             )
+
+    @property
+    def largest_bytes(self) -> int:
+        """Of its pictures and of the file that is made of them, as if nothing could be packed."""
+        return 2 * (self.frames * (PIXEL_BYTES * self.width + 1) * self.height + PICTURE_BYTES * self.frames)
 
     def frame(self, number: int) -> RefractionView:
         """The view of one picture, from 0."""

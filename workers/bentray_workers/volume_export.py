@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,6 +46,16 @@ class Format:
     extension: str
     media_type: str
     write: Callable[[Path, Content], None]
+
+
+# Of the numbers of a volume, and of what a file says beside them.
+NUMBER_BYTES, HEADER_BYTES = 8, 64 * 2**10
+
+
+def largest_bytes(shape: Sequence[int], *, uploaded: bool) -> int:
+    """Bytes that a volume of this shape takes in any of the formats, at most."""
+    images = 1 if uploaded else len(IMAGES)
+    return images * NUMBER_BYTES * math.prod(shape) + HEADER_BYTES
 
 
 def export_volume(volume: Path, *, target: Path, name: str) -> None:

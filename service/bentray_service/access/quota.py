@@ -1,28 +1,105 @@
-"""How much a tenant may store."""
+"""How much a tenant may store: reserved before the work begins, so that nothing comes together beyond it."""
 
 from __future__ import annotations
 
-from ..refusals import QuotaUsedUp
-from ..storage.tenant_files import TenantFiles
+import os
+import secrets
+import socket
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+from starlette.concurrency import run_in_threadpool
+
+from ..storage import usage
+from ..storage.database import Database
+from ..storage.files import Files
+from ..storage.tenants import Tenant
+from ..storage.usage import Lease, Usage
+
+# How long a process that says nothing is believed to be at work on what it has reserved room for, s.
+LEASE_S = 900.0
 
 
-def check_room(files: TenantFiles, most: int, wanted: int = 1) -> None:
-    """Refuse what would not fit.
+class Quota:
+    """Reserves room for what tenants are about to store, in the database: services that share it agree."""
 
-    What several requests bring at the same moment may together go beyond it, once.
+    def __init__(self, database: Database, most_bytes: int, clock: Callable[[], float] = time.time) -> None:
+        """Args:
+        database: which holds the rows.
+        most_bytes: that a tenant may store.
+        clock: seconds since 1970.
+        """
+        self.most_bytes = most_bytes
+        self._database = database
+        self._clock = clock
+        self._owner = f"{socket.gethostname()[:40]}-{os.getpid()}-{secrets.token_hex(4)}"
 
-    Args:
-        files: of the tenant.
-        most: bytes that it may store.
-        wanted: bytes that are to come.
+    def of(self, tenant: Tenant) -> Usage:
+        """What a tenant stores and has reserved."""
+        with self._database.read() as connection:
+            return usage.usage_of(connection, tenant)
 
-    Raises:
-        QuotaUsedUp: when there is less room.
-    """
-    used = files.bytes_used()
-    if used + wanted > most:
-        raise QuotaUsedUp(
-            "storage",
-            f"{used} bytes stored, {wanted} more asked for",
-            f"at most {most} bytes for a tenant (BENTRAY_MAX_TENANT_BYTES); delete something",
-        )
+    @asynccontextmanager
+    async def reserved(self, tenant: Tenant, name: str, size: int) -> AsyncIterator[None]:
+        """Reserve room while the block runs; what has been stored by its end stays, without anything else.
+
+        Args:
+            tenant: whose it is.
+            name: of the thing that is to come.
+            size: bytes that it will have at most; ``resize`` changes it.
+
+        Raises:
+            QuotaUsedUp: when there is less room.
+        """
+        await run_in_threadpool(self.resize, tenant, name, size)
+        try:
+            yield
+        finally:
+            await run_in_threadpool(self.release, tenant, name)
+
+    def resize(self, tenant: Tenant, name: str, size: int) -> None:
+        """Change how much is reserved for a thing; it is reserved for this process if nothing was.
+
+        Raises:
+            QuotaUsedUp: when there is less room; what was reserved stays so.
+        """
+        with self._database.write() as connection:
+            usage.reserve(connection, tenant, name, size, self.most_bytes, self._lease())
+
+    def stored(self, tenant: Tenant, name: str, size: int) -> None:
+        """Say that a thing without a row of its own is stored now, and how large it is."""
+        with self._database.write() as connection:
+            usage.store(connection, tenant, name, size)
+
+    def gone(self, tenant: Tenant, name: str) -> None:
+        """Say that a thing without a row of its own is stored no more."""
+        with self._database.write() as connection:
+            usage.forget(connection, tenant, [name])
+
+    def release(self, tenant: Tenant, name: str) -> None:
+        """Give up a reservation; what is stored by now stays."""
+        with self._database.write() as connection:
+            usage.release(connection, tenant, name)
+
+    def begin(self, files: Files, *, alone: bool) -> None:
+        """Drop what processes that died had reserved, and take the sizes of the files that lie here.
+
+        Args:
+            files: the data folder.
+            alone: no other service uses the database, so that none of the reservations is of a living one.
+        """
+        with self._database.write() as connection:
+            usage.drop_leased(connection) if alone else usage.drop_expired(connection)
+        for tenant, sizes in files.sizes():
+            with self._database.write() as connection:
+                usage.correct(connection, tenant, sizes)
+
+    def renew(self) -> None:
+        """Say that this process is still at work, and drop what those that died had reserved."""
+        with self._database.write() as connection:
+            usage.renew(connection, self._lease())
+            usage.drop_expired(connection)
+
+    def _lease(self) -> Lease:
+        return Lease(self._owner, self._clock() + LEASE_S)

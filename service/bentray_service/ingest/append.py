@@ -6,6 +6,8 @@ import base64
 import binascii
 import hashlib
 import hmac
+import math
+import os
 import threading
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
@@ -16,6 +18,7 @@ from typing import Self
 from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.atomic import sync, write_bytes
 
 from ..refusals import Locked, UnknownChecksum, WrongChecksum
 from .receive import pour
@@ -54,8 +57,7 @@ class Hold:
     """Who is at work on which upload: one at a time."""
 
     def __init__(self) -> None:
-        # Where each stood when it was held, as far as that matters.
-        self._held: dict[str, int | None] = {}
+        self._held: set[str] = set()
         self._lock = threading.Lock()
 
     @contextmanager
@@ -68,20 +70,12 @@ class Hold:
         with self._lock:
             if upload_id in self._held:
                 raise Locked("upload", f"{upload_id}, to which another request writes", "one at a time")
-            self._held[upload_id] = None
+            self._held.add(upload_id)
         try:
             yield
         finally:
             with self._lock:
-                del self._held[upload_id]
-
-    def doubt(self, upload_id: str, offset: int) -> None:
-        """What comes after ``offset`` counts once the upload is let go: it may be cut off again."""
-        self._held[upload_id] = offset
-
-    def sure(self, upload_id: str) -> int | None:
-        """The offset beyond which there are doubts; None where there are none."""
-        return self._held.get(upload_id)
+                self._held.remove(upload_id)
 
 
 async def append(
@@ -89,7 +83,8 @@ async def append(
 ) -> int:
     """Append a body to ``path``, durably, without blocking the event loop.
 
-    What came before the client went away stays. With a checksum all of it counts, or nothing.
+    What came before the client went away stays, also when this process dies. With a checksum all of it
+    counts, or nothing: until it is verified a file beside ``path`` says where it begins.
 
     Args:
         stream: the chunks of the body.
@@ -106,9 +101,8 @@ async def append(
         WrongChecksum, StorageFull: as their names say.
     """
     digest = _hasher(checksum.algorithm) if checksum is not None else None
-    await run_in_threadpool(path.touch)
+    await run_in_threadpool(_begin, path, offset if checksum is not None else None)
     file = await run_in_threadpool(path.open, "r+b", 0)
-    whole = False
     try:
         await run_in_threadpool(file.seek, offset)
         accepted = f"at most {length - offset} bytes, up to the Upload-Length of {length}"
@@ -117,20 +111,63 @@ async def append(
             if not hmac.compare_digest(digest.digest(), checksum.digest):
                 found = base64.b64encode(digest.digest()).decode()
                 raise WrongChecksum("body", f"{checksum.algorithm} {found}", "what Upload-Checksum says")
-            whole = True
+            await run_in_threadpool(_verified, path)
     finally:
-        if checksum is not None and not whole:
-            await run_in_threadpool(file.truncate, offset)
         await run_in_threadpool(file.close)
+        await run_in_threadpool(discard_unverified, path)
     return offset + size
 
 
 def size_of(path: Path) -> int:
-    """Bytes that are there, of a file that is not made before the first of them."""
+    """Bytes that are there and count, of a file that is not made before the first of them."""
+    # Asked before and after, for a piece may begin or end meanwhile.
+    before = _unverified_from(path)
     try:
-        return path.stat().st_size
+        size = path.stat().st_size
     except FileNotFoundError:
         return 0
+    return int(min(size, before, _unverified_from(path)))
+
+
+def discard_unverified(path: Path) -> None:
+    """Cut off what came of a piece whose checksum was not verified, also by a process that died."""
+    begin = _unverified_from(path)
+    if begin != math.inf:
+        with path.open("r+b") as file:
+            file.truncate(int(begin))
+            os.fsync(file.fileno())
+        _verified(path)
+
+
+def remove(path: Path) -> None:
+    """Remove what came of an upload."""
+    path.unlink(missing_ok=True)
+    _mark(path).unlink(missing_ok=True)
+
+
+def _begin(path: Path, unverified_from: int | None) -> None:
+    """Make the file if it is not there; before any byte of a piece to verify comes, say so durably."""
+    path.touch()
+    discard_unverified(path)
+    if unverified_from is not None:
+        write_bytes(_mark(path), str(unverified_from).encode())
+
+
+def _verified(path: Path) -> None:
+    _mark(path).unlink()
+    sync(path.parent)
+
+
+def _unverified_from(path: Path) -> float:
+    """The offset from which on nothing counts; infinity where all of it does."""
+    try:
+        return int(_mark(path).read_text())
+    except FileNotFoundError:
+        return math.inf
+
+
+def _mark(path: Path) -> Path:
+    return path.with_name(f"{path.name}.unverified")
 
 
 def _hasher(algorithm: str) -> hashlib._Hash:

@@ -32,6 +32,7 @@ def make_canonical(
     files: TenantFiles,
     limits: Limits,
     given: Mapping[str, Any],
+    reserve: Callable[[int], None],
     started: Callable[[int], None] = lambda process_id: None,
 ) -> dict[str, Any]:
     """Check ``source`` in a process of its own and put the canonical file where its id says.
@@ -43,26 +44,33 @@ def make_canonical(
         files: of the tenant.
         limits: of the process.
         given: what the user says of it.
+        reserve: reserves so many bytes for it, in place of what was reserved before; it may refuse.
         started: told the id of the process.
 
     Returns:
         The summary of what it holds.
 
     Raises:
+        QuotaUsedUp: from ``reserve``; nothing is left then.
         InvalidInput, StorageFull: as ``sandbox.ingest`` does; nothing is left then.
         StorageAway: when the canonical file cannot be kept now; the same.
     """
+    received = source.stat().st_size
     try:
+        candidate = files.candidate(result_id)
         summary = ingest(
             what,
             source,
-            files.candidate(result_id),
+            candidate,
             memory_bytes=limits.memory_bytes,
             seconds=limits.seconds,
             scratch=limits.scratch,
             given=given,
             started=started,
+            reserve=lambda size: reserve(max(size, received)),
         )
+        # What was received goes now.
+        reserve(candidate.stat().st_size)
         files.adopt(result_id)
     finally:
         files.discard_candidate(result_id)

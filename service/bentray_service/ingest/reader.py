@@ -1,4 +1,4 @@
-"""The thread that reads uploads which came in pieces, once they are whole."""
+"""The thread that has uploads read which came in pieces, once they are whole."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ import os
 import secrets
 import signal
 import threading
+from collections import Counter
 from collections.abc import Mapping
+from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -17,13 +20,15 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.errors import InvalidInput
 
+from ..access.quota import Quota
 from ..errors import INTERNAL, Problem, from_exception, make
 from ..refusals import StorageAway, StorageFull, UnknownId
 from ..storage.files import Files
 from ..storage.tenants import Tenant
 from ..storage.uploads import Uploads
-from .append import size_of
+from .append import discard_unverified, size_of
 from .canonical import Limits, make_canonical
+from .fair_queue import FairQueue
 from .receive import BATCH_BYTES
 
 log = logging.getLogger("bentray.ingest")
@@ -46,13 +51,20 @@ class Store(Protocol):
 
 
 class UploadReader:
-    """Reads one upload after another, the oldest first, each by a process of its own.
+    """Puts uploads into the queue of the readers, the oldest first, a few of each tenant at a time.
 
     What a service that died was reading is read again.
     """
 
     def __init__(
-        self, uploads: Uploads, files: Files, stores: Mapping[str, Store], limits: Limits, keep_s: float
+        self,
+        uploads: Uploads,
+        files: Files,
+        stores: Mapping[str, Store],
+        limits: Limits,
+        keep_s: float,
+        queue: FairQueue,
+        quota: Quota,
     ) -> None:
         """Args:
         uploads: their rows.
@@ -60,22 +72,32 @@ class UploadReader:
         stores: the rows of what they become, by the word for it.
         limits: of a process.
         keep_s: how long the row of a read upload is kept, s.
+        queue: what reads them in turn.
+        quota: of what tenants may store.
         """
         self._uploads = uploads
         self._files = files
         self._stores = stores
         self._limits = limits
         self._keep_s = keep_s
+        self._queue = queue
+        self._quota = quota
+        self._lock = threading.Lock()
+        # Uploads that are in the queue, and the processes of those that are read.
+        self._queued: dict[str, Tenant] = {}
+        self._children: dict[str, int] = {}
+        self._put_off = False
         self._wake = threading.Event()
         self._leaving = threading.Event()
-        self._child_id: int | None = None
         self._thread = threading.Thread(target=self._loop, name="uploads", daemon=True)
 
     def start(self) -> None:
         """Take up what a dead process left, then begin."""
         for row in self._uploads.receiving():
+            path = self._files.of(Tenant(row["tenant"])).upload(row["id"])
+            discard_unverified(path)
             # It died between the last byte and saying so.
-            if size_of(self._files.of(Tenant(row["tenant"])).upload(row["id"])) == row["length"]:
+            if size_of(path) == row["length"]:
                 self._uploads.arrived(row["id"])
         self._thread.start()
 
@@ -88,33 +110,68 @@ class UploadReader:
         return self._thread.is_alive()
 
     def stop(self) -> None:
-        """End the thread, and the process whose work it waits for; that upload is read at the next start."""
+        """End the thread, and the processes at work; their uploads are read at the next start."""
         self._leaving.set()
         self._wake.set()
-        self._end_child()
+        with self._lock:
+            children = list(self._children.values())
+        for child in children:
+            _end(child)
         self._thread.join(STOP_SECONDS)
 
     def _loop(self) -> None:
         while not self._leaving.is_set():
             self._wake.clear()
-            pause = IDLE_SECONDS
             try:
-                for row in self._uploads.unread():
-                    if self._leaving.is_set():
-                        return
-                    self._read(row)
-            except (SQLAlchemyError, StorageAway, StorageFull) as error:
-                log.warning("uploads wait: %s", error)
-                pause = PATIENCE_SECONDS
-            self._wake.wait(pause) if pause == IDLE_SECONDS else self._leaving.wait(pause)
+                self._submit()
+            except SQLAlchemyError as error:
+                self._wait(error)
+            if self._put_off:
+                self._put_off = False
+                self._leaving.wait(PATIENCE_SECONDS)
+            else:
+                self._wake.wait(IDLE_SECONDS)
+
+    def _submit(self) -> None:
+        """Put what is whole into the queue, no more of a tenant than can be read at a time."""
+        with self._lock:
+            queued = set(self._queued)
+            room = Counter({tenant: -count for tenant, count in Counter(self._queued.values()).items()})
+        for row in self._uploads.unread():
+            tenant = Tenant(row["tenant"])
+            if row["id"] in queued or room[tenant] + self._queue.share <= 0 or not self._is_here(row):
+                continue
+            room[tenant] -= 1
+            with self._lock:
+                self._queued[row["id"]] = tenant
+            future = self._queue.submit(tenant, partial(self._read, row))
+            future.add_done_callback(partial(self._ended, row["id"]))
+
+    def _ended(self, upload_id: str, future: Future[None]) -> None:
+        with self._lock:
+            del self._queued[upload_id]
+        error = None if future.cancelled() else future.exception()
+        if error is not None:
+            self._wait(error)
+        self._wake.set()
+
+    def _wait(self, error: BaseException) -> None:
+        """Try again after a while."""
+        log.warning("uploads wait: %s", error)
+        self._put_off = True
+
+    def _is_here(self, row: Row) -> bool:
+        """Whether it lies in this data folder, and not with another service that uses this database."""
+        tenant = Tenant(row["tenant"])
+        path = self._files.of(tenant).upload(row["id"])
+        return path.exists() or self._known(self._stores[row["what"]], tenant, row["result_id"])
 
     def _read(self, row: Row) -> None:
+        if self._leaving.is_set():
+            return
         tenant, store = Tenant(row["tenant"]), self._stores[row["what"]]
         path = self._files.of(tenant).upload(row["id"])
         if not self._known(store, tenant, row["result_id"]):
-            if not path.exists():
-                # It lies with another service that uses this database.
-                return
             problem = self._refusal(row, tenant, store, path)
             if problem is not None:
                 if not self._leaving.is_set():
@@ -129,7 +186,14 @@ class UploadReader:
         instance, files = f"/v1/uploads/{row['id']}", self._files.of(tenant)
         try:
             summary = make_canonical(
-                row["what"], path, row["result_id"], files, self._limits, row["given"], self._started
+                row["what"],
+                path,
+                row["result_id"],
+                files,
+                self._limits,
+                row["given"],
+                partial(self._quota.resize, tenant, row["result_id"]),
+                partial(self._started, row["id"]),
             )
             store.add(tenant, row["result_id"], size=row["length"], sha256=digest_of(path), summary=summary)
         except (StorageAway, StorageFull, SQLAlchemyError):
@@ -143,7 +207,8 @@ class UploadReader:
             words = f"an error of the service, not of the file; it is in the log under {number}"
             return make(INTERNAL, words, instance=instance, correlation_id=number)
         finally:
-            self._child_id = None
+            with self._lock:
+                self._children.pop(row["id"], None)
         return None
 
     def _known(self, store: Store, tenant: Tenant, name: str) -> bool:
@@ -154,16 +219,16 @@ class UploadReader:
             return False
         return True
 
-    def _started(self, process_id: int) -> None:
-        self._child_id = process_id
+    def _started(self, upload_id: str, process_id: int) -> None:
+        with self._lock:
+            self._children[upload_id] = process_id
         if self._leaving.is_set():
-            self._end_child()
+            _end(process_id)
 
-    def _end_child(self) -> None:
-        child = self._child_id
-        if child is not None:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(child, signal.SIGKILL)
+
+def _end(process_id: int) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process_id, signal.SIGKILL)
 
 
 def digest_of(path: Path) -> str:

@@ -6,14 +6,14 @@ import asyncio
 import errno
 import hashlib
 import os
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
 
 from starlette.concurrency import run_in_threadpool
 
-from ..refusals import EmptyBody, StorageFull, TooLarge
+from ..refusals import EmptyBody, QuotaUsedUp, StorageFull, TooLarge
 
 # Chunks wait as they came, which saves copying them together; a client may send tiny ones.
 BATCH_BYTES, BATCH_CHUNKS = 4 * 1024 * 1024, 1024
@@ -30,7 +30,12 @@ class Received:
 
 
 async def receive(
-    stream: AsyncIterator[bytes], announced: int | None, path: Path, limit: int, expected: str
+    stream: AsyncIterator[bytes],
+    announced: int | None,
+    path: Path,
+    limit: int,
+    expected: str,
+    reserve: Callable[[int], None] = lambda size: None,
 ) -> Received:
     """Write a body to ``path``, durably, without blocking the event loop.
 
@@ -40,6 +45,8 @@ async def receive(
         path: the file to make; the caller removes it.
         limit: largest size, bytes.
         expected: what the body should hold, for the refusal of an empty one.
+        reserve: called in a thread before more is written than was announced, with the size that there may be
+            then; it may refuse.
 
     Raises:
         TooLarge, EmptyBody, StorageFull: as their names say.
@@ -50,9 +57,10 @@ async def receive(
     if announced is not None and announced > limit:
         raise TooLarge("body", f"{announced} bytes", accepted)
     digest = hashlib.sha256()
+    growing = _Reserved(announced or 0, limit, reserve)
     file = await run_in_threadpool(path.open, "xb", 0)
     try:
-        size = await pour(stream, file, limit, accepted, digest)
+        size = await pour(stream, file, limit, accepted, digest, growing.make_room)
     finally:
         await run_in_threadpool(file.close)
     if not size:
@@ -61,7 +69,12 @@ async def receive(
 
 
 async def pour(
-    stream: AsyncIterator[bytes], file: FileIO, limit: int, accepted: str, digest: hashlib._Hash | None
+    stream: AsyncIterator[bytes],
+    file: FileIO,
+    limit: int,
+    accepted: str,
+    digest: hashlib._Hash | None,
+    make_room: Callable[[int], None] = lambda size: None,
 ) -> int:
     """Write what comes to the end of an open file, one batch while the next one comes, and sync it.
 
@@ -73,6 +86,7 @@ async def pour(
         limit: at most so many bytes; those that go beyond are not written.
         accepted: the limit in words.
         digest: fed with all that is written.
+        make_room: called in a thread before the file grows, with its size then.
 
     Returns:
         how many bytes came.
@@ -80,7 +94,7 @@ async def pour(
     Raises:
         TooLarge, StorageFull: as their names say.
     """
-    size, batch, held, behind = 0, [], 0, _Behind(file, digest)
+    size, batch, held, behind = 0, [], 0, _Behind(file, digest, make_room)
     try:
         try:
             async for chunk in stream:
@@ -106,6 +120,29 @@ async def pour(
     return size
 
 
+class _Reserved:
+    """What is reserved for a body; one without a length has twice as much each time, so that few calls do."""
+
+    def __init__(self, reserved: int, limit: int, reserve: Callable[[int], None]) -> None:
+        self._reserved = reserved
+        self._limit = limit
+        self._reserve = reserve
+
+    def make_room(self, size: int) -> None:
+        """Reserve room for ``size`` bytes, if there is none yet."""
+        if size <= self._reserved:
+            return
+        for wanted in (min(2 * size, self._limit), size):
+            try:
+                self._reserve(wanted)
+            except QuotaUsedUp:
+                if wanted == size:
+                    raise
+            else:
+                self._reserved = wanted
+                return
+
+
 class _Behind:
     """Writes a batch in a thread while the next one comes.
 
@@ -113,9 +150,11 @@ class _Behind:
         failed: whether a write has; nothing more may be written then.
     """
 
-    def __init__(self, file: FileIO, digest: hashlib._Hash | None) -> None:
+    def __init__(self, file: FileIO, digest: hashlib._Hash | None, make_room: Callable[[int], None]) -> None:
         self._file = file
         self._digest = digest
+        self._make_room = make_room
+        self._size = 0
         self._running: asyncio.Task[None] | None = None
         self._unsynced = 0
         self.failed = False
@@ -140,6 +179,8 @@ class _Behind:
                 raise
 
     def _write(self, batch: list[bytes]) -> None:
+        self._size += sum(map(len, batch))
+        self._make_room(self._size)
         if self._digest is not None:
             for chunk in batch:
                 self._digest.update(chunk)

@@ -21,6 +21,8 @@ log = logging.getLogger("bentray.jobs")
 INTERVAL_SECONDS = 0.3
 # Of how many sweeps the record of a job tells at most; the file of the result has all of them.
 MOST_SWEEPS = 500
+# How often a job that has kept something is asked how much that takes on the disk.
+MEASURE_SECONDS = 30.0
 
 
 class Reporter:
@@ -36,12 +38,21 @@ class Reporter:
         job_id: str,
         leaving: Callable[[], bool],
         clock: Callable[[], float] = time.monotonic,
+        taken: Callable[[], int] = lambda: 0,
     ) -> None:
+        """Args:
+        queue, job_id: which job.
+        leaving: whether the service leaves.
+        clock: seconds.
+        taken: measures how many bytes the job takes on the disk.
+        """
         self._queue = queue
         self._job_id = job_id
         self._leaving = leaving
         self._clock = clock
+        self._taken = taken
         self._written = self._asked = -INTERVAL_SECONDS
+        self._measured = -MEASURE_SECONDS
         self._pending: Progress | None = None
         self._stopped = self._further = False
         self.lost = False
@@ -75,15 +86,18 @@ class Reporter:
         self._pending = None
 
     def saved(self) -> None:
-        """Say once that the job has kept something to go on from."""
-        if not self._further:
-            try:
+        """The job has kept something to go on from: say so once, and now and then how much that takes."""
+        try:
+            if not self._further:
                 self._queue.got_further(self._job_id)
                 self._further = True
-            except DatabaseAway:
-                pass
-            except SQLAlchemyError:
-                log.warning("that %s got further could not be stored", self._job_id, exc_info=True)
+            if self._clock() - self._measured >= MEASURE_SECONDS:
+                self._measured = self._clock()
+                self._queue.took(self._job_id, self._taken())
+        except DatabaseAway:
+            pass
+        except SQLAlchemyError:
+            log.warning("that %s got further could not be stored", self._job_id, exc_info=True)
 
     def stop(self) -> bool:
         """Whether the job should give up: it was cancelled or lost to another service, or this one leaves."""

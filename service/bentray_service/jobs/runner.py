@@ -21,6 +21,7 @@ from bentray_workers.slices import Cancelled
 from ..compute import Compute
 from ..logs import about
 from ..refusals import Damaged, DatabaseAway, DatabaseFull, StorageAway
+from ..storage.disk import bytes_in
 from ..storage.files import Files
 from ..storage.queue import LEASE_S, Queue
 from ..storage.schema import ENDED
@@ -155,7 +156,9 @@ class Runner:
 
     def _run_known(self, job: dict[str, Any]) -> None:
         job_id, files = job["id"], self._files.of(Tenant(job["tenant"]))
-        reporter = Reporter(self._queue, job_id, self._leaving.is_set)
+        reporter = Reporter(
+            self._queue, job_id, self._leaving.is_set, taken=lambda: bytes_in(files.work(job_id))
+        )
         kind = KINDS[job["kind"]]
         target = kind.target(files, job)
         try:
@@ -254,7 +257,9 @@ class Runner:
         target: Path,
     ) -> None:
         reporter.flush()
-        if not self._queue.succeed(job_id, result, kind.table):
+        # One that has no row is one file.
+        size = target.stat().st_size if result is None else 0
+        if not self._queue.succeed(job_id, result, kind.table, size):
             if self._queue.told(job_id) is None:
                 # Another service runs it by now, and writes the same file.
                 return

@@ -23,6 +23,7 @@ class AccessRecord(BaseModel):
     who: str = Field(description="The id of the key, or the user of the proxy.")
     scopes: list[str]
     bytes_stored: int = Field(description="By the tenant, over all.")
+    bytes_reserved: int = Field(description="For its uploads and jobs that are not at their end.")
     bytes_most: int = Field(description="That the tenant may store.")
     requests_per_minute: int = Field(description="That the tenant may send; 0: any number.")
     renders_per_minute: int = Field(description="Pictures among them that may be drawn; 0: any number.")
@@ -32,12 +33,14 @@ class AccessRecord(BaseModel):
 def show_access(service: Service, caller: Asking) -> AccessRecord:
     """Who the caller is, and what it may do and store."""
     settings, limited = service.settings, caller.how != "open"
+    used = service.quota.of(caller.tenant)
     return AccessRecord(
         tenant=caller.tenant,
         how=caller.how,
         who=caller.who,
         scopes=sorted(caller.scopes),
-        bytes_stored=service.files.of(caller.tenant).bytes_used(),
+        bytes_stored=used.stored,
+        bytes_reserved=used.reserved,
         bytes_most=settings.max_tenant_bytes,
         requests_per_minute=settings.requests_per_minute if limited else 0,
         renders_per_minute=settings.renders_per_minute if limited else 0,

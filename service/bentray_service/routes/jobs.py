@@ -16,7 +16,6 @@ from bentray_workers.asked_simulation import AskedSimulation
 from bentray_workers.field_settings import FieldSettings, check_faces
 from bentray_workers.turntable import Turntable
 
-from ..access.quota import check_room
 from ..asked_settings import known_only
 from ..errors import described
 from ..refusals import NoAnimation
@@ -132,7 +131,6 @@ def start_job(
     ] = None,
 ) -> JobRecord:
     """Queue a job. It is stored before this answers, and survives a restart of the service."""
-    check_room(service.files.of(tenant), service.settings.max_tenant_bytes)
     plan = None
     if isinstance(asked, ReconstructionRequest):
         dataset = service.datasets.get(tenant, asked.dataset)
@@ -140,16 +138,17 @@ def start_job(
         settings = asked.settings.to_dict()
         path = service.files.of(tenant).dataset(dataset["id"])
         plan = service.compute.plan(dataset["counts"], path, asked.settings)
+        largest = plan["stored_bytes"]
     elif isinstance(asked, SimulationRequest):
         read, settings = {}, asked.settings.plain()
         plan = service.compute.plan_simulation(asked.settings)
         # Its parts, and the file that is made of them.
-        wanted = 2 * plan["result_bytes"]
-        check_room(service.files.of(tenant), service.settings.max_tenant_bytes, wanted)
+        largest = 2 * plan["result_bytes"]
     elif isinstance(asked, GeometryFieldRequest):
         mesh = service.meshes.get(tenant, asked.mesh)
         check_faces(mesh["faces"])
         settings = asked.settings.plain()
+        largest = asked.settings.largest_bytes(mesh["faces"])
         read = {"mesh_id": mesh["id"], "field_id": field_of(asked.settings.content(mesh["content"]))}
     else:
         volume = service.volumes.get(tenant, asked.volume)
@@ -157,10 +156,17 @@ def start_job(
         service.compute.check_turntable(volume["shape"], asked.settings)
         read = {"volume_id": volume["id"]}
         settings = asked.settings.within(*volume["value_range"]).plain()
-    most = service.settings.max_queued_jobs
+        largest = asked.settings.largest_bytes
     job = job_record(
         service.jobs.add(
-            tenant, asked.kind, settings, **read, plan=plan, most_queued=most, key=idempotency_key
+            tenant,
+            asked.kind,
+            settings,
+            **read,
+            plan=plan,
+            reserve=(largest, service.quota.most_bytes),
+            most_queued=service.settings.max_queued_jobs,
+            key=idempotency_key,
         )
     )
     log.info("%s waits, of kind %s", job.id, job.kind, extra={"figures": {"job": job.id}})

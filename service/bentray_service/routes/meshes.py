@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import math
+from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response, status
 from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.isosurface_mesh import MOST_STEP, check_nodes
+from bentray_workers.isosurface_mesh import MOST_STEP, check_nodes, largest_bytes
 
-from ..access.quota import check_room
 from ..errors import described
 from ..storage.deletion import Stored
 from ..storage.ids import new_id
@@ -108,21 +108,23 @@ async def mesh_of_volume(
     if iso is not None and not (math.isfinite(iso) and low <= iso < high):
         raise InvalidInput("iso", iso, f"{low:g} to less than {high:g}, the range of the volume")
     mesh_id, files = new_id("mesh"), service.files.of(tenant)
-    await run_in_threadpool(check_room, files, service.settings.max_tenant_bytes)
     service.door.check_render(caller)
-    path, made = files.volume(volume["id"]), files.candidate(mesh_id)
+    path = files.volume(volume["id"])
 
-    def store(summary: dict[str, Any]) -> dict[str, Any]:
+    def store(made: Path, summary: dict[str, Any]) -> dict[str, Any]:
+        service.quota.resize(tenant, mesh_id, made.stat().st_size)
         content = files.adopt(mesh_id).read_bytes()
         digest = hashlib.sha256(content).hexdigest()
         told = summary | {"title": volume["title"], "volume_id": volume["id"]}
         return service.meshes.add(tenant, mesh_id, size=len(content), sha256=digest, summary=told)
 
-    try:
-        work = service.pictures.mesh_volume(tenant, volume, path, iso, step, made)
-        row = await run_in_threadpool(store, await while_connected(request, work))
-    finally:
-        files.discard_candidate(mesh_id)
+    async with service.quota.reserved(tenant, mesh_id, largest_bytes(volume["shape"], step)):
+        try:
+            made = files.candidate(mesh_id)
+            work = service.pictures.mesh_volume(tenant, volume, path, iso, step, made)
+            row = await run_in_threadpool(store, made, await while_connected(request, work))
+        finally:
+            files.discard_candidate(mesh_id)
     record = mesh_record(row)
     response.headers["Location"] = record.links["self"]
     return record

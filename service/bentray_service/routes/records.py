@@ -99,6 +99,9 @@ class PlanRecord(BaseModel):
     )
     rows_bytes: int | None = Field(None, description="Of the rays of all emitters, in a reconstruction.")
     state_bytes: int | None = Field(None, description="Of what comes back from a task of it.")
+    stored_bytes: int | None = Field(
+        None, description="The most that a reconstruction stores, its checkpoints among it."
+    )
     result_bytes: int | None = Field(None, description="The most that the file of a simulation takes.")
     minutes: float | None = Field(
         None, description="About how long a simulation takes these workers, with nothing else to do."

@@ -15,7 +15,6 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Header, Request, Response, status
 from starlette.concurrency import run_in_threadpool
 
-from ..access.quota import check_room
 from ..errors import described
 from ..ingest.append import ALGORITHMS, Checksum, append, size_of
 from ..refusals import StorageFull, TooLarge, WrongOffset, WrongProtocol
@@ -91,9 +90,9 @@ def begin_upload(
     free = shutil.disk_usage(service.files.root).free
     if upload_length > free:
         raise StorageFull("Upload-Length", f"{upload_length} bytes", f"at most {free} bytes, which are free")
-    check_room(service.files.of(tenant), service.settings.max_tenant_bytes, upload_length)
-    keep_s = service.settings.upload_keep_s
-    row = service.uploads.add(tenant, what, upload_length, given, upload_metadata, keep_s)
+    service.upload_limits.check_begin(tenant)
+    keep_s, most_bytes = service.settings.upload_keep_s, service.quota.most_bytes
+    row = service.uploads.add(tenant, what, upload_length, given, upload_metadata, keep_s, most_bytes)
     record = upload_record(row, 0)
     response.headers["Location"] = record.links["self"]
     response.headers["Upload-Expires"] = http_date(row["expires"])
@@ -160,8 +159,6 @@ async def send_piece(
             announced = int(request.headers.get("content-length", 0))
             if announced > length - offset:
                 raise TooLarge("body", f"{announced} bytes", f"at most {length - offset} bytes")
-            if checksum is not None:
-                service.hold.doubt(upload_id, offset)
             try:
                 offset = await append(request.stream(), path, offset, length, checksum)
             finally:
@@ -194,8 +191,7 @@ def offset_of(service: Parts, tenant: Tenant, row: Row) -> int:
     """
     if row["state"] != "receiving":
         return int(row["length"])
-    sure = service.hold.sure(row["id"])
-    return size_of(service.files.of(tenant).upload(row["id"])) if sure is None else sure
+    return size_of(service.files.of(tenant).upload(row["id"]))
 
 
 def http_date(seconds: float) -> str:

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
-import anyio
 from fastapi import Request
 from starlette.concurrency import run_in_threadpool
+from starlette.requests import ClientDisconnect
 
-from ..access.quota import check_room
 from ..ingest.canonical import Limits, make_canonical
 from ..ingest.child import ACCEPTED
+from ..ingest.fair_queue import FairQueue
 from ..ingest.receive import Received, receive
+from ..refusals import Busy
 from ..storage.tenants import Tenant
 from ..wiring import Parts
 
-# Each ingest process may take the whole of its memory limit.
-INGESTS_AT_ONCE = 2
+# How long a request waits for its turn, s. Proxies hardly wait longer; uploads in pieces do.
+LONGEST_WAIT_S = 300.0
 
 Row = dict[str, Any]
 
@@ -50,29 +53,54 @@ async def take_in(
         given: what the user says of it.
     """
     announced = request.headers.get("content-length")
-    files = service.files.of(tenant)
+    wanted = int(announced) if announced else None
+    files, settings, quota = service.files.of(tenant), service.settings, service.quota
     path = files.incoming(upload_id)
-
-    settings, most = service.settings, service.settings.max_tenant_bytes
+    resize = partial(quota.resize, tenant, upload_id)
 
     def check_and_store(received: Received) -> Row:
-        # What came without its length being announced, or beside others, lies there by now.
-        check_room(files, most, 0)
         limits = Limits(settings.ingest_memory_bytes, settings.ingest_seconds, service.files.scratch)
-        summary = make_canonical(what, path, upload_id, files, limits, given)
+        summary = make_canonical(what, path, upload_id, files, limits, given, resize)
         return store(received.size, received.sha256, summary)
 
-    wanted = int(announced) if announced else None
-    await run_in_threadpool(check_room, files, most, wanted or 1)
+    with service.upload_limits(tenant):
+        try:
+            await run_in_threadpool(resize, wanted or 1)
+            received = await receive(
+                request.stream(), wanted, path, settings.max_upload_bytes, ACCEPTED[what], resize
+            )
+            return await in_turn(request, service.ingest_queue, tenant, partial(check_and_store, received))
+        finally:
+            await run_in_threadpool(path.unlink, missing_ok=True)
+            await run_in_threadpool(quota.release, tenant, upload_id)
+
+
+async def in_turn(request: Request, queue: FairQueue, tenant: Tenant, work: Callable[[], Row]) -> Row:
+    """What ``work`` returns, once it is the tenant's turn.
+
+    Args:
+        request: whose body has been read; when its client goes away, it leaves the queue.
+        queue: of all tenants.
+        tenant: whose request it is.
+        work: what is to be done.
+
+    Raises:
+        ClientDisconnect: when the client went away before its turn came.
+        Busy: when its turn did not come in ``LONGEST_WAIT_S``.
+    """
+    task = queue.submit(tenant, work)
+    result: asyncio.Future[Row] = asyncio.wrap_future(task)
+    gone = asyncio.ensure_future(request.receive())
+    either: list[asyncio.Future[Any]] = [result, gone]
     try:
-        received = await receive(
-            request.stream(),
-            wanted,
-            path,
-            settings.max_upload_bytes,
-            ACCEPTED[what],
-        )
-        limiter: anyio.CapacityLimiter = request.app.state.ingest_limiter
-        return await anyio.to_thread.run_sync(check_and_store, received, limiter=limiter)
+        await asyncio.wait(either, timeout=LONGEST_WAIT_S, return_when=asyncio.FIRST_COMPLETED)
+        # What has begun comes to its end: nobody knows how far it is.
+        if result.done() or not task.cancel():
+            return await result
+        if gone.done():
+            raise ClientDisconnect
+        found = f"no turn in {LONGEST_WAIT_S:g} s, {queue.waiting(tenant)} of this tenant still wait"
+        raise Busy("uploads", found, "another try later, or an upload in pieces, which waits by itself")
     finally:
-        await run_in_threadpool(path.unlink, missing_ok=True)
+        task.cancel()
+        gone.cancel()

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from bentray_workers.volume_export import FORMATS
+from bentray_workers.volume_export import FORMATS, largest_bytes
 
 from .. import __version__
 from ..errors import described
@@ -68,13 +68,17 @@ async def volume_data(
         if request.method == "HEAD":
             return _not_made(tag, chosen.media_type, name)
         parts_of(request).door.check_render(caller_of(request))
-        await while_connected(request, service.pictures.export(tenant, volume, path, made, format))
+        most = largest_bytes(volume["shape"], uploaded="job_id" not in volume)
+        async with service.quota.reserved(tenant, made.name, most):
+            await while_connected(request, service.pictures.export(tenant, volume, path, made, format))
+            await run_in_threadpool(service.quota.stored, tenant, made.name, made.stat().st_size)
     answer = download(request, made, seed, chosen.media_type, name, tag)
     try:
         await run_in_threadpool(service.volumes.get, tenant, volume["id"])
     except UnknownId:
         # Made after its files were removed: nobody else would remove it.
         made.unlink(missing_ok=True)
+        await run_in_threadpool(service.quota.gone, tenant, made.name)
         raise
     return answer
 

@@ -12,6 +12,7 @@ from .database import Database
 from .ids import checked
 from .schema import datasets
 from .tenants import Tenant
+from .usage import keep
 
 Row = dict[str, Any]
 
@@ -30,6 +31,7 @@ class Datasets:
                     tenant=tenant, id=dataset_id, created=time.time(), bytes=size, sha256=sha256, **summary
                 )
             )
+            keep(connection, tenant, dataset_id, size)
         return self.get(tenant, dataset_id)
 
     def get(self, tenant: Tenant, dataset_id: str) -> Row:

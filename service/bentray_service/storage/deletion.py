@@ -9,6 +9,7 @@ from typing import NamedTuple
 from sqlalchemy import ColumnElement, Connection, Table, delete, or_, select, update
 
 from ..refusals import DatabaseAway, InUse, StorageAway, UnknownId
+from . import usage
 from .checksums import forget
 from .database import Database
 from .files import Files
@@ -76,6 +77,7 @@ class Deletion:
             self._refuse_unfinished(connection, stored, gone)
             fields = _fields(connection, stored.tenant, name, gone)
             _forget(connection, stored.tenant, {name, *results}, fields, gone)
+            usage.forget(connection, stored.tenant, [name, *results, *fields, *gone])
         try:
             self._files.of(stored.tenant).remove([name, *results, *fields, *gone])
         except (StorageAway, DatabaseAway, OSError):

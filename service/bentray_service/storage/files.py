@@ -93,6 +93,11 @@ class Files:
         for files in self._all():
             files.keep_work(job_ids)
 
+    def sizes(self) -> Iterator[tuple[Tenant, dict[str, int]]]:
+        """Of each tenant what lies here of its stored things, bytes by id; see ``TenantFiles.sizes``."""
+        for files in self._all():
+            yield Tenant(files.root.name), files.sizes()
+
     def _all(self) -> Iterator[TenantFiles]:
         for folder in self._tenants.iterdir():
             yield self.of(Tenant(folder.name))

@@ -1,14 +1,17 @@
-"""How a job changes its state: one update and one appended event, in the transaction of the caller."""
+"""How a job changes its state: one update and one appended event, in the transaction of the caller.
+
+At its end the room that was reserved for it is given up.
+"""
 
 from __future__ import annotations
 
 import time
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, insert, update
+from sqlalchemy import ColumnElement, Connection, delete, insert, select, update
 
 from . import schema
-from .schema import jobs
+from .schema import ENDED, jobs, storage
 
 RUNNING = ("running", "cancelling")
 
@@ -29,6 +32,10 @@ def change(
     changed = connection.execute(update(jobs).where(*where).values(state=after, **values))
     if changed.rowcount:
         tell(connection, job_id, after, note)
+        if after in ENDED:
+            mine = select(jobs.c.tenant).where(jobs.c.id == job_id).scalar_subquery()
+            reserved = storage.c.tenant == mine, storage.c.name == job_id, storage.c.reserved
+            connection.execute(delete(storage).where(*reserved))
     return bool(changed.rowcount)
 
 

@@ -13,7 +13,7 @@ from sqlalchemy import Connection, func, insert, select
 from sqlalchemy.exc import IntegrityError
 
 from ..refusals import Finished, KeyReused, QueueFull, UnknownId
-from . import schema
+from . import schema, usage
 from .database import Database
 from .ids import checked, new_id
 from .job_states import change, tell
@@ -42,15 +42,28 @@ class Jobs:
         field_id: str | None = None,
         *,
         plan: Row | None = None,
+        reserve: tuple[int, int] | None = None,
         most_queued: int | None = None,
         key: str | None = None,
     ) -> Row:
         """Store a queued job on its dataset, volume or mesh; it survives a crash once this returns.
 
+        Args:
+            tenant: whose it is.
+            kind: a key of ``jobs.kinds.KINDS``.
+            settings: as its kind reads them.
+            dataset_id, volume_id, mesh_id: what it reads.
+            field_id: what it makes, where that is named before.
+            plan: how a reconstruction is cut into tasks.
+            reserve: bytes that it will store at most while it runs, and that the tenant may store over all.
+            most_queued: how many may wait.
+            key: what the client calls the request.
+
         With a ``key`` that this tenant has used before, the job of that time is returned, and none is made.
 
         Raises:
             KeyReused: when something else was asked under this key.
+            QuotaUsedUp: when the tenant has less room than is to be reserved.
             QueueFull: when ``most_queued`` jobs of this tenant wait already.
             UnknownId: when the dataset has been deleted meanwhile.
         """
@@ -75,6 +88,8 @@ class Jobs:
                     raise QueueFull(
                         "jobs", f"{waiting} that wait", f"fewer than {most_queued}; try again later"
                     )
+            if reserve is not None:
+                usage.reserve(connection, tenant, job_id, *reserve)
             connection.execute(
                 insert(jobs).values(
                     id=job_id,

@@ -12,6 +12,7 @@ from .database import Database
 from .ids import checked
 from .schema import meshes
 from .tenants import Tenant
+from .usage import keep
 
 Row = dict[str, Any]
 
@@ -30,6 +31,7 @@ class Meshes:
                     tenant=tenant, id=mesh_id, created=time.time(), bytes=size, sha256=sha256, **summary
                 )
             )
+            keep(connection, tenant, mesh_id, size)
         return self.get(tenant, mesh_id)
 
     def get(self, tenant: Tenant, mesh_id: str) -> Row:

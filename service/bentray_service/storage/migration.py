@@ -38,6 +38,8 @@ CREATE TABLE jobs (
     UNIQUE (id), FOREIGN KEY(dataset_id) REFERENCES datasets (id))
 """
 
+STORED_IN_VERSION_3 = ("datasets", "uploaded_volumes", "volumes", "meshes", "geometry_fields")
+
 UPLOADED_VOLUMES_OF_VERSION_2 = Table(
     "uploaded_volumes",
     MetaData(),
@@ -124,12 +126,23 @@ def _to_3(connection: Connection) -> None:
 
 
 def _to_4(connection: Connection) -> None:
-    """Files have checksums, and what is too old is marked before it goes."""
+    """Files have checksums, what is too old is marked before it goes, and what tenants store is counted."""
     connection.execute(text("ALTER TABLE about ADD COLUMN observed_s FLOAT NOT NULL DEFAULT 0"))
     connection.execute(text("ALTER TABLE about ADD COLUMN begun INTEGER NOT NULL DEFAULT 0"))
     connection.execute(text("ALTER TABLE datasets ADD COLUMN counts JSON"))
-    for new in (schema.checksums, schema.too_old):
+    for new in (schema.checksums, schema.too_old, schema.storage):
         new.create(connection)
+    _count_what_is_stored(connection)
+
+
+def _count_what_is_stored(connection: Connection) -> None:
+    """As far as rows tell; the service corrects the sizes by those of the files when it starts."""
+    rows = [f"SELECT tenant, id, bytes, false FROM {table}" for table in STORED_IN_VERSION_3]  # noqa: S608
+    # A service that died may have stored what an upload became.
+    coming = "state IN ('receiving', 'reading') AND result_id NOT IN (SELECT name FROM storage)"
+    rows.append(f"SELECT tenant, result_id, length, true FROM uploads WHERE {coming}")  # noqa: S608
+    for query in rows:
+        connection.execute(text(f"INSERT INTO storage (tenant, name, bytes, reserved) {query}"))
 
 
 STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType({1: _to_2, 2: _to_3, 3: _to_4})

@@ -11,10 +11,11 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, and_, func, insert, or_, select, update
 
-from . import schema
+from . import schema, usage
 from .database import Database
 from .job_states import RUNNING, change
 from .schema import ENDED, jobs, volumes
+from .tenants import Tenant
 
 Row = dict[str, Any]
 MAX_ATTEMPTS = 3
@@ -103,6 +104,14 @@ class Queue:
         with self._database.write() as connection:
             connection.execute(update(jobs).where(self._held(job_id), jobs.c.attempts > 1).values(attempts=1))
 
+    def took(self, job_id: str, size: int) -> None:
+        """Store how many bytes a running job takes by now, where that is more than was reserved for it."""
+        with self._database.write() as connection:
+            mine = select(jobs.c.tenant).where(self._held(job_id))
+            tenant = connection.execute(mine).scalar_one_or_none()
+            if tenant is not None:
+                usage.grow(connection, Tenant(tenant), job_id, size)
+
     def _held(self, job_id: str) -> ColumnElement[bool]:
         return and_(jobs.c.id == job_id, jobs.c.lease_owner == self._owner, jobs.c.state.in_(RUNNING))
 
@@ -112,27 +121,31 @@ class Queue:
         with self._database.write() as connection:
             connection.execute(update(jobs).where(self._held(job_id)).values(**now))
 
-    def succeed(self, job_id: str, result: Row | None, into: str = volumes.name) -> bool:
+    def succeed(self, job_id: str, result: Row | None, into: str = volumes.name, size: int = 0) -> bool:
         """Store the success and the result, if there is one; False when it was cancelled in the meantime.
 
         Args:
             job_id: of the job.
             result: a row; where its tenant has one with this id already, that one stays.
             into: the name of its table.
+            size: bytes of a result that has no row.
         """
         with self._database.write() as connection:
             now = time.time()
             advice = (result or {}).get("provenance", {}).get("advice")
             if not self._end(connection, job_id, ("running",), "succeeded", finished=now, advice=advice):
                 return False
-            if result is not None:
+            mine = select(jobs.c.tenant).where(jobs.c.id == job_id)
+            tenant = Tenant(connection.execute(mine).scalar_one())
+            if result is None:
+                usage.store(connection, tenant, job_id, size)
+            else:
                 table = schema.metadata.tables[into]
-                mine = select(jobs.c.tenant).where(jobs.c.id == job_id)
-                tenant = connection.execute(mine).scalar_one()
                 there = select(table.c.id).where(table.c.tenant == tenant, table.c.id == result["id"])
                 if connection.execute(there).first() is None:
                     row = {**result, "tenant": tenant, "job_id": job_id, "created": now}
                     connection.execute(insert(table).values(**row))
+                    usage.store(connection, tenant, result["id"], result["bytes"])
             return True
 
     def fail(self, job_id: str, problem: Row) -> None:

@@ -277,3 +277,17 @@ too_old = Table(
     Column("what", String(16), nullable=False),
     Column("noticed_s", Float, nullable=False),
 )
+
+# What each tenant stores, in bytes, and what it has reserved for what is on its way: an upload under the id
+# of what it becomes, a job under its own, a volume in another format as ``ID.EXTENSION``.
+storage = Table(
+    "storage",
+    metadata,
+    Column("tenant", String(64), primary_key=True),
+    Column("name", String(64), primary_key=True),
+    Column("bytes", BigInteger, nullable=False),
+    Column("reserved", Boolean, nullable=False),
+    # Of a reservation that ends with its process: which one, and until when it is believed to live.
+    Column("lease_owner", String(64)),
+    Column("lease_until", Float),
+)

@@ -7,6 +7,7 @@ from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
 
+from .disk import bytes_in
 from .ids import PREFIXES, checked
 from .store import Store
 
@@ -53,7 +54,8 @@ class TenantFiles:
                 shutil.rmtree(left)
             else:
                 left.unlink()
-        for folder in (self._datasets, self._volumes, self._exports, self._animations, self._meshes):
+        single = self._datasets, self._volumes, self._exports, self._animations, self._meshes, self._uploads
+        for folder in single:
             for left in folder.glob("*.partial"):
                 left.unlink()
 
@@ -159,6 +161,16 @@ class TenantFiles:
             self._store.remove([path])
         else:
             path.unlink(missing_ok=True)
+
+    def sizes(self) -> dict[str, int]:
+        """Bytes of each stored thing that lies here, by its id; of a volume in another format by the name of
+        the file."""
+        found = {}
+        for name in (*KEPT, "exports"):
+            for path in (self.root / name).iterdir():
+                key = path.name if name == "exports" else path.name.partition(".")[0]
+                found[key] = bytes_in(path) if path.is_dir() else path.stat().st_size
+        return found
 
     def bytes_used(self) -> int:
         """The size of all of it, bytes, wherever it is kept; raises StorageAway where that cannot be told."""

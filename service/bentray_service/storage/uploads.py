@@ -5,16 +5,22 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from sqlalchemy import ColumnElement, insert, select, update
+from sqlalchemy import ColumnElement, Connection, func, insert, select, update
 from sqlalchemy import delete as delete_from
 
-from ..refusals import UnknownId
+from ..refusals import TooOften, UnknownId
+from . import usage
 from .database import Database
 from .ids import checked, new_id
 from .schema import uploads
 from .tenants import Tenant
 
 Row = dict[str, Any]
+
+# Of a tenant, begun and not whole. A client that is done with one ends it; the others expire.
+MOST_BEGUN = 100
+# After which it is worth another try, s.
+AGAIN_S = 60.0
 
 
 class Uploads:
@@ -26,8 +32,17 @@ class Uploads:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def add(self, tenant: Tenant, what: str, length: int, given: Row, metadata: str, keep_s: float) -> Row:
-        """Store a new upload.
+    def add(
+        self,
+        tenant: Tenant,
+        what: str,
+        length: int,
+        given: Row,
+        metadata: str,
+        keep_s: float,
+        most_bytes: int,
+    ) -> Row:
+        """Store a new upload, and reserve the room for it.
 
         Args:
             tenant: whose it is.
@@ -36,16 +51,25 @@ class Uploads:
             given: what the user says of it, as the ingest process wants it.
             metadata: the same as it was sent.
             keep_s: how long it is kept unless something comes, s.
+            most_bytes: that the tenant may store.
+
+        Raises:
+            QuotaUsedUp: when there is less room than ``length``.
+            TooOften: when ``MOST_BEGUN`` of the tenant have been begun and are not whole.
         """
         upload_id, now = new_id("upload"), time.time()
+        # Named at once, so that reading it a second time makes the same file.
+        result_id = new_id(what)
         with self._database.write() as connection:
+            # First, for it lets the uploads of a tenant begin one after the other.
+            usage.reserve(connection, tenant, result_id, length, most_bytes)
+            _check_begun(connection, tenant)
             connection.execute(
                 insert(uploads).values(
                     id=upload_id,
                     tenant=tenant,
                     what=what,
-                    # Named at once, so that reading it a second time makes the same file.
-                    result_id=new_id(what),
+                    result_id=result_id,
                     length=length,
                     given=given,
                     metadata=metadata,
@@ -100,11 +124,12 @@ class Uploads:
 
     def refuse(self, upload_id: str, problem: Row, keep_s: float) -> None:
         """It cannot be read."""
-        self._change(upload_id, state="refused", problem=problem, expires=time.time() + keep_s)
+        self._change(upload_id, released=True, state="refused", problem=problem, expires=time.time() + keep_s)
 
     def remove(self, upload_id: str) -> None:
         """Forget it."""
         with self._database.write() as connection:
+            _release(connection, upload_id)
             connection.execute(delete_from(uploads).where(uploads.c.id == upload_id))
 
     def _where(self, *conditions: ColumnElement[bool]) -> list[Row]:
@@ -112,6 +137,23 @@ class Uploads:
         with self._database.read() as connection:
             return [dict(row) for row in connection.execute(query).mappings()]
 
-    def _change(self, upload_id: str, **values: Any) -> None:
+    def _change(self, upload_id: str, *, released: bool = False, **values: Any) -> None:
         with self._database.write() as connection:
+            if released:
+                _release(connection, upload_id)
             connection.execute(update(uploads).where(uploads.c.id == upload_id).values(**values))
+
+
+def _check_begun(connection: Connection, tenant: Tenant) -> None:
+    begun = uploads.c.tenant == tenant, uploads.c.state == "receiving"
+    count = connection.execute(select(func.count()).where(*begun)).scalar_one()
+    if count >= MOST_BEGUN:
+        accepted = f"fewer than {MOST_BEGUN} of a tenant at a time; end those that are no longer needed"
+        raise TooOften("uploads", f"{count} that are begun and not whole", accepted, AGAIN_S)
+
+
+def _release(connection: Connection, upload_id: str) -> None:
+    """Give up what is reserved for it; what it has become stays stored."""
+    query = select(uploads.c.tenant, uploads.c.result_id).where(uploads.c.id == upload_id)
+    for row in connection.execute(query):
+        usage.release(connection, Tenant(row.tenant), row.result_id)

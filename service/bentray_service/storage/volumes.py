@@ -12,6 +12,7 @@ from .database import Database
 from .ids import checked
 from .schema import datasets, jobs, uploaded_volumes, volumes
 from .tenants import Tenant
+from .usage import keep
 
 Row = dict[str, Any]
 
@@ -35,6 +36,7 @@ class Volumes:
                     tenant=tenant, id=volume_id, created=time.time(), bytes=size, sha256=sha256, **summary
                 )
             )
+            keep(connection, tenant, volume_id, size)
         return self.get(tenant, volume_id)
 
     def get(self, tenant: Tenant, volume_id: str) -> Row:

@@ -1,46 +1,174 @@
-"""What a tenant may store: refused before it is received, and what of others is there does not count."""
+"""What a tenant may store, over HTTP: reserved before anything is received, made or run."""
 
+import gzip
+import io
+import time
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
+import nibabel
+import numpy as np
 import pytest
 
-from bentray_service.access.quota import check_room
-from bentray_service.refusals import QuotaUsedUp
-from bentray_service.storage.files import Files
-from bentray_service.storage.tenants import LOCAL, Tenant
+from bentray_service.storage.disk import bytes_in
+from bentray_service.storage.ids import new_id
+from bentray_service.storage.tenants import LOCAL
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
+BYTES = {"Content-Type": "application/octet-stream"}
+TUS = {"Tus-Resumable": "1.0.0"}
+MOST = 2_000_000
+PATIENCE_S = 30.0
 
 
-def test_to_the_last_byte(tmp_path):
-    files = Files(tmp_path)
-    mine = files.of(LOCAL)
-    (files.of(Tenant("other")).root / "volumes" / "x").write_bytes(bytes(5000))
-    (mine.root / "fields" / "deep").mkdir()
-    (mine.root / "fields" / "deep" / "x").write_bytes(bytes(900))
-    check_room(mine, 1000, 100)
-    with pytest.raises(QuotaUsedUp, match="900 bytes stored, 101 more"):
-        check_room(mine, 1000, 101)
+def used(http):
+    found = http.get("/v1/access").json()
+    return found["bytes_stored"], found["bytes_reserved"]
 
 
-def test_uploads_and_jobs_beyond_it_are_refused_and_leave_nothing(
-    start, scan, uploaded, submitted, until, work
-):
+def kept(http):
+    return bytes_in(http.app.state.parts.files.of(LOCAL).root)
+
+
+def refused(answer):
+    assert answer.status_code == 507, answer.text
+    found = answer.json()
+    assert found["type"] == "/problems/quota-used-up"
+    assert "BENTRAY_MAX_TENANT_BYTES" in found["accepted"]
+    return found["found"]
+
+
+def settled(http, place):
+    deadline = time.monotonic() + PATIENCE_S
+    while time.monotonic() < deadline:
+        record = http.get(place).json()
+        if record["state"] in ("done", "refused"):
+            return record
+        time.sleep(0.02)
+    raise AssertionError(record)
+
+
+def packed_zeros(count):
+    """A volume of so many bytes that packs a thousandfold."""
+    shape = (100, 100, count // 10_000)
+    return gzip.compress(nibabel.Nifti1Image(np.zeros(shape, np.uint8), np.eye(4)).to_bytes())
+
+
+def volume(http, values):
+    buffer = io.BytesIO()
+    np.save(buffer, values)
+    answer = http.post("/v1/volumes", content=buffer.getvalue(), headers=BYTES)
+    assert answer.status_code == 201, answer.text
+    return answer.json()["id"]
+
+
+def test_what_is_refused_leaves_nothing_and_what_is_deleted_gives_its_room_back(start, scan, uploaded):
     content = scan().read_bytes()
     http = start(max_tenant_bytes=int(1.5 * len(content)))
     dataset = uploaded(http)
-    files = http.app.state.parts.files.of(LOCAL)
+    stored = kept(http)
+    assert used(http) == (stored, 0)
 
     def in_pieces():
         yield content
 
     for body in (content, in_pieces()):
-        answer = http.post("/v1/datasets", content=body, headers=HDF5)
-        assert (answer.status_code, answer.json()["type"]) == (507, "/problems/quota-used-up")
-        assert "BENTRAY_MAX_TENANT_BYTES" in answer.json()["accepted"]
-    tus = {"Tus-Resumable": "1.0.0", "Upload-Length": str(len(content))}
-    assert http.post("/v1/uploads", headers=tus).status_code == 507
-    assert not list((files.root / "incoming").iterdir())
+        said = refused(http.post("/v1/datasets", content=body, headers=HDF5))
+        assert said.startswith(f"{stored} bytes stored, ")
+        assert used(http) == (stored, 0)
+    refused(http.post("/v1/uploads", headers={**TUS, "Upload-Length": str(len(content))}))
+    assert kept(http) == stored
     assert len(http.get("/v1/datasets").json()["datasets"]) == 1
-    submitted(http, dataset)
-    (files.root / "exports" / "filler").write_bytes(bytes(len(content)))
-    answer = http.post("/v1/jobs", json={"kind": "reconstruction", "dataset": dataset})
-    assert answer.status_code == 507
+    assert http.delete(f"/v1/datasets/{dataset}").status_code == 204
+    assert used(http) == (0, 0)
+    uploaded(http)
+
+
+def test_uploads_in_pieces_begun_at_once_do_not_come_together_beyond_it(start):
+    http, begin = start(max_tenant_bytes=MOST), Barrier(8)
+
+    def ask(_):
+        begin.wait()
+        return http.post("/v1/uploads", headers={**TUS, "Upload-Length": str(MOST // 3)}).status_code
+
+    with ThreadPoolExecutor(8) as pool:
+        told = list(pool.map(ask, range(8)))
+    assert sorted(told) == [201] * 3 + [507] * 5
+    assert used(http) == (0, MOST // 3 * 3)
+
+
+@pytest.mark.parametrize("in_pieces", [False, True])
+def test_a_packed_volume_counts_as_it_will_be_stored_before_it_is_written(start, in_pieces):
+    http, content = start(max_tenant_bytes=MOST), packed_zeros(11_000_000)
+    assert len(content) < MOST / 50
+    if not in_pieces:
+        said = refused(http.post("/v1/volumes", content=content, headers=BYTES))
+    else:
+        kind = {"Upload-Metadata": "kind dm9sdW1l", "Upload-Length": str(len(content))}
+        place = http.post("/v1/uploads", headers={**TUS, **kind}).headers["location"]
+        media = {"Content-Type": "application/offset+octet-stream", "Upload-Offset": "0"}
+        assert http.patch(place, content=content, headers={**TUS, **media}).status_code == 204
+        problem = settled(http, place)["problem"]
+        assert (problem["status"], problem["type"]) == (507, "/problems/quota-used-up")
+        said = problem["found"]
+    assert said == "0 bytes stored, 0 reserved, 11000000 more asked for"
+    assert used(http) == (0, 0)
+    assert kept(http) == 0
+    assert http.get("/v1/volumes").json() == {"volumes": []}
+
+
+def test_exports_count(start):
+    http = start(max_tenant_bytes=MOST)
+    name = volume(http, np.zeros((64, 64, 64), np.float32))
+    place = f"/v1/volumes/{name}/data"
+    told = {kind: http.get(place, params={"format": kind}).status_code for kind in ("npy", "nifti", "mat")}
+    # A mesh of bytes is written as numbers of eight at worst: that is what is reserved meanwhile.
+    assert told == {"npy": 507, "nifti": 507, "mat": 507}
+    http = start("larger", max_tenant_bytes=2 * MOST)
+    name = volume(http, np.zeros((64, 64, 64), np.float32))
+    place = f"/v1/volumes/{name}/data"
+    told = [http.get(place, params={"format": kind}) for kind in ("npy", "npy", "nifti", "metaimage")]
+    assert [one.status_code for one in told] == [200, 200, 507, 507]
+    assert used(http) == (kept(http), 0)
+    assert http.delete(f"/v1/volumes/{name}").status_code == 204
+    assert used(http) == (0, 0)
+
+
+def test_jobs_reserve_what_they_will_store(start, uploaded, submitted, work, until):
+    """Of many that are submitted while the first runs, none goes beyond it; at its end it counts as it is."""
+    http = start(max_tenant_bytes=MOST)
+    dataset = uploaded(http)
+    stored, _ = used(http)
+    work.hold.clear()
+    job = submitted(http, dataset, nodes=64)
+    assert job["plan"]["stored_bytes"] >= 4 * 64 * 64 * 8
+    assert used(http) == (stored, job["plan"]["stored_bytes"])
+    asked = {"kind": "reconstruction", "dataset": dataset, "settings": {"nodes": 200, "sweeps": 1}}
+    refused(http.post("/v1/jobs", json=asked))
+    work.hold.set()
+    until(http, job["id"])
+    assert used(http) == (kept(http), 0)
+
+
+def test_geometry_fields_reserve_their_tables(start):
+    http = start(max_tenant_bytes=3_000_000)
+    corners = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
+    answer = http.post("/v1/meshes", content=f"OFF\n4 4 0\n{corners}".encode(), headers=BYTES)
+    # They stay queued.
+    http.app.state.parts.runner.stop()
+    asked = {"kind": "geometry-field", "mesh": answer.json()["id"]}
+    small = {"samples": 8, "inner_samples": 4, "image_size": 33}
+    told = [http.post("/v1/jobs", json={**asked, "settings": {**small, "divisions": k}}) for k in range(1, 9)]
+    assert [one.status_code for one in told] == [202, 202, *[507] * 6]
+    # Each has two tables of 36 n⁴ entries of 4 bytes, whatever the mesh.
+    assert 2 * 8 * 36 * 8**4 < used(http)[1] < 3_000_000
+    assert http.post(told[0].json()["links"]["cancel"]).status_code == 202
+    assert http.post("/v1/jobs", json={**asked, "settings": small}).status_code == 202
+
+
+def test_what_a_service_that_died_had_reserved_is_free_at_the_next_start(start):
+    http = start(max_tenant_bytes=MOST)
+    http.app.state.parts.quota.resize(LOCAL, new_id("dataset"), MOST)
+    assert used(http) == (0, MOST)
+    http.__exit__()
+    assert used(start(max_tenant_bytes=MOST)) == (0, 0)

@@ -3,11 +3,15 @@
 import asyncio
 import base64
 import hashlib
+import signal
+import subprocess
+import sys
 
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.ingest.append import Checksum, Hold, append
+from bentray_service.ingest import receive as receiving
+from bentray_service.ingest.append import Checksum, Hold, append, discard_unverified, size_of
 from bentray_service.refusals import Locked, TooLarge, UnknownChecksum, WrongChecksum
 
 BEGIN = b"begin "
@@ -89,6 +93,68 @@ def test_one_writer_at_a_time_also_after_a_failure():
     with pytest.raises(ConnectionError):
         fail()
     with hold("a"), hold("b"):
-        hold.doubt("a", 7)
-        assert (hold.sure("a"), hold.sure("b")) == (7, None)
-    assert hold.sure("a") is None
+        pass
+
+
+DIES = """
+import asyncio, os, sys
+from pathlib import Path
+from bentray_service.ingest.append import Checksum, append
+
+async def stream():
+    yield b"unverified"
+    await asyncio.sleep(0)
+    while path.stat().st_size < 16:
+        # Chunks are written in batches; those that are large at once.
+        yield bytes(8 * 2**20)
+    os.kill(os.getpid(), 9)
+
+path = Path(sys.argv[1])
+checksum = Checksum.of(sys.argv[2]) if sys.argv[2:] else None
+asyncio.run(append(stream(), path, 6, 2**40, checksum))
+"""
+
+
+@pytest.mark.parametrize("checked", [False, True])
+def test_what_came_before_a_kill_counts_unless_its_checksum_was_not_verified(tmp_path, checked):
+    path = tmp_path / "u"
+    path.write_bytes(BEGIN)
+    said = [f"md5 {base64.b64encode(bytes(16)).decode()}"] if checked else []
+    ended = subprocess.run([sys.executable, "-c", DIES, str(path), *said], timeout=60)
+    assert ended.returncode == -signal.SIGKILL
+    assert path.stat().st_size > 16
+    if not checked:
+        assert size_of(path) == path.stat().st_size
+        return
+    # Also before anything has been cut off.
+    assert size_of(path) == len(BEGIN)
+    discard_unverified(path)
+    assert path.read_bytes() == BEGIN
+    assert size_of(path) == len(BEGIN)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_piece_may_follow_one_that_was_not_verified(tmp_path):
+    """As where cutting it off failed."""
+    path = tmp_path / "u"
+    path.write_bytes(BEGIN + b"unverified")
+    (tmp_path / "u.unverified").write_text(str(len(BEGIN)))
+    assert run(path, b"middle") == 12
+    assert path.read_bytes() == b"begin middle"
+    assert size_of(path) == 12
+
+
+def test_bytes_of_a_piece_do_not_count_while_it_is_checked(tmp_path, monkeypatch):
+    monkeypatch.setattr(receiving, "BATCH_BYTES", 1)
+    seen, path = [], tmp_path / "u"
+    path.write_bytes(BEGIN)
+
+    async def watched():
+        for chunk in (b"mid", b"dle"):
+            yield chunk
+            await asyncio.sleep(0)
+            seen.append(size_of(path))
+
+    asyncio.run(append(watched(), path, len(BEGIN), 100, checksum("md5", b"middle")))
+    assert seen == [len(BEGIN)] * 2
+    assert size_of(path) == 12

@@ -6,13 +6,15 @@ import time
 import pytest
 
 from bentray_kernels.errors import InvalidInput
+from bentray_service.access.quota import Quota
 from bentray_service.ingest import reader as reading
 from bentray_service.ingest.canonical import Limits
+from bentray_service.ingest.fair_queue import FairQueue
 from bentray_service.ingest.reader import UploadReader
 from bentray_service.refusals import StorageFull, UnknownId
 from bentray_service.storage.database import open_database
 from bentray_service.storage.files import Files
-from bentray_service.storage.tenants import LOCAL
+from bentray_service.storage.tenants import LOCAL, Tenant
 from bentray_service.storage.uploads import Uploads
 
 PATIENCE_S = 20.0
@@ -41,6 +43,7 @@ def bench(tmp_path, monkeypatch):
     monkeypatch.setattr(reading, "make_canonical", made.meet)
     yield made
     made.reader.stop()
+    made.queue.stop()
     database.close()
 
 
@@ -49,26 +52,28 @@ class Bench:
         self.uploads, self.files, self.store = Uploads(database), Files(folder), Store()
         self.files.prepare()
         self.answers, self.read = [], []
-        limits = Limits(2**30, 10.0, folder)
-        self.reader = UploadReader(self.uploads, self.files, {"dataset": self.store}, limits, 60.0)
+        limits, self.queue = Limits(2**30, 10.0, folder), FairQueue(1)
+        self.queue.start()
+        stores, quota = {"dataset": self.store}, Quota(database, 10**6)
+        self.reader = UploadReader(self.uploads, self.files, stores, limits, 60.0, self.queue, quota)
 
-    def meet(self, what, source, result_id, files, limits, given, started):
+    def meet(self, what, source, result_id, files, limits, given, reserve, started):
         self.read.append(result_id)
         answer = self.answers.pop(0) if self.answers else {"title": "a scan"}
         if isinstance(answer, Exception):
             raise answer
         return answer
 
-    def whole(self):
-        row = self.uploads.add(LOCAL, "dataset", 3, {}, "", 60.0)
-        self.files.of(LOCAL).upload(row["id"]).write_bytes(b"abc")
+    def whole(self, tenant=LOCAL):
+        row = self.uploads.add(tenant, "dataset", 3, {}, "", 60.0, 10**6)
+        self.files.of(tenant).upload(row["id"]).write_bytes(b"abc")
         self.uploads.arrived(row["id"])
         return row
 
     def settled(self, row):
         deadline = time.monotonic() + PATIENCE_S
         while time.monotonic() < deadline:
-            now = self.uploads.get(LOCAL, row["id"])
+            now = self.uploads.get(Tenant(row["tenant"]), row["id"])
             if now["state"] in ("done", "refused"):
                 return now
             time.sleep(0.01)

@@ -14,6 +14,7 @@ from bentray_service.storage.ids import new_id, volume_of
 from bentray_service.storage.jobs import Jobs
 from bentray_service.storage.queue import Queue
 from bentray_service.storage.tenants import LOCAL
+from bentray_service.storage.usage import Usage, usage_of
 from bentray_service.storage.volumes import Volumes
 
 # The tables of version 1, word for word as SQLite kept them.
@@ -116,7 +117,7 @@ def test_the_old_tables_were_those_of_version_1(old, tmp_path):
         names = {row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     connection.close()
     later = {"uploaded_volumes", "meshes", "geometry_fields", "keys", "uploads", "bucket_mark"}
-    later |= {"checksums", "too_old"}
+    later |= {"checksums", "too_old", "storage"}
     assert names == set(expected) - later
 
 
@@ -145,6 +146,13 @@ def test_a_job_that_waited_is_run(old):
     queue = Queue(database)
     assert queue.claim()["id"] == WAITING
     assert queue.state(WAITING) == "running"
+    database.close()
+
+
+def test_what_was_stored_counts(old):
+    database = open_database(old)
+    with database.read() as connection:
+        assert usage_of(connection, LOCAL) == Usage(stored=9 + 9, reserved=0)
     database.close()
 
 
@@ -193,6 +201,7 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
     told = Recorder()
     monkeypatch.setattr(type(schema.uploaded_volumes), "create", lambda table, to: to.said.append(table.name))
     migration.migrate(told, 1)
+    into = "INSERT INTO storage (tenant, name, bytes, reserved)"
     assert told.said[:-1] == [
         "uploaded_volumes",
         "ALTER TABLE jobs ALTER COLUMN dataset_id DROP NOT NULL",
@@ -227,6 +236,13 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
         "ALTER TABLE datasets ADD COLUMN counts JSON",
         "checksums",
         "too_old",
+        "storage",
+        *(
+            f"{into} SELECT tenant, id, bytes, false FROM {table}"
+            for table in ("datasets", "uploaded_volumes", "volumes", "meshes", "geometry_fields")
+        ),
+        f"{into} SELECT tenant, result_id, length, true FROM uploads "
+        "WHERE state IN ('receiving', 'reading') AND result_id NOT IN (SELECT name FROM storage)",
     ]
     assert told.said[-1].startswith("UPDATE about SET version")
 

@@ -1,0 +1,134 @@
+"""Whose upload is read next: tenants take turns, and uploads of one tenant go in the order they came."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter, deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Any
+
+from dask.system import CPU_COUNT
+from distributed.system import MEMORY_LIMIT
+
+from ..storage.tenants import Tenant
+
+# One that no tenant can hold beside the two that each may.
+LEAST_AT_ONCE = 3
+STOP_SECONDS = 30.0
+
+
+def readers_at_once(memory_bytes: int) -> int:
+    """How many readers this machine can have at a time, each of which may take ``memory_bytes``.
+
+    They take half of the memory at most, but for the least number of them.
+    """
+    return max(LEAST_AT_ONCE, min(int(CPU_COUNT), int(MEMORY_LIMIT) // (2 * memory_bytes)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    work: Callable[[], Any]
+    future: Future[Any]
+
+
+class FairQueue:
+    """Does work in threads of its own, of up to ``at_once`` uploads at the same time.
+
+    Next is the tenant with the fewest at work, of these the one that was served longest ago. One thread is
+    left to the others: whoever comes while a single tenant keeps the service busy begins at once.
+
+    Attributes:
+        share: how many of one tenant are at work at a time.
+    """
+
+    def __init__(self, at_once: int) -> None:
+        self.share = max(1, at_once - 1)
+        self._waiting: dict[Tenant, deque[_Task]] = {}
+        # When each tenant was served last, as a number that grows.
+        self._served: Counter[Tenant] = Counter()
+        self._turn = 0
+        self._working: Counter[Tenant] = Counter()
+        self._changed = threading.Condition()
+        self._leaving = False
+        self._threads = [
+            threading.Thread(target=self._loop, name=f"ingest-{i}", daemon=True) for i in range(at_once)
+        ]
+
+    def start(self) -> None:
+        for thread in self._threads:
+            thread.start()
+
+    def alive(self) -> bool:
+        """Whether every thread is there."""
+        return all(thread.is_alive() for thread in self._threads)
+
+    def stop(self) -> None:
+        """Cancel what waits, and end the threads after what they are at."""
+        with self._changed:
+            self._leaving = True
+            waiting = [task.future for tasks in self._waiting.values() for task in tasks]
+            self._changed.notify_all()
+        for future in waiting:
+            future.cancel()
+        for thread in self._threads:
+            thread.join(STOP_SECONDS)
+
+    def submit(self, tenant: Tenant, work: Callable[[], Any]) -> Future[Any]:
+        """Let ``work`` be done in the tenant's turn; cancelling the future before that leaves the queue."""
+        task = _Task(work, Future())
+        with self._changed:
+            self._waiting.setdefault(tenant, deque()).append(task)
+            self._changed.notify()
+        task.future.add_done_callback(
+            lambda future: self._leave(tenant, task) if future.cancelled() else None
+        )
+        return task.future
+
+    def waiting(self, tenant: Tenant) -> int:
+        """How many of a tenant wait."""
+        with self._changed:
+            return len(self._waiting.get(tenant, ()))
+
+    def _leave(self, tenant: Tenant, task: _Task) -> None:
+        with self._changed:
+            tasks = self._waiting.get(tenant)
+            if tasks is not None and task in tasks:
+                tasks.remove(task)
+                if not tasks:
+                    del self._waiting[tenant]
+
+    def _loop(self) -> None:
+        while True:
+            with self._changed:
+                while (found := self._take()) is None and not self._leaving:
+                    self._changed.wait()
+            if found is None:
+                return
+            tenant, task = found
+            if task.future.set_running_or_notify_cancel():
+                try:
+                    result = task.work()
+                except BaseException as error:
+                    task.future.set_exception(error)
+                else:
+                    task.future.set_result(result)
+            with self._changed:
+                self._working[tenant] -= 1
+                # Another thread may have passed this tenant by, with nobody else there.
+                self._changed.notify_all()
+
+    def _take(self) -> tuple[Tenant, _Task] | None:
+        """The next, which counts as at work from now on."""
+        able = [tenant for tenant in self._waiting if self._working[tenant] < self.share]
+        if self._leaving or not able:
+            return None
+        tenant = min(able, key=lambda one: (self._working[one], self._served[one]))
+        task = self._waiting[tenant].popleft()
+        if not self._waiting[tenant]:
+            del self._waiting[tenant]
+        self._working[tenant] += 1
+        self._turn += 1
+        self._served[tenant] = self._turn
+        return tenant, task
