@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import secrets
 import socket
+import threading
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
 from starlette.concurrency import run_in_threadpool
 
+from sqlalchemy.exc import SQLAlchemyError
+
 from ..storage import usage
 from ..storage.database import Database
 from ..storage.files import Files
 from ..storage.tenants import Tenant
 from ..storage.usage import Lease, Usage
+
+log = logging.getLogger("bentray.access")
 
 # How long a process that says nothing is believed to be at work on what it has reserved room for, s.
 LEASE_S = 900.0
@@ -33,6 +39,9 @@ class Quota:
         self.most_bytes = most_bytes
         self._database = database
         self._clock = clock
+        self._lock = threading.Lock()
+        # What is to be released.
+        self._ended: set[tuple[Tenant, str]] = set()
         self._owner = f"{socket.gethostname()[:40]}-{os.getpid()}-{secrets.token_hex(4)}"
 
     def of(self, tenant: Tenant) -> Usage:
@@ -78,9 +87,13 @@ class Quota:
             usage.forget(connection, tenant, [name])
 
     def release(self, tenant: Tenant, name: str) -> None:
-        """Give up a reservation; what is stored by now stays."""
-        with self._database.write() as connection:
-            usage.release(connection, tenant, name)
+        """Give up a reservation, later if the database is away now; what is stored by then stays."""
+        with self._lock:
+            self._ended.add((tenant, name))
+        try:
+            self._release_ended()
+        except SQLAlchemyError:
+            log.warning("the reservation of %s is given up later", name, exc_info=True)
 
     def begin(self, files: Files, *, alone: bool) -> None:
         """Drop what processes that died had reserved, and take the sizes of the files that lie here.
@@ -97,9 +110,19 @@ class Quota:
 
     def renew(self) -> None:
         """Say that this process is still at work, and drop what those that died had reserved."""
+        self._release_ended()
         with self._database.write() as connection:
             usage.renew(connection, self._lease())
             usage.drop_expired(connection)
+
+    def _release_ended(self) -> None:
+        with self._lock:
+            ended = list(self._ended)
+        with self._database.write() as connection:
+            for tenant, name in ended:
+                usage.release(connection, tenant, name)
+        with self._lock:
+            self._ended.difference_update(ended)
 
     def _lease(self) -> Lease:
         return Lease(self._owner, self._clock() + LEASE_S)

@@ -5,6 +5,7 @@ import hashlib
 import io
 import os
 import time
+from dataclasses import replace
 from email.utils import parsedate_to_datetime
 
 import numpy as np
@@ -13,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import update
 
+from bentray_service.ingest.upload_limits import UploadLimits
 from bentray_service.storage import schema
 
 TUS = {"Tus-Resumable": "1.0.0"}
@@ -345,3 +347,29 @@ def test_what_was_stored_at_a_death_is_not_stored_twice(start, scan):
     http.app.state.parts.reader.notify()
     assert settled(http, place)["result"] == done["result"]
     assert len(http.get("/v1/datasets").json()["datasets"]) == 1
+
+
+def test_bytes_of_a_piece_that_was_not_verified_before_a_death_do_not_count(start):
+    http = start()
+    place = begin(http, 100)
+    piece(http, place, 0, b"verified")
+    stored = http.app.state.parts.files.of("local").upload(place.rpartition("/")[2])
+    http.__exit__()
+    # As a kill within a piece with a checksum leaves it.
+    stored.write_bytes(b"verified" + b"not verified")
+    stored.with_name(f"{stored.name}.unverified").write_text("8")
+    http = start()
+    assert offset(http, place) == 8
+    assert stored.read_bytes() == b"verified"
+    assert piece(http, place, 8, b" piece").headers["upload-offset"] == "14"
+    assert left_in(http) == [stored.name]
+
+
+def test_uploads_are_begun_no_faster_than_allowed(start, monkeypatch):
+    http = start()
+    few = replace(http.app.state.parts, upload_limits=UploadLimits(begun_per_minute=2))
+    monkeypatch.setattr(http.app.state, "parts", few)
+    answers = [http.post("/v1/uploads", headers={**TUS, "Upload-Length": "9"}) for _ in range(3)]
+    assert [one.status_code for one in answers] == [201, 201, 429]
+    assert problem(answers[2], 429)["field"] == "uploads"
+    assert 1 <= int(answers[2].headers["retry-after"]) <= 30

@@ -7,7 +7,7 @@ from threading import Barrier
 import pytest
 
 from bentray_service.access.quota import LEASE_S, Quota
-from bentray_service.refusals import QuotaUsedUp, TooOften
+from bentray_service.refusals import DatabaseAway, QuotaUsedUp, TooOften
 from bentray_service.storage import uploads as uploading
 from bentray_service.storage.database import open_database
 from bentray_service.storage.datasets import Datasets
@@ -113,6 +113,20 @@ def test_what_fails_gives_its_room_back_and_what_is_stored_keeps_it(database):
     assert quota.of(LOCAL) == Usage(0, 0)
     take_in(whole=True)
     assert quota.of(LOCAL) == Usage(40, 0)
+
+
+def test_a_database_that_is_away_keeps_no_room_for_what_has_ended(database, monkeypatch):
+    quota = Quota(database, 100)
+
+    def away():
+        raise DatabaseAway("no answer")
+
+    with quota.reserved(LOCAL, "ds-1", 60):
+        monkeypatch.setattr(database, "write", away)
+    assert quota.of(LOCAL) == Usage(0, 60)
+    monkeypatch.undo()
+    quota.renew()
+    assert quota.of(LOCAL) == Usage(0, 0)
 
 
 def test_an_upload_has_its_room_until_it_is_forgotten_refused_or_stored(database):
