@@ -5,6 +5,7 @@ import time
 import pytest
 from sqlalchemy import func, insert, select, update
 
+from bentray_service.access.quota import Quota
 from bentray_service.housekeeping import DAY_S, Housekeeper
 from bentray_service.ingest.append import Hold
 from bentray_service.refusals import InUse, UnknownId
@@ -175,7 +176,7 @@ def test_a_result_goes_with_its_job_and_leaves_the_scan(shelf):
     job, volume = shelf.reconstruction(dataset)
     shelf.turntable(volume)
     shelf.delete("volume", volume)
-    assert (shelf.left(), shelf.rows()) == ([f"{dataset}.h5"], {"datasets": 1})
+    assert (shelf.left(), shelf.rows()) == ([f"{dataset}.h5"], {"datasets": 1, "storage": 1})
     with pytest.raises(UnknownId):
         shelf.jobs.get(LOCAL, job)
 
@@ -185,7 +186,7 @@ def test_an_uploaded_volume_leaves_its_mesh(shelf):
     shelf.turntable(volume)
     mesh = shelf.mesh(volume_id=volume, iso=0.5)
     shelf.delete("volume", volume)
-    assert (shelf.left(), shelf.rows()) == ([f"{mesh}.h5"], {"meshes": 1})
+    assert (shelf.left(), shelf.rows()) == ([f"{mesh}.h5"], {"meshes": 1, "storage": 1})
     assert Meshes(shelf.database).get(LOCAL, mesh)["volume_id"] is None
 
 
@@ -230,7 +231,8 @@ def test_old_data_go_and_young_data_stay(shelf):
     clocks.pass_by(DAY_S)
     keeper.sweep()
     assert shelf.left() == sorted([f"{young}.h5", f"{needed}.h5"])
-    assert shelf.rows() == {"datasets": 2, "jobs": 1, "events": 1, "too_old": 1}, "the one that is needed"
+    left = {"datasets": 2, "jobs": 1, "events": 1, "too_old": 1, "storage": 2}
+    assert shelf.rows() == left, "the one that is needed"
     for gone in (volume, mesh):
         assert not any(gone in name for name in shelf.left())
 
@@ -311,6 +313,7 @@ def housekeeper(shelf, clocks, keep_days=30.0, uploads=None):
         shelf.files,
         shelf.deletion,
         Hold(),
+        Quota(shelf.database, 10**9),
         Ages(shelf.database),
         observed,
         orphans,
