@@ -64,15 +64,15 @@ async def take_in(
         return store(received.size, received.sha256, summary)
 
     with service.upload_limits(tenant):
-        try:
-            await run_in_threadpool(resize, wanted or 1)
-            received = await receive(
-                request.stream(), wanted, path, settings.max_upload_bytes, ACCEPTED[what], resize
-            )
-            return await in_turn(request, service.ingest_queue, tenant, partial(check_and_store, received))
-        finally:
-            await run_in_threadpool(path.unlink, missing_ok=True)
-            await run_in_threadpool(quota.release, tenant, upload_id)
+        async with quota.reserved(tenant, upload_id, wanted or 1):
+            try:
+                received = await receive(
+                    request.stream(), wanted, path, settings.max_upload_bytes, ACCEPTED[what], resize
+                )
+                work = partial(check_and_store, received)
+                return await in_turn(request, service.ingest_queue, tenant, work)
+            finally:
+                await run_in_threadpool(path.unlink, missing_ok=True)
 
 
 async def in_turn(request: Request, queue: FairQueue, tenant: Tenant, work: Callable[[], Row]) -> Row:

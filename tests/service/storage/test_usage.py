@@ -1,5 +1,6 @@
 """What tenants store and reserve, on every database: many at once never go beyond what is allowed."""
 
+import asyncio
 import time
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
@@ -101,17 +102,17 @@ def test_the_refusal_says_what_is_stored_reserved_and_allowed(database):
 def test_what_fails_gives_its_room_back_and_what_is_stored_keeps_it(database):
     quota, dataset = Quota(database, 100), new_id("dataset")
 
-    def take_in(*, whole):
-        with quota.reserved(LOCAL, dataset, 60):
+    async def take_in(*, whole):
+        async with quota.reserved(LOCAL, dataset, 60):
             quota.resize(LOCAL, dataset, 40)
             if not whole:
                 raise ConnectionError
             Datasets(database).add(LOCAL, dataset, size=60, sha256="0" * 64, summary=SUMMARY)
 
     with pytest.raises(ConnectionError):
-        take_in(whole=False)
+        asyncio.run(take_in(whole=False))
     assert quota.of(LOCAL) == Usage(0, 0)
-    take_in(whole=True)
+    asyncio.run(take_in(whole=True))
     assert quota.of(LOCAL) == Usage(40, 0)
 
 
@@ -121,8 +122,9 @@ def test_a_database_that_is_away_keeps_no_room_for_what_has_ended(database, monk
     def away():
         raise DatabaseAway("no answer")
 
-    with quota.reserved(LOCAL, "ds-1", 60):
-        monkeypatch.setattr(database, "write", away)
+    quota.resize(LOCAL, "ds-1", 60)
+    monkeypatch.setattr(database, "write", away)
+    quota.release(LOCAL, "ds-1")
     assert quota.of(LOCAL) == Usage(0, 60)
     monkeypatch.undo()
     quota.renew()
