@@ -19,8 +19,9 @@ from _scaling_work import Work
 
 from bentray_workers.cluster import Cluster, open_cluster
 from bentray_workers.dask_settings import NO_DASHBOARD, ours
-from bentray_workers.driving import IN_FLIGHT, finished
+from bentray_workers.driving import finished
 from bentray_workers.lanes import RECONSTRUCTION, THREADS
+from bentray_workers.shares import IN_FLIGHT
 
 SETTLE_S = 2.0
 

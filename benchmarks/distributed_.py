@@ -25,7 +25,8 @@ from bentray_service.compute import Compute
 from bentray_workers.attempts import Attempts
 from bentray_workers.cluster import Cluster, open_cluster
 from bentray_workers.reconstruction_file import write_reconstruction
-from bentray_workers.slices import IN_FLIGHT, Cancelled, finished, reconstruct
+from bentray_workers.shares import IN_FLIGHT
+from bentray_workers.slices import Cancelled, finished, reconstruct
 from bentray_workers.subdomains import settle
 
 # Processes and blocks along each axis of Table 8's column; the machine may have fewer cores.

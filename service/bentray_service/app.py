@@ -171,6 +171,7 @@ def _open(
         files,
         compute,
         settings.jobs_at_once,
+        settings.tenants_at_once,
         settings.min_free_bytes,
         # The lock on the folder keeps other services away from the database that lies in it.
         alone=settings.database_url is None,

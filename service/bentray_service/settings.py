@@ -60,6 +60,12 @@ class ServiceSettings(BaseSettings):
         50 * GIB, ge=0, description="Bytes that data_dir may hold of what is kept in storage_url."
     )
     jobs_at_once: int = Field(2, ge=1, le=64, description="Jobs that run at the same time; the others wait.")
+    tenants_at_once: int = Field(
+        16,
+        ge=1,
+        le=256,
+        description="Tenants of whom one job runs in any case, beyond jobs_at_once; the workers are shared.",
+    )
     max_queued_jobs: int = Field(
         1000, ge=1, description="Jobs that may wait, of each tenant; a further one is refused with 429."
     )

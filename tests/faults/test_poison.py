@@ -17,6 +17,7 @@ from bentray_workers.checkpoints import Checkpoints
 from bentray_workers.dask_settings import NO_DASHBOARD, ours
 from bentray_workers.driving import run_on_cluster
 from bentray_workers.lanes import OFFERED, THREADS
+from bentray_workers.shares import alone
 
 pytestmark = pytest.mark.slow
 
@@ -45,7 +46,7 @@ def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):
             kept = Checkpoints(tmp_path / "checkpoints")
             attempts = Attempts(client, tmp_path)
             try:
-                run = run_on_cluster(client, attempts, None)
+                run = run_on_cluster(client, attempts, alone(client, "recon"), None)
                 slices._drive(run, {"0": chain}, 0, 0, kept, lambda progress: None)
             except KilledWorker as error:
                 ends["poisoned"] = error

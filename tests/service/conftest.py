@@ -22,6 +22,7 @@ from bentray_service.settings import ServiceSettings
 from bentray_service.web.listening import Listening
 from bentray_service.web.server import Server
 from bentray_workers import slices
+from bentray_workers.shares import Share
 
 with warnings.catch_warnings():
     # Starlette's test client would rather have httpx2; our own client is written for httpx.
@@ -118,6 +119,7 @@ class FakeWork:
         stop: Callable[[], bool],
         work_dir: Path,
         on_saved: Callable[[], None],
+        share: Share,
     ) -> Reconstruction:
         self.calls.append((path, settings))
         assert work_dir.is_dir()

@@ -41,7 +41,7 @@ class Future(distributed.Future):
 
 
 class Client:
-    def submit(self, task, *work, resources, pure):
+    def submit(self, task, *work, resources, priority, pure):
         assert task is watched
         assert (resources, pure) == (attempts.RECONSTRUCTION, False)
         return Future(work)

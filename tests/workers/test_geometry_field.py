@@ -13,6 +13,7 @@ from bentray_workers.field_files import FieldFiles, mapped, read_chart
 from bentray_workers.field_settings import FieldSettings
 from bentray_workers.geometry_field import build, bytes_of
 from bentray_workers.render_tasks import ClusterTasks, ThreadTasks
+from bentray_workers.shares import alone
 from bentray_workers.slices import Cancelled
 
 from .field_folders import SMALL, stored
@@ -24,7 +25,9 @@ def nothing():
 
 @pytest.fixture(params=["cluster", "threads"])
 def tasks(request, cluster):
-    return ClusterTasks(cluster.client, 0) if request.param == "cluster" else ThreadTasks()
+    if request.param == "threads":
+        return ThreadTasks()
+    return ClusterTasks(cluster.client, 0, alone(cluster.client, "render"))
 
 
 @pytest.fixture

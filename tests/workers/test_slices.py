@@ -2,6 +2,7 @@
 
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import count
 
@@ -13,6 +14,7 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers import first_arrivals, slices
 from bentray_workers.dataset_file import write_dataset
+from bentray_workers.shares import Shares
 from bentray_workers.slices import Cancelled
 
 from .tearing import torn_runs
@@ -156,3 +158,26 @@ def test_a_torn_run_is_gone_on_from_to_the_same_bits(cluster, scan, path, tmp_pa
         assert np.array_equal(getattr(result, name), getattr(expected, name)), name
     for name in ("history", "settings", "trials"):
         assert getattr(result, name) == getattr(expected, name), name
+
+
+def test_a_small_job_of_another_tenant_runs_beside_a_large_one_to_the_same_bits(cluster, scan, path):
+    """The large one has been there first and fills every worker; it goes on meanwhile and ends as alone."""
+    shares, seen = Shares(), []
+    large = replace(PLAN, sweeps=60)
+
+    def work():
+        with shares.of("busy", "recon", cluster.client) as share:
+            return slices.reconstruct(cluster.client, path, large, seen.append, share=share)
+
+    with ThreadPoolExecutor(1) as pool:
+        busy = pool.submit(work)
+        while not seen:
+            time.sleep(0.01)
+        with shares.of("new", "recon", cluster.client) as share:
+            small = slices.reconstruct(cluster.client, path, PLAN, share=share)
+        beside = not busy.done()
+        result = busy.result(timeout=120.0)
+    assert beside, "the small one did not wait for the end of the large one"
+    np.testing.assert_array_equal(small.speed, slices.reconstruct(None, path, PLAN).speed)
+    np.testing.assert_array_equal(result.speed, slices.reconstruct(None, path, large).speed)
+    assert result.history[-1].sweep == 60

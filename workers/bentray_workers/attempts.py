@@ -24,6 +24,7 @@ class _Attempt(NamedTuple):
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
     strikes: int
+    priority: int
     marker: Path
 
 
@@ -46,9 +47,14 @@ class Attempts:
         self._markers = (folder / f"call-{number}" for number in count())
         self._made: dict[Future, _Attempt] = {}
 
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future:
-        """Begin a call; its future is to be handed to ``ended`` once it has ended."""
-        return self._submit(_Attempt(function, arguments, 0, next(self._markers)))
+    def submit(self, function: Callable[..., Any], *arguments: Any, priority: int = 0) -> Future:
+        """Begin a call; its future is to be handed to ``ended`` once it has ended.
+
+        Args:
+            function, arguments: what to call.
+            priority: higher ones first, where calls wait for the same worker.
+        """
+        return self._submit(_Attempt(function, arguments, 0, priority, next(self._markers)))
 
     def ended(self, future: Future, *, keep: bool = False) -> tuple[Future | None, Any]:
         """What a call gave; or the same call once more, where its workers died and it may not be the cause.
@@ -81,7 +87,8 @@ class Attempts:
 
     def _submit(self, attempt: _Attempt) -> Future:
         work = attempt.marker, attempt.function, *attempt.arguments
-        future = self._client.submit(watched, *work, resources=self._resources, pure=False)
+        how = {"resources": self._resources, "priority": attempt.priority, "pure": False}
+        future = self._client.submit(watched, *work, **how)
         self._made[future] = attempt
         return future
 

@@ -11,10 +11,7 @@ from distributed import Client, Future, wait
 from bentray_kernels.tomography.chains import Call
 
 from .attempts import Attempts
-from .connected import connected_workers
-
-# Tasks in flight for each worker: one at work and one ready.
-IN_FLIGHT = 2
+from .shares import Share
 
 POLL_S = 0.2
 
@@ -56,15 +53,15 @@ def run_here(stop: Callable[[], bool] | None) -> Run:
     return run
 
 
-def run_on_cluster(client: Client, attempts: Attempts, stop: Callable[[], bool] | None) -> Run:
-    """Runs calls on a cluster, a few at a time for each worker.
+def run_on_cluster(client: Client, attempts: Attempts, share: Share, stop: Callable[[], bool] | None) -> Run:
+    """Runs calls on a cluster, as many at a time as the job's share of the workers allows.
 
     Args:
         client: of the cluster.
         attempts: of the job.
+        share: of the job; what is run and what it gives does not depend on it.
         stop: polled several times a second; true ends with ``Cancelled``.
     """
-    window = IN_FLIGHT * max(1, len(connected_workers(client)))
 
     def run(
         first: list[tuple[str, Call]], chains: Mapping[str, Follows], moved: Callable[[str], None]
@@ -73,9 +70,12 @@ def run_on_cluster(client: Client, attempts: Attempts, stop: Callable[[], bool] 
         running: dict[Future, tuple[str, Call]] = {}
         try:
             while ready or running:
-                while ready and len(running) < window:
+                while share.may_begin(len(running), len(ready)):
                     name, call = ready.popleft()
-                    running[attempts.submit(call.function, *call.arguments)] = name, call
+                    priority = share.priority(len(running))
+                    running[attempts.submit(call.function, *call.arguments, priority=priority)] = name, call
+                if not running:
+                    share.wait()
                 for future in finished(client, list(running)):
                     name, call = running.pop(future)
                     again, given = attempts.ended(future, keep=call.keep)
@@ -91,12 +91,13 @@ def run_on_cluster(client: Client, attempts: Attempts, stop: Callable[[], bool] 
         finally:
             for future in running:
                 future.cancel()
+            share.pause()
 
     return run
 
 
 def finished(client: Client, running: list[Future]) -> list[Future]:
-    """Those that have ended; waits for the first one, ``POLL_S`` at most."""
+    """Those that have ended; waits for the first one, ``POLL_S`` at most. Of none there are none."""
     # The client is nobody's default, so ``wait`` must be told which it is.
     with client.as_current():
         try:

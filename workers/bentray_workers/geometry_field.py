@@ -104,7 +104,7 @@ def _run(
     running: list[Any] = []
     try:
         while waiting or running:
-            while waiting and len(running) < tasks.window:
+            while tasks.may_begin(len(running), len(waiting)):
                 function, arguments = waiting.pop()
                 running.append(tasks.submit(function, *arguments))
             for future in tasks.ended(running):
@@ -118,6 +118,7 @@ def _run(
     finally:
         for future in running:
             future.cancel()
+        tasks.may_begin(0, 0)
 
 
 def _move(folder: Path, target: Path) -> None:

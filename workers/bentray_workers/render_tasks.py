@@ -9,19 +9,16 @@ from typing import Any, Protocol
 
 from distributed import Client
 
-from .connected import connected_workers
-from .driving import IN_FLIGHT, POLL_S, finished
+from .driving import POLL_S, finished
 from .lanes import RENDER
+from .shares import Share
 
 
 class Tasks(Protocol):
-    """Where tasks are done; futures are those of Dask or of ``concurrent.futures``, which are alike here.
+    """Where tasks are done; futures are those of Dask or of ``concurrent.futures``, which are alike here."""
 
-    Attributes:
-        window: how many may be in flight.
-    """
-
-    window: int
+    def may_begin(self, in_flight: int, ready: int) -> bool:
+        """Whether to begin one more, with so many in flight and so many that could begin."""
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Begin a task; its future."""
@@ -36,18 +33,26 @@ class ClusterTasks:
     Args:
         client: of it.
         priority: above or below that of other tasks.
+        share: of the workers.
     """
 
-    def __init__(self, client: Client, priority: int) -> None:
+    def __init__(self, client: Client, priority: int, share: Share) -> None:
         self._client = client
         self._priority = priority
-        self.window = IN_FLIGHT * max(1, len(connected_workers(client)))
+        self._share = share
+        self._next = priority
+
+    def may_begin(self, in_flight: int, ready: int) -> bool:
+        self._next = self._priority + self._share.priority(in_flight)
+        return self._share.may_begin(in_flight, ready)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        how = {"pure": False, "resources": RENDER, "priority": self._priority}
+        how = {"pure": False, "resources": RENDER, "priority": self._next}
         return self._client.submit(function, *arguments, **how)
 
     def ended(self, running: list[Any]) -> list[Any]:
+        if not running:
+            self._share.wait()
         return finished(self._client, running)
 
 
@@ -55,8 +60,11 @@ class ThreadTasks:
     """In threads of this process, one a core; compiled kernels let go of the GIL."""
 
     def __init__(self) -> None:
-        self.window = len(os.sched_getaffinity(0))
-        self._pool = ThreadPoolExecutor(self.window)
+        self._threads = len(os.sched_getaffinity(0))
+        self._pool = ThreadPoolExecutor(self._threads)
+
+    def may_begin(self, in_flight: int, ready: int) -> bool:
+        return ready > 0 and in_flight < self._threads
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
         return self._pool.submit(function, *arguments)

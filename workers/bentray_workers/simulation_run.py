@@ -13,10 +13,10 @@ from bentray_kernels.tomography import Progress
 
 from .asked_simulation import AskedSimulation
 from .attempts import Attempts
-from .connected import connected_workers
+from .shares import Share, alone
 from .simulation_ending import finish
 from .simulation_parts import folder_of, make_part, missing, parts_of
-from .slices import IN_FLIGHT, Cancelled, finished
+from .slices import Cancelled, finished
 
 
 def simulate_scan(
@@ -27,6 +27,7 @@ def simulate_scan(
     on_progress: Callable[[Progress], None],
     on_saved: Callable[[], None],
     stop: Callable[[], bool],
+    share: Share | None = None,
 ) -> dict[str, Any]:
     """Simulate a scan into a dataset file, to the bits that ``simulate`` gives in one process.
 
@@ -39,6 +40,7 @@ def simulate_scan(
         on_progress: called after each task.
         on_saved: the same.
         stop: polled all the while; true ends with ``Cancelled``, whatever tasks are at work.
+        share: of the workers; None: all of them.
 
     Returns:
         As ``simulation_ending.finish``.
@@ -52,17 +54,21 @@ def simulate_scan(
     folder.mkdir(exist_ok=True)
     parts = parts_of(settings)
     waiting = deque(missing(parts, folder))
-    attempts, window = Attempts(client, work_dir), IN_FLIGHT * _workers(client)
+    attempts, share = Attempts(client, work_dir), share or alone(client, "recon")
     done, total = len(parts) - len(waiting), len(parts) + 1
     on_progress(Progress(done, total))
     running: set[Future] = set()
     result: dict[str, Any] | None = None
     try:
         while result is None:
-            while waiting and len(running) < window:
-                running.add(attempts.submit(make_part, settings, waiting.popleft(), folder))
-            if done == len(parts) and not running:
-                running.add(attempts.submit(finish, settings, folder, target))
+            ending = done == len(parts) and not running
+            while share.may_begin(len(running), len(waiting) + ending):
+                call, *given = (finish, folder, target) if ending else (make_part, waiting.popleft(), folder)
+                priority = share.priority(len(running))
+                running.add(attempts.submit(call, settings, *given, priority=priority))
+                ending = False
+            if not running:
+                share.wait()
             for future in finished(client, list(running)):
                 running.remove(future)
                 again, given = attempts.ended(future)
@@ -78,8 +84,5 @@ def simulate_scan(
     finally:
         for future in running:
             future.cancel()
+        share.pause()
     return result
-
-
-def _workers(client: Client) -> int:
-    return max(1, len(connected_workers(client)))

@@ -20,15 +20,16 @@ from bentray_kernels.tomography.reconstruction import carried_out, measured
 from .attempts import Attempts
 from .checkpoints import Checkpoints
 from .dataset_file import read_dataset
-from .driving import IN_FLIGHT, Cancelled, Run, finished, run_here, run_on_cluster
+from .driving import Cancelled, Run, finished, run_here, run_on_cluster
 from .findings_file import Found, read_findings
 from .first_arrivals import Arrivals, Files, Guide, Source
 from .offers import resources_for
 from .reconstruction_file import write_reconstruction
 from .scan import FileScan, FileWaveScan
+from .shares import Share, alone
 from .trace_reading import trace_samples
 
-__all__ = ["IN_FLIGHT", "Cancelled", "finished", "reconstruct"]
+__all__ = ["Cancelled", "finished", "reconstruct"]
 
 # The phase of a job's progress after those of ``first_arrivals``.
 RECONSTRUCTING = "reconstructing"
@@ -42,6 +43,7 @@ def reconstruct(
     stop: Callable[[], bool] | None = None,
     work_dir: Path | None = None,
     on_saved: Callable[[], None] = lambda: None,
+    share: Share | None = None,
 ) -> Reconstruction:
     """Reconstruct a dataset file, on a cluster or in this process; both give the same bits.
 
@@ -58,6 +60,7 @@ def reconstruct(
             unfinished run of the same dataset and settings left is gone on from, to the same bits. None: a
             temporary folder of this machine.
         on_saved: called after each checkpoint.
+        share: of the workers; None: all of them. The bits do not depend on it.
 
     Raises:
         Cancelled: when ``stop`` said so.
@@ -68,7 +71,7 @@ def reconstruct(
             run = run_here(stop)
         else:
             attempts = Attempts(client, folder, resources_for(client, settings))
-            run = run_on_cluster(client, attempts, stop)
+            run = run_on_cluster(client, attempts, share or alone(client, "recon"), stop)
         job = _Job(run, dataset_path, folder, Checkpoints(folder / "checkpoints", on_saved), count())
         rising = _Rising(on_progress)
         path, found, chosen, trials = _guided(job, settings, rising)

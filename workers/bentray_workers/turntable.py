@@ -18,14 +18,14 @@ from bentray_kernels.tomography import Progress
 
 from .asked_fields import asked
 from .atomic import replacing, write_bytes
-from .connected import connected_workers
-from .driving import IN_FLIGHT, Cancelled, finished
+from .driving import Cancelled, finished
 from .lanes import RENDER
 from .offers import offers_by_address
 from .picture_cost import placed, refraction_bytes
 from .refraction import tasks_of
 from .refraction_view import RefractionView
 from .scene_cache import stored_shape
+from .shares import Share, alone
 from .strips import submit
 
 FORMATS = ("zip", "apng")
@@ -89,6 +89,7 @@ def turn(
     on_progress: Callable[[Progress], None],
     on_saved: Callable[[], None],
     stop: Callable[[], bool],
+    share: Share | None = None,
 ) -> None:
     """Draw all pictures on a cluster and write them to one file.
 
@@ -102,6 +103,7 @@ def turn(
         on_progress: called after each picture.
         on_saved: the same.
         stop: polled between pictures; true ends with ``Cancelled``.
+        share: of the workers; None: all of them.
 
     Raises:
         Cancelled: when ``stop`` said so.
@@ -111,14 +113,17 @@ def turn(
     waiting = deque((number, frame) for number, frame in enumerate(frames) if not frame.exists())
     drawn = len(frames) - len(waiting)
     running: dict[Future, Path] = {}
-    window = IN_FLIGHT * max(1, len(connected_workers(client)))
+    share = share or alone(client, "render")
     where = placed(refraction_bytes(stored_shape(path), turntable), offers_by_address(client))
     on_progress(Progress(drawn, len(frames)))
     try:
         while waiting or running:
-            while waiting and len(running) < window:
+            while share.may_begin(len(running), len(waiting)):
                 number, frame = waiting.popleft()
-                running[submit(client, tasks_of(path, turntable.frame(number)), PRIORITY, where)] = frame
+                priority = PRIORITY + share.priority(len(running))
+                running[submit(client, tasks_of(path, turntable.frame(number)), priority, where)] = frame
+            if not running:
+                share.wait()
             for future in finished(client, list(running)):
                 write_bytes(running.pop(future), future.result())
                 drawn += 1
@@ -136,6 +141,7 @@ def turn(
     finally:
         for future in running:
             future.cancel()
+        share.pause()
 
 
 def write_zip(frames: Sequence[Path], target: Path) -> None:

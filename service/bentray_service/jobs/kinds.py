@@ -21,6 +21,7 @@ from bentray_workers.asked_simulation import AskedSimulation
 from bentray_workers.field_settings import FieldSettings
 from bentray_workers.reconstruction_file import write_reconstruction
 from bentray_workers.render_tasks import ClusterTasks
+from bentray_workers.shares import Share
 from bentray_workers.simulation_run import simulate_scan
 from bentray_workers.turntable import PRIORITY, Turntable, turn
 
@@ -45,6 +46,7 @@ class Task:
         on_progress: told how far it is; may be called often.
         on_saved: told whenever it has kept something to go on from.
         stop: whether to give up, by raising ``slices.Cancelled``.
+        share: of the workers; how many tasks the job may have in flight.
     """
 
     client: Any
@@ -55,6 +57,7 @@ class Task:
     on_progress: Callable[[Progress], None]
     on_saved: Callable[[], None]
     stop: Callable[[], bool]
+    share: Share
 
 
 class Kind(Protocol):
@@ -62,10 +65,14 @@ class Kind(Protocol):
 
     Attributes:
         table: the name of that in which its results are.
+        lane: what its tasks ask of a worker, a key of ``bentray_workers.lanes.OFFERED``.
     """
 
     @property
     def table(self) -> str: ...
+
+    @property
+    def lane(self) -> str: ...
 
     def source(self, files: TenantFiles, job: Row) -> Path:
         """The file that the job reads; one that reads nothing has its own folder."""
@@ -83,7 +90,7 @@ class Kind(Protocol):
 class ReconstructionKind:
     """Speed of sound from one dataset."""
 
-    table = schema.volumes.name
+    table, lane = schema.volumes.name, "recon"
     settings: TypeAdapter[Settings] = TypeAdapter(Settings)
 
     def source(self, files: TenantFiles, job: Row) -> Path:
@@ -94,9 +101,8 @@ class ReconstructionKind:
 
     def run(self, task: Task) -> Row | None:
         settings = self.settings.validate_python(task.settings)
-        result = slices.reconstruct(
-            task.client, task.source, settings, task.on_progress, task.stop, task.work_dir, task.on_saved
-        )
+        progress = task.on_progress, task.stop, task.work_dir, task.on_saved
+        result = slices.reconstruct(task.client, task.source, settings, *progress, share=task.share)
         if not np.isfinite(result.speed).all():
             found = f"no finite speed at {np.count_nonzero(~np.isfinite(result.speed))} nodes"
             accepted = "settings by which it converges: a smaller relaxation or a larger penalty_strength"
@@ -111,7 +117,7 @@ class ReconstructionKind:
 class SimulationKind:
     """The scan of a phantom, as a dataset."""
 
-    table = schema.datasets.name
+    table, lane = schema.datasets.name, "recon"
     settings: TypeAdapter[AskedSimulation] = TypeAdapter(AskedSimulation)
 
     def source(self, files: TenantFiles, job: Row) -> Path:
@@ -122,7 +128,7 @@ class SimulationKind:
 
     def run(self, task: Task) -> Row | None:
         asked = self.settings.validate_python(task.settings)
-        progress = task.on_progress, task.on_saved, task.stop
+        progress = task.on_progress, task.on_saved, task.stop, task.share
         found = simulate_scan(task.client, asked, task.target, task.work_dir, *progress)
         return {"id": task.target.stem, **found}
 
@@ -133,7 +139,7 @@ class SimulationKind:
 class RefractionKind:
     """A turntable of one volume; it has no row but the job's."""
 
-    table = schema.volumes.name
+    table, lane = schema.volumes.name, "render"
     settings: TypeAdapter[Turntable] = TypeAdapter(Turntable)
 
     def source(self, files: TenantFiles, job: Row) -> Path:
@@ -153,6 +159,7 @@ class RefractionKind:
             task.on_progress,
             task.on_saved,
             task.stop,
+            task.share,
         )
         return None
 
@@ -163,7 +170,7 @@ class RefractionKind:
 class GeometryFieldKind:
     """The geometry field of one mesh."""
 
-    table = schema.geometry_fields.name
+    table, lane = schema.geometry_fields.name, "render"
     settings: TypeAdapter[FieldSettings] = TypeAdapter(FieldSettings)
 
     def source(self, files: TenantFiles, job: Row) -> Path:
@@ -175,7 +182,7 @@ class GeometryFieldKind:
     def run(self, task: Task) -> Row | None:
         settings = self.settings.validate_python(task.settings)
         figures = geometry_field.build(
-            ClusterTasks(task.client, PRIORITY),
+            ClusterTasks(task.client, PRIORITY, task.share),
             task.source,
             settings,
             task.target,

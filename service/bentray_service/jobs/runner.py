@@ -16,6 +16,7 @@ from distributed.comm import CommClosedError
 from distributed.scheduler import NoValidWorkerError, NoWorkerError
 from sqlalchemy.exc import SQLAlchemyError
 
+from bentray_workers.shares import Shares
 from bentray_workers.slices import Cancelled
 
 from ..compute import Compute
@@ -57,16 +58,26 @@ FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class Runner:
-    """Runs up to ``at_once`` jobs at the same time.
+    """Runs up to ``at_once`` jobs at the same time, and one of each tenant that has none, up to ``tenants``.
 
-    A thread only drives its job: the work is done by the cluster. While the disk has less than
-    ``min_free_bytes`` free, or the store is away, jobs wait.
+    A thread only drives its job: the work is done by the cluster, which the jobs share. While the disk has
+    less than ``min_free_bytes`` free, or the store is away, jobs wait.
     """
 
     def __init__(
-        self, queue: Queue, files: Files, compute: Compute, at_once: int, min_free_bytes: int, *, alone: bool
+        self,
+        queue: Queue,
+        files: Files,
+        compute: Compute,
+        at_once: int,
+        tenants: int,
+        min_free_bytes: int,
+        *,
+        alone: bool,
     ) -> None:
         """Args:
+        at_once: jobs that run whoever's they are.
+        tenants: jobs that run at most, those beyond ``at_once`` of tenants without another one.
         alone: whether no other service uses the database; see ``Jobs.recover``.
         """
         self._queue = queue
@@ -74,13 +85,16 @@ class Runner:
         self._compute = compute
         self._min_free_bytes = min_free_bytes
         self._alone = alone
-        self._wake = threading.Condition()
-        self._leaving = threading.Event()
-        self._in_hand: set[str] = set()
+        self._at_once = at_once
+        self._most = max(at_once, tenants)
+        self._shares = Shares()
+        self._wake, self._leaving = threading.Event(), threading.Event()
+        # The job of each thread. One that was released may be taken again before its thread has ended.
+        self._in_hand: dict[threading.Thread, str] = {}
         self._threads = [
-            threading.Thread(target=self._loop, name=f"job-{i}", daemon=True) for i in range(at_once)
+            threading.Thread(target=self._take, name="jobs", daemon=True),
+            threading.Thread(target=self._keep_leases, name="leases", daemon=True),
         ]
-        self._threads.append(threading.Thread(target=self._keep_leases, name="leases", daemon=True))
 
     def start(self) -> None:
         """Take up what a dead process left, then begin."""
@@ -91,15 +105,19 @@ class Runner:
 
     def _recover(self) -> None:
         crashed = CRASHED.model_dump(exclude_none=True)
-        again = self._queue.recover(crashed, alone=self._alone, held=tuple(self._in_hand))
+        again = self._queue.recover(crashed, alone=self._alone, held=self._held())
         if again:
             log.warning("%d jobs of a service that died wait again", again)
             self.notify()
 
+    def _held(self) -> tuple[str, ...]:
+        """The jobs that are at work here."""
+        return tuple(self._in_hand.copy().values())
+
     def _keep_leases(self) -> None:
         while not self._leaving.wait(LEASE_CHECK_SECONDS):
             try:
-                self._queue.renew(tuple(self._in_hand))
+                self._queue.renew(self._held())
                 self._recover()
             except DatabaseAway as error:
                 log.warning("the leases could not be renewed: %s", error)
@@ -108,44 +126,65 @@ class Runner:
 
     def notify(self) -> None:
         """Say that a job has been queued."""
-        with self._wake:
-            self._wake.notify()
+        self._wake.set()
 
     def alive(self) -> bool:
-        """Whether every thread is there."""
+        """Whether the threads that take jobs and keep leases are there."""
         return all(thread.is_alive() for thread in self._threads)
 
     def stop(self) -> None:
         """Stop the running jobs, put them back in the queue and end the threads."""
         self._leaving.set()
-        with self._wake:
-            self._wake.notify_all()
-        for thread in self._threads:
+        self._wake.set()
+        for thread in [*self._threads, *tuple(self._in_hand)]:
             thread.join(STOP_SECONDS)
             if thread.is_alive():
                 log.warning(
                     "%s did not stop in %g s; its job runs again at the next start", thread.name, STOP_SECONDS
                 )
 
-    def _loop(self) -> None:
+    def _take(self) -> None:
+        """Take jobs as long as there is room for one more, and begin each in a thread of its own."""
         while not self._leaving.is_set():
+            # Before looking: what is queued from here on wakes this thread again.
+            self._wake.clear()
             try:
-                job = self._queue.claim() if self._has_room() and self._files.store.fault() is None else None
-                if job is not None:
-                    self._in_hand.add(job["id"])
-                    try:
-                        self._run(job)
-                    finally:
-                        self._in_hand.discard(job["id"])
+                if self._begin():
                     continue
             except DatabaseAway:
                 # The thread must outlive it; that it is away is in the log already, once.
                 pass
             except Exception:
-                # Whatever it is, as a full disk: the slot would be lost for good.
-                log.exception("a job could not be taken or ended; trying again in %g s", IDLE_SECONDS)
-            with self._wake:
-                self._wake.wait(IDLE_SECONDS)
+                # Whatever it is: no job would ever begin again.
+                log.exception("a job could not be taken; trying again in %g s", IDLE_SECONDS)
+            self._wake.wait(IDLE_SECONDS)
+
+    def _begin(self) -> bool:
+        """Begin a job, if there is one that may."""
+        running = len(self._in_hand)
+        if running >= self._most or not self._has_room() or self._files.store.fault() is not None:
+            return False
+        job = self._queue.claim(idle_only=running >= self._at_once)
+        if job is None:
+            return False
+        thread = threading.Thread(target=self._see_to_its_end, args=(job,), name=job["id"], daemon=True)
+        self._in_hand[thread] = job["id"]
+        try:
+            thread.start()
+        except BaseException:
+            del self._in_hand[thread]
+            raise
+        return True
+
+    def _see_to_its_end(self, job: dict[str, Any]) -> None:
+        try:
+            self._run(job)
+        except Exception:
+            # Whatever it is, as a full disk: the job is taken up again, since nobody is at work on it.
+            log.exception("%s could not be ended", job["id"])
+        finally:
+            del self._in_hand[threading.current_thread()]
+            self._wake.set()
 
     def _has_room(self) -> bool:
         return shutil.disk_usage(self._files.root).free >= self._min_free_bytes
@@ -171,18 +210,21 @@ class Runner:
             except Damaged:
                 # It is made again.
                 self._files.store.remove([target])
-            result = kind.run(
-                Task(
-                    client=self._compute.client,
-                    source=source,
-                    settings=job["settings"],
-                    target=target,
-                    work_dir=files.work(job_id),
-                    on_progress=reporter.report,
-                    on_saved=reporter.saved,
-                    stop=reporter.stop,
+            client = self._compute.client
+            with self._shares.of(job["tenant"], kind.lane, client) as share:
+                result = kind.run(
+                    Task(
+                        client=client,
+                        source=source,
+                        settings=job["settings"],
+                        target=target,
+                        work_dir=files.work(job_id),
+                        on_progress=reporter.report,
+                        on_saved=reporter.saved,
+                        stop=reporter.stop,
+                        share=share,
+                    )
                 )
-            )
             self._keep(target, reporter)
         except Cancelled:
             if not reporter.lost:

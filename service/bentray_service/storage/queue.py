@@ -58,11 +58,14 @@ class Queue:
         with self._database.read() as connection:
             return set(connection.execute(select(jobs.c.id).where(jobs.c.state.not_in(ENDED))).scalars())
 
-    def claim(self) -> Row | None:
+    def claim(self, *, idle_only: bool = False) -> Row | None:
         """Turn a queued job into a running one of this service and return it; None when none waits.
 
         Of the tenants that wait, the one with the fewest running jobs is next, then the one whose last job
         began longest ago; of its jobs the oldest.
+
+        Args:
+            idle_only: only of tenants of whom no job is running.
         """
         of_tenant = jobs.alias()
         same = of_tenant.c.tenant == jobs.c.tenant
@@ -70,7 +73,7 @@ class Queue:
         served = select(func.coalesce(func.max(of_tenant.c.started), 0.0)).where(same).scalar_subquery()
         next_one = (
             select(jobs.c.id)
-            .where(jobs.c.state == "queued")
+            .where(jobs.c.state == "queued", *((running == 0,) if idle_only else ()))
             .order_by(running, served, jobs.c.number)
             .limit(1)
             .with_for_update(skip_locked=True)

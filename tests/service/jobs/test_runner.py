@@ -1,6 +1,7 @@
 """The runner: jobs in order, a few at a time, each to its end."""
 
 import errno
+import shutil
 import time
 
 import numpy as np
@@ -10,8 +11,9 @@ from distributed.comm import CommClosedError
 from sqlalchemy.exc import DataError, OperationalError
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography.settings import Settings
 from bentray_service.storage.queue import Queue
-from bentray_service.storage.tenants import LOCAL
+from bentray_service.storage.tenants import LOCAL, Tenant
 
 
 def test_at_most_so_many_at_a_time(start, uploaded, submitted, until, work):
@@ -25,6 +27,44 @@ def test_at_most_so_many_at_a_time(start, uploaded, submitted, until, work):
     assert [http.get(f"/v1/jobs/{job_id}").json()["state"] for job_id in made[2:]] == ["queued", "queued"]
     work.hold.set()
     assert [until(http, job_id)["state"] for job_id in made] == ["succeeded"] * 4
+
+
+def states_of(http, jobs):
+    return [http.app.state.parts.queue.state(job) for job in jobs]
+
+
+def until_states(http, jobs, *wanted):
+    deadline = time.monotonic() + 20.0
+    while tuple(found := states_of(http, jobs)) != wanted:
+        assert time.monotonic() < deadline, found
+        time.sleep(0.02)
+
+
+def test_another_tenants_job_begins_beside_jobs_of_hours(start, uploaded, work):
+    """Of one tenant as many run as may at a time, of each other one in any case, up to so many in all."""
+    http = start(jobs_at_once=2, tenants_at_once=4)
+    dataset, parts = uploaded(http), http.app.state.parts
+    settings, mine = Settings(nodes=16, sweeps=1).to_dict(), parts.files.of(LOCAL).dataset(dataset)
+    for tenant in "abcd":
+        shutil.copy(mine, parts.files.of(Tenant(tenant)).dataset(dataset))
+
+    def add(tenant):
+        job = parts.jobs.add(Tenant(tenant), "reconstruction", settings, dataset)["id"]
+        parts.runner.notify()
+        return job
+
+    work.hold.clear()
+    jobs = [add("a") for _ in range(3)]
+    until_states(http, jobs, "running", "running", "queued")
+    jobs += [add("b"), add("b")]
+    until_states(http, jobs, "running", "running", "queued", "running", "queued")
+    jobs += [add("c"), add("d")]
+    until_states(http, jobs, "running", "running", "queued", "running", "queued", "running", "queued")
+    assert parts.runner.alive()
+    parts.jobs.request_cancel(Tenant("c"), jobs[5])
+    until_states(http, jobs, "running", "running", "queued", "running", "queued", "cancelled", "running")
+    work.hold.set()
+    until_states(http, jobs, *["succeeded"] * 5, "cancelled", "succeeded")
 
 
 def test_a_new_job_wakes_the_runner(start, uploaded, submitted, until, work, monkeypatch):

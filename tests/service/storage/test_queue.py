@@ -170,6 +170,18 @@ def test_tenants_take_turns(jobs, queue, dataset):
     assert [queue.claim()["tenant"] for _ in range(3)] == ["b", "a", "a"]
 
 
+def test_only_tenants_without_a_running_job_where_that_is_asked(jobs, queue, dataset):
+    for tenant in ("a", "a", "b"):
+        jobs.add(Tenant(tenant), "reconstruction", {}, dataset)
+    assert queue.claim(idle_only=True)["tenant"] == "a"
+    job = queue.claim(idle_only=True)
+    assert job["tenant"] == "b"
+    assert queue.claim(idle_only=True) is None
+    queue.fail(job["id"], PROBLEM)
+    assert queue.claim(idle_only=True) is None
+    assert queue.claim()["tenant"] == "a"
+
+
 def test_a_job_on_a_volume_ends_without_one(jobs, queue, database):
     job = jobs.add(LOCAL, "refraction", {"frames": 3}, volume_id="vol-" + "0" * 20)
     assert (job["dataset_id"], job["volume_id"]) == (None, "vol-" + "0" * 20)

@@ -1,0 +1,203 @@
+"""Shares of the workers: tenants alike, then the jobs of each alike, task by task, whoever came first."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from distributed import Client
+
+from .connected import connected_workers
+
+# Tasks in flight for each worker where nobody else wants it: one at work and one ready.
+IN_FLIGHT = 2
+# How often the workers are counted, s.
+COUNT_S = 2.0
+# A job that has not asked for so long wants nothing now: it reads, writes or waits for something else, s.
+ASKED_S = 1.0
+# How long a job without a task in flight waits for its turn before it looks again, s.
+TURN_S = 0.2
+
+
+class Share:
+    """What one job may have of the workers; see ``Shares``.
+
+    Attributes:
+        tenant, lane: whose it is, and what its tasks ask for.
+        in_flight, ready: tasks that it has begun and not seen the end of; tasks that could begin.
+        begun: which task of all was its last; asked: when it was last heard of, s.
+    """
+
+    def __init__(self, shares: Shares, tenant: str, lane: str, count: Callable[[], int]) -> None:
+        self.tenant, self.lane = tenant, lane
+        self.in_flight = self.ready = 0
+        self.begun, self.asked = 0, -ASKED_S
+        self._shares = shares
+        self._count = count
+        self._workers, self._counted = 1, -COUNT_S
+
+    def may_begin(self, in_flight: int, ready: int) -> bool:
+        """Whether to begin one more task now; to be asked before each, and again once tasks have ended.
+
+        Args:
+            in_flight: tasks of this job that have begun and whose end has not been seen.
+            ready: tasks that could begin.
+
+        Raises:
+            ConnectionError: when the scheduler is away.
+        """
+        now = self._shares.clock()
+        if now - self._counted >= COUNT_S:
+            self._workers, self._counted = max(1, self._count()), now
+        return self._shares.decide(self, in_flight, ready, self._workers)
+
+    def pause(self) -> None:
+        """Say that nothing is in flight and nothing wanted."""
+        self._shares.decide(self, 0, 0, self._workers)
+
+    def wait(self) -> None:
+        """Wait for a turn, a moment at most; for jobs with nothing in flight that they could wait for."""
+        self._shares.wait(TURN_S)
+
+    @staticmethod
+    def priority(in_flight: int) -> int:
+        """Of the next task, for Dask: the first of a job goes before what others have ready beside theirs."""
+        return -in_flight
+
+
+class Shares:
+    """Divides the workers among the jobs of one service.
+
+    A tenant alone has all workers, with a task ready for each. Where several are at work, each may have an
+    equal part at any time, one worker is kept free for each that has less, and what remains goes to whoever
+    has tasks for it. With fewer workers than tenants they take turns by the time they have had. The jobs of
+    one tenant divide its part alike.
+
+    Args:
+        clock: seconds.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self.clock = clock
+        self._changed = threading.Condition()
+        self._jobs: list[Share] = []
+        # Time of workers that each tenant has had, s, since others were there.
+        self._had: dict[tuple[str, str], float] = {}
+        self._updated = clock()
+        self._begun = 0
+
+    @contextmanager
+    def of(self, tenant: str, lane: str, client: Client) -> Iterator[Share]:
+        """The share of a job while it runs.
+
+        Args:
+            tenant: whose job it is.
+            lane: what its tasks ask for, as ``recon``.
+            client: of the cluster.
+        """
+        share = self.join(tenant, lane, client)
+        try:
+            yield share
+        finally:
+            self._leave(share)
+
+    def join(self, tenant: str, lane: str, client: Client) -> Share:
+        """As ``of``, for good."""
+        share = Share(self, tenant, lane, lambda: len(connected_workers(client)))
+        with self._changed:
+            self._account()
+            others = [self._had[one.lane, one.tenant] for one in self._jobs if one.lane == lane]
+            # Whoever comes anew has had as much as the one who has had least.
+            self._had.setdefault((lane, tenant), min(others, default=0.0))
+            self._jobs.append(share)
+        return share
+
+    def _leave(self, share: Share) -> None:
+        whose = share.lane, share.tenant
+        with self._changed:
+            self._account()
+            self._jobs.remove(share)
+            if all((one.lane, one.tenant) != whose for one in self._jobs):
+                del self._had[whose]
+            self._changed.notify_all()
+
+    def decide(self, share: Share, in_flight: int, ready: int, workers: int) -> bool:
+        """As ``Share.may_begin``."""
+        with self._changed:
+            self._account()
+            fewer = in_flight < share.in_flight
+            share.in_flight, share.ready, share.asked = in_flight, ready, self.clock()
+            may = ready > 0 and self._is_next(share, workers)
+            if may:
+                share.in_flight += 1
+                self._begun += 1
+                share.begun = self._begun
+            if fewer or not ready:
+                self._changed.notify_all()
+            return may
+
+    def wait(self, seconds: float) -> None:
+        """Until something has changed."""
+        with self._changed:
+            self._changed.wait(seconds)
+
+    def _is_next(self, share: Share, workers: int) -> bool:
+        jobs: dict[str, list[Share]] = {}
+        for one in self._jobs:
+            if one.lane == share.lane:
+                jobs.setdefault(one.tenant, []).append(one)
+        held = {tenant: sum(one.in_flight for one in of_it) for tenant, of_it in jobs.items()}
+        most = self._most(share, jobs, held, workers)
+        if held[share.tenant] >= most:
+            return False
+        if len(jobs) > workers and not self._has_turn(share, jobs, held, workers):
+            return False
+        others = [one for one in jobs[share.tenant] if one is not share and self._wants(one)]
+        return all((share.in_flight, share.begun) <= (one.in_flight, one.begun) for one in others)
+
+    def _most(self, share: Share, jobs: dict[str, list[Share]], held: dict[str, int], workers: int) -> int:
+        """How many tasks the tenant of a job may have in flight."""
+        if len(jobs) == 1:
+            return IN_FLIGHT * workers
+        had = self._had[share.lane, share.tenant]
+        equal, kept = workers // len(jobs), 0
+        for tenant, of_it in jobs.items():
+            if tenant != share.tenant:
+                # What cannot be divided goes to those who have had less.
+                part = equal + (self._had[share.lane, tenant] < had and workers % len(jobs) > 0)
+                kept += min(part, held[tenant] + max(1, sum(one.ready for one in of_it)))
+        return max(1, equal, workers - kept)
+
+    def _has_turn(
+        self, share: Share, jobs: dict[str, list[Share]], held: dict[str, int], workers: int
+    ) -> bool:
+        """Of more tenants than workers: whether one is free, and nobody who waits for it has had less.
+
+        Who is new need not wait for what others have ready, only for what they have at work.
+        """
+        if not any(one.begun for one in jobs[share.tenant]):
+            return True
+        if sum(min(1, count) for count in held.values()) >= workers:
+            return False
+        had = self._had[share.lane, share.tenant]
+        return not any(
+            self._had[share.lane, tenant] < had
+            for tenant, of_it in jobs.items()
+            if tenant != share.tenant and not held[tenant] and any(self._wants(one) for one in of_it)
+        )
+
+    def _wants(self, share: Share) -> bool:
+        return share.ready > 0 and self.clock() - share.asked < ASKED_S
+
+    def _account(self) -> None:
+        now = self.clock()
+        for one in self._jobs:
+            self._had[one.lane, one.tenant] += one.in_flight * (now - self._updated)
+        self._updated = now
+
+
+def alone(client: Client, lane: str) -> Share:
+    """The share of a job with which no other has to share."""
+    return Shares().join("", lane, client)
