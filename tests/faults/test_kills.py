@@ -65,6 +65,7 @@ def test_whatever_is_killed_nothing_is_lost(machine, scan, scan_file):
     volumes = machine.http.get("/v1/volumes").json()["volumes"]
     assert len(volumes) == len(list((machine.files / "volumes").iterdir())) == len(jobs)
     wait_until(lambda: not list((machine.files / "work").iterdir()))
+    assert [path for path in (machine.data, *machine.data.rglob("*")) if path.lstat().st_mode & 0o077] == []
     attempts = sum(attempts_of(machine, job) for job in jobs)
     # Two jobs run at once, and nearly every kill but a worker's, which Dask makes good, tore one.
     assert attempts > len(jobs) + targets.count("service")
