@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+import uvicorn
 
+from bentray_service.app import create_app
 from bentray_service.client import AsyncClient, Client, ClientError, flows, patience, uploading
 from bentray_service.client.errors import NoAnswer
 from bentray_service.client.patience import Patience
 from bentray_service.client.steps import Ask, Fetch, Pause
+from bentray_service.settings import ServiceSettings
 
 from .cutting_proxy import cutting
 
@@ -189,6 +196,47 @@ def test_so_it_is_asynchronously(serve: Callable[..., str], scan: Callable[..., 
     with cutting(url, cuts) as proxy:
         assert asyncio.run(call(proxy.url, told)).startswith("job-")
     assert cuts == []
+
+
+@contextmanager
+def service(data: Path, port: int, cluster: Any) -> Iterator[int]:
+    """The application behind a real socket; on leaving it is stopped as by SIGTERM."""
+    app = create_app(ServiceSettings(data_dir=data), cluster)
+    server = uvicorn.Server(uvicorn.Config(app, port=port, log_level="warning", lifespan="on"))
+    thread = threading.Thread(target=server.run, daemon=True)
+    thread.start()
+    while not server.started:
+        assert thread.is_alive()
+        time.sleep(0.02)
+    try:
+        yield int(server.servers[0].sockets[0].getsockname()[1])
+    finally:
+        app.state.leaving.set()
+        server.should_exit = True
+        thread.join()
+
+
+def test_a_job_is_waited_for_while_its_service_is_started_again(
+    scan: Callable[..., Path], work: Any, cluster: Any, tmp_path: Path, soon: None
+) -> None:
+    told: list[str] = []
+    with ThreadPoolExecutor(1) as pool:
+        work.hold.clear()
+        with service(tmp_path / "data", 0, cluster) as port:
+            client = Client(f"http://127.0.0.1:{port}", poll_s=0.05, on_wait=told.append)
+            job = client.submit(client.upload(scan())["id"], {"nodes": 16, "sweeps": 1})["id"]
+            done = pool.submit(client.wait, job)
+            while not work.calls:
+                time.sleep(0.02)
+        while not told:
+            time.sleep(0.02)
+        work.hold.set()
+        with service(tmp_path / "data", port, cluster), client:
+            record = done.result(timeout=60.0)
+            assert client.download(record["volume"], "h5", tmp_path / "image.h5").stat().st_size > 0
+    assert (record["id"], record["state"], len(work.calls)) == (job, "succeeded", 2)
+    assert told[0].endswith("trying again for up to 300 s.")
+    assert told[-1] == "The service answers again."
 
 
 def test_no_patience_gives_up_at_once(serve: Callable[..., str], soon: None) -> None:

@@ -123,7 +123,7 @@ def test_cancel_between_pictures(serving, until):
 
 
 def test_a_stopped_job_runs_again_at_the_next_start(serving, until, monkeypatch):
-    def hold(client, path, turntable, target, work_dir, on_progress, on_saved, stop):
+    def hold(client, path, turntable, target, work_dir, on_progress, on_saved, stop, share):
         on_progress(Progress(1, 3))
         while not stop():
             pass
