@@ -53,4 +53,24 @@ def test_a_million_pairs_take_a_bit_each(tmp_path):
     wrong = Finding("dead elements", "1", "", "left out", pairs=np.ones((1000, 1000), bool), value=math.nan)
     write_findings(tmp_path / "findings.json", Found((wrong,), True, True))
     assert (tmp_path / "findings.json").stat().st_size < 200_000
-    assert json.loads((tmp_path / "findings.json").read_text())["findings"][0]["value"] is None
+    assert json.loads((tmp_path / "findings.json").read_text())["content"]["findings"][0]["value"] is None
+
+
+@pytest.mark.parametrize("spoiled", ["findings.json", "picked.h5"])
+@pytest.mark.parametrize("how", ["flip", "cut", "empty", "missing"])
+def test_damage_of_either_file_is_found(tmp_path, spoiled, how):
+    path, picked = tmp_path / "findings.json", tmp_path / "picked.h5"
+    picked.write_bytes(bytes(range(256)))
+    found = Found((), True, True)
+    write_findings(path, found, picked)
+    assert read_findings(path, picked) == found
+    file = tmp_path / spoiled
+    content = file.read_bytes()
+    if how == "missing":
+        file.unlink()
+    else:
+        # In the digest of the second file, or in its middle.
+        flipped = content[:-9] + bytes([content[-9] ^ 1]) + content[-8:]
+        file.write_bytes({"flip": flipped, "cut": content[:40], "empty": b""}[how])
+    with pytest.raises((OSError, ValueError, KeyError, TypeError)):
+        read_findings(path, picked)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import json
 import math
 from pathlib import Path
@@ -43,25 +44,49 @@ class Found(NamedTuple):
         return words(self.findings, stacked=stacked)
 
 
-def write_findings(path: Path, found: Found) -> None:
+def write_findings(path: Path, found: Found, picked: Path | None = None) -> None:
     """Write them; ``path`` is replaced whole or not touched.
+
+    Args:
+        path: of the file.
+        found: what was found.
+        picked: the file that goes on in place of the dataset's own, whose SHA-256 is kept with them.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
     content = {**found._asdict(), "findings": [_plain(finding) for finding in found.findings]}
-    write_bytes(path, json.dumps(content, allow_nan=False).encode())
+    content["picked_sha256"] = None if picked is None else _digest_of(picked)
+    write_bytes(path, json.dumps({"sha256": _digest(content), "content": content}, allow_nan=False).encode())
 
 
-def read_findings(path: Path) -> Found:
+def read_findings(path: Path, picked: Path | None = None) -> Found:
     """What ``write_findings`` wrote.
 
+    Args:
+        path: of the file.
+        picked: compared with what it was then, where it goes on and is given.
+
     Raises:
-        OSError, ValueError, KeyError: for a file that is absent or damaged.
+        OSError, ValueError, KeyError, TypeError: for a file that is absent or damaged, either of them.
     """
-    content = json.loads(path.read_bytes())
+    whole = json.loads(path.read_bytes())
+    content = whole["content"]
+    if _digest(content) != whole["sha256"]:
+        raise ValueError(f"{path.name} is damaged")
+    if picked is not None and content["changed"] and _digest_of(picked) != content["picked_sha256"]:
+        raise ValueError(f"{picked.name} is damaged")
     findings = tuple(_finding(plain) for plain in content["findings"])
     return Found(findings, bool(content["examined"]), bool(content["changed"]))
+
+
+def _digest(content: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _digest_of(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _plain(finding: Finding) -> dict[str, Any]:

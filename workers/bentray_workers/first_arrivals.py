@@ -265,7 +265,8 @@ def join(source: Source, files: Files, slices: list[tuple[Dataset, tuple[Finding
         parts = [one for one, _ in slices]
         shown = parts[0] if whole.slice_z_m is None else stacked(whole, parts)
         write_dataset(files.picked, replace(shown, truth=whole.truth))
-    write_findings(files.findings, Found(findings, source.examines, changed))
+    found = Found(findings, source.examines, changed)
+    write_findings(files.findings, found, files.picked if changed else None)
 
 
 def _accepted(source: Source, index: int, findings: Sequence[Finding]) -> tuple[Finding, ...]:

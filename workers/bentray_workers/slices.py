@@ -139,8 +139,9 @@ def _arrived(
 ) -> tuple[Path, Found]:
     """What goes on after a round of picking, and what it found."""
     try:
-        found = read_findings(files.findings)
-    except (OSError, ValueError, KeyError):
+        found = read_findings(files.findings, files.picked)
+    except (OSError, ValueError, KeyError, TypeError):
+        # Absent, or damaged since: they are made, or made again.
         arrivals = Arrivals(source, files, guide)
         first = [("arrivals", call) for call in arrivals.first()]
         rising.tell(arrivals.progress)
