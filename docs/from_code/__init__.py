@@ -9,6 +9,7 @@ from typing import Any
 from .command_line import commands
 from .dispersion import dispersion
 from .rest import addresses, records
+from .scan_limits import scan_limits
 from .service_settings import settings_table
 
 # A page asks for one of these by a comment on a line of its own: <!-- from the code: commands -->
@@ -17,6 +18,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "addresses": addresses,
     "records": records,
     "dispersion": dispersion,
+    "scan limits": scan_limits,
     "service settings": settings_table,
 }
 # Between bars a docstring has an absolute value, reStructuredText a substitution.

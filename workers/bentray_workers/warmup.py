@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import os
 import tempfile
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+import bentray_kernels
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation import Ring
 from bentray_kernels.eikonal import methods
@@ -84,7 +86,10 @@ def dask_setup(worker: Any) -> None:
 
 @contextmanager
 def _one_at_a_time() -> Iterator[None]:
-    """The first worker of a machine compiles, which takes a minute; the others then load what it has made."""
-    with (Path(tempfile.gettempdir()) / f"bentray-warm-up-{os.getuid()}.lock").open("ab") as file:
+    """The first worker of an installation compiles, for minutes; the others then load what it has made."""
+    # Where its kernels are cached: in the folder that the environment names, else beside their sources.
+    cache = os.environ.get("NUMBA_CACHE_DIR") or str(Path(bentray_kernels.__file__).parent)
+    name = f"bentray-warm-up-{os.getuid()}-{hashlib.sha256(cache.encode()).hexdigest()[:16]}.lock"
+    with (Path(tempfile.gettempdir()) / name).open("ab") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield

@@ -14,6 +14,10 @@ from . import descriptors
 from .connections import Connections, Limits
 from .protocol import BoundedProtocol
 
+# What requests under way may take once the service is told to stop, s: an upload that never ends must not
+# keep it from stopping, and a client goes on with what it sent by tus.
+PATIENCE_S = 5
+
 
 class Server(uvicorn.Server):
     """The server of an application."""
@@ -37,6 +41,7 @@ class Server(uvicorn.Server):
             # Whether a proxy is believed is for the door to say, by who really called.
             proxy_headers=False,
             lifespan="on",
+            timeout_graceful_shutdown=PATIENCE_S,
         )
         super().__init__(config)
 

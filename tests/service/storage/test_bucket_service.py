@@ -66,20 +66,22 @@ def test_a_result_is_served_from_the_bucket_wherever_it_was_made(
 
     # With nothing here and the bucket away it says so, and everything is there again when that is back.
     s3_server.away.set()
-    asked = {"kind": "reconstruction", "dataset": dataset}
     for answer in (
         first.get(f"{path}/data"),
         first.get(f"{path}/slice.png"),
         first.post("/v1/datasets", content=scan().read_bytes(), headers=HDF5),
-        first.post("/v1/jobs", json=asked),
         first.delete(f"/v1/datasets/{dataset}"),
     ):
         assert told(answer) == AWAY
+    # A job is planned from what the database tells, and waits for the files.
+    waiting = first.post("/v1/jobs", json={"kind": "reconstruction", "dataset": dataset})
+    assert waiting.status_code == 202
     ready = first.get("/health/ready")
     assert (ready.status_code, ready.json()["field"]) == (503, "storage")
     assert "bentray_storage_up 0.0" in first.get("/metrics").text
     s3_server.away.clear()
     assert first.get("/health/ready").status_code == 200
+    assert until(first, waiting.json()["id"])["state"] == "succeeded"
     assert len(first.get("/v1/datasets").json()["datasets"]) == 1
 
     second = service("two")
