@@ -365,10 +365,9 @@ def test_bytes_of_a_piece_that_was_not_verified_before_a_death_do_not_count(star
     assert left_in(http) == [stored.name]
 
 
-def test_uploads_are_begun_no_faster_than_allowed(start, monkeypatch):
+def test_uploads_are_begun_no_faster_than_allowed(start):
     http = start()
-    few = replace(http.app.state.parts, upload_limits=UploadLimits(begun_per_minute=2))
-    monkeypatch.setattr(http.app.state, "parts", few)
+    http.app.state.parts = replace(http.app.state.parts, upload_limits=UploadLimits(begun_per_minute=2))
     answers = [http.post("/v1/uploads", headers={**TUS, "Upload-Length": "9"}) for _ in range(3)]
     assert [one.status_code for one in answers] == [201, 201, 429]
     assert problem(answers[2], 429)["field"] == "uploads"
