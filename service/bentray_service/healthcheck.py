@@ -66,7 +66,7 @@ def check_worker(address: str) -> str | None:
     silence = heartbeat.silence_s(address)
     if silence is not None and silence <= heartbeat.STALE_S:
         return None
-    known = "none yet" if silence is None else f"the last {silence:.0f} s ago"
+    known = "none" if silence is None else f"the last {silence:.0f} s ago"
     return f"no sign of life of a worker of {address}: {known}"
 
 

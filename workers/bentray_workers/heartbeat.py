@@ -5,6 +5,7 @@ A preload module of Dask; a health check reads the file, so Dask is imported whe
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import tempfile
@@ -25,11 +26,17 @@ def file_for(scheduler: str) -> Path:
 
 
 def silence_s(scheduler: str) -> float | None:
-    """Time since the last sign of life, s; None where there was none yet."""
+    """Time since the last sign of life, s; None where there was none, or who gave it is gone."""
     try:
-        return max(time.time() - file_for(scheduler).stat().st_mtime, 0.0)
+        with file_for(scheduler).open("rb") as file:
+            try:
+                # A worker that was killed leaves a file that is fresh for a while, but not its lock.
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return max(time.time() - os.fstat(file.fileno()).st_mtime, 0.0)
     except FileNotFoundError:
-        return None
+        pass
+    return None
 
 
 def dask_setup(worker: Any) -> None:
@@ -37,16 +44,14 @@ def dask_setup(worker: Any) -> None:
     from distributed.core import Status
     from tornado.ioloop import PeriodicCallback
 
-    file = file_for(worker.scheduler.address)
+    # Open as long as the process lives.
+    file = file_for(worker.scheduler.address).open("ab")
+    fcntl.flock(file, fcntl.LOCK_SH)
+    os.utime(file.fileno(), (0.0, 0.0))
 
     def beat() -> None:
         stream = worker.batched_stream.comm
         if worker.status == Status.running and stream is not None and not stream.closed():
-            file.touch()
+            os.utime(file.fileno())
 
     worker.periodic_callbacks["bentray-heartbeat"] = PeriodicCallback(beat, 1000.0 * BEAT_S)
-
-
-def dask_teardown(worker: Any) -> None:
-    """Called by Dask when a worker ends in good order."""
-    file_for(worker.scheduler.address).unlink(missing_ok=True)
