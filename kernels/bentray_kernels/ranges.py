@@ -59,6 +59,10 @@ class Range:
         return {low: self.least, "exclusiveMaximum" if self.below else "maximum": self.most}
 
 
+# Of random numbers: the integers that every reader of JSON keeps exactly.
+SEED = Range(0, 2**53 - 1)
+
+
 def ranged(default: Any, within: Range, **metadata: Any) -> Any:
     """A field of a dataclass that takes numbers of one range, or None.
 

@@ -64,6 +64,7 @@ from .storage.private import private_files
 from .storage.queue import Queue
 from .storage.uploads import Uploads
 from .storage.volumes import Volumes
+from .web.description import Described
 from .web.headers import SecurityHeaders
 from .web.pace import Pace
 from .web.request_id import RequestIds
@@ -103,7 +104,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
         finally:
             await run_in_threadpool(stack.close)
 
-    app = FastAPI(
+    app = Described(
         title="Bentray",
         version=__version__,
         description=DESCRIPTION,

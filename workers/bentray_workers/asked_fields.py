@@ -14,16 +14,20 @@ MOST_PIXELS = 4096
 MOST_RAYS = MOST_PIXELS**2
 
 
-def asked(default: Any, description: str, within: Range | None = None) -> Any:
+def asked(
+    default: Any, description: str, within: Range | None = None, schema: Mapping[str, Any] | None = None
+) -> Any:
     """A field; its description is what OpenAPI and the options of the command say.
 
     Args:
         default: of the field.
         description: of the field.
         within: the range of its numbers, checked by ``check``.
+        schema: where there is no such range, what JSON Schema can say of what the field may be beside its
+            type; the class itself checks it.
     """
     if within is None:
-        return field(default=default, metadata={"description": description})
+        return field(default=default, metadata={"description": description, "json_schema_extra": schema})
     return ranged(default, within, description=description)
 
 

@@ -15,6 +15,8 @@ from bentray_kernels.splines.prefilter import MOST_SMOOTHING
 
 from .asked_fields import MOST_PIXELS, MOST_RAYS, asked, check
 
+INDEX = Range(0.01, 100.0)
+
 CHOICES = {
     "filter": tuple(FILTERS),
     "camera": ("orthographic", "perspective"),
@@ -35,14 +37,26 @@ class RefractionView:
     """
 
     iso: tuple[float, ...] = asked(
-        (), "Rising iso-values, unit of the volume; without any, the middle of its range after smoothing."
+        (),
+        "Rising iso-values, unit of the volume; without any, the middle of its range after smoothing.",
+        schema={"maxItems": MOST_ISOS},
     )
-    index: tuple[float, ...] = asked((1.5,), "Refractive index above each iso-value.")
-    outside: float = asked(1.0, "Refractive index below the first iso-value.", Range(0.01, 100.0))
+    index: tuple[float, ...] = asked(
+        (1.5,),
+        "Refractive index above each iso-value: as many as there are of these, or one.",
+        schema={"items": {"type": "number", **INDEX.schema}, "minItems": 1, "maxItems": MOST_ISOS},
+    )
+    outside: float = asked(1.0, "Refractive index below the first iso-value.", INDEX)
     surroundings: int = asked(
-        0, "Which layer goes on around the volume: 0 the one below the first iso-value, 1 the next, ..."
+        0,
+        "Which layer goes on around the volume: 0 the one below the first iso-value, 1 the next, ...",
+        schema={"minimum": 0, "maximum": MOST_ISOS},
     )
-    filter: str = asked("bspline3", "Filter between the nodes: " + ", ".join(FILTERS) + ".")
+    filter: str = asked(
+        "bspline3",
+        "Filter between the nodes: " + ", ".join(FILTERS) + ".",
+        schema={"enum": list(FILTERS)},
+    )
     smoothing: float = asked(
         0.0,
         "How much a B-spline smooths away; 0 passes through the nodes, 10 to 100 takes off steps of 8 bits.",
@@ -84,8 +98,8 @@ class RefractionView:
             raise InvalidInput("iso", f"{len(self.iso)} iso-values", f"at most {MOST_ISOS}")
         if len(self.index) != max(len(self.iso), 1):
             raise InvalidInput("index", self.index, f"{max(len(self.iso), 1)}: one for each iso-value")
-        if not all(0.01 <= n <= 100.0 for n in self.index):
-            raise InvalidInput("index", self.index, "refractive indices from 0.01 to 100")
+        for index in self.index:
+            INDEX.check("index", index)
         if not 0 <= self.surroundings <= len(self.index):
             raise InvalidInput("surroundings", self.surroundings, f"a layer, 0 to {len(self.index)}")
         if self.iso:

@@ -16,7 +16,7 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
-from bentray_kernels.ranges import Range, check_ranges, ranged
+from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
 from bentray_kernels.tomography import Progress
 from bentray_kernels.tomography.problem import MARGIN_NODES
 
@@ -26,7 +26,7 @@ from .emitter_batches import arrivals
 MOST_REFINEMENT = 64
 
 # Of every simulated scan.
-NODES, SEED = Range(16, 1024), Range(0, 2**63 - 1)
+NODES = Range(16, 1024)
 SNR = Range(1e-6, 1e12)
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar, Literal
 
 from ..acquisition import PICKERS
 from ..eikonal import methods
 from ..errors import InvalidInput
 from ..limits import SPEED_MPS
-from ..ranges import Range, check_ranges, ranged
+from ..ranges import SEED, Range, check_ranges, ranged
 
 METHODS = ("sart", "gauss-newton", "auto", "waveform")
 RAYS = ("curved", "straight", "adjoint")
@@ -25,6 +25,8 @@ AMPLITUDES = ("recorded", "ratio", "spectrum", "centroid")
 OF_SPECTRA = ("spectrum", "centroid")
 WAVE_MISFITS = ("correlation", "least-squares")
 LEAST_NODES = 16
+# What a speed may be, as JSON Schema says it.
+SPEED = {"type": "number", **SPEED_MPS.schema}
 WAVE_BANDS = 4
 
 
@@ -117,7 +119,7 @@ class Settings:
 
     method: Literal["sart", "gauss-newton", "auto", "waveform"] = "sart"
     rays: Literal["curved", "straight", "adjoint"] = "curved"
-    eikonal: str = DEVIATION
+    eikonal: str = field(default=DEVIATION, metadata={"json_schema_extra": {"enum": [DEVIATION, *methods()]}})
     decomposition: Literal["slices", "volume"] = "slices"
     axial_room_nodes: int | None = ranged(None, Range(2, 4096))
     nodes: int = ranged(128, Range(LEAST_NODES, 2048))
@@ -126,7 +128,9 @@ class Settings:
     straight_sweeps: int = ranged(0, Range(0, 1000))
     coarser_grids: int = ranged(0, Range(0, 6))
     stop_rms_s: float = ranged(0.0, Range(0.0, 1.0, unit="s"))
-    speed_bounds_mps: tuple[float, float] = (1300.0, 1800.0)
+    speed_bounds_mps: tuple[float, float] = field(
+        default=(1300.0, 1800.0), metadata={"json_schema_extra": {"prefixItems": [SPEED, SPEED]}}
+    )
     speed_update: Literal["fixed", "data-driven"] = "fixed"
     speed_range_mps: tuple[float, float] | None = None
     front_smoothing_nodes: float = ranged(0.0, Range(0.0, 32.0))
@@ -135,7 +139,7 @@ class Settings:
     relaxation_decay: float = ranged(1.0, Range(0.0, 1.0, above=True))
     subset: int = ranged(1, Range(1, 4096))
     smoothing_nodes: float = ranged(1.0, Range(0.0, 32.0))
-    seed: int = ranged(0, Range(0, 2**63 - 1))
+    seed: int = ranged(0, SEED)
     penalty: Literal["total-variation", "laplacian", "tikhonov"] = "total-variation"
     penalty_strength: float = ranged(0.3, Range(0.0, 10.0))
     edge_mps: float = ranged(0.0, Range(0.0, 1000.0, unit="m/s"))

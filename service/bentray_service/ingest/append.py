@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import base64
-import binascii
 import hashlib
 import hmac
 import math
 import os
+import re
 import threading
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
@@ -23,7 +23,13 @@ from bentray_workers.atomic import sync, write_bytes
 from ..refusals import Locked, UnknownChecksum, WrongChecksum
 from .receive import pour
 
-ALGORITHMS = ("sha256", "sha1", "md5")
+# Each with the form of its digest in base 64.
+ALGORITHMS = {
+    "sha256": "[A-Za-z0-9+/]{43}=",
+    "sha1": "[A-Za-z0-9+/]{27}=",
+    "md5": "[A-Za-z0-9+/]{22}==",
+}
+CHECKSUM = "^(" + "|".join(f"{name} {digest}" for name, digest in ALGORITHMS.items()) + ")$"
 
 
 @dataclass(frozen=True)
@@ -41,16 +47,12 @@ class Checksum:
             UnknownChecksum: for an algorithm that is not in ``ALGORITHMS``.
             InvalidInput: for anything that is no digest of it.
         """
-        algorithm, _, text = header.strip().partition(" ")
+        algorithm, _, text = header.partition(" ")
         if algorithm not in ALGORITHMS:
             raise UnknownChecksum("Upload-Checksum", repr(algorithm[:40]), " or ".join(ALGORITHMS))
-        try:
-            digest = base64.b64decode(text.strip(), validate=True)
-        except (binascii.Error, ValueError):
-            digest = b""
-        if len(digest) != _hasher(algorithm).digest_size:
+        if not re.fullmatch(CHECKSUM, header):
             raise InvalidInput("Upload-Checksum", repr(text[:80]), f"the {algorithm} of the body in base 64")
-        return cls(algorithm, digest)
+        return cls(algorithm, base64.b64decode(text))
 
 
 class Hold:

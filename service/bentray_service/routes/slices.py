@@ -22,13 +22,17 @@ COLOUR_SCHEMA = cast("dict[str, Any]", COLOUR_VALUE.schema)
 
 async def asked_look(
     colormap: Annotated[
-        str, Query(max_length=40, description="One of " + ", ".join(COLORMAPS) + ".")
+        str,
+        Query(
+            description="One of " + ", ".join(COLORMAPS) + ".", json_schema_extra={"enum": list(COLORMAPS)}
+        ),
     ] = "viridis",
     size: Annotated[
         int | None,
         Query(
             description=f"Longest side in pixels, {LEAST_FRAMED} to {MOST_SIZE}, without a frame from "
-            f"{LEAST_SIZE}. Without it text has its usual size, and the bare image a pixel a node."
+            f"{LEAST_SIZE}. Without it text has its usual size, and the bare image a pixel a node.",
+            json_schema_extra={"minimum": LEAST_SIZE, "maximum": MOST_SIZE},
         ),
     ] = None,
     interpolation: Annotated[

@@ -16,13 +16,13 @@ from fastapi import APIRouter, Depends, Header, Request, Response, status
 from starlette.concurrency import run_in_threadpool
 
 from ..errors import described
-from ..ingest.append import ALGORITHMS, Checksum, append, size_of
+from ..ingest.append import ALGORITHMS, CHECKSUM, Checksum, append, size_of
 from ..refusals import StorageFull, TooLarge, WrongOffset, WrongProtocol
 from ..storage.tenants import Tenant
 from ..web.tus_headers import PLACE, VERSION
 from ..wiring import CallerTenant, Parts, Service
 from .bodies import only
-from .upload_metadata import read_metadata
+from .upload_metadata import METADATA, read_metadata
 from .upload_records import UploadRecord, result_link, upload_record
 
 MEDIA_TYPE = "application/offset+octet-stream"
@@ -32,7 +32,11 @@ Row = dict[str, Any]
 Offset = Annotated[int, Header(ge=0, le=2**63 - 1, description="Where the body begins: what HEAD says.")]
 
 
-Version = Annotated[str, Header(max_length=20, description="Of the protocol: 1.0.0.")]
+# The protocol wants 412 for another version, and 400 for a checksum of an unknown kind, where a form that
+# FastAPI checks itself would be 422; so the forms of both are only described here.
+Version = Annotated[
+    str, Header(max_length=20, description="Of the protocol.", json_schema_extra={"const": VERSION})
+]
 
 
 def speaks_tus(tus_resumable: Version) -> None:
@@ -77,6 +81,7 @@ def begin_upload(
             max_length=4000,
             description="Names, each with its value in base 64: kind (dataset, volume or mesh; dataset "
             "without it), title, and of a volume spacing_m, shape and dtype; others are left alone.",
+            json_schema_extra={"pattern": METADATA},
         ),
     ] = "",
 ) -> UploadRecord:
@@ -139,7 +144,10 @@ async def send_piece(
     upload_offset: Offset,
     upload_checksum: Annotated[
         str | None,
-        Header(max_length=200, description="sha256, sha1 or md5, and the body's in base 64."),
+        Header(
+            description="sha256, sha1 or md5, and the body's in base 64.",
+            json_schema_extra={"pattern": CHECKSUM},
+        ),
     ] = None,
 ) -> Response:
     """Append a piece. What came stays when the connection breaks; HEAD says where to go on.

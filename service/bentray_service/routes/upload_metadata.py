@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-import binascii
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -19,24 +19,39 @@ LONGEST_TITLE = 200
 # Nodes along an axis of a volume of raw bytes.
 SIDE = Range(2, 2**31)
 FORM = "names, each with its value in base 64, parted by commas"
+KNOWN = ("kind", "title", "spacing_m", "shape", "dtype")
+
+# The forms of what is text in a request, as the description says them. A space may follow a comma.
+_PAIR = r"[!-+\--~]+( ([A-Za-z0-9+/]{4})*([A-Za-z0-9+/]{2}==|[A-Za-z0-9+/]{3}=)?)?"
+METADATA = f"^({_PAIR}(, ?{_PAIR})*)?$"
+_DISTANCE = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?"
+SPACING = f"^{_DISTANCE}(, ?{_DISTANCE}, ?{_DISTANCE})?$"
+_COUNT = r"[1-9][0-9]{0,9}"
+SHAPE = f"^{_COUNT}, ?{_COUNT}, ?{_COUNT}$"
 
 
 def read_metadata(header: str) -> tuple[str, Row]:
     """What the upload becomes, and what the ingest process is told of it.
 
     Args:
-        header: as ``kind bWVzaA==,title Tm9zZQ==``; names that are not known are left alone.
+        header: as ``kind bWVzaA==,title Tm9zZQ==``; the values of names that are not known may be any bytes.
 
     Raises:
         InvalidInput: for what is not of that form, and for values that cannot be used.
     """
+    if not re.fullmatch(METADATA, header):
+        raise InvalidInput("Upload-Metadata", repr(header[:80]), FORM)
     found = {}
-    for pair in filter(None, (part.strip() for part in header.split(","))):
-        name, _, value = pair.partition(" ")
+    for pair in header.split(","):
+        name, _, value = pair.strip().partition(" ")
+        if name not in KNOWN:
+            continue
         try:
-            found[name] = base64.b64decode(value.strip(), validate=True).decode()
-        except (binascii.Error, ValueError):
-            raise InvalidInput("Upload-Metadata", repr(pair[:80]), FORM) from None
+            found[name] = base64.b64decode(value).decode()
+        except UnicodeDecodeError:
+            raise InvalidInput(
+                "Upload-Metadata", repr(pair[:80]), f"{FORM}; that of {name} is text"
+            ) from None
     what = found.get("kind", "dataset")
     if what not in ACCEPTED:
         raise InvalidInput("Upload-Metadata kind", repr(what[:80]), " or ".join(ACCEPTED))
@@ -56,22 +71,23 @@ def volume_given(title: str, spacing_m: str | None, shape: str | None, dtype: st
     """
     return {
         "title": title,
-        "spacing_m": _numbers("spacing_m", spacing_m, float, SPACING_M, "0.001 or 0.001,0.001,0.002"),
-        "shape": _numbers("shape", shape, int, SIDE, "nx,ny,nz"),
+        "spacing_m": _numbers(
+            "spacing_m", spacing_m, SPACING, float, SPACING_M, "0.001 or 0.001,0.001,0.002"
+        ),
+        "shape": _numbers("shape", shape, SHAPE, int, SIDE, "nx,ny,nz"),
         "dtype": dtype,
     }
 
 
 def _numbers(
-    field: str, text: str | None, kind: Callable[[str], float], within: Range, accepted: str
+    field: str, text: str | None, form: str, kind: Callable[[str], float], within: Range, accepted: str
 ) -> list[float] | None:
-    """The numbers in a text, which commas part."""
+    """The numbers in a text of some form, which commas part."""
     if text is None:
         return None
-    try:
-        found = [kind(part) for part in text.split(",")]
-    except ValueError:
-        raise InvalidInput(field, repr(text[:80]), accepted) from None
+    if not re.fullmatch(form, text):
+        raise InvalidInput(field, repr(text[:80]), accepted)
+    found = [kind(part) for part in text.split(",")]
     for number in found:
         within.check(field, number)
     return found

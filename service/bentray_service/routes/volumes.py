@@ -6,6 +6,8 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response, status
 
+from bentray_workers.volume_reading import RAW_TYPES
+
 from ..errors import described
 from ..storage.deletion import Stored
 from ..storage.ids import new_id
@@ -13,7 +15,7 @@ from ..wiring import CallerTenant, Service
 from . import slices, volume_data
 from .bodies import only
 from .records import VolumeList, VolumeRecord, volume_record
-from .upload_metadata import volume_given
+from .upload_metadata import SHAPE, SPACING, volume_given
 from .uploads import body_of, take_in
 
 MEDIA_TYPES = ("application/octet-stream", "application/x-npy", "application/x-hdf5")
@@ -38,15 +40,26 @@ async def upload_volume(
     title: Annotated[str, Query(max_length=200, description="In place of the file's own.")] = "",
     spacing_m: Annotated[
         str | None,
-        Query(max_length=100, description="One distance or three, m; NumPy and raw only, 0.001 without it."),
+        Query(
+            max_length=100,
+            description="One distance or three, m; NumPy and raw only, 0.001 without it.",
+            json_schema_extra={"pattern": SPACING},
+        ),
     ] = None,
     shape: Annotated[
-        str | None, Query(max_length=100, description="nx,ny,nz of raw bytes, in which x runs fastest.")
+        str | None,
+        Query(
+            max_length=100,
+            description="nx,ny,nz of raw bytes, in which x runs fastest.",
+            json_schema_extra={"pattern": SHAPE},
+        ),
     ] = None,
     dtype: Annotated[
         str | None,
         Query(
-            max_length=20, description="Of raw bytes: uint8, int16, float32, ...; big-endian as uint16-be."
+            max_length=20,
+            description="Of raw bytes: uint8, int16, float32, ...; big-endian as uint16-be.",
+            json_schema_extra={"pattern": "^(" + "|".join(RAW_TYPES) + ")$"},
         ),
     ] = None,
 ) -> VolumeRecord:
