@@ -18,11 +18,11 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE7_FREQUENCY_HZ, TABLE7_GRIDS, TABLE7_SIDE_M, table7, table7_slices
-from bentray_kernels.ranges import Range, check_ranges, ranged
+from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
 from bentray_kernels.tomography import Progress
 
 from .emitter_batches import arrivals
-from .simulation import MOST_REFINEMENT, NODES, SEED, SNR, ring_radius
+from .simulation import MOST_REFINEMENT, NODES, SNR, ring_radius
 
 # The coarsest voxels that the phantom's lesions are measured in; wider ones would join them.
 LEAST_NODES = min(nodes for nodes, _ in TABLE7_GRIDS)

@@ -22,7 +22,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE6_SIDE_M, EllipsePhantom, table6
 from bentray_kernels.phantoms.volume import PhantomSlice
-from bentray_kernels.ranges import Range, check_ranges, ranged
+from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
 from bentray_kernels.tomography import Progress
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.points import REACH
@@ -31,7 +31,7 @@ from bentray_kernels.wave.stencil import longest_step, phase_error
 from bentray_kernels.wave.strips import Poll, unheeded
 
 from .lanes import RECONSTRUCTION
-from .simulation import NODES, SEED, SNR, ring_radius
+from .simulation import NODES, SNR, ring_radius
 
 # The pulse is a sine under a Gaussian; at this many times its centre frequency it has 3 % of its height.
 HIGHEST = 1.54

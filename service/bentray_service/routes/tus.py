@@ -147,6 +147,7 @@ async def send_piece(
         Header(
             description="sha256, sha1 or md5, and the body's in base 64.",
             json_schema_extra={"pattern": CHECKSUM},
+            examples=["sha1 Kq5sNclPz7QV2+lfQIuc6R7oRu0="],
         ),
     ] = None,
 ) -> Response:
