@@ -115,7 +115,7 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.TooManyStreams: Kind(429, "too-many-streams", "Too many event streams are open"),
     refusals.QuotaUsedUp: Kind(507, "quota-used-up", "The tenant stores as much as it may"),
     refusals.NoSuchPart: Kind(416, "no-such-part", "The part of the file is not there"),
-    refusals.NoAnimation: Kind(404, "no-animation", "The job has no animation"),
+    refusals.NoAnimation: Kind(409, "no-animation", "The job has no animation"),
     refusals.StorageFull: Kind(507, "storage-full", "The disk of the service is full"),
     refusals.StorageAway: Kind(503, "storage-away", "The storage of the service does not answer"),
     refusals.DatabaseAway: Kind(503, "database-away", "The database of the service does not answer"),

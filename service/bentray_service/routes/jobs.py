@@ -214,7 +214,7 @@ def cancel_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord
 @router.get(
     "/{job_id}/animation",
     response_class=Response,
-    responses={**download_of(*ANIMATIONS.values()), **described(404, 503)},
+    responses={**download_of(*ANIMATIONS.values()), **described(404, 409, 503)},
 )
 def animation(job_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
     """The pictures of a job of kind refraction, once it has succeeded.

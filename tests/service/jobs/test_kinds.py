@@ -119,7 +119,7 @@ def test_cancel_between_pictures(serving, until):
         assert done["progress"]["done"] < 720
         assert not list((http.app.state.parts.files.of(LOCAL).root / "animations").iterdir())
         answer = http.get(f"/v1/jobs/{job['id']}/animation")
-        assert (answer.status_code, answer.json()["type"]) == (404, "/problems/no-animation")
+        assert (answer.status_code, answer.json()["type"]) == (409, "/problems/no-animation")
 
 
 def test_a_stopped_job_runs_again_at_the_next_start(serving, until, monkeypatch):
