@@ -83,7 +83,7 @@ class Kind(Protocol):
     def run(self, task: Task) -> Row | None:
         """Do the work, write ``task.target``, and return the row that tells of it, if there is one."""
 
-    def discard(self, target: Path) -> None:
+    def discard(self, files: TenantFiles, target: Path) -> None:
         """Remove what was written, of a job that was cancelled at its very end."""
 
 
@@ -110,8 +110,8 @@ class ReconstructionKind:
         write_reconstruction(task.target, result)
         return {"id": task.target.stem, **_describe(result), "bytes": task.target.stat().st_size}
 
-    def discard(self, target: Path) -> None:
-        target.unlink(missing_ok=True)
+    def discard(self, files: TenantFiles, target: Path) -> None:
+        files.drop(target)
 
 
 class SimulationKind:
@@ -132,8 +132,8 @@ class SimulationKind:
         found = simulate_scan(task.client, asked, task.target, task.work_dir, *progress)
         return {"id": task.target.stem, **found}
 
-    def discard(self, target: Path) -> None:
-        target.unlink(missing_ok=True)
+    def discard(self, files: TenantFiles, target: Path) -> None:
+        files.drop(target)
 
 
 class RefractionKind:
@@ -163,8 +163,8 @@ class RefractionKind:
         )
         return None
 
-    def discard(self, target: Path) -> None:
-        target.unlink(missing_ok=True)
+    def discard(self, files: TenantFiles, target: Path) -> None:
+        files.drop(target)
 
 
 class GeometryFieldKind:
@@ -195,7 +195,7 @@ class GeometryFieldKind:
         found = {"id": task.target.name, "mesh_id": task.source.stem, "bytes": size}
         return {**found, "settings": settings.plain(), "figures": figures}
 
-    def discard(self, target: Path) -> None:
+    def discard(self, files: TenantFiles, target: Path) -> None:
         """Keep it: it is named by its content, and may be another job's too."""
 
 

@@ -8,6 +8,7 @@ import shutil
 import threading
 from collections.abc import Callable
 from concurrent.futures import CancelledError
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -305,7 +306,9 @@ class Runner:
             if self._queue.told(job_id) is None:
                 # Another service runs it by now, and writes the same file.
                 return
-            kind.discard(target)
+            with suppress(StorageAway):
+                # What stays is found as an orphan.
+                kind.discard(files, target)
             self._queue.cancelled(job_id)
         files.drop_work(job_id)
 

@@ -75,6 +75,14 @@ def tag_of(path: Path, seed: str) -> str:
         raise Deleted(path.name.partition(".")[0]) from error
 
 
+def size_of(path: Path) -> int:
+    """Bytes of a file; raises Deleted when there is none any more."""
+    try:
+        return path.stat().st_size
+    except FileNotFoundError as error:
+        raise Deleted(path.name.partition(".")[0]) from error
+
+
 def unchanged(request: Request, tag: str) -> Response | None:
     """The answer to a client that has it, or None."""
     known = request.headers.get("if-none-match")

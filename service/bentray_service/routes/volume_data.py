@@ -13,7 +13,7 @@ from .. import __version__
 from ..errors import described
 from ..refusals import UnknownId
 from ..wiring import CallerTenant, Service, caller_of, parts_of
-from .downloads import download, download_of, headers_of, tag_of, unchanged
+from .downloads import download, download_of, headers_of, size_of, tag_of, unchanged
 from .pictures import while_connected
 
 HDF5 = "application/x-hdf5"
@@ -71,7 +71,7 @@ async def volume_data(
         most = largest_bytes(volume["shape"], uploaded="job_id" not in volume)
         async with service.quota.reserved(tenant, made.name, most):
             await while_connected(request, service.pictures.export(tenant, volume, path, made, format))
-            await run_in_threadpool(service.quota.stored, tenant, made.name, made.stat().st_size)
+            await run_in_threadpool(service.quota.stored, tenant, made.name, size_of(made))
     answer = download(request, made, seed, chosen.media_type, name, tag)
     try:
         await run_in_threadpool(service.volumes.get, tenant, volume["id"])

@@ -16,6 +16,7 @@ from ..refusals import Damaged, DatabaseAway, DatabaseFull, Deleted
 from .checksums import Checksums, Row
 from .digests import Digest, digest_of, stamp_of
 from .store import Store
+from .tenant_files import KEPT
 from .tenants import Tenant
 
 log = logging.getLogger("bentray.storage")
@@ -53,6 +54,9 @@ class CheckedStore:
             Damaged: when it is not what was stored, or not there any more.
             Deleted: when there is none, nor a row of its checksum.
         """
+        if path.parent.name not in KEPT:
+            # On its way, as the work folder of a job that reads nothing else: it has no checksum.
+            return self._inner.bring(path)
         tenant, name, place = self._named(path)
         row = self._checksums.get(tenant, name)
         try:
@@ -105,12 +109,18 @@ class CheckedStore:
             return True
 
     def _first_seen(self, tenant: Tenant, name: str, place: str, path: Path) -> None:
-        """Take a thing from before there were checksums as it is."""
-        log.info("%s of %s has no checksum yet; it is taken as it is", name, tenant)
+        """Take a thing from before there were checksums as it is.
+
+        Raises:
+            Deleted: when it is being deleted, and only its file is still there.
+        """
         with self._alone(path):
             stamp, found = stamp_of(path), digest_of(path)
             self._compared[path] = found.sha256, stamp
-        self._checksums.note(tenant, name, place, found, as_written=False)
+        if not self._checksums.note_first_seen(tenant, name, place, found):
+            self._compared.pop(path, None)
+            raise Deleted(name)
+        log.info("%s of %s had no checksum yet; it is taken as it is", name, tenant)
 
     def _mend(self, path: Path, row: Row) -> None:
         """Take another copy in place of a damaged one, if there is one.

@@ -10,10 +10,13 @@ from sqlalchemy import Connection, delete, insert, select, update
 
 from .database import Database
 from .digests import Digest
-from .schema import checksums
+from .schema import checksums, datasets, geometry_fields, jobs, meshes, uploaded_volumes, volumes
 from .tenants import Tenant
 
 Row = dict[str, Any]
+
+# Where a thing that is stored has its row; that of a turntable is its job's.
+STORED = (datasets, uploaded_volumes, volumes, meshes, geometry_fields, jobs)
 
 
 class Checksums:
@@ -32,12 +35,25 @@ class Checksums:
             found: what is in it.
             as_written: whether that is known to be as it was written.
         """
-        now: Row = {"path": path, "bytes": found.bytes, "sha256": found.sha256, "noted": time.time()}
-        now |= {"as_written": as_written, "damaged": None}
         with self._database.write() as connection:
-            mine = checksums.c.tenant == tenant, checksums.c.id == name
-            if not connection.execute(update(checksums).where(*mine).values(**now)).rowcount:
-                connection.execute(insert(checksums).values(tenant=tenant, id=name, **now))
+            _note(connection, tenant, name, path, found, as_written)
+
+    def note_first_seen(self, tenant: Tenant, name: str, path: str, found: Digest) -> bool:
+        """The same of a thing from before there were checksums; False, and no row, if it has been deleted.
+
+        Its file may still lie there: rows go first.
+        """
+        with self._database.write() as connection:
+            known = any(
+                connection.execute(
+                    # Whoever deletes it now is waited for.
+                    select(table.c.id).where(table.c.tenant == tenant, table.c.id == name).with_for_update()
+                ).first()
+                for table in STORED
+            )
+            if known:
+                _note(connection, tenant, name, path, found, as_written=False)
+            return known
 
     def get(self, tenant: Tenant, name: str) -> Row | None:
         """The row of a thing; None of one that has none, as from before version 4 or deleted."""
@@ -62,6 +78,16 @@ class Checksums:
         """Delete the rows of things with these ids."""
         with self._database.write() as connection:
             forget(connection, tenant, names)
+
+
+def _note(
+    connection: Connection, tenant: Tenant, name: str, path: str, found: Digest, as_written: bool
+) -> None:
+    now: Row = {"path": path, "bytes": found.bytes, "sha256": found.sha256, "noted": time.time()}
+    now |= {"as_written": as_written, "damaged": None}
+    mine = checksums.c.tenant == tenant, checksums.c.id == name
+    if not connection.execute(update(checksums).where(*mine).values(**now)).rowcount:
+        connection.execute(insert(checksums).values(tenant=tenant, id=name, **now))
 
 
 def forget(connection: Connection, tenant: Tenant, names: Collection[str]) -> None:

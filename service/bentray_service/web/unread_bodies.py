@@ -70,7 +70,12 @@ class ClosesUnread(PatientBodies):
             return
         self._leaving = True
         self.flow.resume_reading()
-        self.transport.write_eof()
+        try:
+            self.transport.write_eof()
+        except OSError:
+            # The client has closed its end, which nobody sees while reading is paused.
+            self.transport.abort()
+            return
         self._end = self.loop.call_later(LINGER_S, self.transport.abort)
 
     def _start_asgi_task(self, cycle: RequestResponseCycle, app: Any) -> None:

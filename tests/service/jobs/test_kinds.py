@@ -17,6 +17,7 @@ from bentray_kernels.tomography import Progress
 from bentray_service.app import create_app
 from bentray_service.jobs import kinds
 from bentray_service.settings import ServiceSettings
+from bentray_service.storage.checksums import Checksums
 from bentray_service.storage.ids import new_id
 from bentray_service.storage.tenants import LOCAL
 from bentray_workers import field_settings, geometry_field
@@ -280,15 +281,25 @@ def test_a_cancelled_field_leaves_nothing(serving, until, monkeypatch):
         wait_until_empty(http.app.state.parts.files.of(LOCAL).root / "work")
 
 
-def test_a_field_that_is_cancelled_at_its_end_stays_for_others(tmp_path):
-    kept = tmp_path / "field"
+def test_a_field_that_is_cancelled_at_its_end_stays_for_others(start):
+    parts = start().app.state.parts
+    files = parts.files.of(LOCAL)
+    kept = files.field(new_id("field"))
     kept.mkdir()
-    kinds.KINDS["geometry-field"].discard(kept)
+    kinds.KINDS["geometry-field"].discard(files, kept)
     assert kept.exists()
-    written = tmp_path / "volume.h5"
+
+
+@pytest.mark.parametrize("kind", ["reconstruction", "simulation"])
+def test_of_others_nothing_stays_not_even_a_checksum(start, kind):
+    parts = start().app.state.parts
+    files = parts.files.of(LOCAL)
+    written = kinds.KINDS[kind].target(files, {"id": new_id("job")})
     written.write_bytes(b"x")
-    kinds.KINDS["reconstruction"].discard(written)
+    parts.files.store.publish(written)
+    kinds.KINDS[kind].discard(files, written)
     assert not written.exists()
+    assert Checksums(parts.database).all() == []
 
 
 @pytest.mark.parametrize(

@@ -46,7 +46,9 @@ def test_another_tenants_job_begins_beside_jobs_of_hours(start, uploaded, work):
     dataset, parts = uploaded(http), http.app.state.parts
     settings, mine = Settings(nodes=16, sweeps=1).to_dict(), parts.files.of(LOCAL).dataset(dataset)
     for tenant in "abcd":
-        shutil.copy(mine, parts.files.of(Tenant(tenant)).dataset(dataset))
+        its = parts.files.of(Tenant(tenant)).dataset(dataset)
+        shutil.copy(mine, its)
+        parts.files.store.publish(its)
 
     def add(tenant):
         job = parts.jobs.add(Tenant(tenant), "reconstruction", settings, dataset)["id"]

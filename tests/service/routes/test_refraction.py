@@ -238,8 +238,8 @@ def breast(settings, slices, step):
 def test_a_reconstruction_as_glass(http, uploaded, submitted, until, work, monkeypatch, slices, step, found):
     plain = type(work).__call__
 
-    def in_space(self, *given):
-        return breast(plain(self, *given).settings, slices, step)
+    def in_space(self, *given, **more):
+        return breast(plain(self, *given, **more).settings, slices, step)
 
     monkeypatch.setattr(type(work), "__call__", in_space)
     volume = http.get(until(http, submitted(http, uploaded(http))["id"])["links"]["volume"]).json()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from bentray_service.storage.deletion import Stored
 from bentray_service.storage.ids import new_id
 from bentray_service.storage.tenants import LOCAL
 from bentray_workers.volume_file import Volume, write_volume
@@ -113,6 +114,19 @@ class OtherProcess(FakeCluster):
 
 
 @pytest.mark.slow
+def test_an_export_whose_volume_goes_when_it_is_made(http, upload, monkeypatch):
+    parts = http.app.state.parts
+    export = parts.pictures.export
+
+    async def delete_then(tenant, volume, *given):
+        await export(tenant, volume, *given)
+        parts.deletion.delete(Stored(tenant, "volume", volume["id"]))
+
+    monkeypatch.setattr(parts.pictures, "export", delete_then)
+    answer = http.get(f"{upload}?format=npy")
+    assert (answer.status_code, answer.json()["type"]) == (404, "/problems/deleted")
+
+
 def test_files_are_not_made_in_the_memory_of_the_service(start):
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         http = start(cluster=OtherProcess(pool))

@@ -3,6 +3,7 @@
 import os
 
 import pytest
+from sqlalchemy import insert
 
 from bentray_service.refusals import Damaged, Deleted
 from bentray_service.storage.checked_store import CheckedStore
@@ -12,6 +13,7 @@ from bentray_service.storage.files import Files
 from bentray_service.storage.ids import new_id
 from bentray_service.storage.local_store import LocalStore
 from bentray_service.storage.open_store import open_store
+from bentray_service.storage.schema import uploaded_volumes
 from bentray_service.storage.tenants import LOCAL
 
 from .store_suite import StoreSuite
@@ -149,15 +151,39 @@ def test_what_a_scrub_found_is_not_served_by_a_process_that_has_compared_it(open
         files.store.bring(path)
 
 
-def test_a_file_of_an_older_version_is_taken_as_it_is_and_kept_so(opened, rows):
-    path = opened().of(LOCAL).dataset(new_id("dataset"))
+def test_a_file_of_an_older_version_is_taken_as_it_is_and_kept_so(opened, rows, tmp_path):
+    path = opened().of(LOCAL).volume(new_id("volume"))
     path.write_bytes(CONTENT)
+    told = {"title": "", "shape": [], "spacing_m": [], "origin_m": [], "value_range": []}
+    own = {"tenant": LOCAL, "id": path.stem, "created": 0.0, "bytes": len(CONTENT), "sha256": ""}
+    database = open_database(f"sqlite:///{tmp_path / 'db.sqlite'}")
+    with database.write() as connection:
+        connection.execute(insert(uploaded_volumes).values(**own, **told))
+    database.close()
     assert opened().store.bring(path) == path
     row = rows.get(LOCAL, path.stem)
-    assert (row["as_written"], row["bytes"], row["path"]) == (False, len(CONTENT), f"datasets/{path.name}")
+    assert (row["as_written"], row["bytes"], row["path"]) == (False, len(CONTENT), f"volumes/{path.name}")
     flip(path)
     with pytest.raises(Damaged):
         opened().store.bring(path)
+
+
+def test_the_work_of_a_job_changes_freely(opened, rows):
+    files = opened()
+    folder = files.of(LOCAL).work(new_id("job"))
+    assert files.store.bring(folder) == folder
+    (folder / "part-0.npz").write_bytes(CONTENT)
+    assert opened().store.bring(folder) == folder
+    assert rows.all() == []
+
+
+def test_what_is_being_deleted_gets_no_checksum_again(opened, rows):
+    # The rows are gone, the file is not yet.
+    path = stored(opened())
+    rows.forget(LOCAL, [path.stem])
+    with pytest.raises(Deleted):
+        opened().store.bring(path)
+    assert rows.all() == []
 
 
 def test_a_bucket_has_another_copy(tmp_path, rows, bucket_url):

@@ -1,5 +1,8 @@
 """An answer to a body that was not read is the last one of its connection, and the client can read it."""
 
+import asyncio
+import logging
+import threading
 import time
 
 import pytest
@@ -62,6 +65,29 @@ def test_a_body_that_is_there_costs_no_connection(server):
         for _ in range(3):
             connection.sendall(HEAD % 4 + b"body")
             assert read_answer(connection) == (401, b"not today")
+
+
+def test_a_client_that_left_while_nothing_was_read_is_no_fault(caplog):
+    left = threading.Event()
+
+    async def app(scope, receive, send):
+        headers = [(b"content-length", b"9")]
+        await send({"type": "http.response.start", "status": 401, "headers": headers})
+        while not left.is_set():
+            await asyncio.sleep(0.01)
+        await send({"type": "http.response.body", "body": b"not today"})
+
+    with caplog.at_level(logging.ERROR), served(app) as server:
+        with connected(server) as connection:
+            # So much that reading is paused, and the end of the connection is not seen.
+            connection.sendall(HEAD % 1_000_000 + bytes(200_000))
+            assert connection.recv(65536).endswith(b"\r\n\r\n")
+        left.set()
+        deadline = time.monotonic() + 10.0
+        while len(server.connections):
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+    assert not caplog.records
 
 
 def test_no_descriptor_stays_behind(server):
