@@ -62,7 +62,11 @@ def test_nothing_is_left_of_a_hostile_file(start, hostile):
     root = http.app.state.parts.files.root
     # The audit tells of the requests; it holds nothing of the files.
     left = {path.name for path in root.rglob("*") if path.is_file() and path.parent.name != "audit"}
-    assert left <= {"service.lock", *(f"bentray.sqlite{more}" for more in ("", "-wal", "-shm"))}
+    assert left <= {
+        "service.lock",
+        "database.json",
+        *(f"bentray.sqlite{more}" for more in ("", "-wal", "-shm")),
+    }
     assert http.get("/v1/datasets").json() == {"datasets": []}
     assert http.get("/v1/volumes").json() == {"volumes": []}
     assert http.get("/v1/meshes").json() == {"meshes": []}
