@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentray_kernels.arrays import Floats, Ints
-from bentray_kernels.tomography.settings import Settings
 
-from .task_memory import Summary
-from .wave_memory import Traces
-
+# What plans are made with loads compiled kernels, which take seconds: the reader of an upload starts without.
 if TYPE_CHECKING:
     from bentray_kernels.acquisition import Dataset
+    from bentray_kernels.tomography.settings import Settings
+
+    from .task_memory import Summary
+    from .wave_memory import Traces
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,8 @@ class DatasetCounts:
             settings: with ``reciprocity``, elements that only send or only receive do both; and whether
                 amplitudes are read from traces.
         """
+        from .task_memory import Summary
+
         both = (self.elements, self.elements)
         emitters, receivers = both if settings.reciprocity else (self.emissions, self.receivers)
         return Summary(
@@ -96,6 +99,8 @@ class DatasetCounts:
         return asdict(self)
 
     def _traces(self) -> Traces | None:
+        from .wave_memory import Traces
+
         if not self.samples or self.rate_hz is None or self.frequency_hz is None:
             return None
         return Traces(

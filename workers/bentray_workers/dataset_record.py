@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from .dataset_counts import DatasetCounts
+
 if TYPE_CHECKING:
     from bentray_kernels.acquisition.dataset import Dataset
 
@@ -12,9 +14,6 @@ LONGEST_TEXT = 200
 
 def record_of(dataset: Dataset) -> dict[str, Any]:
     """By the names that the service keeps it under; ``counts`` is what plans are made of."""
-    # It loads the plan's own modules, which the service has and a reader of volumes does not need.
-    from .dataset_counts import DatasetCounts
-
     return {
         "title": text(dataset.title),
         "source": text(dataset.source),

@@ -107,3 +107,15 @@ def test_the_readers_of_scans_and_volumes_load_nothing_compiled():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+def test_reading_a_scan_loads_no_compiled_kernels(scan, tmp_path):
+    # They take seconds for every upload, and the reader's environment names no place to keep them.
+    program = (
+        "import sys; from pathlib import Path; from bentray_service.ingest.child import convert\n"
+        "found = convert('dataset', Path(sys.argv[1]), Path(sys.argv[2]), {})\n"
+        "print(sorted(found), 'numba' in sys.modules)"
+    )
+    command = [sys.executable, "-c", program, str(scan()), str(tmp_path / "canonical.h5")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout == "['ok'] False\n"
