@@ -5,7 +5,7 @@ import json
 from sqlalchemy.exc import OperationalError
 
 from bentray_kernels.tomography.result import Progress, Sweep
-from bentray_service.jobs.reporter import Reporter
+from bentray_service.jobs.reporter import MEASURE_SECONDS, Reporter
 
 
 class FakeJobs:
@@ -15,10 +15,15 @@ class FakeJobs:
         self.now = "running"
         self.away = False
         self.further = 0
+        self.sizes = []
 
     def got_further(self, job_id):
         self.check()
         self.further += 1
+
+    def took(self, job_id, size):
+        self.check()
+        self.sizes.append(size)
 
     def check(self):
         if self.away:
@@ -92,15 +97,19 @@ def test_stop_when_the_service_leaves():
     assert jobs.asked == 0
 
 
-def test_what_is_kept_is_told_once():
-    jobs = FakeJobs()
-    reporter = Reporter(jobs, "job", lambda: False)
+def test_what_is_kept_is_told_once_and_its_size_now_and_then():
+    jobs, clock = FakeJobs(), Clock()
+    reporter = Reporter(jobs, "job", lambda: False, clock, taken=lambda: 7)
     jobs.away = True
     reporter.saved()
     jobs.away = False
     for _ in range(5):
         reporter.saved()
     assert jobs.further == 1
+    assert jobs.sizes == [7]
+    clock.now += MEASURE_SECONDS
+    reporter.saved()
+    assert jobs.sizes == [7, 7]
 
 
 def test_a_job_that_another_service_runs_is_left():
