@@ -11,7 +11,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms.surfaces import bumpy_ball, torus
 from bentray_workers import field_cache, strips
 from bentray_workers.field_cache import world_at
-from bentray_workers.field_picture import map_png, picture_png, strip_image, submit
+from bentray_workers.field_picture import map_png, picture_png, strip_image, tasks_of
 from bentray_workers.field_settings import FieldSettings
 from bentray_workers.field_view import CHOICES, LOOKUPS, FieldView
 from bentray_workers.geometry_image_file import GeometryMaps, read_geometry_image, write_geometry_image
@@ -66,7 +66,10 @@ def test_strips_are_parts_of_the_whole(folder, cluster, monkeypatch):
     assert (off > 2).mean() < 0.002
     monkeypatch.setattr(strips, "TASK_RAYS", 8 * 48 * 4)
     assert len(strips.strips_of(view)) == 5
-    assert Image.open(io.BytesIO(submit(cluster.client, folder, view, 0).result())).size == (48, 40)
+    assert Image.open(io.BytesIO(strips.submit(cluster.client, tasks_of(folder, view), 0).result())).size == (
+        48,
+        40,
+    )
 
 
 def test_self_reflection_alone_is_dark_around(folder):
