@@ -27,7 +27,7 @@ async def until(so: Callable[[], object]) -> None:
 def test_a_lost_worker_is_replaced_until_the_scheduler_is_gone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(joining, "PRELOAD", None)
+    monkeypatch.setattr(joining, "PRELOADS", [])
     monkeypatch.setattr(joining, "LOOK_S", 0.1)
     said: list[str] = []
 

@@ -23,6 +23,8 @@ from .lanes import THREADS
 from .providers import PRELOAD
 from .supervision import FIRST_PAUSE_S, LONGEST_PAUSE_S, LOOK_S, Losses
 
+# What Dask loads into each worker before it joins.
+PRELOADS = [PRELOAD, heartbeat.__name__]
 # How long a worker may take to compile its kernels and to join, s.
 START_S = 600
 # How long workers may take to hand over their results when they are told to stop, s.
@@ -143,7 +145,7 @@ def _nanny(asked: Joining, number: int) -> Any:
         host=asked.host or own_address(asked.scheduler),
         name=name,
         security=asked.security,
-        preload=[PRELOAD, heartbeat.__name__],
+        preload=PRELOADS,
         dashboard=False,
         dashboard_address=NO_DASHBOARD,
         # One process that cannot join must not wait for ever: all of them try again together.
