@@ -1,0 +1,228 @@
+"""Mixed hostile and honest traffic for a long time: honest work is done, nobody waits long, nothing grows."""
+
+from __future__ import annotations
+
+import logging
+import os
+import statistics
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.phantoms import ONE_HOLE, TABLE6_SIDE_M, sampled, table6
+from bentray_kernels.tomography import Settings, reconstruct
+from bentray_workers.dataset_file import write_dataset
+
+from ..service.ingest.hostile_volumes import npy
+from .footprint import Footprint, measured, oldest_upload, rise
+from .honest_traffic import PLAN, HonestTenant
+from .hostile_traffic import HostileTraffic, cube
+from .ledger import Ledger
+from .live_service import LiveService
+
+pytestmark = pytest.mark.nightly
+log = logging.getLogger(__name__)
+
+MINUTES = float(os.environ.get("BENTRAY_SOAK_MINUTES", "30"))
+# The traffic comes in so many spells, between which the service rests and is measured.
+SPELLS = 24
+SHORTEST_SPELL_S = 20.0
+# Of the spells, those in which caches, pools and compiled code come to their size.
+WARM_UP = 1 / 3
+REST_S = 5.0
+SETTLE_S = 60.0
+
+# Not a measure of speed: beyond this nobody would say that the service lives.
+LIVE_S = 10.0
+LIVE_EVERY_S = 0.5
+# A line fitted to the samples at rest after the warm-up may rise by so much from the first to the last.
+# Memory: what the allocator keeps differs by some MiB between spells; a leak of 100 bytes a request, of the
+# hundred thousand requests of half an hour, would be 10 MiB on top.
+MOST_SERVICE_MIB = 32.0
+MOST_WORKERS_MIB = 96.0
+# Descriptors and threads: pools may differ by a few at rest, a leak is one for each of thousands of requests.
+MOST_DESCRIPTORS = 8.0
+MOST_THREADS = 8.0
+# The log tells of what was refused at most once a minute a kind, or a line for a file that broke its reader.
+MOST_LOG_BYTES_A_MINUTE = 256 * 1024
+STOP_S = 30.0
+
+HONEST = ("ada", "bell")
+HOSTILE = "mallory"
+CONNECTIONS = 200
+MAX_TENANT_BYTES = 16 * 2**20
+UPLOAD_KEEP_S = 20.0
+# An abandoned upload is marked by the first sweep after it has expired, once more kept for as long, and
+# removed by the next sweep; sweeps are a minute apart.
+LONGEST_UPLOAD_S = 2 * UPLOAD_KEEP_S + 3 * 60.0 + 60.0
+
+
+class Probe:
+    """Asks whether the service lives, again and again, on a new connection each time."""
+
+    def __init__(self, url: str) -> None:
+        self._url = f"{url}/health/live"
+        self.seconds: list[float] = []
+        self.failures: list[str] = []
+        self._leaving = threading.Event()
+        self._thread = threading.Thread(target=self._ask)
+        self._thread.start()
+
+    def stop(self) -> None:
+        self._leaving.set()
+        self._thread.join(2 * LIVE_S)
+
+    def _ask(self) -> None:
+        while not self._leaving.wait(LIVE_EVERY_S):
+            begun = time.monotonic()
+            try:
+                answer = httpx.get(self._url, timeout=LIVE_S)
+                if answer.status_code != 200:
+                    self.failures.append(f"{answer.status_code} {answer.text[:200]}")
+            except httpx.HTTPError as error:
+                self.failures.append(repr(error))
+            self.seconds.append(time.monotonic() - begun)
+
+
+@pytest.fixture
+def service(tmp_path):
+    made = LiveService(
+        tmp_path,
+        (*HONEST, HOSTILE),
+        BENTRAY_CONNECTIONS_PER_ADDRESS=str(CONNECTIONS),
+        BENTRAY_MAX_TENANT_BYTES=str(MAX_TENANT_BYTES),
+        BENTRAY_UPLOAD_KEEP_S=str(UPLOAD_KEEP_S),
+        BENTRAY_MIN_FREE_BYTES="0",
+    )
+    yield made
+    made.kill()
+
+
+@pytest.fixture
+def soak_scan() -> Dataset:
+    """Small, for there are many."""
+    ring, emitters = Ring(16, 0.08), np.arange(16)
+    delta = TravelTimeScan(table6(1500.0), ring, TABLE6_SIDE_M, nodes=32).delta_tof(emitters)
+    return Dataset(ring.positions(), emitters, emitters, 1500.0, delta_tof_s=delta)
+
+
+def test_honest_work_is_done_and_nothing_grows(service, soak_scan, tmp_path, caplog):
+    # A line for each request is too much here.
+    caplog.set_level(logging.WARNING, "httpx")
+    ledger = Ledger()
+    honest, hostile = parties(ledger, service, soak_scan, tmp_path)
+    probe = Probe(service.url)
+    samples: list[Footprint] = []
+    begun = time.monotonic()
+    try:
+        # Undisturbed; what comes later is compared with this.
+        for tenant in honest:
+            tenant.round()
+        workers = service.worker_pids()
+        samples.append(at_rest(service))
+        begun = time.monotonic()
+        spell_s = max(SHORTEST_SPELL_S, 60.0 * MINUTES / SPELLS)
+        while time.monotonic() - begun < 60.0 * MINUTES:
+            spell(honest, hostile, time.monotonic() + spell_s)
+            hostile.clean()
+            samples.append(at_rest(service))
+            oldest = oldest_upload(service.data)
+            assert oldest is None or time.time() - oldest < LONGEST_UPLOAD_S
+        minutes = (time.monotonic() - begun) / 60.0
+        assert not probe.failures
+        assert max(probe.seconds) < LIVE_S
+        assert not ledger.faults, "\n".join(ledger.faults[:20])
+        assert not ledger.told_to_two()
+        said = service.log.read_text(errors="replace")
+        assert "Traceback" not in said, said[said.index("Traceback") - 500 :][:4000]
+        assert samples[-1].log_bytes < MOST_LOG_BYTES_A_MINUTE * minutes
+        assert service.worker_pids() == workers
+        check_stop(service, hostile)
+        check_flat(samples)
+    finally:
+        probe.stop()
+        report(samples, probe, ledger, honest, (time.monotonic() - begun) / 60.0)
+        for one in (*honest, hostile):
+            one.close()
+
+
+def parties(
+    ledger: Ledger, service: LiveService, scan: Dataset, folder: Path
+) -> tuple[list[HonestTenant], HostileTraffic]:
+    """Those who ask."""
+    write_dataset(folder / "scan.h5", scan)
+    speed = reconstruct(scan, Settings(**PLAN)).speed
+    ball = npy(sampled(ONE_HOLE, 12))
+    honest = [
+        HonestTenant(ledger, service.url, who, service.keys[who], folder / "scan.h5", ball, folder, speed)
+        for who in HONEST
+    ]
+    built = folder / "hostile"
+    built.mkdir()
+    # Four million bytes each, packed or not.
+    quota_volume = cube(100)
+    key = service.keys[HOSTILE]
+    told = service.url, HOSTILE, key, HONEST
+    hostile = HostileTraffic(ledger, *told, built, ball, quota_volume, CONNECTIONS)
+    return honest, hostile
+
+
+def spell(honest: list[HonestTenant], hostile: HostileTraffic, until: float) -> None:
+    """All of them at once."""
+    actors = [*(tenant.work for tenant in honest), *hostile.actors()]
+    with ThreadPoolExecutor(len(actors)) as pool:
+        for done in [pool.submit(actor, until) for actor in actors]:
+            done.result()
+
+
+def at_rest(service: LiveService) -> Footprint:
+    """A sample once nothing has become less for a while."""
+    deadline = time.monotonic() + SETTLE_S
+    found = measured(service)
+    while True:
+        time.sleep(REST_S)
+        before, found = found, measured(service)
+        less = found.descriptors < before.descriptors or found.bytes < before.bytes
+        if not less or time.monotonic() > deadline:
+            return found
+
+
+def check_flat(samples: list[Footprint]) -> None:
+    """Nothing grows after the warm-up, and nothing is left of what was deleted."""
+    warm = samples[int(len(samples) * WARM_UP) :]
+    assert rise([one.service_mib for one in warm]) < MOST_SERVICE_MIB
+    assert rise([one.workers_mib for one in warm]) < MOST_WORKERS_MIB
+    assert rise([one.descriptors for one in warm]) < MOST_DESCRIPTORS
+    assert rise([one.threads for one in warm]) < MOST_THREADS
+    assert {one.processes for one in samples} == {samples[0].processes}
+    assert [one.rows for one in samples] == [{}] * len(samples)
+    assert [one.bytes for one in samples] == [0] * len(samples)
+
+
+def check_stop(service: LiveService, hostile: HostileTraffic) -> None:
+    """It ends in time although connections are open and a request is at work."""
+    held = threading.Thread(target=lambda: hostile.actors()[0](time.monotonic()))
+    held.start()
+    assert service.stop(STOP_S) == []
+    held.join()
+
+
+def report(
+    samples: list[Footprint], probe: Probe, ledger: Ledger, honest: list[HonestTenant], minutes: float
+) -> None:
+    """Log what was measured: shown of a failure, and with ``--log-cli-level=INFO``."""
+    log.info("%.1f minutes, %d answers", minutes, sum(ledger.counts.values()))
+    log.info("live: median %.3f s, worst %.3f s", statistics.median(probe.seconds), max(probe.seconds))
+    for who in (*HONEST, HOSTILE, "nobody"):
+        log.info("%s: %s", who, ledger.statuses(who))
+    for one in honest:
+        log.info("honest: %d rounds, told to wait for %.0f s", one.rounds, one.waits_s)
+    for number, sample in enumerate(samples):
+        log.info("%3d %s", number, sample)
