@@ -202,10 +202,7 @@ class Runner:
         kind = KINDS[job["kind"]]
         target = kind.target(files, job)
         try:
-            source = kind.source(files, job)
-            # A job that reads nothing has its own folder, which is stored nowhere and changes as it works.
-            if source != files.work(job_id):
-                source = self._files.store.bring(source)
+            source = self._files.store.bring(kind.source(files, job))
             try:
                 # Another job may have made the same, and a kind may then take it as it is.
                 self._files.store.bring(target)
