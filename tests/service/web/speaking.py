@@ -26,6 +26,9 @@ def served(app: Any, limits: Limits | None = None, **settings: Any) -> Iterator[
         listening.bind(("127.0.0.1", 0))
         server = Server(app, ServiceSettings(**settings))
         server.config.lifespan = "off"
+        if limits is not None:
+            # Before it starts, which takes them from the descriptors in use.
+            server._limits = lambda in_use: limits  # type: ignore[method-assign]
         server.port = listening.getsockname()[1]  # type: ignore[attr-defined]
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
         thread.start()
@@ -33,8 +36,6 @@ def served(app: Any, limits: Limits | None = None, **settings: Any) -> Iterator[
         while not server.started:
             assert time.monotonic() < deadline
             time.sleep(0.01)
-        if limits is not None:
-            server.connections.limits = limits
         try:
             yield server
         finally:

@@ -115,8 +115,8 @@ def test_the_residual_curve_shows_where_a_stage_begins(page, serve, scan, work):
 def test_a_volume_in_space_is_shown_as_glass(page, serve, scan, work, monkeypatch):
     plain = type(work).__call__
 
-    def in_space(self, *given):
-        result = plain(self, *given)
+    def in_space(self, *given, **named):
+        result = plain(self, *given, **named)
         ball = 40.0 * sampled(ONE_HOLE, 16)
         return replace(
             result,
@@ -215,7 +215,7 @@ def test_what_cannot_be_shown_is_told_in_words(page, serve, tmp_path):
 
 
 def test_a_mesh_is_uploaded_and_its_field_looked_at(page, serve, tmp_path, monkeypatch):
-    monkeypatch.setattr(kinds, "ClusterTasks", lambda client, priority: ThreadTasks())
+    monkeypatch.setattr(kinds, "ClusterTasks", lambda *given: ThreadTasks())
     ring = torus(16, 10)
     content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
     (tmp_path / "ring.ply").write_bytes(content)
@@ -312,7 +312,12 @@ def test_a_simulated_scan_is_there_to_be_reconstructed(page, serve, monkeypatch)
     made = {"title": "A phantom", "source": "", "license": "", "dimension": 2, "elements": 16, "ntx": 16}
     made |= {"nrx": 16, "slices": 1, "has_traces": False, "has_travel_times": True, "has_truth": True}
     made |= {"water_speed_mps": 1500.0, "bytes": 1, "sha256": "0" * 64}
-    monkeypatch.setattr(kinds, "simulate_scan", lambda *given: made)
+
+    def simulate_scan(client, asked, target, *given):
+        target.write_bytes(b"scan")
+        return made
+
+    monkeypatch.setattr(kinds, "simulate_scan", simulate_scan)
     url = serve()
     asked = {"kind": "simulation", "settings": {"nodes": 16, "elements": 16}}
     assert httpx.post(f"{url}/v1/jobs", json=asked).status_code == 202
