@@ -12,7 +12,8 @@ import pytest
 from bentray_kernels.errors import InvalidInput
 from bentray_workers import picture_cost
 from bentray_workers.asked_fields import MOST_PIXELS
-from bentray_workers.picture_cost import Cost, Stored, check_memory, placed, refraction_cost
+from bentray_workers.field_view import FieldView
+from bentray_workers.picture_cost import Cost, Stored, check_memory, field_cost, placed, refraction_cost
 from bentray_workers.picture_tasks import volume_slice_png
 from bentray_workers.planning import Offer
 from bentray_workers.refraction import strip_image
@@ -38,6 +39,16 @@ def test_a_large_picture_of_smooth_glass_is_taken_and_a_deep_one_refused():
     )
     assert width / height == pytest.approx(2.0, rel=0.01)
     refraction_cost(stored, RefractionView(width=width, height=height, depth=200))
+
+
+def test_the_page_may_draw_a_field_and_the_largest_picture_of_few_surfaces():
+    page = field_cost({}, FieldView(width=512, height=512, rays=2))
+    assert page.seconds < 5.0
+    assert (
+        field_cost({}, FieldView(width=MOST_PIXELS, height=MOST_PIXELS)).seconds < picture_cost.MOST_SECONDS
+    )
+    with pytest.raises(InvalidInput, match=r"width, height, rays, depth: .* or a smaller depth"):
+        field_cost({}, FieldView(width=MOST_PIXELS, height=MOST_PIXELS, depth=64))
 
 
 def test_it_grows_with_whatever_takes_longer():
