@@ -6,7 +6,17 @@ import copy
 
 import dask
 
+# What Dask keeps of what is over, for developers of Dask. Each stream to a worker or from a client would keep
+# its last thousand messages, with arguments of up to a megabyte each, and each process an hour of its load.
+LOGS = {
+    "distributed.admin.low-level-log-length": 0,
+    "distributed.admin.system-monitor.log-length": 1,
+}
+
 SETTINGS = {
+    **LOGS,
+    # What a scheduler would keep for ever, and no setting bounds.
+    "distributed.scheduler.preload": ["bentray_workers.scheduler_history"],
     # A queue without workers fails its tasks after this long instead of waiting for ever.
     "distributed.scheduler.no-workers-timeout": "60s",
     # Workers that a task may kill besides the one that gives it up: each takes seconds to come back.
@@ -24,6 +34,7 @@ SETTINGS = {
 
 # The settings of a process that has a client, and perhaps a cluster of its own.
 OF_CLIENTS = {
+    **LOGS,
     # A step of a refinement takes the images of many steps before it, and Dask would warn from 10 MB on.
     "distributed.admin.large-graph-warning-threshold": "100MB",
     # A worker may be away for this long before its nanny is ended: compiling its kernels takes minutes. Dask

@@ -106,6 +106,7 @@ def _listen(host: str, port: int) -> socket.socket:
 def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> None:
     from .. import logs
     from ..app import create_app
+    from ..arenas import limit_arenas
     from ..web.server import Server
 
     host, port = listening.getsockname()[:2]
@@ -125,6 +126,7 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
             made.state.leaving.set()
             await super().shutdown(sockets)
 
+    limit_arenas()
     made = create_app(settings)
     app = _Starting(made)
     server = Announcing(app, settings)

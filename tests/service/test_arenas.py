@@ -1,0 +1,54 @@
+"""However many threads a service has, the allocator divides its memory into few arenas."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from bentray_service.arenas import MOST
+
+# Prints how many arenas there are once many threads have allocated.
+PROGRAM = """
+import ctypes, sys, tempfile, threading
+from bentray_service.arenas import limit_arenas
+
+if sys.argv[1] == "limited":
+    limit_arenas()
+libc = ctypes.CDLL(None)
+libc.malloc.restype = libc.fdopen.restype = ctypes.c_void_p
+libc.malloc_info.argtypes = [ctypes.c_int, ctypes.c_void_p]
+libc.fflush.argtypes = [ctypes.c_void_p]
+together = threading.Barrier(32)
+
+def allocate():
+    together.wait()
+    for _ in range(100):
+        libc.malloc(1000)
+    together.wait()
+
+threads = [threading.Thread(target=allocate) for _ in range(32)]
+for one in threads:
+    one.start()
+for one in threads:
+    one.join()
+with tempfile.TemporaryFile() as file:
+    stream = libc.fdopen(file.fileno(), b"w")
+    libc.malloc_info(0, stream)
+    libc.fflush(stream)
+    file.seek(0)
+    print(file.read().count(b"<heap nr="))
+"""
+
+
+def arenas(how: str) -> int:
+    """How many there are in a process that limits them or does not."""
+    done = subprocess.run([sys.executable, "-c", PROGRAM, how], capture_output=True, text=True, check=True)
+    return int(done.stdout)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc alone has arenas")
+def test_many_threads_share_few_arenas() -> None:
+    assert arenas("as ever") > MOST
+    assert arenas("limited") <= MOST

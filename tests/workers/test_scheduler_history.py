@@ -1,0 +1,66 @@
+"""A scheduler of ours, its streams and its workers keep nothing of tasks that are done."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from distributed.batched import BatchedSend
+from distributed.scheduler import TaskGroup
+
+from bentray_workers.cluster import Cluster, open_cluster
+
+TASKS = 20
+# Of an array that each task is given.
+VALUES = 10_000
+FORGET_S = 10.0
+
+
+@pytest.fixture
+def cluster() -> Iterator[Cluster]:
+    """One with everything in this process."""
+    with open_cluster(workers=1, processes=False) as made:
+        yield made
+
+
+def run_tasks(cluster: Cluster) -> None:
+    """One after the other, each forgotten before the next."""
+    deployed: Any = cluster._deployed
+    for number in range(TASKS):
+        assert cluster.client.submit(np.sum, np.full(VALUES, number), pure=False).result() == VALUES * number
+        deadline = time.monotonic() + FORGET_S
+        while deployed.scheduler.tasks:
+            assert time.monotonic() < deadline
+            time.sleep(0.005)
+
+
+def alive(kind: type[Any]) -> list[Any]:
+    """The objects of a class that something refers to."""
+    gc.collect()
+    return [one for one in gc.get_objects() if type(one) is kind]
+
+
+def test_no_group_of_tasks_is_kept(cluster: Cluster) -> None:
+    run_tasks(cluster)
+    assert alive(TaskGroup) == []
+
+
+def test_no_message_is_kept(cluster: Cluster) -> None:
+    run_tasks(cluster)
+    streams = [stream for stream in alive(BatchedSend) if stream.message_count]
+    # Of the client, of the worker, and of the scheduler to each of them.
+    assert len(streams) >= 3
+    assert [len(stream.recent_message_log) for stream in streams] == [0] * len(streams)
+
+
+def test_a_worker_keeps_no_times_of_single_tasks(cluster: Cluster) -> None:
+    deployed: Any = cluster._deployed
+    (worker,) = deployed.workers.values()
+    run_tasks(cluster)
+    before = set(worker.digests_total)
+    run_tasks(cluster)
+    assert set(worker.digests_total) == before
