@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass
 from typing import Literal, NamedTuple
 
 from ..errors import InvalidInput
-from ..limits import SPEED_MPS
+from ..limits import SPACING_M, SPEED_MPS
+from ..ranges import SEED, Range, check_ranges, ranged
 from .misfits import Measure, measure
 from .simulation import Unknown
+
+# Of a band, around those that every pulse of a scan asks for.
+CORNER_HZ = Range(1e2, 1e11, unit="Hz")
+# Wide enough for every record and every array.
+WINDOW_S = Range(0.0, 1.0, above=True, unit="s")
+DISTANCE_M = Range(0.0, 100.0, unit="m")
+STEP_MPS = Range(0.0, SPEED_MPS.most, above=True, unit="m/s")
 
 
 @dataclass(frozen=True)
@@ -24,23 +32,18 @@ class Band:
         of: what is refined; the other stays as it is.
     """
 
-    low_hz: float
-    high_hz: float
-    spacing_m: float
-    iterations: int = 10
-    emitters: int = 32
-    smoothing_m: float = 2e-3
+    low_hz: float = ranged(MISSING, CORNER_HZ)
+    high_hz: float = ranged(MISSING, CORNER_HZ)
+    spacing_m: float = ranged(MISSING, SPACING_M)
+    iterations: int = ranged(10, Range(1, 1000))
+    emitters: int = ranged(32, Range(1, 65_536))
+    smoothing_m: float = ranged(2e-3, DISTANCE_M)
     of: Unknown = "speed"
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.low_hz < self.high_hz < float("inf"):
-            raise InvalidInput("band_hz", (self.low_hz, self.high_hz), "0 < low_hz < high_hz, in Hz")
-        if not 0.0 < self.spacing_m < float("inf"):
-            raise InvalidInput("spacing_m", self.spacing_m, "a finite spacing > 0 m")
-        if self.iterations < 1 or self.emitters < 1:
-            raise InvalidInput("iterations, emitters", (self.iterations, self.emitters), "at least 1 of each")
-        if not 0.0 <= self.smoothing_m < float("inf"):
-            raise InvalidInput("smoothing_m", self.smoothing_m, "a finite length >= 0 m")
+        check_ranges(self)
+        if self.low_hz >= self.high_hz:
+            raise InvalidInput("band_hz", (self.low_hz, self.high_hz), "low_hz < high_hz, in Hz")
 
     def looks(self, held_out: int) -> int:
         """Looks of single emitters at images, the first one included; shortened steps take more."""
@@ -118,19 +121,20 @@ class WaveSettings:
     bands: tuple[Band, ...]
     misfit: Literal["correlation", "least-squares"] = "correlation"
     window_s: tuple[float, float] = (60e-6, 40e-6)
-    nearest_m: float = 0.03
+    nearest_m: float = ranged(0.03, DISTANCE_M)
     speed_bounds_mps: tuple[float, float] = (1350.0, 1650.0)
-    largest_step_mps: float = 12.0
-    first_step_mps: float = 2.0
-    memory: int = 8
-    held_out: int = 4
-    variation: float = 0.0
-    seed: int = 0
+    largest_step_mps: float = ranged(12.0, STEP_MPS)
+    first_step_mps: float = ranged(2.0, STEP_MPS)
+    memory: int = ranged(8, Range(1, 1000))
+    held_out: int = ranged(4, Range(0, 65_536))
+    variation: float = ranged(0.0, Range(0.0, 10.0))
+    seed: int = ranged(0, SEED)
     roi: bool = False
 
     def __post_init__(self) -> None:
         if not self.bands:
             raise InvalidInput("bands", "none", "at least one band")
+        check_ranges(self)
         measure(self.misfit)
         low, high = self.speed_bounds_mps
         least, most = SPEED_MPS.least, SPEED_MPS.most
@@ -138,20 +142,8 @@ class WaveSettings:
             raise InvalidInput(
                 "speed_bounds_mps", self.speed_bounds_mps, f"{least:g} <= lowest < highest <= {most:g} m/s"
             )
-        if min(self.window_s) <= 0.0:
-            raise InvalidInput("window_s", self.window_s, "two times > 0 s")
-        if self.nearest_m < 0.0:
-            raise InvalidInput("nearest_m", self.nearest_m, "a distance >= 0 m")
-        if min(self.largest_step_mps, self.first_step_mps) <= 0.0:
-            raise InvalidInput(
-                "largest_step_mps, first_step_mps",
-                (self.largest_step_mps, self.first_step_mps),
-                "speeds > 0 m/s",
-            )
-        if not 0.0 <= self.variation < float("inf"):
-            raise InvalidInput("variation", self.variation, "a part >= 0 of the misfit")
-        if self.memory < 1 or self.held_out < 0:
-            raise InvalidInput("memory, held_out", (self.memory, self.held_out), "memory >= 1, held_out >= 0")
+        for end in self.window_s:
+            WINDOW_S.check("window_s", end)
 
     def steps(self, of: Unknown) -> Steps:
         """How far an image of speed or attenuation may go."""
