@@ -65,7 +65,8 @@ class Housekeeper:
         hold: of an upload, so that none vanishes under whoever writes to it.
         quota: whose reservations are renewed as long as this process lives.
         ages, observed: what tells since when something is too old.
-        keep_days: how long datasets, volumes and meshes are kept; None: until they are deleted.
+        keep_days: how long datasets, volumes and meshes are kept, and jobs that have none of them; None:
+            until they are deleted.
         upload_keep_s: how long an upload is kept after something came, s.
         clocks: s since 1970, and seconds that only grow.
         """

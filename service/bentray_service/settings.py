@@ -84,7 +84,10 @@ class ServiceSettings(BaseSettings):
         description="How long an unfinished upload is kept after something came, in seconds.",
     )
     keep_days: float | None = Field(
-        None, gt=0, description="Age at which datasets, volumes and meshes are deleted; never without it."
+        None,
+        gt=0,
+        description="Age at which datasets, volumes, meshes and jobs without any are deleted; "
+        "never without it.",
     )
     min_free_bytes: int = Field(
         GIB // 2,

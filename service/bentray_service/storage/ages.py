@@ -13,7 +13,7 @@ from .tenants import Tenant
 
 
 class Aged(NamedTuple):
-    """Something that has an age; ``what`` is ``dataset``, ``volume``, ``mesh`` or ``upload``."""
+    """Something that has an age; ``what`` is ``dataset``, ``volume``, ``mesh``, ``job`` or ``upload``."""
 
     tenant: Tenant
     what: str

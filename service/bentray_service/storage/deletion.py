@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable, Collection, Iterator
 from typing import NamedTuple
 
-from sqlalchemy import ColumnElement, Connection, Table, delete, or_, select, update
+from sqlalchemy import ColumnElement, Connection, Table, and_, delete, or_, select, update
 
 from ..refusals import DatabaseAway, InUse, StorageAway, UnknownId
 from . import usage
@@ -32,7 +32,7 @@ log = logging.getLogger("bentray.storage")
 
 
 class Stored(NamedTuple):
-    """One thing that can be deleted; ``what`` is ``dataset``, ``volume`` or ``mesh``."""
+    """One thing that can be deleted; ``what`` is ``dataset``, ``volume``, ``mesh`` or ``job``."""
 
     tenant: Tenant
     what: str
@@ -40,11 +40,12 @@ class Stored(NamedTuple):
 
 
 class Deletion:
-    """Deletes datasets, volumes and meshes of a tenant.
+    """Deletes datasets, volumes, meshes and jobs of a tenant.
 
     A dataset goes with the simulation that made it, its jobs and their volumes, a volume with the job that
     made it, its turntables and its exports, a mesh with its jobs and their fields. A mesh made of a volume
-    stays.
+    stays. A job by itself is one that none of them takes along: it read nothing that is stored, and made
+    nothing, as a simulation that was cancelled or failed.
 
     Whoever reads a file meanwhile has it open, or finds neither file nor row. A death on the way leaves
     files that no row knows; see ``Orphans``.
@@ -87,7 +88,8 @@ class Deletion:
         """What every tenant has from before a time, in seconds since 1970."""
         for what, tables in _TABLES.items():
             for table in tables:
-                query = select(table.c.tenant, table.c.id).where(table.c.created < time)
+                old = _ended_with_nothing(time) if table is jobs else table.c.created < time
+                query = select(table.c.tenant, table.c.id).where(old)
                 with self._database.read() as connection:
                     found = connection.execute(query).all()
                 yield from (Stored(Tenant(tenant), what, name) for tenant, name in found)
@@ -119,6 +121,13 @@ def _of_dataset(connection: Connection, tenant: Tenant, name: str) -> set[str]:
 def _of_volume(connection: Connection, tenant: Tenant, name: str) -> set[str]:
     made_it = select(volumes.c.job_id).where(volumes.c.id == name)
     return _of(connection, tenant, or_(jobs.c.volume_id == name, jobs.c.id.in_(made_it)))
+
+
+def _ended_with_nothing(time: float) -> ColumnElement[bool]:
+    """Jobs that ended before a time and that nothing stored takes along when it is deleted."""
+    read = jobs.c.dataset_id, jobs.c.volume_id, jobs.c.mesh_id
+    made = select(datasets.c.id).where(datasets.c.job_id == jobs.c.id).exists()
+    return and_(jobs.c.finished < time, *(one.is_(None) for one in read), ~made)
 
 
 def _fields(connection: Connection, tenant: Tenant, mesh: str, gone: Collection[str]) -> set[str]:
@@ -164,9 +173,15 @@ def _forget(
     connection.execute(update(meshes).where(meshes.c.volume_id.in_(names)).values(volume_id=None))
 
 
-_TABLES = {"dataset": (datasets,), "volume": (volumes, uploaded_volumes), "mesh": (meshes,)}
+_TABLES = {
+    "dataset": (datasets,),
+    "volume": (volumes, uploaded_volumes),
+    "mesh": (meshes,),
+    "job": (jobs,),
+}
 _JOBS: dict[str, Callable[[Connection, Tenant, str], set[str]]] = {
     "dataset": _of_dataset,
     "volume": _of_volume,
     "mesh": lambda connection, tenant, name: _of(connection, tenant, jobs.c.mesh_id == name),
+    "job": lambda connection, tenant, name: {name},
 }

@@ -77,6 +77,15 @@ class Shelf:
             path.write_bytes(b"x")
         return job, name
 
+    def simulation(self, state, days=31.0):
+        """A job that reads nothing, and ended so many days ago."""
+        job = self.ended(self.jobs.add(LOCAL, "simulation", {}), state=state)
+        if days is not None:
+            with self.database.write() as connection:
+                mine = update(schema.jobs).where(schema.jobs.c.id == job)
+                connection.execute(mine.values(finished=time.time() - days * DAY_S))
+        return job
+
     def turntable(self, volume, tenant=LOCAL):
         job = self.ended(self.jobs.add(tenant, "refraction", {}, volume_id=volume))
         self.files.of(tenant).animation(job, "zip").write_bytes(b"x")
@@ -239,6 +248,31 @@ def test_old_data_go_and_young_data_stay(shelf):
     assert shelf.rows() == left, "the one that is needed"
     for gone in (volume, mesh):
         assert not any(gone in name for name in shelf.left())
+
+
+def test_old_jobs_without_anything_go_too(shelf):
+    """As simulations that were cancelled or failed: no dataset takes them along when it goes."""
+    dataset = shelf.dataset()
+    made = shelf.simulation("succeeded")
+    with shelf.database.write() as connection:
+        rows = schema.datasets
+        connection.execute(update(rows).where(rows.c.id == dataset).values(job_id=made))
+    shelf.reconstruction(dataset)
+    young, at_work = shelf.simulation("failed", days=28), shelf.simulation("running", days=None)
+    kept = [row["id"] for row in shelf.jobs.newest(LOCAL, 9)]
+    for state in ("cancelled", "failed"):
+        shelf.simulation(state)
+    clocks = Clocks()
+    keeper = housekeeper(shelf, clocks)
+    keeper.sweep()
+    assert len(shelf.jobs.newest(LOCAL, 9)) == 6, "they are marked first"
+    clocks.pass_by(DAY_S - 3600.0)
+    keeper.sweep()
+    clocks.pass_by(3600.0)
+    keeper.sweep()
+    assert [row["id"] for row in shelf.jobs.newest(LOCAL, 9)] == kept
+    assert {young, at_work, made} < set(kept)
+    assert shelf.rows()["events"] == len(kept)
 
 
 def test_a_clock_that_is_wrong_for_a_while_deletes_nothing(shelf, caplog):
