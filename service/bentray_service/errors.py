@@ -32,7 +32,7 @@ MEDIA_TYPE = "application/problem+json"
 LONGEST_FOUND = 120
 # Seconds after which it is worth another try, where workers or the queue are full, or the storage is away.
 RETRY_AFTER = "10"
-METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
+METHODS = ("DELETE", "GET", "HEAD", "OPTIONS", "PATCH", "POST", "PUT")
 
 JOB_KINDS = ("reconstruction", "simulation", "refraction", "geometry-field")
 
@@ -97,6 +97,7 @@ PROBLEMS: Mapping[type[Exception], Kind] = {
     refusals.TooSlow: Kind(408, "too-slow", "The body came too slowly"),
     refusals.TinyChunks: Kind(400, "tiny-chunks", "The body comes in too many small chunks"),
     refusals.MalformedRequest: Kind(400, "malformed-request", "The request is no HTTP"),
+    refusals.UnknownMethod: Kind(501, "unknown-method", "The method is unknown"),
     refusals.HeadTooLarge: Kind(431, "head-too-large", "The head of the request is too long"),
     refusals.TooManyConnections: Kind(503, "too-many-connections", "Too many connections are open"),
     refusals.WrongProtocol: Kind(412, "wrong-protocol", "The upload protocol is another"),

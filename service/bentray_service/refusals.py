@@ -71,6 +71,10 @@ class MalformedRequest(InvalidInput):
     """What came is no HTTP."""
 
 
+class UnknownMethod(InvalidInput):
+    """The method is one that nothing here knows."""
+
+
 class HeadTooLarge(InvalidInput):
     """The head of the request is too long."""
 

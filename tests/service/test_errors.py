@@ -84,6 +84,9 @@ def test_router_errors_are_problems_too(http):
     assert (wrong.status_code, wrong.json()["type"]) == (405, "/problems/method-not-allowed")
     assert wrong.headers["allow"] == "GET, POST"
     assert "accepted: GET, POST" in wrong.json()["detail"]
+    for method in ("OPTIONS", "TRACE", "PROPFIND"):
+        answer = http.request(method, "/refused")
+        assert (answer.status_code, answer.headers["allow"]) == (405, "GET, POST"), method
 
 
 def test_methods_are_told_of_included_routers_and_static_files_too(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 
 import httptools
 from starlette.responses import Response
@@ -10,8 +11,8 @@ from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
 from bentray_kernels.errors import InvalidInput
 
-from ..errors import refused
-from ..refusals import HeadTooLarge, MalformedRequest
+from ..errors import METHODS, refused
+from ..refusals import HeadTooLarge, MalformedRequest, UnknownMethod
 
 # Within it the whole head of a request must be there.
 HEAD_S = 10.0
@@ -21,6 +22,8 @@ LONGEST_HEAD = 32 * 1024
 MOST_PIPELINED = 8
 # Of what has come, read at once, bytes: others wait for as long as it is parsed.
 READ_BYTES = 64 * 1024
+# RFC 9112, section 3; the method is a token of RFC 9110, section 5.6.2.
+REQUEST_LINE = re.compile(rb"(?:\r?\n)*([!#$%&'*+.^_`|~0-9A-Za-z-]+) [!-~]+ HTTP/\d\.\d\r?\n")
 
 
 class HeadInTime(HttpToolsProtocol):
@@ -69,10 +72,21 @@ class HeadInTime(HttpToolsProtocol):
                 self._read_bytes += len(data)
                 _check_length(self._read_bytes - READ_BYTES)
         except httptools.HttpParserError as error:
-            cause = error.__context__
-            self.refuse(cause if isinstance(cause, InvalidInput) else _malformed(str(error)))
+            self.refuse(self._reason(error, data))
         except InvalidInput as error:
             self.refuse(error)
+
+    def _reason(self, error: httptools.HttpParserError, data: bytes) -> InvalidInput:
+        """What is wrong with what came last, which the parser did not take."""
+        cause = error.__context__
+        if isinstance(cause, InvalidInput):
+            return cause
+        # The parser reads nothing of a request whose method it does not know. Where others came before it
+        # in these data, they are being answered, and nobody is told.
+        line = REQUEST_LINE.match(data) if self._in_head else None
+        if line is not None and line[1].decode() not in METHODS:
+            return _unknown(line[1].decode())
+        return _malformed(str(error))
 
     def _parse(self, data: bytes) -> None:
         while data:
@@ -120,7 +134,7 @@ class HeadInTime(HttpToolsProtocol):
         if self.parser.should_upgrade():
             method = self.parser.get_method().decode("ascii")
             if method == "CONNECT":
-                raise MalformedRequest("method", method, "one of a server that is no proxy")
+                raise _unknown(method)
             self.scope["method"], self._upgrade = method, True
             return
         hosts = sum(name == b"host" for name, _ in self.headers)
@@ -174,6 +188,10 @@ def _check_length(head: int) -> None:
 
 def _malformed(reason: str) -> MalformedRequest:
     return MalformedRequest("request", f"no HTTP/1.1 ({reason})", "a request as RFC 9112 writes it")
+
+
+def _unknown(method: str) -> UnknownMethod:
+    return UnknownMethod("method", method, ", ".join(METHODS))
 
 
 def _written(response: Response) -> bytes:

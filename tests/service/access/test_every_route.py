@@ -38,7 +38,7 @@ from bentray_workers.reconstruction_file import write_reconstruction
 from ..conftest import FakeCluster
 
 ACME, OTHER = Tenant("acme"), Tenant("other")
-VERBS = (*errors.METHODS, "OPTIONS")
+VERBS = errors.METHODS
 # What a header that is required holds.
 REQUIRED = {"tus-resumable": "1.0.0", "upload-offset": "0", "upload-length": "4"}
 # Texts that mean nothing to the service, so that anything may be in them.

@@ -92,7 +92,12 @@ def test_a_head_in_parts_is_one(telling):
         (b"GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n", 400, "malformed-request"),
         (b"GET / HTTP/1.1\r\nHost : a\r\n\r\n", 400, "malformed-request"),
         (b"\x16\x03\x01\x02\x00", 400, "malformed-request"),
-        (b"CONNECT here:443 HTTP/1.1\r\nHost: here\r\n\r\n", 400, "malformed-request"),
+        (b"CONNECT here:443 HTTP/1.1\r\nHost: here\r\n\r\n", 501, "unknown-method"),
+        (b"BREW /pot HTTP/1.1\r\nHost: here\r\n\r\n", 501, "unknown-method"),
+        (b"get / HTTP/1.1\r\nHost: here\r\n\r\n", 501, "unknown-method"),
+        (b"PLAY / HTTP/1.1\r\nHost: here\r\n\r\n", 501, "unknown-method"),
+        (b"BREW /pot\r\n\r\n", 400, "malformed-request"),
+        (b"GE\x00T / HTTP/1.1\r\nHost: here\r\n\r\n", 400, "malformed-request"),
         (REQUEST[:-2] + b"Content-Length: 1\r\nTransfer-Encoding: chunked\r\n\r\n", 400, "malformed-request"),
     ],
 )
@@ -104,6 +109,15 @@ def test_what_is_no_head_is_a_problem(telling, sent, status, slug):
         if slug is not None:
             assert body["type"] == f"/problems/{slug}"
             assert read_to_end(connection) == b""
+
+
+def test_a_body_that_looks_like_a_request_is_a_body(telling):
+    with connected(telling) as connection:
+        connection.sendall(REQUEST.replace(b"GET", b"POST")[:-2] + b"Transfer-Encoding: chunked\r\n\r\n")
+        time.sleep(0.05)
+        connection.sendall(b"BREW /pot HTTP/1.1\r\n\r\n")
+        # It is no chunk; the request is being answered and finds its body broken off.
+        assert b" 501 " not in read_to_end(connection)
 
 
 def test_what_follows_a_body_is_no_header(telling):
