@@ -16,6 +16,7 @@ from matplotlib.text import Text
 from bentray_kernels.opencl import Session, choose
 
 from . import opencl, postgresql
+from . import small_disk as small
 
 # `push`, which `make test` and CI use, tries the same examples every time: a change is not judged by luck.
 # `nightly`, of `make test-all`, searches at random and prints what repeats a failure (@reproduce_failure).
@@ -76,6 +77,15 @@ def _device_for_marked_tests(request: pytest.FixtureRequest) -> None:
     """A test marked ``opencl`` needs the device, whether it asks for the session or not."""
     if request.node.get_closest_marker("opencl"):
         request.getfixturevalue("opencl_session")
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 16 MiB. Skips where this machine does not let a test have one."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    with small.mounted(folder):
+        yield folder
 
 
 @pytest.fixture(scope="session")

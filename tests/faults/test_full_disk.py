@@ -1,12 +1,10 @@
 """A disk that is full in the middle of a job: the job waits, and goes on once there is room."""
 
-import contextlib
-import os
 import sqlite3
-import subprocess
 
 import numpy as np
 import pytest
+from tests.small_disk import MIB, fill
 
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_workers.reconstruction_file import read_reconstruction
@@ -16,21 +14,6 @@ from .machine import Machine, wait_until
 pytestmark = pytest.mark.slow
 
 PLAN = {"nodes": 64, "attenuation": False, "method": "sart", "sweeps": 300}
-MIB = 2**20
-
-
-@pytest.fixture
-def small_disk(tmp_path):
-    """A file system of 16 MiB."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=16m", "tmpfs", str(folder)]
-    if os.getuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode != 0:
-        pytest.skip("this machine does not let the test mount a small file system")
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
 def test_a_job_waits_for_room(tmp_path, small_disk, scan, scan_file):
@@ -40,10 +23,7 @@ def test_a_job_waits_for_room(tmp_path, small_disk, scan, scan_file):
         dataset = machine.upload(scan_file)
         job = machine.submit(dataset, **PLAN)
         wait_until(lambda: list(small_disk.glob(f"tenants/local/work/{job}/checkpoints/*.npz")))
-        filler = small_disk / "filler"
-        with contextlib.suppress(OSError), filler.open("wb", buffering=0) as file:
-            while file.write(b"\0" * 4096):
-                pass
+        filler = fill(small_disk)
         # SQLite may have no room to say so before there is some.
         wait_until(lambda: not machine.http.get("/health/ready").is_success)
         wait_until(lambda: "waits for room" in (tmp_path / "service.log").read_text())

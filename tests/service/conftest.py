@@ -31,7 +31,8 @@ with warnings.catch_warnings():
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
 ENDED = ("succeeded", "failed", "cancelled")
-PATIENCE_S = 20.0
+# What takes longer hangs: a job may have to compile its kernels first, on a machine that is busy.
+PATIENCE_S = 240.0
 
 
 class FakeFuture:

@@ -1,6 +1,7 @@
 """Kinds of jobs: turntables and geometry fields; cancelled, refused, and taken up again after a death."""
 
 import io
+import threading
 import time
 import zipfile
 from contextlib import contextmanager
@@ -25,6 +26,8 @@ from bentray_workers.cluster import open_cluster
 from bentray_workers.mesh_file import StoredMesh, summary_of, write_mesh
 from bentray_workers.slices import Cancelled
 from bentray_workers.volume_file import Volume, write_volume
+
+from ..conftest import PATIENCE_S
 
 SMALL = {"width": 24, "height": 16, "iso": [0.5], "frames": 3}
 
@@ -213,7 +216,7 @@ def ask_field(http, mesh, **settings):
 
 def test_a_torn_field_is_gone_on_from_at_the_next_start(serving, until, monkeypatch):
     monkeypatch.setattr(geometry_field, "TASK_RAYS", 32 * 216)
-    plain, calls = geometry_field.build, []
+    plain, calls, torn = geometry_field.build, [], threading.Event()
 
     def held(*given):
         """As a service that leaves once three tasks have ended: the rest is still to do."""
@@ -224,25 +227,23 @@ def test_a_torn_field_is_gone_on_from_at_the_next_start(serving, until, monkeypa
         def saved():
             told.append(1)
             on_saved()
+            if len(told) == 3:
+                torn.set()
 
         def leave():
-            while len(calls) == 1 and len(told) >= 3:
-                if stop():
-                    return True
-            return stop()
+            while not stop():
+                if len(calls) > 1 or not torn.is_set():
+                    return False
+                time.sleep(0.01)
+            return True
 
         return plain(*others, saved, leave)
 
     monkeypatch.setattr(geometry_field, "build", held)
     with serving() as http:
         job = ask_field(http, put_mesh(http)).json()
-        until(http, job["id"], "running")
         files = http.app.state.parts.files.of(LOCAL)
-        work = files.work(job["id"]) / "done"
-        deadline = time.monotonic() + 30.0
-        while len(list(work.glob("*.json"))) < 2:
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
+        assert torn.wait(PATIENCE_S)
     with serving() as http:
         done = until(http, job["id"])
         assert done["state"] == "succeeded", done["error"]
@@ -257,7 +258,7 @@ def test_a_torn_field_is_gone_on_from_at_the_next_start(serving, until, monkeypa
 
 def wait_until_empty(folder):
     """What a job made on its way goes right after its end is stored."""
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + PATIENCE_S
     while list(folder.iterdir()):
         assert time.monotonic() < deadline
         time.sleep(0.02)

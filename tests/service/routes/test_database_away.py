@@ -1,9 +1,8 @@
 """While the database is away every answer is a 503 that says when to try again, and then it goes on."""
 
-import sqlite3
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 
 import httpx
 import pytest
@@ -14,18 +13,11 @@ from bentray_service.storage import database
 from bentray_service.storage.keys import Keys
 from bentray_service.storage.tenants import LOCAL
 
+from ..held_database import held
+
 HDF5 = {"Content-Type": "application/x-hdf5"}
 JOB = {"kind": "simulation", "settings": {"nodes": 16, "elements": 16}}
 FIELD = "/v1/volumes/vol-00000000000000000000"
-
-
-@contextmanager
-def held(path):
-    """Another program that writes for a long time, as a backup may."""
-    with closing(sqlite3.connect(path, isolation_level=None)) as other:
-        other.execute("BEGIN IMMEDIATE")
-        yield
-        other.execute("ROLLBACK")
 
 
 @contextmanager

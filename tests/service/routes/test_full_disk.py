@@ -1,13 +1,11 @@
 """A full disk: every write is a 507 or a line, whatever little room is left, and nothing of it stays."""
 
-import contextlib
 import io
-import os
-import subprocess
 
 import numpy as np
 import pytest
 import trimesh
+from tests.small_disk import fill
 from typer.testing import CliRunner
 
 from bentray_service.cli import app as cli
@@ -17,30 +15,6 @@ TUS = {"Tus-Resumable": "1.0.0"}
 JOB = {"kind": "simulation", "settings": {"nodes": 16, "elements": 16}}
 # The database needs a few pages for a row, files more.
 LEFT_BYTES = (0, 4096, 16384, 65536, 150_000)
-
-
-@pytest.fixture
-def small_disk(tmp_path):
-    """A file system of 8 MiB."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=8m", "tmpfs", str(folder)]
-    if os.getuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode != 0:
-        pytest.skip("this machine does not let the test mount a small file system")
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", "-l", str(folder)], check=True)
-
-
-def fill(folder, left):
-    """Leave so many bytes."""
-    filler = folder / "filler"
-    filler.unlink(missing_ok=True)
-    free = os.statvfs(folder)
-    with contextlib.suppress(OSError), filler.open("wb", buffering=0) as file:
-        for _ in range(max(0, free.f_bavail * free.f_bsize - left) // 4096):
-            file.write(b"\0" * 4096)
 
 
 def requests(scan):

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import sqlite3
 import subprocess
 import threading
 import time
@@ -18,6 +17,8 @@ from bentray_service.storage.database import open_database
 from bentray_service.storage.jobs import Jobs
 from bentray_service.storage.tenants import LOCAL
 
+from ..held_database import held
+
 # A request that waits longer than this would be one that hangs.
 BOUNDED_S = 8.0
 
@@ -25,15 +26,6 @@ BOUNDED_S = 8.0
 def ask(opened):
     with opened.read() as connection:
         return connection.execute(select(schema.about.c.version)).scalar_one()
-
-
-@contextmanager
-def held(path):
-    """Another program that writes for a long time, as a backup may."""
-    with closing(sqlite3.connect(path, isolation_level=None)) as other:
-        other.execute("BEGIN IMMEDIATE")
-        yield
-        other.execute("ROLLBACK")
 
 
 @contextmanager
