@@ -44,7 +44,7 @@ docs: install-docs ## build the pages of docs/ into build/docs; a warning is an 
 	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
 	@echo "The documentation: build/docs/index.html"
 
-bench: install ## run benchmarks/NAME.py; NAME=reconstruction ARGS=--quick
+bench: install ## run the benchmark NAME; NAME=reconstruction ARGS=--quick
 	@mkdir -p build/bench
 	@$(BIN)/bentray bench $(NAME) $(ARGS) --json build/bench/$(NAME).json
 

@@ -23,8 +23,8 @@ from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_service.cli.service_process import running_service
 from bentray_service.client import Client
-from bentray_workers.dataset_file import write_dataset
-from bentray_workers.simulation import SimulationSettings, simulate
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.simulation.plane import SimulationSettings, simulate
 
 FOLDER = Path(__file__).parent / "pictures"
 CHROMIUM = Path("/usr/bin/chromium")

@@ -13,7 +13,7 @@ import pytest
 from moto.moto_server.werkzeug_app import DomainDispatcherApplication, create_backend_app
 from werkzeug.serving import make_server
 
-from bentray_service.storage.bucket import Bucket
+from bentray_service.files.bucket import Bucket
 
 SECRET = "a-secret-that-no-log-shows"
 

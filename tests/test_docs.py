@@ -18,8 +18,8 @@ import typer
 
 from bentray_service.cli import app
 from bentray_service.cli.service_process import running_service
-from bentray_workers.dataset_file import write_dataset
-from bentray_workers.simulation import SimulationSettings, simulate
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.simulation.plane import SimulationSettings, simulate
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"

@@ -17,10 +17,10 @@ from bentray_kernels.eikonal import methods
 from bentray_kernels.tomography import Settings
 from bentray_service.app import create_app
 from bentray_service.cli import app
-from bentray_service.cli.settings_options import OPTIONS
+from bentray_service.cli.options.settings_options import OPTIONS
 from bentray_service.jobs.kinds import KINDS
 from bentray_service.settings import ServiceSettings
-from bentray_workers.dataset_file import read_dataset
+from bentray_workers.files.dataset import read_dataset
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXTS = ("README.md", "CONTRIBUTING.md", "deploy/README.md", "deploy/SCALING.md")

@@ -12,15 +12,21 @@ from fastapi.security import HTTPBearer
 from fastapi.staticfiles import StaticFiles
 from starlette.concurrency import run_in_threadpool
 
-from bentray_workers.cluster import open_cluster
+from bentray_workers.cluster.connection import open_cluster
 
-from . import __version__, errors
+from . import __version__
 from .access.audit import Audit
-from .access.door import Door
-from .access.guard import Guard
 from .access.key_watch import KeyWatch
 from .access.quota import Quota
+from .access.sign_in import Door
 from .compute import Cluster, Compute
+from .files.checked_store import CheckedStore
+from .files.data_folder import Files, lock
+from .files.deletion import Deletion
+from .files.open_store import open_store
+from .files.orphans import Orphans
+from .files.private import private_files
+from .guard import Guard
 from .housekeeping import Housekeeper
 from .ingest.append import Hold
 from .ingest.canonical import Limits
@@ -45,29 +51,24 @@ from .routes import (
     tus,
     volumes,
 )
+from .rows.ages import Ages
+from .rows.checksums import Checksums
+from .rows.database import open_database
+from .rows.datasets import Datasets
+from .rows.geometry_fields import GeometryFields
+from .rows.job_queue import Queue
+from .rows.jobs import Jobs
+from .rows.keys import Keys
+from .rows.meshes import Meshes
+from .rows.observed_time import ObservedTime
+from .rows.uploads import Uploads
+from .rows.volumes import Volumes
 from .settings import ServiceSettings
-from .storage.ages import Ages
-from .storage.checked_store import CheckedStore
-from .storage.checksums import Checksums
-from .storage.database import open_database
-from .storage.datasets import Datasets
-from .storage.deletion import Deletion
-from .storage.files import Files, lock
-from .storage.geometry_fields import GeometryFields
-from .storage.jobs import Jobs
-from .storage.keys import Keys
-from .storage.meshes import Meshes
-from .storage.observed_time import ObservedTime
-from .storage.open_store import open_store
-from .storage.orphans import Orphans
-from .storage.private import private_files
-from .storage.queue import Queue
-from .storage.uploads import Uploads
-from .storage.volumes import Volumes
+from .web import errors
 from .web.description import Described
 from .web.headers import SecurityHeaders
-from .web.pace import Pace
 from .web.request_id import RequestIds
+from .web.request_rate import Pace
 from .web.tus_headers import TusHeaders
 from .wiring import Parts
 

@@ -37,7 +37,7 @@ def settings_of(given: Mapping[str, Any]) -> Settings:
         return ADAPTER.validate_python(known_only(dict(given)))
     except ValidationError as error:
         # Loads FastAPI, which nothing else here needs.
-        from .errors import fault_of
+        from .web.errors import fault_of
 
         fault = fault_of(error.errors()[0])
         raise InvalidInput(fault.field, fault.found, fault.accepted) from None

@@ -10,8 +10,8 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 from fastapi import Depends, Query, Request
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.field_view import FieldView
-from bentray_workers.refraction_view import RefractionView
+from bentray_workers.rendering.field_view import FieldView
+from bentray_workers.rendering.refraction_view import RefractionView
 
 View = TypeVar("View")
 

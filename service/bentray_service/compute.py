@@ -7,16 +7,18 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from bentray_kernels.tomography.settings import Settings
-from bentray_workers import picture_cost, planning, simulation_planning
-from bentray_workers.asked_simulation import AskedSimulation
-from bentray_workers.dataset_counts import DatasetCounts
-from bentray_workers.dataset_summary import counts_in
-from bentray_workers.offers import offers_of, prepared_offers
-from bentray_workers.refraction_view import RefractionView
+from bentray_workers.cluster.capacities import offers_of, prepared_offers
+from bentray_workers.files.dataset.counts import DatasetCounts
+from bentray_workers.files.dataset.summary import counts_in
+from bentray_workers.reconstruction import planning
+from bentray_workers.rendering import picture_cost
+from bentray_workers.rendering.refraction_view import RefractionView
+from bentray_workers.simulation import simulation_planning
+from bentray_workers.simulation.request import AskedSimulation
 
 
 class Cluster(Protocol):
-    """What :func:`bentray_workers.cluster.open_cluster` gives; tests bring a lighter one."""
+    """What :func:`bentray_workers.cluster.connection.open_cluster` gives; tests bring a lighter one."""
 
     @property
     def client(self) -> Any: ...

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from bentray_workers import heartbeat
+from bentray_workers.cluster import heartbeat
 
 SECONDS = 10.0
 # Both sides of Dask's protocol begin with a message that holds this name.

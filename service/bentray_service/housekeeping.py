@@ -11,15 +11,15 @@ from typing import Any
 from sqlalchemy.exc import SQLAlchemyError
 
 from .access.quota import Quota
+from .files.data_folder import Files
+from .files.deletion import Deletion, Stored
+from .files.orphans import Orphans
 from .ingest.append import Hold, remove
 from .refusals import DatabaseAway, InUse, Locked, StorageAway, UnknownId
-from .storage.ages import Aged, Ages
-from .storage.deletion import Deletion, Stored
-from .storage.files import Files
-from .storage.observed_time import ObservedTime
-from .storage.orphans import Orphans
-from .storage.tenants import Tenant
-from .storage.uploads import Uploads
+from .rows.ages import Aged, Ages
+from .rows.observed_time import ObservedTime
+from .rows.tenants import Tenant
+from .rows.uploads import Uploads
 
 log = logging.getLogger("bentray.housekeeping")
 

@@ -17,7 +17,7 @@ from prometheus_client.registry import Collector
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from .storage.schema import STATES
+from .rows.schema import STATES
 
 if TYPE_CHECKING:
     from .wiring import Parts

@@ -11,10 +11,10 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 
-from bentray_workers.planning import Offer
+from bentray_workers.cluster.capacities import Offer
 
 from .refusals import TooOften
-from .storage.tenants import Tenant
+from .rows.tenants import Tenant
 
 # A picture that would be done later than this, by what is known of those before it, is refused, s.
 LATEST_S = 60.0

@@ -15,20 +15,21 @@ from typing import Any, TypeVar
 from distributed import KilledWorker
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers import field_picture, picture_cost, picture_tasks, refraction, volume_export
-from bentray_workers.field_view import FieldView
-from bentray_workers.isosurface_mesh import mesh_volume
-from bentray_workers.offers import offers_by_address
-from bentray_workers.picture_cost import Cost, Stored
-from bentray_workers.planning import Offer
-from bentray_workers.quality import quality_page, quality_report
-from bentray_workers.refraction_view import RefractionView
-from bentray_workers.strips import Tasks
+from bentray_workers.cluster.capacities import Offer, offers_by_address
+from bentray_workers.files import volume_export
+from bentray_workers.images import drawing_tasks
+from bentray_workers.reconstruction.quality_report import quality_page, quality_report
+from bentray_workers.rendering import field_picture, picture_cost, refraction
+from bentray_workers.rendering.field_view import FieldView
+from bentray_workers.rendering.isosurface_mesh import mesh_volume
+from bentray_workers.rendering.picture_cost import Cost, Stored
+from bentray_workers.rendering.refraction_view import RefractionView
+from bentray_workers.rendering.tiles import Tasks
 
 from .compute import Cluster
 from .picture_queue import LONG_S, PictureQueue
 from .refusals import Busy, StorageFull
-from .storage.tenants import Tenant
+from .rows.tenants import Tenant
 
 # From the admission of a picture to its end.
 RENDER_SECONDS = 120.0
@@ -76,7 +77,7 @@ class Pictures:
             how: as in ``bentray_workers.images.slice``, or ``volume_slice`` of an upload.
         """
         cost = picture_cost.slice_cost(Stored.of(volume), how.get("size"))
-        draw = picture_tasks.slice_png if "job_id" in volume else picture_tasks.volume_slice_png
+        draw = drawing_tasks.slice_png if "job_id" in volume else drawing_tasks.volume_slice_png
         return bytes(await self._one(tenant, ("size", "this slice", cost), path, draw, how))
 
     async def refraction_png(self, tenant: Tenant, volume: Row, path: Path, view: RefractionView) -> bytes:
@@ -91,12 +92,12 @@ class Pictures:
         return bytes(await self._made(tenant, what, folder, lambda here: field_picture.tasks_of(here, view)))
 
     async def field_map_png(self, tenant: Tenant, field: Row, folder: Path, which: str) -> bytes:
-        """The geometry image of a field, as ``bentray_workers.field_picture.map_png``."""
+        """The geometry image of a field, as ``bentray_workers.rendering.field_picture.map_png``."""
         what = "field", str(field["id"]), picture_cost.map_cost(field["figures"])
         return bytes(await self._one(tenant, what, folder, field_picture.map_png, {"what": which}))
 
     async def quality(self, tenant: Tenant, dataset: Row, path: Path, picker: str) -> dict[str, Any]:
-        """The examination of a dataset file, see ``bentray_workers.quality``."""
+        """The examination of a dataset file, see ``bentray_workers.reconstruction.quality_report``."""
         what = "dataset", str(dataset["id"]), picture_cost.quality_cost(dataset)
         return dict(await self._one(tenant, what, path, quality_report, {"picker": picker}))
 
@@ -108,7 +109,7 @@ class Pictures:
     async def mesh_volume(
         self, tenant: Tenant, volume: Row, path: Path, iso: float | None, step: int, target: Path
     ) -> dict[str, Any]:
-        """The iso-surface of a volume as a mesh file; as ``bentray_workers.isosurface_mesh.mesh_volume``."""
+        """The iso-surface of a volume as a mesh file; as ``isosurface_mesh.mesh_volume``."""
         what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.mesh_cost(Stored.of(volume))
         how = {"iso": iso, "step": step, "target": target}
         return dict(await self._one(tenant, what, path, mesh_volume, how))

@@ -13,11 +13,11 @@ from sqlalchemy.exc import SQLAlchemyError
 from bentray_kernels.errors import InvalidInput
 
 from .compute import Compute
+from .files.data_folder import Files
 from .ingest.reader import UploadReader
 from .jobs.runner import Runner
 from .refusals import NotReady
-from .storage.database import Database
-from .storage.files import Files
+from .rows.database import Database
 
 # Who asks is answered within this time, s; a part that takes longer is a fault.
 WITHIN_S = 3.0

@@ -9,10 +9,12 @@ from fastapi import Depends, Request
 
 from .access.audit import Audit
 from .access.caller import Caller
-from .access.door import Door
 from .access.key_watch import KeyWatch
 from .access.quota import Quota
+from .access.sign_in import Door
 from .compute import Compute
+from .files.data_folder import Files
+from .files.deletion import Deletion
 from .housekeeping import Housekeeper
 from .ingest.append import Hold
 from .ingest.fair_queue import FairQueue
@@ -22,18 +24,16 @@ from .jobs.feed import Feed
 from .jobs.runner import Runner
 from .pictures import Pictures
 from .readiness import Readiness
+from .rows.database import Database
+from .rows.datasets import Datasets
+from .rows.geometry_fields import GeometryFields
+from .rows.job_queue import Queue
+from .rows.jobs import Jobs
+from .rows.meshes import Meshes
+from .rows.tenants import Tenant
+from .rows.uploads import Uploads
+from .rows.volumes import Volumes
 from .settings import ServiceSettings
-from .storage.database import Database
-from .storage.datasets import Datasets
-from .storage.deletion import Deletion
-from .storage.files import Files
-from .storage.geometry_fields import GeometryFields
-from .storage.jobs import Jobs
-from .storage.meshes import Meshes
-from .storage.queue import Queue
-from .storage.tenants import Tenant
-from .storage.uploads import Uploads
-from .storage.volumes import Volumes
 
 
 @dataclass(frozen=True)

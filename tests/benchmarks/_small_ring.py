@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from _travel_times import TravelTimes
+from benchmarks.reconstruction._travel_times import TravelTimes
 
 from bentray_kernels.acquisition import Dataset
 

@@ -1,12 +1,11 @@
-"""Benchmarks import each other by their bare names, as `bentray bench` lets them; so do their tests."""
+"""The benchmarks are a namespace package of the checkout, as `bentray bench` has them."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
+ROOT = str(Path(__file__).resolve().parents[2])
 
-for folder in (HERE, HERE.parents[1] / "benchmarks"):
-    if str(folder) not in sys.path:
-        sys.path.insert(0, str(folder))
+if ROOT not in sys.path:
+    sys.path.insert(0, ROOT)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from _ideal_times import ideal
+from benchmarks.acquisition._ideal_times import ideal
 
 from bentray_kernels.acquisition import Dataset, Truth
-from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 
 ELEMENTS = 12

@@ -8,11 +8,11 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
-import _kwave_peer
 import numpy as np
 import pytest
-from _kwave_peer import installed, mass
-from _wave_shots import Shot, delays, misfit, pulse
+from benchmarks.waves import _kwave_peer
+from benchmarks.waves._kwave_peer import installed, mass
+from benchmarks.waves._wave_shots import Shot, delays, misfit, pulse
 
 SHOT = Shot("water", 4.5, 0.012, receivers=7)
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-import reconstruction_peers
-from reconstruction_peers import Found, beside, rows
+from benchmarks.reconstruction import reconstruction_peers
+from benchmarks.reconstruction.reconstruction_peers import Found, beside, rows
 
 
 def quiet(done: int, total: int, note: str = "") -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from _scaling_cluster import Run
-from _scaling_model import BUSY, Model, beats
-from _scaling_work import Work
+from benchmarks.cluster._scaling_cluster import Run
+from benchmarks.cluster._scaling_model import BUSY, Model, beats
+from benchmarks.cluster._scaling_work import Work
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import warnings
 
-import _tomography_peers
 import numpy as np
 import pytest
-from _small_ring import DISC_MPS, WATER_MPS, disc, ring
-from _tomography_peers import PEERS, installed
+from benchmarks.reconstruction import _tomography_peers
+from benchmarks.reconstruction._tomography_peers import PEERS, installed
+
+from ._small_ring import DISC_MPS, WATER_MPS, disc, ring
 
 
 @pytest.mark.parametrize("name", list(PEERS))

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from _tomography_scan import REFINEMENT, SIDE_M, SPEEDS_MPS, breast, fine_spacing, positions, scan
+from benchmarks.reconstruction._tomography_scan import (
+    REFINEMENT,
+    SIDE_M,
+    SPEEDS_MPS,
+    breast,
+    fine_spacing,
+    positions,
+    scan,
+)
 
 
 def in_water(speed: np.ndarray, spacing: float, node: tuple[int, ...]) -> np.ndarray:

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from _small_ring import ELEMENTS, NODES, SIDE_M, WATER_MPS, dataset, ring
-from _travel_times import TravelTimes
+from benchmarks.reconstruction._travel_times import TravelTimes
+
+from ._small_ring import ELEMENTS, NODES, SIDE_M, WATER_MPS, dataset, ring
 
 
 def test_each_pair_comes_once_and_with_the_mean_of_both_ways() -> None:

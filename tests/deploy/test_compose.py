@@ -13,10 +13,10 @@ import pytest
 import typer
 import yaml
 
-from bentray_service.access.token import Token
 from bentray_service.cli import app
+from bentray_service.rows.api_key import Token
 from bentray_service.settings import ServiceSettings
-from bentray_workers.dask_settings import SETTINGS
+from bentray_workers.cluster.dask_settings import SETTINGS
 
 from . import compose
 

@@ -14,10 +14,10 @@ import pytest
 from bentray_kernels.tomography import Settings
 from bentray_service.client import Client
 from bentray_service.healthcheck import check_scheduler
-from bentray_workers.dataset_file import write_dataset
-from bentray_workers.reconstruction_file import read_reconstruction
-from bentray_workers.simulation import SimulationSettings, simulate
-from bentray_workers.slices import reconstruct
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.files.reconstruction import read_reconstruction
+from bentray_workers.reconstruction.reconstruction_run import reconstruct
+from bentray_workers.simulation.plane import SimulationSettings, simulate
 
 from .. import postgresql
 from ..listening import beyond_loopback, listening, pages

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
-from bentray_workers.dataset_file import write_dataset
+from bentray_workers.files.dataset import write_dataset
 
 from .machine import Machine
 

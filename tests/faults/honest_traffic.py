@@ -13,7 +13,7 @@ from typing import Any
 import httpx
 import numpy as np
 
-from bentray_workers.reconstruction_file import read_reconstruction
+from bentray_workers.files.reconstruction import read_reconstruction
 
 from .ledger import LATER, Ledger
 from .machine import PATIENCE_S

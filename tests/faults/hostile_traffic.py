@@ -14,10 +14,10 @@ from typing import Any
 import httpx
 import numpy as np
 
-from bentray_workers.dataset_file import write_dataset
+from bentray_workers.files.dataset import write_dataset
 
 from ..service.ingest import hostile_datasets, hostile_meshes, hostile_variants, hostile_volumes
-from ..workers.datasets import small
+from ..workers.files.datasets import small
 from .hostile_connections import FROM, HostileConnections
 from .ledger import Ledger
 

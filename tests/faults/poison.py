@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bentray_kernels.tomography import Problem, Settings
-from bentray_workers.scan import FileScan
+from bentray_workers.reconstruction.file_scan import FileScan
 
 
 class PoisonedScan(NamedTuple):
-    """As ``bentray_workers.scan.FileScan``."""
+    """As ``bentray_workers.reconstruction.file_scan.FileScan``."""
 
     path: Path
     settings: Settings

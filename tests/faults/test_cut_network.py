@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.tomography import Settings, reconstruct
-from bentray_workers.reconstruction_file import read_reconstruction
+from bentray_workers.files.reconstruction import read_reconstruction
 
 from .machine import Machine, wait_until
 

@@ -4,11 +4,11 @@ import sqlite3
 
 import numpy as np
 import pytest
-from tests.small_disk import MIB, fill
 
 from bentray_kernels.tomography import Settings, reconstruct
-from bentray_workers.reconstruction_file import read_reconstruction
+from bentray_workers.files.reconstruction import read_reconstruction
 
+from ..small_disk import MIB, fill
 from .machine import Machine, wait_until
 
 pytestmark = pytest.mark.slow

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from bentray_kernels.tomography import Settings, reconstruct
-from bentray_workers.asked_simulation import AskedSimulation
-from bentray_workers.dataset_file import write_dataset
-from bentray_workers.reconstruction_file import read_reconstruction
-from bentray_workers.wave_simulation import simulate_waves
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.files.reconstruction import read_reconstruction
+from bentray_workers.simulation.request import AskedSimulation
+from bentray_workers.simulation.waves import simulate_waves
 
 from .conftest import ELEMENTS
 from .machine import wait_until

@@ -10,14 +10,14 @@ from distributed import Client, KilledWorker, LocalCluster
 from distributed.scheduler import NoValidWorkerError, NoWorkerError
 
 from bentray_kernels.tomography import Settings, reconstruct
-from bentray_kernels.tomography.chains import Chain
-from bentray_workers import slices
-from bentray_workers.attempts import Attempts, ResultsLostError
-from bentray_workers.checkpoints import Checkpoints
-from bentray_workers.dask_settings import NO_DASHBOARD, ours
-from bentray_workers.driving import run_on_cluster
-from bentray_workers.lanes import OFFERED, THREADS
-from bentray_workers.shares import alone
+from bentray_kernels.tomography.task_chains import Chain
+from bentray_workers.cluster.attempts import Attempts, ResultsLostError
+from bentray_workers.cluster.checkpoints import Checkpoints
+from bentray_workers.cluster.dask_settings import NO_DASHBOARD, ours
+from bentray_workers.cluster.fair_shares import alone
+from bentray_workers.cluster.resources import OFFERED, THREADS
+from bentray_workers.cluster.task_loop import run_on_cluster
+from bentray_workers.reconstruction import reconstruction_run
 
 pytestmark = pytest.mark.slow
 
@@ -39,7 +39,9 @@ def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):
     ):
 
         def innocent():
-            ends["innocent"] = slices.reconstruct(client, scan_file, PLAN, work_dir=tmp_path / "work")
+            ends["innocent"] = reconstruction_run.reconstruct(
+                client, scan_file, PLAN, work_dir=tmp_path / "work"
+            )
 
         def poisoned():
             chain = Chain(PoisonedScan(scan_file, PLAN, os.getpid()), 0)
@@ -47,7 +49,7 @@ def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):
             attempts = Attempts(client, tmp_path)
             try:
                 run = run_on_cluster(client, attempts, alone(client, "recon"), None)
-                slices._drive(run, {"0": chain}, 0, 0, kept, lambda progress: None)
+                reconstruction_run._drive(run, {"0": chain}, 0, 0, kept, lambda progress: None)
             except KilledWorker as error:
                 ends["poisoned"] = error
 

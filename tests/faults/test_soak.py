@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.phantoms import ONE_HOLE, TABLE6_SIDE_M, sampled, table6
 from bentray_kernels.tomography import Settings, reconstruct
-from bentray_workers.dataset_file import write_dataset
+from bentray_workers.files.dataset import write_dataset
 
 from ..service.ingest.hostile_volumes import npy
 from .footprint import Footprint, measured, oldest_upload, rise

@@ -12,7 +12,7 @@ import pytest
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Settings, reconstruct
-from bentray_workers.reconstruction_file import read_reconstruction
+from bentray_workers.files.reconstruction import read_reconstruction
 
 from .machine import PATIENCE_S, Machine, wait_until
 

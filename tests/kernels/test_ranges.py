@@ -7,11 +7,12 @@ from dataclasses import dataclass, fields, replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.extremes import EXTREMES
 
 from bentray_kernels.errors import LONGEST_FIELD, LONGEST_VALUE, InvalidInput
 from bentray_kernels.ranges import Range, check_ranges, ranged, ranges_of
 from bentray_kernels.tomography.settings import Settings
+
+from ..extremes import EXTREMES
 
 numbers = st.sampled_from(EXTREMES) | st.floats() | st.integers()
 

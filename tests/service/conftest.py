@@ -21,8 +21,8 @@ from bentray_service.app import create_app
 from bentray_service.settings import ServiceSettings
 from bentray_service.web.listening import Listening
 from bentray_service.web.server import Server
-from bentray_workers import slices
-from bentray_workers.shares import Share
+from bentray_workers.cluster.fair_shares import Share
+from bentray_workers.reconstruction import reconstruction_run
 
 with warnings.catch_warnings():
     # Starlette's test client would rather have httpx2; our own client is written for httpx.
@@ -130,7 +130,7 @@ class FakeWork:
         for stage, sweep in passes:
             while True:
                 if stop():
-                    raise slices.Cancelled
+                    raise reconstruction_run.Cancelled
                 if self.hold.wait(0.01):
                     break
             history += (Sweep(0, sweep, 2e-6 / sweep, 8, stage),)
@@ -159,7 +159,7 @@ class FakeWork:
 def work(monkeypatch: pytest.MonkeyPatch) -> FakeWork:
     """A reconstruction that the test holds and lets go."""
     fake = FakeWork()
-    monkeypatch.setattr(slices, "reconstruct", fake)
+    monkeypatch.setattr(reconstruction_run, "reconstruct", fake)
     return fake
 
 

@@ -11,7 +11,7 @@ from schemathesis.generation.meta import CoverageScenario
 from schemathesis.openapi.checks import RejectedPositiveData
 from schemathesis.specs.openapi.checks import negative_data_rejection, positive_data_acceptance
 
-from bentray_workers.asked_simulation import OWN
+from bentray_workers.simulation.request import OWN
 
 # Pieces of uploads are bytes as they are.
 schemathesis.serializer.alias("application/offset+octet-stream", "application/octet-stream")

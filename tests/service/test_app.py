@@ -17,11 +17,11 @@ from sqlalchemy import update
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_service.app import create_app
+from bentray_service.rows import schema
+from bentray_service.rows.ids import new_id
+from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
-from bentray_service.storage import schema
-from bentray_service.storage.ids import new_id
-from bentray_service.storage.tenants import LOCAL
-from bentray_workers.cluster import open_cluster
+from bentray_workers.cluster.connection import open_cluster
 
 
 def test_dataset_in_image_out(start, uploaded, submitted, until, work):
@@ -139,7 +139,7 @@ def test_a_killed_service_loses_no_job(tmp_path, scan, asked):
         "import sys, uvicorn\n"
         "from bentray_service.app import create_app\n"
         "from bentray_service.settings import ServiceSettings\n"
-        "from bentray_workers.cluster import open_cluster\n"
+        "from bentray_workers.cluster.connection import open_cluster\n"
         "cluster = open_cluster(workers=1, processes=False)\n"
         "uvicorn.run(create_app(ServiceSettings(), cluster), port=int(sys.argv[1]), log_level='warning')\n"
     )

@@ -12,8 +12,8 @@ from fastapi.params import Query
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.asked_view import asked_of
-from bentray_workers.field_view import FieldView
-from bentray_workers.refraction_view import RefractionView
+from bentray_workers.rendering.field_view import FieldView
+from bentray_workers.rendering.refraction_view import RefractionView
 
 
 def asked(query: bytes) -> Request:

@@ -9,9 +9,9 @@ import pytest
 from bentray_kernels.ranges import RANGE
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.openapi import description
-from bentray_workers.asked_simulation import AskedSimulation
-from bentray_workers.field_settings import FieldSettings
-from bentray_workers.turntable import Turntable
+from bentray_workers.rendering.field_settings import FieldSettings
+from bentray_workers.rendering.turntable import Turntable
+from bentray_workers.simulation.request import AskedSimulation
 
 from ..extremes import EXTREMES
 

@@ -12,7 +12,7 @@ import time
 import pytest
 
 from bentray_service.healthcheck import check, check_scheduler, check_worker, main
-from bentray_workers import heartbeat
+from bentray_workers.cluster import heartbeat
 
 
 def wait_for(heard):

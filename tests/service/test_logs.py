@@ -7,10 +7,10 @@ import pytest
 from distributed import batched
 
 from bentray_service import logs
-from bentray_service.access.token import Token
 from bentray_service.logs import Lines, Words, about
-from bentray_service.storage.keys import Keys
-from bentray_service.storage.tenants import Tenant
+from bentray_service.rows.api_key import Token
+from bentray_service.rows.keys import Keys
+from bentray_service.rows.tenants import Tenant
 
 log = logging.getLogger("bentray.test")
 

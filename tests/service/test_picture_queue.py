@@ -8,8 +8,8 @@ import pytest
 from bentray_service import picture_queue
 from bentray_service.picture_queue import LATEST_S, MOST_IN_ALL, MOST_OF_TENANT, PictureQueue
 from bentray_service.refusals import TooOften
-from bentray_service.storage.tenants import Tenant
-from bentray_workers.planning import Offer
+from bentray_service.rows.tenants import Tenant
+from bentray_workers.cluster.capacities import Offer
 
 A, B, C = (Tenant(name) for name in "abc")
 

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from bentray_service.access.token import Token
 from bentray_service.openapi import description
+from bentray_service.rows.api_key import Token
 
 STREAM = {"Content-Type": "application/octet-stream"}
 HERE = Path(__file__).parent

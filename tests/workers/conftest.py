@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation import Ring
-from bentray_workers.cluster import open_cluster
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
+from bentray_workers.cluster.connection import open_cluster
 
 
 @pytest.fixture(scope="session")

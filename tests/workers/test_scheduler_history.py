@@ -12,7 +12,7 @@ import pytest
 from distributed.batched import BatchedSend
 from distributed.scheduler import TaskGroup
 
-from bentray_workers.cluster import Cluster, open_cluster
+from bentray_workers.cluster.connection import Cluster, open_cluster
 
 TASKS = 20
 # Of an array that each task is given.

@@ -6,16 +6,16 @@ from .dataset import Dataset, Truth, Waveform
 from .water import speed_from_temperature, temperature_from_speed
 
 if TYPE_CHECKING:
-    from .picking import PICKERS, pick
+    from .picking.first_arrivals import PICKERS, pick
 else:
 
     def __getattr__(name: str) -> object:
         """Picking is compiled and slow to load; each upload starts a process that needs none of it."""
         if name not in ("PICKERS", "pick"):
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        from . import picking
+        from .picking import first_arrivals
 
-        return getattr(picking, name)
+        return getattr(first_arrivals, name)
 
 
 __all__ = [

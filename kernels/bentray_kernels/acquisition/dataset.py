@@ -8,10 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
-from ..limits import ATTENUATION_NP_M, FREQUENCY_HZ, SAMPLING_HZ, SPEED_MPS, TEMPERATURE_C, TIME_S, check_size
+from ..limits import (
+    ATTENUATION_NP_M,
+    FREQUENCY_HZ,
+    SAMPLING_HZ,
+    SPEED_MPS,
+    TEMPERATURE_C,
+    TIME_S,
+    check_size,
+)
 from ..ranges import check_ranges, ranged
 from . import rules
-from .truth import Truth
+from .simulation.phantom_truth import Truth
 from .waveform import Waveform
 
 __all__ = ["Dataset", "Truth", "Waveform"]

@@ -9,15 +9,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Flags, Floats
 from ..errors import InvalidInput
-from ..limits import (
-    DEVIATION_S,
-    LOG_RATIO_NP,
-    PLACE_M,
-    PRESSURE,
-    RADIUS_M,
-    TIME_S,
-    WIDTH_M,
-)
+from ..limits import DEVIATION_S, LOG_RATIO_NP, PLACE_M, PRESSURE, RADIUS_M, TIME_S, WIDTH_M
 from . import rules
 from .dataset import POSITION, Dataset
 

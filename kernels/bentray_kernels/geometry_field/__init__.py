@@ -6,24 +6,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .defects import SoundMesh, sound
-    from .geometric_error import GeometricError
-    from .geometry_image import GeometryImage
-    from .inner_field import InnerField, build_inner_rows, spread_points
-    from .mesh import Chart, TriangleMesh
-    from .outer_field import OuterField, build_rows, mark_borders
-    from .parameterisation import Parameterisation, parameterise
-    from .scene import Ground, Instance, Material, Scene, Shape, placed
-    from .subsampling import FittedImage, fitted_image
-    from .surface import Surface, surface_of
-    from .tracing import TraceSettings, trace
-    from .world import World, world_of
+    from .image.geometry_image import GeometryImage
+    from .image.subsampling import FittedImage, fitted_image
+    from .layout.parameterisation import Parameterisation, parameterise
+    from .tables.inner_field import InnerField, build_inner_rows, spread_points
+    from .tables.outer_field import OuterField, build_rows, mark_borders
+    from .tracing.packed_scene import World, world_of
+    from .tracing.ray_tracer import TraceSettings, trace
+    from .tracing.scene import Ground, Instance, Material, Scene, Shape, placed
 
 # Functions with the name of their module, as ``geometry_image.geometry_image``, are to be had from there.
 __all__ = [
-    "Chart",
     "FittedImage",
-    "GeometricError",
     "GeometryImage",
     "Ground",
     "InnerField",
@@ -33,10 +27,7 @@ __all__ = [
     "Parameterisation",
     "Scene",
     "Shape",
-    "SoundMesh",
-    "Surface",
     "TraceSettings",
-    "TriangleMesh",
     "World",
     "build_inner_rows",
     "build_rows",
@@ -44,27 +35,21 @@ __all__ = [
     "mark_borders",
     "parameterise",
     "placed",
-    "sound",
     "spread_points",
-    "surface_of",
     "trace",
     "world_of",
 ]
 
 # Imported when they are asked for: who only reads a mesh needs no libigl.
 _MODULES = {
-    "defects": ("SoundMesh", "sound"),
-    "geometric_error": ("GeometricError",),
-    "geometry_image": ("GeometryImage",),
-    "inner_field": ("InnerField", "build_inner_rows", "spread_points"),
-    "mesh": ("Chart", "TriangleMesh"),
-    "outer_field": ("OuterField", "build_rows", "mark_borders"),
-    "parameterisation": ("Parameterisation", "parameterise"),
-    "scene": ("Ground", "Instance", "Material", "Scene", "Shape", "placed"),
-    "subsampling": ("FittedImage", "fitted_image"),
-    "surface": ("Surface", "surface_of"),
-    "tracing": ("TraceSettings", "trace"),
-    "world": ("World", "world_of"),
+    "image.geometry_image": ("GeometryImage",),
+    "image.subsampling": ("FittedImage", "fitted_image"),
+    "layout.parameterisation": ("Parameterisation", "parameterise"),
+    "tables.inner_field": ("InnerField", "build_inner_rows", "spread_points"),
+    "tables.outer_field": ("OuterField", "build_rows", "mark_borders"),
+    "tracing.packed_scene": ("World", "world_of"),
+    "tracing.ray_tracer": ("TraceSettings", "trace"),
+    "tracing.scene": ("Ground", "Instance", "Material", "Scene", "Shape", "placed"),
 }
 _PLACES = {name: module for module, names in _MODULES.items() for name in names}
 

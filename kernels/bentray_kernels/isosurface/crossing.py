@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from ..arrays import Vector
 from ..compiled import kernel
 from .octree import Octree
-from .roots import Field, Ray, Vector, brent, field_at, first_root_of_cubic, newton
+from .roots import Field, Ray, brent, field_at, first_root_of_cubic, newton
 
 # How the search looks within a cell.
 CERTAIN, CERTAIN_BRENT, BRENT, ANALYTIC = 0, 1, 2, 3

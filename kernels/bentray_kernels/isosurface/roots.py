@@ -7,10 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arrays import Vector
 from ..compiled import kernel
 from ..splines.sampling import Stencil, value_and_gradient_at, value_at
-
-Vector = tuple[float, float, float]
 
 # Steps of either method; both halve what is left at worst every third.
 STEPS = 200

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Vector
 from ..compiled import kernel
 from ..isosurface.crossing import MOST_HALVINGS, Search, leave_interval
 from ..isosurface.octree import Octree
 from ..isosurface.roots import Field, Ray, field_at, point_at, ray_of
 from ..splines.sampling import value_and_gradient_at
-from .optics import Vector, refracted
+from .optics import refracted
 from .scene import Scene
 
 # What became of a ray: it met nothing; it was refracted; it did not leave within the depth limit, or ran

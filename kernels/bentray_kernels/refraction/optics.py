@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
+from ..arrays import Vector
 from ..compiled import kernel
-
-Vector = tuple[float, float, float]
 
 
 @kernel(inline="always")

@@ -8,14 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Vector
 from ..compiled import kernel
 from ..errors import InvalidInput
 from ..isosurface.crossing import MOST_HALVINGS, Search, leave_interval
 from .backdrop import Colours
 from .camera import Camera
 from .caster import Medium, affine, gradient_at, in_nodes, layer_at, medium_of, through_box, unit_normal
-from .optics import Vector
 from .scene import Scene
 
 

@@ -1,8 +1,8 @@
 """Sound speed and attenuation from travel times, along straight or bent rays."""
 
+from .errors_against_truth import mean_absolute_error, rmse
 from .problem import Problem
-from .quality import mean_absolute_error, rmse
-from .reconstruction import reconstruct
+from .reconstruct import reconstruct
 from .result import RESIDUAL_EDGES_S, Progress, Reconstruction, Sweep, Trial
 from .settings import Settings
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
-from . import huber
+from .finite_frequency import bending, seen
 from .focusing import focusing
-from .linear import Linearised, smoothing
-from .linearisation import Rows, linearise_losses
-from .matrix import back_project, project
+from .gauss_newton import huber
+from .gauss_newton.linear_problem import Linearised, smoothing
+from .gauss_newton.linearisation import Rows, linearise_losses
+from .gauss_newton.ray_matrix import back_project, project
 from .problem import Problem
-from .ray_width import bending, seen
 from .settings import Settings
 
 # Solutions, each with the outliers, and the total variation, that the misfit of the one before asks for: more

@@ -9,12 +9,12 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from ..arrays import Floats, Ints
-from .gauss_newton import look as rows_of
-from .linear import Linearised
-from .linearisation import Rows
-from .matrix import back_project, project
+from .finite_frequency import blurred
+from .gauss_newton.gauss_newton_step import look as rows_of
+from .gauss_newton.linear_problem import Linearised
+from .gauss_newton.linearisation import Rows
+from .gauss_newton.ray_matrix import back_project, project
 from .problem import Problem
-from .ray_width import blurred
 from .settings import Settings
 
 # Side of a field of the checkerboard, nodes.
@@ -43,7 +43,7 @@ def recovery(problem: Problem, parts: Sequence[Rows], width: float = 0.0) -> Flo
     Args:
         problem: the slice or volume.
         parts: rows of all emitters, in their order.
-        width: of the rays, nodes; see ``ray_width``.
+        width: of the rays, nodes; see ``finite_frequency``.
 
     Returns:
         Of the region's shape; 0 outside the region.

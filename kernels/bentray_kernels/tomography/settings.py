@@ -37,7 +37,7 @@ class Settings:
     Attributes:
         method: ``sart`` uses one emitter after the other (chapter 6); ``gauss-newton`` all at once, with bent
             rays and a penalty; ``auto`` tries several on part of the pairs and takes the one that predicts
-            the others best, see ``advice``; ``waveform`` does so too, and then refines that image until the
+            the others best, see ``model_selection``; ``waveform`` does so too, and then refines that image until the
             traces that waves through it would make agree with those recorded, see ``wave``. It needs slices
             with traces of object and water; its image has the finest grid that its waves ask for, ``nodes``
             is that of the rays.
@@ -88,7 +88,7 @@ class Settings:
             elements and broken traces out, and after it times that others contradict; see
             ``acquisition.quality``. A scan that must not be used is refused. It says what it found.
         guided_rounds: how often, where only traces were uploaded, times are read again about those that the
-            image of the rays predicts; fewer once they stay. For slices; see ``alternation``.
+            image of the rays predicts; fewer once they stay. For slices; see ``guided_picking``.
         attenuation: reconstruct it too, where there are amplitudes; with ``waveform`` from the traces,
             once the speed is refined. Experimental there.
         amplitudes: where they come from: ``recorded`` takes those of the file (``amplitude/log_ratio_np``);

@@ -15,7 +15,7 @@ from .medium import EDGE_NODES, Medium
 from .points import Points
 from .simulation import placed
 from .stencil import HALO, longest_step, weights
-from .stepping import advance, inject, read
+from .time_step import advance, inject, read
 
 
 @dataclass(frozen=True)

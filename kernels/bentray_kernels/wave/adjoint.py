@@ -15,8 +15,8 @@ from .medium import Medium
 from .points import Points
 from .simulation import Unknown, forward, placed
 from .stencil import weights
-from .stepping import advance, inject
-from .strips import Poll, strips, unheeded
+from .time_blocks import Poll, strips, unheeded
+from .time_step import advance, inject
 
 # A misfit of simulated traces (nrx, nt): its value, and its derivative by every sample.
 Misfit = Callable[[NDArray[Any]], tuple[float, Floats]]
@@ -64,7 +64,7 @@ def slope(
         misfit: of the traces.
         every: time steps from one stored field to the next.
         by: of what the gradient is.
-        poll: see ``strips``.
+        poll: see ``time_blocks``.
 
     Raises:
         InvalidInput: as ``simulate``; a step between fields below 1.
@@ -94,7 +94,7 @@ def backward(
         heard: the receivers.
         residual: (nrx, nt), derivative of the misfit by every sample.
         scattered: as ``forward`` gives it.
-        poll: see ``strips``.
+        poll: see ``time_blocks``.
     """
     kind = medium.keep.dtype
     fields = np.zeros((2, *medium.keep.shape), kind)

@@ -11,7 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Floats
 from ..errors import InvalidInput
-from .room import check_room
+from .memory import check_room
 from .stencil import HALO, longest_step
 
 # Width of the absorbing edge, nodes; power of its profile; what its end sends back at normal incidence.
@@ -68,7 +68,7 @@ class Medium:
             attenuation: as ``speed``, Np/m, >= 0; None: no loss.
             edge_nodes: width of the absorbing edges, nodes.
             dtype: of the fields; float64 for tests of exactness.
-            room_bytes: what one emission may take, see ``room.emission_bytes``.
+            room_bytes: what one emission may take, see ``wave.memory.emission_bytes``.
 
         Raises:
             InvalidInput: for a speed or an attenuation that is none, an edge without a node, a time step

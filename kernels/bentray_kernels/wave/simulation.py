@@ -12,10 +12,10 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from .medium import Medium
 from .points import Points, place
-from .space import forward_in_space
+from .simulation_3d import forward_in_space
 from .stencil import HALO, weights
-from .stepping import advance, braked, curvature, inject, read, released, spread
-from .strips import Poll, strips, unheeded
+from .time_blocks import Poll, strips, unheeded
+from .time_step import advance, braked, curvature, inject, read, released, spread
 
 # What a gradient may be by.
 Unknown = Literal["speed", "attenuation"]
@@ -40,7 +40,7 @@ def simulate(
     """Traces of a point source.
 
     Order 2 in time, in space 8 or what is asked for; free of temporal dispersion where wavelet and traces
-    are taken through ``sampling.resampler``. Releases the GIL.
+    are taken through ``waveform.trace_resampling.resampler``. Releases the GIL.
 
     Args:
         medium: to travel through, of two axes or three.
@@ -48,7 +48,7 @@ def simulate(
         receivers: (nrx, d), m.
         wavelet: (nt,), the source s(t) of (1/c^2) p'' - laplacian p = s(t) delta(x), a sample a time step.
         order: in space; see ``stencil.weights``. Data of another one than a refinement's test it honestly.
-        poll: see ``strips``.
+        poll: see ``time_blocks``.
 
     Returns:
         (nrx, nt), of the medium's type; sample n is the pressure at n time steps.
@@ -109,7 +109,7 @@ def forward(
         every: 0: keep nothing.
         order: in space.
         by: the change that scatters.
-        poll: see ``strips``.
+        poll: see ``time_blocks``.
 
     Returns:
         traces: (nrx, nt).

@@ -11,7 +11,7 @@ from .medium import Medium
 from .points import REACH, Points
 from .simulation import check_flat, forward, placed
 from .stencil import HALO, weights
-from .stepping import QUIET
+from .time_step import QUIET
 
 if TYPE_CHECKING:
     from ..opencl.session import Session

@@ -9,7 +9,7 @@ from typing import Literal
 
 from bentray_kernels.errors import InvalidInput
 
-from ..storage.tenants import LOCAL, Tenant
+from ..rows.tenants import LOCAL, Tenant
 
 # What each scope allows; few, so that one can say what a key can do.
 SCOPES: Mapping[str, str] = MappingProxyType(

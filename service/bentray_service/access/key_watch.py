@@ -11,9 +11,9 @@ import anyio
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ..errors import refused
 from ..refusals import DatabaseAway, NotLetIn
-from ..storage.keys import Keys
+from ..rows.keys import Keys
+from ..web.errors import refused
 
 log = logging.getLogger("bentray.access")
 

@@ -14,11 +14,11 @@ from contextlib import asynccontextmanager
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.concurrency import run_in_threadpool
 
-from ..storage import usage
-from ..storage.database import Database
-from ..storage.files import Files
-from ..storage.tenants import Tenant
-from ..storage.usage import Lease, Usage
+from ..files.data_folder import Files
+from ..rows import usage
+from ..rows.database import Database
+from ..rows.tenants import Tenant
+from ..rows.usage import Lease, Usage
 
 log = logging.getLogger("bentray.access")
 

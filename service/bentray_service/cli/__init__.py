@@ -25,9 +25,9 @@ from . import (
     verify,
     worker,
 )
-from .endings import Commands
-from .repeated_words import SpacingInRow
-from .terminal import show_our_warnings_in_a_line
+from .options.repeated_words import SpacingInRow
+from .output.exit_codes import Commands
+from .output.terminal import show_our_warnings_in_a_line
 
 __all__ = ["app", "main"]
 

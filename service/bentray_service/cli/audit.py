@@ -12,7 +12,7 @@ import typer
 from bentray_kernels.errors import InvalidInput
 
 from .keys import Data
-from .terminal import AsJson, print_json, print_table
+from .output.terminal import AsJson, print_json, print_table
 
 COLUMNS = ("time", "tenant", "how", "who", "method", "route", "ids", "status", "sent")
 
@@ -40,8 +40,8 @@ def audit(
     Example:  bentray audit --id ds-0123456789abcdef0123 --since 2026-11-01
     """
     from ..access.audit import entries
+    from ..files.data_folder import Files
     from ..settings import ServiceSettings
-    from ..storage.files import Files
 
     settings = ServiceSettings.load(**({} if data is None else {"data_dir": data}))
     folder, first = Files(settings.data_dir).audit, _day(since)

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from bentray_kernels.errors import InvalidInput
 
-from .batch_view import report, watching
-from .paths import output_folder
-from .results import write_results
-from .terminal import without_nan
+from .options.paths import output_folder
+from .output.batch_view import report, watching
+from .output.results import write_results
+from .output.terminal import without_nan
 
 if TYPE_CHECKING:
     from bentray_kernels.tomography import Settings
-    from bentray_workers.batch import Entry
+    from bentray_workers.reconstruction.batch import Entry
 
 
 def submit_batch(
@@ -49,8 +49,8 @@ def submit_batch(
     entries = entries_of(folder)
     results = output_folder((output or folder / "results").resolve())
 
-    from bentray_workers import batch
-    from bentray_workers.cluster import open_cluster
+    from bentray_workers.cluster.connection import open_cluster
+    from bentray_workers.reconstruction import batch
 
     for entry in entries:
         found = finished(results / entry.name, entry.source, settings)
@@ -74,7 +74,7 @@ def entries_of(folder: Path) -> list[Entry]:
     Raises:
         InvalidInput: where there are none.
     """
-    from bentray_workers.batch import Entry
+    from bentray_workers.reconstruction.batch import Entry
 
     if not folder.is_dir():
         raise InvalidInput("--batch", f"{folder} (no such folder)", "a folder of datasets, *.h5")
@@ -88,10 +88,11 @@ def reconstruct_one(
     client: Any, entry: Entry, results: Path, settings: Settings, stop: Callable[[], bool]
 ) -> None:
     """Reconstruct one dataset into its folder of results; the picture is drawn by the cluster too."""
-    from bentray_workers.batch import report_of
-    from bentray_workers.dataset_file import read_dataset
-    from bentray_workers.lanes import RENDER
-    from bentray_workers.slices import Cancelled, reconstruct
+    from bentray_workers.cluster.resources import RENDER
+    from bentray_workers.cluster.task_loop import Cancelled
+    from bentray_workers.files.dataset import read_dataset
+    from bentray_workers.reconstruction.batch import report_of
+    from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
     folder, asked = output_folder(results / entry.name), _asked(entry.source, settings)
 
@@ -126,7 +127,7 @@ def _asked(source: Path, settings: Settings) -> dict[str, Any]:
 
 def finished(folder: Path, source: Path, settings: Settings) -> dict[str, Any] | None:
     """The figures of a whole and sound result of this file with these settings; None without one."""
-    from bentray_workers.reconstruction_file import read_reconstruction
+    from bentray_workers.files.reconstruction import read_reconstruction
 
     try:
         found: dict[str, Any] = json.loads((folder / "reconstruction.json").read_text())

@@ -1,4 +1,4 @@
-"""`bentray bench`: run one file of `benchmarks/` and write its rows."""
+"""`bentray bench`: run one benchmark of `benchmarks/` and write its rows."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from typing import Annotated
 import typer
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.atomic import write_bytes
+from bentray_workers.files.atomic import write_bytes
 
-from .endings import WorkFailed
-from .row import Row
-from .terminal import Step, print_lines, print_table, progress_bar, without_nan
+from .output.benchmark_row import Row
+from .output.exit_codes import WorkFailed
+from .output.terminal import Step, print_lines, print_table, progress_bar, without_nan
 
 Rows = Callable[[bool, Step], Iterable[Row]]
 
 
 def bench(
-    name: Annotated[str, typer.Argument(help="Name of a file in benchmarks/, without .py.")],
+    name: Annotated[str, typer.Argument(help="Name of a file in a folder of benchmarks/, without .py.")],
     json_file: Annotated[Path, typer.Option("--json", help="File to write the rows to.")],
     quick: Annotated[bool, typer.Option("--quick", help="Smaller problems, for trying it out.")] = False,
 ) -> None:
@@ -65,20 +65,20 @@ def load(name: str, folder: Path) -> Rows:
         InvalidInput: for a name that is no benchmark; lists those that are.
         WorkFailed: when the file does not define ``rows``.
     """
-    # A benchmark called as a package is has an underscore behind its name, so as not to stand in for it.
-    files = (path.stem for path in folder.glob("*.py") if not path.stem.startswith("_"))
-    known = {stem.rstrip("_"): stem for stem in sorted(files)}
+    # What only other benchmarks import has a name that begins with an underscore.
+    files = (path for path in folder.glob("*/*.py") if not path.stem.startswith("_"))
+    known = {path.stem: path.parent.name for path in sorted(files, key=lambda path: path.stem)}
     # A hyphen is what a command line has between words, an underscore what a module has.
     stem = name.replace("-", "_")
     if stem not in known:
         raise InvalidInput("name", repr(name), "one of " + ", ".join(known))
-    # As a script would see it: benchmarks share files whose names begin with an underscore.
-    if str(folder) not in sys.path:
-        sys.path.insert(0, str(folder))
-    module = importlib.import_module(known[stem])
+    # A namespace package of the checkout.
+    if str(folder.parent) not in sys.path:
+        sys.path.insert(0, str(folder.parent))
+    module = importlib.import_module(f"{folder.name}.{known[stem]}.{stem}")
     measure: Rows | None = getattr(module, "rows", None)
     if measure is None:
-        raise WorkFailed(f"benchmarks/{stem}.py defines no rows(quick, progress)")
+        raise WorkFailed(f"benchmarks/{known[stem]}/{stem}.py defines no rows(quick, progress)")
     return measure
 
 

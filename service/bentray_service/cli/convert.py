@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from .paths import check_apart, input_file, output_file
-from .terminal import AsJson, print_json, print_lines
+from .options.paths import check_apart, input_file, output_file
+from .output.terminal import AsJson, print_json, print_lines
 
 ACCEPTED = "the path of a scan in MATLAB 5 or 7.3, .npz, a zip of k-Wave outputs, or HDF5"
 

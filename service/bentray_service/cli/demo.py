@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bentray_workers.atomic import write_bytes
+from bentray_workers.files.atomic import write_bytes
 
-from .endings import WorkFailed, service_answers
-from .paths import output_folder
+from .options.paths import output_folder
+from .output.exit_codes import WorkFailed, service_answers
+from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar, remark
 from .service_process import running_service
 from .submit import show_job
-from .terminal import AsJson, print_json, print_lines, print_table, progress_bar, remark
 
 if TYPE_CHECKING:
     from bentray_kernels.tomography import Reconstruction
@@ -43,12 +43,12 @@ def demo(
     """
     folder = output_folder(output)
 
-    from bentray_workers.dataset_file import write_dataset
+    from bentray_workers.files.dataset import write_dataset
     from bentray_workers.images.comparison import comparison_png
-    from bentray_workers.simulation import SimulationSettings, simulate
+    from bentray_workers.simulation.plane import SimulationSettings, simulate
 
     from ..client import Client
-    from .figures import figures
+    from .output.figures import figures
 
     settings = SimulationSettings(nodes=nodes, elements=elements, coupling_mps=coupling)
     started = time.perf_counter()
@@ -85,7 +85,7 @@ def demo(
 def _reconstruct(
     client: Client, dataset: str, name: str, asked: dict[str, Any], folder: Path
 ) -> tuple[Reconstruction, float]:
-    from bentray_workers.reconstruction_file import read_reconstruction
+    from bentray_workers.files.reconstruction import read_reconstruction
 
     with progress_bar(f"Reconstructing, {name} rays") as step:
         job = client.wait(client.submit(dataset, asked)["id"], lambda record: show_job(record, step))

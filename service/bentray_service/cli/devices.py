@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from .opencl_help import help_of
-from .terminal import AsJson, print_json, print_lines, print_table, progress_bar
+from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 if TYPE_CHECKING:
     from bentray_kernels.opencl import Choice, Device, Verdict

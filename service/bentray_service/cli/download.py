@@ -9,9 +9,9 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .endings import service_answers
-from .paths import output_file
-from .terminal import AsJson, print_json, print_lines, progress_bar, remark
+from .options.paths import output_file
+from .output.exit_codes import service_answers
+from .output.terminal import AsJson, print_json, print_lines, progress_bar, remark
 
 if TYPE_CHECKING:
     from ..client.flows import Format

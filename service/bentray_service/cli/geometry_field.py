@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .field_options import AskedField, with_field_options
-from .paths import input_file, output_folder
-from .terminal import AsJson, Step, print_json, print_lines, print_table, progress_bar
+from .options.field_options import AskedField, with_field_options
+from .options.paths import input_file, output_folder
+from .output.terminal import AsJson, Step, print_json, print_lines, print_table, progress_bar
 
 if TYPE_CHECKING:
     from bentray_kernels.tomography import Progress
-    from bentray_workers.field_view import FieldView
-    from bentray_workers.mesh_reading import ReadMesh
+    from bentray_workers.files.mesh_formats import ReadMesh
+    from bentray_workers.rendering.field_view import FieldView
 
 ACCEPTED = "a triangle mesh: PLY, OBJ, OFF, STL, glTF or GLB"
 
@@ -39,12 +39,12 @@ def geometry_field(
     source, folder = input_file(mesh, ACCEPTED), output_folder(output)
     settings, view = asked.settings(), asked.view()
 
-    from bentray_service.storage.ids import field_of
-    from bentray_workers.field_settings import check_faces
-    from bentray_workers.geometry_field import build
-    from bentray_workers.mesh_file import StoredMesh, summary_of, write_mesh
-    from bentray_workers.mesh_reading import read_mesh
-    from bentray_workers.render_tasks import ThreadTasks
+    from bentray_service.rows.ids import field_of
+    from bentray_workers.cluster.task_pool import ThreadTasks
+    from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
+    from bentray_workers.files.mesh_formats import read_mesh
+    from bentray_workers.rendering.field_settings import check_faces
+    from bentray_workers.rendering.geometry_field import build
 
     read: ReadMesh = read_mesh(source.read_bytes())
     check_faces(len(read.surface.mesh.faces))
@@ -78,9 +78,9 @@ def _draw(field: Path, view: FieldView, folder: Path, step: Step) -> dict[str, s
     """The three pictures; their paths by name."""
     from concurrent.futures import ThreadPoolExecutor
 
-    from bentray_workers.atomic import write_bytes
-    from bentray_workers.field_picture import map_png, strip_image
-    from bentray_workers.strips import joined_png
+    from bentray_workers.files.atomic import write_bytes
+    from bentray_workers.rendering.field_picture import map_png, strip_image
+    from bentray_workers.rendering.tiles import joined_png
 
     rows = max(1, 2**16 // (view.width * view.rays**2))
     firsts = range(0, view.height, rows)
@@ -103,7 +103,7 @@ def _draw(field: Path, view: FieldView, folder: Path, step: Step) -> dict[str, s
 
 
 def _write(path: Path, found: dict[str, Any]) -> None:
-    from bentray_workers.field_files import write_json
+    from bentray_workers.files.geometry_field_folder import write_json
 
     write_json(path, found)
 

@@ -14,10 +14,10 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .terminal import AsJson, print_json, print_lines, print_table, remark
+from .output.terminal import AsJson, print_json, print_lines, print_table, remark
 
 if TYPE_CHECKING:
-    from ..storage.keys import Keys
+    from ..rows.keys import Keys
 
 Data = Annotated[
     Path | None,
@@ -50,8 +50,8 @@ def create(
     Example:  bentray keys create --tenant clinic --name scanner --expires 90d
     """
     from ..access.caller import checked_scopes
-    from ..access.token import Token
-    from ..storage.tenants import checked_tenant
+    from ..rows.api_key import Token
+    from ..rows.tenants import checked_tenant
 
     asked, whose = checked_scopes(scopes), checked_tenant(tenant)
     if not (1 <= len(name) <= LONGEST_NAME and name.isprintable()):
@@ -78,7 +78,7 @@ def list_keys(
 
     Example:  bentray keys list --tenant clinic
     """
-    from ..storage.tenants import checked_tenant
+    from ..rows.tenants import checked_tenant
 
     whose = None if tenant is None else checked_tenant(tenant)
     with _opened(data) as store:
@@ -111,11 +111,11 @@ def revoke(
 
 @contextmanager
 def _opened(data: Path | None) -> Iterator[Keys]:
+    from ..files.data_folder import Files
+    from ..files.private import private_files
+    from ..rows.database import open_database
+    from ..rows.keys import Keys
     from ..settings import ServiceSettings
-    from ..storage.database import open_database
-    from ..storage.files import Files
-    from ..storage.keys import Keys
-    from ..storage.private import private_files
 
     settings = ServiceSettings.load(**({} if data is None else {"data_dir": data}))
     with private_files():

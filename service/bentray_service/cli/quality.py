@@ -9,9 +9,9 @@ from typing import Annotated, Any
 
 import typer
 
-from .endings import WorkFailed
-from .paths import input_file, output_folder
-from .terminal import AsJson, print_json, print_lines, print_table, progress_bar
+from .options.paths import input_file, output_folder
+from .output.exit_codes import WorkFailed
+from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 
 class Water(StrEnum):
@@ -45,9 +45,9 @@ def quality(
     """
     source, folder = input_file(file), output_folder(output)
 
-    from bentray_workers.atomic import write_bytes
-    from bentray_workers.dataset_file import write_dataset
-    from bentray_workers.quality import calibrate_file, examine_file
+    from bentray_workers.files.atomic import write_bytes
+    from bentray_workers.files.dataset import write_dataset
+    from bentray_workers.reconstruction.quality_report import calibrate_file, examine_file
 
     calibration = None
     with progress_bar("Examining") as step:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .paths import input_file, output_folder
-from .results import show_results, write_results
-from .settings_options import Asked, settings_from, with_settings_options
-from .terminal import AsJson, progress_bar, residual_note
+from .options.paths import input_file, output_folder
+from .options.settings_options import Asked, settings_from, with_settings_options
+from .output.results import show_results, write_results
+from .output.terminal import AsJson, progress_bar, residual_note
 
 if TYPE_CHECKING:
     from bentray_kernels.acquisition import Dataset
@@ -42,7 +42,7 @@ def reconstruct(
     source, folder = input_file(file), output_folder(output)
     settings = settings_from(asked)
 
-    from bentray_workers.dataset_file import read_dataset
+    from bentray_workers.files.dataset import read_dataset
 
     dataset = read_dataset(source, traces=False)
     started = time.perf_counter()
@@ -61,12 +61,12 @@ def run(
     file: Path, dataset: Dataset, settings: Settings, workers: int | None, show: Callable[[Progress], None]
 ) -> Reconstruction:
     """The reconstruction of a file, by so many processes of its own; None: by as many as are of use."""
-    from bentray_workers.slices import reconstruct as reconstruct_slices
+    from bentray_workers.reconstruction.reconstruction_run import reconstruct as reconstruct_slices
 
     count = workers or useful_workers(dataset, settings)
     if count == 1:
         return reconstruct_slices(None, file, settings, show)
-    from bentray_workers.cluster import open_cluster
+    from bentray_workers.cluster.connection import open_cluster
 
     with open_cluster(workers=count) as cluster:
         return reconstruct_slices(cluster.client, file, settings, show)

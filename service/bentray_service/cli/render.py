@@ -14,16 +14,16 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .paths import check_apart, input_file, output_file
-from .terminal import AsJson, print_json, print_lines, print_table, progress_bar
-from .view_options import AskedView, with_view_options
+from .options.paths import check_apart, input_file, output_file
+from .options.view_options import AskedView, with_view_options
+from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 if TYPE_CHECKING:
     from bentray_kernels.refraction import Scene
+    from bentray_workers.files.volume import Volume
     from bentray_workers.images.png import Colours
-    from bentray_workers.refraction import Strip
-    from bentray_workers.refraction_view import RefractionView
-    from bentray_workers.volume_file import Volume
+    from bentray_workers.rendering.refraction import Strip
+    from bentray_workers.rendering.refraction_view import RefractionView
 
 ACCEPTED = "a volume: NumPy, NRRD, NIfTI, HDF5 of Bentray, or raw with --shape and --dtype"
 # What a thread draws at a time: rows, fewer of those with many rays, since Ctrl-C waits for what is begun.
@@ -84,10 +84,10 @@ def render(
     if placed is not None and view.mode == "shaded":
         raise InvalidInput("--map", placed, "nothing with --mode shaded: it does not look at the backdrop")
 
-    from bentray_workers.atomic import write_bytes
+    from bentray_workers.files.atomic import write_bytes
+    from bentray_workers.files.volume_formats import Given, import_volume
     from bentray_workers.images.png import png_of, read_picture
-    from bentray_workers.scene_cache import build, check_size, filtered_of
-    from bentray_workers.volume_reading import Given, import_volume
+    from bentray_workers.rendering.scene_cache import build, check_size, filtered_of
 
     card = None if picture is None else read_picture(picture)
     if file is None:
@@ -119,8 +119,15 @@ def _refuse(given: dict[str, object]) -> None:
 
 
 def _sampled(phantom: Phantom, nodes: int) -> Volume:
-    from bentray_kernels.phantoms import ONE_HOLE, TWO_HOLES, CubeField, FringeSphere, MarschnerLobb, sampled
-    from bentray_workers.volume_file import Volume
+    from bentray_kernels.phantoms import (
+        ONE_HOLE,
+        TWO_HOLES,
+        CubeField,
+        FringeSphere,
+        MarschnerLobb,
+        sampled,
+    )
+    from bentray_workers.files.volume import Volume
 
     fields: dict[Phantom, CubeField] = {
         Phantom.SPHERE: FringeSphere(0.6, 0.06),
@@ -134,7 +141,7 @@ def _sampled(phantom: Phantom, nodes: int) -> Volume:
 def _drawn(
     scene: Scene, view: RefractionView, card: Colours | None, step: Callable[[int, int], None]
 ) -> list[Strip]:
-    from bentray_workers.refraction import strip
+    from bentray_workers.rendering.refraction import strip
 
     found: list[Strip] = []
     rows = min(ROWS, max(1, RAYS // (view.width * view.times**2)))
@@ -165,7 +172,7 @@ def _joined(strips: list[Strip]) -> tuple[Colours, Any]:
 def _save(path: Path, position_m: Any) -> None:
     import numpy as np
 
-    from bentray_workers.atomic import replacing
+    from bentray_workers.files.atomic import replacing
 
     with replacing(path) as partial, partial.open("wb") as file:
         np.save(file, position_m, allow_pickle=False)

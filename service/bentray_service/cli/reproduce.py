@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .endings import WorkFailed
-from .paths import input_file
+from .options.paths import input_file
+from .output.exit_codes import WorkFailed
+from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar, residual_note
 from .reconstruct import run
-from .terminal import AsJson, print_json, print_lines, print_table, progress_bar, residual_note
 
 if TYPE_CHECKING:
     from bentray_kernels.tomography import Progress, Reconstruction
@@ -36,9 +36,9 @@ def reproduce(
 
     Example:  bentray reproduce result/reconstruction.h5 scan.h5
     """
-    from bentray_kernels.tomography.reconstruction import provenance
-    from bentray_workers.dataset_file import read_dataset
-    from bentray_workers.reconstruction_file import read_reconstruction
+    from bentray_kernels.tomography.reconstruct import provenance
+    from bentray_workers.files.dataset import read_dataset
+    from bentray_workers.files.reconstruction import read_reconstruction
 
     record, source = input_file(result), input_file(scan)
     before, dataset = read_reconstruction(record), read_dataset(source, traces=False)
@@ -71,7 +71,7 @@ def compared(before: Reconstruction, after: Reconstruction) -> dict[str, Any]:
     """For each array, None where both are the same to the bit, else the largest difference, or words."""
     import numpy as np
 
-    from bentray_workers.reconstruction_file import IMAGES
+    from bentray_workers.files.reconstruction import IMAGES
 
     found: dict[str, Any] = {}
     for name, place in {**IMAGES, "residuals": "residuals"}.items():

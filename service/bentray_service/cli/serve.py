@@ -15,8 +15,8 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .endings import WorkFailed
-from .terminal import print_lines, remark
+from .output.exit_codes import WorkFailed
+from .output.terminal import print_lines, remark
 
 if TYPE_CHECKING:
     from ..settings import ServiceSettings

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .endings import WorkFailed
+from .output.exit_codes import WorkFailed
 
 # The first start on a machine compiles the kernels: a minute, and several where much else runs.
 START_S = 600.0

@@ -13,12 +13,12 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .paths import output_file
-from .terminal import AsJson, print_json, print_lines, print_table, progress_bar
+from .options.paths import output_file
+from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from bentray_workers.simulation import SimulationSettings
-    from bentray_workers.volume_simulation import VolumeSimulationSettings
+    from bentray_workers.simulation.plane import SimulationSettings
+    from bentray_workers.simulation.volume import VolumeSimulationSettings
 
 
 class Phantom(StrEnum):
@@ -92,10 +92,10 @@ def simulate(
     """
     path = output_file(output, force=force)
 
-    from bentray_workers.dataset_file import write_dataset
-    from bentray_workers.simulation import SimulationSettings
-    from bentray_workers.simulation import simulate as simulate_plane
-    from bentray_workers.volume_simulation import VolumeSimulationSettings, simulate_volume
+    from bentray_workers.files.dataset import write_dataset
+    from bentray_workers.simulation.plane import SimulationSettings
+    from bentray_workers.simulation.plane import simulate as simulate_plane
+    from bentray_workers.simulation.volume import VolumeSimulationSettings, simulate_volume
 
     own_of_waves = {"--frequency": frequency, "--emissions": emissions, "--side": side}
     if waveform:
@@ -156,7 +156,7 @@ def _refuse(unless: str, given: Mapping[str, object]) -> None:
 
 
 def _rows(settings: SimulationSettings | VolumeSimulationSettings, radius_m: float) -> list[tuple[str, str]]:
-    from bentray_workers.volume_simulation import VolumeSimulationSettings
+    from bentray_workers.simulation.volume import VolumeSimulationSettings
 
     rows = [("elements", f"{settings.elements} on a ring of {radius_m * 1e3:.1f} mm radius")]
     noise = "none" if settings.snr is None else f"1/{settings.snr:g} of the signal"

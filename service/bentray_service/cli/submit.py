@@ -9,11 +9,11 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .endings import service_answers
-from .paths import input_file, output_folder
-from .results import show_results, write_results
-from .settings_options import Asked, settings_from, with_settings_options
-from .terminal import AsJson, Step, print_json, print_lines, progress_bar, remark, residual_note
+from .options.paths import input_file, output_folder
+from .options.settings_options import Asked, settings_from, with_settings_options
+from .output.exit_codes import service_answers
+from .output.results import show_results, write_results
+from .output.terminal import AsJson, Step, print_json, print_lines, progress_bar, remark, residual_note
 from .worker import Tls
 
 if TYPE_CHECKING:
@@ -138,8 +138,8 @@ def show_job(record: dict[str, Any], step: Step) -> None:
 
 
 def _report(source: Path, folder: Path, volume: Path, job: dict[str, Any], as_json: bool) -> None:
-    from bentray_workers.dataset_file import read_dataset
-    from bentray_workers.reconstruction_file import read_reconstruction
+    from bentray_workers.files.dataset import read_dataset
+    from bentray_workers.files.reconstruction import read_reconstruction
 
     # The truth, where there is one, is in the file that was sent; the service keeps only the scan.
     dataset = read_dataset(source, traces=False)

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from .endings import WorkFailed
 from .keys import Data
-from .terminal import AsJson, print_json, print_lines, remark
+from .output.exit_codes import WorkFailed
+from .output.terminal import AsJson, print_json, print_lines, remark
 
 # What is named one by one.
 TOLD = ("damaged", "orphan")
@@ -33,14 +33,14 @@ def verify(
 
     Example:  bentray verify --data /srv/bentray --json
     """
+    from ..files.checked_store import CheckedStore
+    from ..files.data_folder import Files, lock
+    from ..files.open_store import open_store
+    from ..files.orphans import Orphans
+    from ..files.scrub import scrub
+    from ..rows.checksums import Checksums
+    from ..rows.database import open_database
     from ..settings import ServiceSettings
-    from ..storage.checked_store import CheckedStore
-    from ..storage.checksums import Checksums
-    from ..storage.database import open_database
-    from ..storage.files import Files, lock
-    from ..storage.open_store import open_store
-    from ..storage.orphans import Orphans
-    from ..storage.scrub import scrub
 
     settings = ServiceSettings.load(**({} if data is None else {"data_dir": data}))
     root = Files(settings.data_dir)

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from .terminal import print_json, print_lines, print_table, progress_bar
+from .output.terminal import print_json, print_lines, print_table, progress_bar
 
 
 def simulate_to(path: Path, asked: dict[str, Any], *, in_space: bool, as_json: bool) -> None:
@@ -19,9 +19,9 @@ def simulate_to(path: Path, asked: dict[str, Any], *, in_space: bool, as_json: b
         in_space: the phantom of Table 7, else that of Table 6 in a plane.
         as_json: for machines.
     """
-    from bentray_workers.dataset_file import write_dataset
-    from bentray_workers.volume_wave_simulation import VolumeWaveSettings
-    from bentray_workers.wave_simulation import WaveSimulationSettings, simulate_waves
+    from bentray_workers.files.dataset import write_dataset
+    from bentray_workers.simulation.volume_waves import VolumeWaveSettings
+    from bentray_workers.simulation.waves import WaveSimulationSettings, simulate_waves
 
     settings = VolumeWaveSettings(**asked) if in_space else WaveSimulationSettings(**asked)
     started = time.perf_counter()

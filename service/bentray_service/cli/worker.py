@@ -11,8 +11,8 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .paths import output_folder
-from .terminal import print_lines, remark
+from .options.paths import output_folder
+from .output.terminal import print_lines, remark
 
 Tls = Annotated[
     Path | None,
@@ -75,9 +75,9 @@ def worker(
     """
     from dask.utils import parse_bytes
 
-    from bentray_workers.joining import Joining, join
-    from bentray_workers.lanes import OFFERED, OPENCL
-    from bentray_workers.tls import security_of
+    from bentray_workers.cluster.local_workers import Joining, join
+    from bentray_workers.cluster.resources import OFFERED, OPENCL
+    from bentray_workers.cluster.tls import security_of
 
     if memory_limit is not None:
         try:

@@ -67,8 +67,8 @@ def read_result(path: Path, record: Mapping[str, Any]) -> Result:
         path: of the file.
         record: of the volume, as the service tells it.
     """
-    from bentray_workers.reconstruction_file import read_reconstruction
-    from bentray_workers.volume_file import read_volume
+    from bentray_workers.files.reconstruction import read_reconstruction
+    from bentray_workers.files.volume import read_volume
 
     told = {name: record[name] for name in ("id", "title", "job", "dataset", "sha256") if record.get(name)}
     spacing: tuple[float, ...]

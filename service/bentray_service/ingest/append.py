@@ -18,7 +18,7 @@ from typing import Self
 from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.atomic import sync, write_bytes
+from bentray_workers.files.atomic import sync, write_bytes
 
 from ..refusals import Locked, UnknownChecksum, WrongChecksum
 from .receive import pour

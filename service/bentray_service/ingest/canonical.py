@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..storage.tenant_files import TenantFiles
+from ..files.tenant_files import TenantFiles
 from .sandbox import ingest
 
 

@@ -18,10 +18,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bentray_workers.dataset_record import record_of, text
+from bentray_workers.files.dataset.record import record_of, text
 
 if TYPE_CHECKING:
-    from bentray_workers.volume_file import Volume
+    from bentray_workers.files.volume import Volume
 
 OnSize = Callable[[int], None]
 
@@ -114,8 +114,8 @@ def _dataset(source: Path, target: Path, given: dict[str, Any], on_size: OnSize)
 
 
 def _volume(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) -> dict[str, Any]:
-    from bentray_workers.volume_file import write_volume
-    from bentray_workers.volume_reading import Given, import_volume
+    from bentray_workers.files.volume import write_volume
+    from bentray_workers.files.volume_formats import Given, import_volume
 
     volume = import_volume(source, Given(**given))
     on_size(volume.values.nbytes)
@@ -124,8 +124,8 @@ def _volume(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) 
 
 
 def _mesh(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) -> dict[str, Any]:
-    from bentray_workers.mesh_file import StoredMesh, summary_of, write_mesh
-    from bentray_workers.mesh_reading import read_mesh
+    from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
+    from bentray_workers.files.mesh_formats import read_mesh
 
     found = read_mesh(source.read_bytes())
     stored = StoredMesh(found.surface.mesh, found.colours)
@@ -138,8 +138,8 @@ CONVERTED = {"dataset": _dataset, "volume": _volume, "mesh": _mesh}
 # Each needs its own reader alone: what starts for every upload should start fast.
 READERS = {
     "dataset": "bentray_workers.foreign_scans",
-    "volume": "bentray_workers.volume_reading",
-    "mesh": "bentray_workers.mesh_reading",
+    "volume": "bentray_workers.files.volume_formats",
+    "mesh": "bentray_workers.files.mesh_formats",
 }
 
 

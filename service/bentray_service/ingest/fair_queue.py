@@ -12,7 +12,7 @@ from typing import Any
 from dask.system import CPU_COUNT
 from distributed.system import MEMORY_LIMIT
 
-from ..storage.tenants import Tenant
+from ..rows.tenants import Tenant
 
 # One that no tenant can hold beside the two that each may.
 LEAST_AT_ONCE = 3

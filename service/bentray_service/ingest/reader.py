@@ -21,11 +21,11 @@ from sqlalchemy.exc import SQLAlchemyError
 from bentray_kernels.errors import InvalidInput
 
 from ..access.quota import Quota
-from ..errors import INTERNAL, Problem, from_exception, make
+from ..files.data_folder import Files
 from ..refusals import StorageAway, StorageFull, UnknownId
-from ..storage.files import Files
-from ..storage.tenants import Tenant
-from ..storage.uploads import Uploads
+from ..rows.tenants import Tenant
+from ..rows.uploads import Uploads
+from ..web.errors import INTERNAL, Problem, from_exception, make
 from .append import discard_unverified, size_of
 from .canonical import Limits, make_canonical
 from .fair_queue import FairQueue

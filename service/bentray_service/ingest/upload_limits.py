@@ -7,9 +7,9 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ..access.rates import Rates
+from ..access.request_rates import Rates
 from ..refusals import Busy, TooOften
-from ..storage.tenants import Tenant
+from ..rows.tenants import Tenant
 
 # Each has a connection, and a file of which it reserved the bytes; few of them are read at a time.
 MOST_OF_TENANT = 32

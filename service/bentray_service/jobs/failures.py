@@ -10,7 +10,7 @@ from distributed import KilledWorker
 
 from bentray_kernels.errors import InvalidInput
 
-from ..errors import FAILED, INTERNAL, Problem, from_exception, make
+from ..web.errors import FAILED, INTERNAL, Problem, from_exception, make
 
 log = logging.getLogger("bentray.jobs")
 

@@ -13,8 +13,8 @@ import anyio
 from sqlalchemy.exc import SQLAlchemyError
 
 from ..refusals import DatabaseAway, TooManyStreams
-from ..storage.jobs import Jobs
-from ..storage.tenants import Tenant
+from ..rows.jobs import Jobs
+from ..rows.tenants import Tenant
 
 log = logging.getLogger("bentray.jobs")
 

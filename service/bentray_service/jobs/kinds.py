@@ -13,21 +13,22 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography.advice import told
+from bentray_kernels.tomography.model_selection.selection import told
 from bentray_kernels.tomography.result import Progress, Reconstruction
 from bentray_kernels.tomography.settings import Settings
-from bentray_workers import geometry_field, slices
-from bentray_workers.asked_simulation import AskedSimulation
-from bentray_workers.field_settings import FieldSettings
-from bentray_workers.reconstruction_file import write_reconstruction
-from bentray_workers.render_tasks import ClusterTasks
-from bentray_workers.shares import Share
-from bentray_workers.simulation_run import simulate_scan
-from bentray_workers.turntable import PRIORITY, Turntable, turn
+from bentray_workers.cluster.fair_shares import Share
+from bentray_workers.cluster.task_pool import ClusterTasks
+from bentray_workers.files.reconstruction import write_reconstruction
+from bentray_workers.reconstruction import reconstruction_run
+from bentray_workers.rendering import geometry_field
+from bentray_workers.rendering.field_settings import FieldSettings
+from bentray_workers.rendering.turntable import PRIORITY, Turntable, turn
+from bentray_workers.simulation.request import AskedSimulation
+from bentray_workers.simulation.simulation_run import simulate_scan
 
-from ..storage import schema
-from ..storage.ids import dataset_of, volume_of
-from ..storage.tenant_files import TenantFiles
+from ..files.tenant_files import TenantFiles
+from ..rows import schema
+from ..rows.ids import dataset_of, volume_of
 
 Row = dict[str, Any]
 
@@ -65,7 +66,7 @@ class Kind(Protocol):
 
     Attributes:
         table: the name of that in which its results are.
-        lane: what its tasks ask of a worker, a key of ``bentray_workers.lanes.OFFERED``.
+        lane: what its tasks ask of a worker, a key of ``bentray_workers.cluster.resources.OFFERED``.
     """
 
     @property
@@ -102,7 +103,9 @@ class ReconstructionKind:
     def run(self, task: Task) -> Row | None:
         settings = self.settings.validate_python(task.settings)
         progress = task.on_progress, task.stop, task.work_dir, task.on_saved
-        result = slices.reconstruct(task.client, task.source, settings, *progress, share=task.share)
+        result = reconstruction_run.reconstruct(
+            task.client, task.source, settings, *progress, share=task.share
+        )
         if not np.isfinite(result.speed).all():
             found = f"no finite speed at {np.count_nonzero(~np.isfinite(result.speed))} nodes"
             accepted = "settings by which it converges: a smaller relaxation or a larger penalty_strength"

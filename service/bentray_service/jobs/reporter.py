@@ -13,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from bentray_kernels.tomography.result import Progress, Sweep
 
 from ..refusals import DatabaseAway
-from ..storage.queue import Queue
+from ..rows.job_queue import Queue
 from .kinds import finite
 
 log = logging.getLogger("bentray.jobs")

@@ -17,18 +17,18 @@ from distributed.comm import CommClosedError
 from distributed.scheduler import NoValidWorkerError, NoWorkerError
 from sqlalchemy.exc import SQLAlchemyError
 
-from bentray_workers.shares import Shares
-from bentray_workers.slices import Cancelled
+from bentray_workers.cluster.fair_shares import Shares
+from bentray_workers.cluster.task_loop import Cancelled
 
 from ..compute import Compute
+from ..files.data_folder import Files
+from ..files.disk import bytes_in
+from ..files.tenant_files import TenantFiles
 from ..logs import about
 from ..refusals import Damaged, DatabaseAway, DatabaseFull, StorageAway
-from ..storage.disk import bytes_in
-from ..storage.files import Files
-from ..storage.queue import LEASE_S, Queue
-from ..storage.schema import ENDED
-from ..storage.tenant_files import TenantFiles
-from ..storage.tenants import Tenant
+from ..rows.job_queue import LEASE_S, Queue
+from ..rows.schema import ENDED
+from ..rows.tenants import Tenant
 from .failures import CRASHED, explain
 from .kinds import KINDS, Kind, Task
 from .reporter import Reporter

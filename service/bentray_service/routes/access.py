@@ -7,7 +7,7 @@ from typing import Literal
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from ..errors import described
+from ..web.errors import described
 from ..wiring import Asking, Service
 
 router = APIRouter(prefix="/v1/access", tags=["access"])

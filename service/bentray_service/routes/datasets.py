@@ -6,14 +6,14 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response, status
 
-from ..errors import described
-from ..storage.deletion import Stored
-from ..storage.ids import new_id
+from ..files.deletion import Stored
+from ..rows.ids import new_id
+from ..web.errors import described
 from ..wiring import CallerTenant, Service
 from . import quality
 from .bodies import only
 from .downloads import download, download_of
-from .records import DatasetList, DatasetRecord, dataset_record
+from .models.records import DatasetList, DatasetRecord, dataset_record
 from .uploads import body_of, take_in
 
 HDF5 = "application/x-hdf5"

@@ -12,8 +12,8 @@ from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from starlette.types import Receive, Scope, Send
 
-from ..errors import described
 from ..refusals import Deleted, NoSuchPart
+from ..web.errors import described
 
 # One part; of several at once, or of a form that nobody knows, the whole file is sent, as RFC 9110 allows.
 ONE_PART = re.compile(r"bytes=(\d*)-(\d*)")

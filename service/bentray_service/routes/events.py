@@ -12,10 +12,10 @@ from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
-from ..errors import described
 from ..jobs.feed import Feed, WatchedJob
-from ..storage.schema import ENDED
-from ..storage.tenants import Tenant
+from ..rows.schema import ENDED
+from ..rows.tenants import Tenant
+from ..web.errors import described
 from ..wiring import CallerTenant, Service
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])

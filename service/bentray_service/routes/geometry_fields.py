@@ -8,11 +8,11 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from ..asked_view import AskedFieldView
-from ..errors import described
-from ..storage.tenants import Tenant
+from ..rows.tenants import Tenant
+from ..web.errors import described
 from ..wiring import CallerTenant, Parts, Service
+from .models.surface_records import FieldList, FieldRecord, field_record
 from .pictures import PICTURE, picture
-from .surface_records import FieldList, FieldRecord, field_record
 
 router = APIRouter(prefix="/v1/geometry-fields", tags=["geometry-fields"])
 

@@ -6,8 +6,8 @@ from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from pydantic import BaseModel, Field
 
-from ..errors import described
 from ..refusals import NotReady
+from ..web.errors import described
 from ..wiring import parts_of
 
 router = APIRouter(prefix="/health", tags=["health"])

@@ -12,19 +12,19 @@ from fastapi.openapi.models import Example
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from bentray_kernels.tomography.settings import Settings
-from bentray_workers.asked_simulation import AskedSimulation
-from bentray_workers.field_settings import FieldSettings, check_faces
-from bentray_workers.turntable import Turntable
+from bentray_workers.rendering.field_settings import FieldSettings, check_faces
+from bentray_workers.rendering.turntable import Turntable
+from bentray_workers.simulation.request import AskedSimulation
 
 from ..asked_settings import known_only
-from ..errors import described
 from ..refusals import NoAnimation
-from ..storage.ids import field_of
+from ..rows.ids import field_of
+from ..web.errors import described
 from ..wiring import CallerTenant, Service
 from .bodies import SmallBody, only
 from .downloads import download, download_of
+from .models.records import JobKind, JobList, JobRecord, State, job_record
 from .pictures import check_renderable
-from .records import JobKind, JobList, JobRecord, State, job_record
 
 log = logging.getLogger("bentray.jobs")
 

@@ -11,15 +11,15 @@ from fastapi import APIRouter, Depends, Query, Request, Response, status
 from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.isosurface_mesh import MOST_STEP, check_nodes, largest_bytes
+from bentray_workers.rendering.isosurface_mesh import MOST_STEP, check_nodes, largest_bytes
 
-from ..errors import described
-from ..storage.deletion import Stored
-from ..storage.ids import new_id
+from ..files.deletion import Stored
+from ..rows.ids import new_id
+from ..web.errors import described
 from ..wiring import Asking, CallerTenant, Service
 from .bodies import only
+from .models.surface_records import MeshList, MeshRecord, mesh_record
 from .pictures import check_renderable, while_connected
-from .surface_records import MeshList, MeshRecord, mesh_record
 from .uploads import body_of, take_in
 
 MEDIA_TYPES = (

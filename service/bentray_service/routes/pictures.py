@@ -10,11 +10,11 @@ from typing import Any, TypeVar
 from fastapi import Request, Response
 from starlette.requests import ClientDisconnect
 
-from bentray_workers.refraction_view import check_even
-from bentray_workers.scene_cache import check_size
+from bentray_workers.rendering.refraction_view import check_even
+from bentray_workers.rendering.scene_cache import check_size
 
 from .. import __version__
-from ..errors import described
+from ..web.errors import described
 from ..wiring import caller_of, parts_of
 
 Made = TypeVar("Made")

@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from ..errors import described
+from ..web.errors import described
 from ..wiring import CallerTenant, Service, caller_of, parts_of
+from .models.quality_records import QualityRecord
 from .pictures import PICTURE, picture, while_connected
-from .quality_records import QualityRecord
 
 router = APIRouter()
 

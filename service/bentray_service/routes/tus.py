@@ -15,15 +15,15 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Header, Request, Response, status
 from starlette.concurrency import run_in_threadpool
 
-from ..errors import described
 from ..ingest.append import ALGORITHMS, CHECKSUM, Checksum, append, size_of
 from ..refusals import StorageFull, TooLarge, WrongOffset, WrongProtocol
-from ..storage.tenants import Tenant
+from ..rows.tenants import Tenant
+from ..web.errors import described
 from ..web.tus_headers import PLACE, VERSION
 from ..wiring import CallerTenant, Parts, Service
 from .bodies import only
+from .models.upload_records import UploadRecord, result_link, upload_record
 from .upload_metadata import METADATA, read_metadata
-from .upload_records import UploadRecord, result_link, upload_record
 
 MEDIA_TYPE = "application/offset+octet-stream"
 EXTENSIONS = "creation,checksum,expiration,termination"

@@ -16,7 +16,7 @@ from ..ingest.child import ACCEPTED
 from ..ingest.fair_queue import FairQueue
 from ..ingest.receive import Received, receive
 from ..refusals import Busy
-from ..storage.tenants import Tenant
+from ..rows.tenants import Tenant
 from ..wiring import Parts
 
 # How long a request waits for its turn, s. Proxies hardly wait longer; uploads in pieces do.

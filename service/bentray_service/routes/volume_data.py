@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from bentray_workers.volume_export import FORMATS, largest_bytes
+from bentray_workers.files.volume_export import FORMATS, largest_bytes
 
 from .. import __version__
-from ..errors import described
 from ..refusals import UnknownId
+from ..web.errors import described
 from ..wiring import CallerTenant, Service, caller_of, parts_of
 from .downloads import download, download_of, headers_of, size_of, tag_of, unchanged
 from .pictures import while_connected

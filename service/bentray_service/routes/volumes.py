@@ -6,15 +6,15 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response, status
 
-from bentray_workers.volume_reading import RAW_TYPES
+from bentray_workers.files.volume_formats import RAW_TYPES
 
-from ..errors import described
-from ..storage.deletion import Stored
-from ..storage.ids import new_id
+from ..files.deletion import Stored
+from ..rows.ids import new_id
+from ..web.errors import described
 from ..wiring import CallerTenant, Service
 from . import slices, volume_data
 from .bodies import only
-from .records import VolumeList, VolumeRecord, volume_record
+from .models.records import VolumeList, VolumeRecord, volume_record
 from .upload_metadata import SHAPE, SPACING, volume_given
 from .uploads import body_of, take_in
 

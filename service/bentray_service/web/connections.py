@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..access.addresses import Network, within
+from .addresses import Network, within
 
 log = logging.getLogger("bentray.connections")
 

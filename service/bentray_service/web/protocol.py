@@ -7,9 +7,9 @@ from typing import Any
 
 from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
 
-from ..errors import refused
 from ..refusals import TooManyConnections
 from .connections import Connections
+from .errors import refused
 from .unread_bodies import ClosesUnread, last
 
 # In which so much of an answer must be taken, or its rest: who does not read holds a file open.

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
-from ..errors import FAILED, INTERNAL, INVALID_REQUEST, NOT_FOUND, PROBLEMS
+from .errors import FAILED, INTERNAL, INVALID_REQUEST, NOT_FOUND, PROBLEMS
 
 Node = dict[str, Any]
 

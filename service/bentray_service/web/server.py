@@ -8,9 +8,9 @@ from typing import Any, cast
 
 import uvicorn
 
-from ..access.addresses import networks
 from ..settings import ServiceSettings
 from . import descriptors
+from .addresses import networks
 from .connections import Connections, Limits
 from .protocol import BoundedProtocol
 

@@ -11,7 +11,7 @@ from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
 from bentray_kernels.errors import InvalidInput
 
 from ..refusals import TinyChunks
-from .heads import HeadInTime
+from .slow_headers import HeadInTime
 
 # What the application is woken for at once, bytes; for less, after so many seconds.
 ENOUGH_BYTES = 16 * 1024

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset, Waveform
-from bentray_kernels.acquisition.simulation import Ring
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
 

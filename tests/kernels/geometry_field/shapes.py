@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from bentray_kernels.geometry_field.inner_field import (
+from bentray_kernels.geometry_field.tables.inner_field import (
     InnerField,
     build_inner_rows,
     inner_field,
     spread_points,
 )
-from bentray_kernels.geometry_field.mesh import Chart, TriangleMesh
-from bentray_kernels.geometry_field.outer_field import OuterField, build_rows, outer_field
-from bentray_kernels.geometry_field.surface import Surface, surface_of
+from bentray_kernels.geometry_field.tables.outer_field import OuterField, build_rows, outer_field
+from bentray_kernels.meshes.mesh import Chart, TriangleMesh
+from bentray_kernels.meshes.surface import Surface, surface_of
 
 
 def octahedron(levels: int) -> TriangleMesh:

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bentray_kernels.arrays import Vector
 from bentray_kernels.compiled import kernel
-from bentray_kernels.refraction.optics import Vector, reflectances, refracted
+from bentray_kernels.refraction.optics import reflectances, refracted
 
 
 @kernel

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation import Ring
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.pairs import count, heights, of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation import Ring, TravelTimeScan
+from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings, mean_absolute_error, reconstruct, rmse

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation import Ring
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings, reconstruct
 
 RING, WATER = Ring(96, 0.08), 1500.0

@@ -7,7 +7,7 @@ import pytest
 
 from bentray_kernels import eikonal, rays
 from bentray_kernels.acquisition import Dataset, Truth
-from bentray_kernels.acquisition.simulation import Ring
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
 from bentray_kernels.tomography.problem import MARGIN_NODES

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.wave import misfits
+from bentray_kernels.tomography.waveform import misfits
 from bentray_kernels.wave.adjoint import backward, slope, stored_bytes
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import forward, placed, simulate

@@ -7,9 +7,9 @@ from datetime import UTC, datetime
 import pytest
 
 from bentray_service.access.audit import Audit, entries
-from bentray_service.access.token import Token
-from bentray_service.storage.keys import Keys
-from bentray_service.storage.tenants import Tenant
+from bentray_service.rows.api_key import Token
+from bentray_service.rows.keys import Keys
+from bentray_service.rows.tenants import Tenant
 
 ENTRY = {"method": "GET", "route": "/v1/datasets/{dataset_id}", "ids": ["ds-1"], "tenant": "acme"}
 

@@ -24,16 +24,16 @@ from sqlalchemy import insert
 
 from bentray_kernels.tomography.result import Reconstruction
 from bentray_kernels.tomography.settings import Settings
-from bentray_service import errors
-from bentray_service.access.token import Token
 from bentray_service.app import create_app
-from bentray_service.routes.surface_records import FieldErrors, FieldSeconds, FieldSizes, Repairs
+from bentray_service.routes.models.surface_records import FieldErrors, FieldSeconds, FieldSizes, Repairs
+from bentray_service.rows import schema
+from bentray_service.rows.api_key import Token
+from bentray_service.rows.ids import new_id, volume_of
+from bentray_service.rows.keys import Keys
+from bentray_service.rows.tenants import Tenant
 from bentray_service.settings import ServiceSettings
-from bentray_service.storage import schema
-from bentray_service.storage.ids import new_id, volume_of
-from bentray_service.storage.keys import Keys
-from bentray_service.storage.tenants import Tenant
-from bentray_workers.reconstruction_file import write_reconstruction
+from bentray_service.web import errors
+from bentray_workers.files.reconstruction import write_reconstruction
 
 from ..conftest import FakeCluster
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from bentray_service.access import key_watch
-from bentray_service.access.token import Token
-from bentray_service.storage.database import open_database
-from bentray_service.storage.keys import Keys
-from bentray_service.storage.tenants import LOCAL
+from bentray_service.rows.api_key import Token
+from bentray_service.rows.database import open_database
+from bentray_service.rows.keys import Keys
+from bentray_service.rows.tenants import LOCAL
 
 PATIENCE_S = 20.0
 

@@ -10,9 +10,9 @@ import nibabel
 import numpy as np
 import pytest
 
-from bentray_service.storage.disk import bytes_in
-from bentray_service.storage.ids import new_id
-from bentray_service.storage.tenants import LOCAL
+from bentray_service.files.disk import bytes_in
+from bentray_service.rows.ids import new_id
+from bentray_service.rows.tenants import LOCAL
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
 BYTES = {"Content-Type": "application/octet-stream"}

@@ -10,7 +10,7 @@ from typer.testing import CliRunner, Result
 
 from bentray_kernels.acquisition import Dataset
 from bentray_service.cli import app
-from bentray_workers.simulation import SimulationSettings, simulate
+from bentray_workers.simulation.plane import SimulationSettings, simulate
 
 Run = Callable[..., Result]
 
@@ -34,7 +34,7 @@ def scan() -> Dataset:
 @pytest.fixture(scope="session")
 def scan_file(scan: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same as a file."""
-    from bentray_workers.dataset_file import write_dataset
+    from bentray_workers.files.dataset import write_dataset
 
     path = tmp_path_factory.mktemp("scan") / "scan.h5"
     write_dataset(path, scan)

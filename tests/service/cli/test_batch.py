@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
-from bentray_workers.cluster import Cluster, open_cluster
-from bentray_workers.reconstruction_file import read_reconstruction
+from bentray_workers.cluster.connection import Cluster, open_cluster
+from bentray_workers.files.reconstruction import read_reconstruction
 
 QUICK = ("--nodes", 24, "--sweeps", 1, "--rays", "straight")
 
@@ -30,7 +30,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 @pytest.fixture(autouse=True)
 def quick_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """The pictures have tests of their own, and take longer than all the rest here."""
-    for module in ("bentray_workers.batch", "bentray_workers.images.report"):
+    for module in ("bentray_workers.reconstruction.batch", "bentray_workers.images.report"):
         monkeypatch.setattr(
             f"{module}.report_png", lambda result, truth, roi: b"\x89PNG of " + bytes(truth.axes, "ascii")
         )

@@ -13,11 +13,11 @@ from typer.testing import Result
 from bentray_kernels.errors import InvalidInput
 from bentray_service.cli import bench as module
 from bentray_service.cli.bench import benchmark_folder, load
-from bentray_service.cli.endings import WorkFailed
-from bentray_service.cli.row import Row
+from bentray_service.cli.output.benchmark_row import Row
+from bentray_service.cli.output.exit_codes import WorkFailed
 
 FAKE = """
-from bentray_service.cli.row import Row
+from bentray_service.cli.output.benchmark_row import Row
 
 def rows(quick, progress):
     progress(1, 2, "first")
@@ -31,10 +31,11 @@ def rows(quick, progress):
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of benchmarks that the command takes for its own."""
     benchmarks = tmp_path / "benchmarks"
-    benchmarks.mkdir()
-    (benchmarks / "fake.py").write_text(FAKE)
-    (benchmarks / "empty.py").write_text("")
-    (benchmarks / "_hidden.py").write_text(FAKE)
+    table = benchmarks / "table"
+    table.mkdir(parents=True)
+    (table / "fake.py").write_text(FAKE)
+    (table / "empty.py").write_text("")
+    (table / "_hidden.py").write_text(FAKE)
     monkeypatch.setattr("bentray_service.cli.bench.benchmark_folder", lambda: benchmarks)
     return benchmarks
 
@@ -68,27 +69,27 @@ def test_an_unknown_name_lists_the_known_ones(
 
 @pytest.mark.parametrize("name", ["two-words", "two_words"])
 def test_words_may_be_joined_as_on_a_command_line(folder: Path, name: str) -> None:
-    (folder / "two_words.py").write_text(FAKE)
+    (folder / "table" / "two_words.py").write_text(FAKE)
     rows = load(name, folder)(True, lambda done, of, words: None)
     assert [row.target for row in rows] == ["E1", "E2", "E3"]
 
 
 def test_a_benchmark_may_be_called_as_a_package_is(folder: Path) -> None:
-    (folder / "distributed_.py").write_text(FAKE)
+    (folder / "table" / "distributed.py").write_text(FAKE)
     rows = load("distributed", folder)(True, lambda done, of, words: None)
     assert [row.target for row in rows] == ["E1", "E2", "E3"]
-    assert sys.modules["distributed"].__file__ != str(folder / "distributed_.py")
+    assert Path(str(sys.modules["distributed"].__file__)).name == "__init__.py"
 
 
 def test_a_benchmark_without_rows_is_named(folder: Path) -> None:
-    with pytest.raises(WorkFailed, match=r"benchmarks/empty.py defines no rows"):
+    with pytest.raises(WorkFailed, match=r"benchmarks/table/empty.py defines no rows"):
         load("empty", folder)
 
 
 def test_the_file_for_the_rows_is_checked_before_anything_runs(
     bentray: Callable[..., Result], folder: Path, tmp_path: Path
 ) -> None:
-    (folder / "fake.py").write_text("raise SystemError('ran')")
+    (folder / "table" / "fake.py").write_text("raise SystemError('ran')")
     result = bentray("bench", "fake", "--json", tmp_path / "absent" / "rows.json")
     assert result.exit_code == 2
     assert "its folder is absent" in result.stderr
@@ -101,9 +102,9 @@ def test_outside_a_checkout_the_reason_is_said(tmp_path: Path, monkeypatch: pyte
         benchmark_folder()
 
 
-@pytest.mark.parametrize("path", sorted(benchmark_folder().glob("[!_]*.py")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted(benchmark_folder().glob("*/[!_]*.py")), ids=lambda path: path.stem)
 def test_every_benchmark_of_the_checkout_fits_the_frame(path: Path) -> None:
-    assert callable(load(path.stem.rstrip("_"), path.parent))
+    assert callable(load(path.stem, path.parents[1]))
 
 
 def test_the_reconstruction_benchmark_measures_what_it_promises() -> None:

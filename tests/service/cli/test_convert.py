@@ -10,7 +10,7 @@ import numpy as np
 from scipy.io import savemat
 from typer.testing import Result
 
-from bentray_workers.dataset_file import read_dataset
+from bentray_workers.files.dataset import read_dataset
 
 from ...workers.foreign_scans.scans import delta_tof, travel_times
 

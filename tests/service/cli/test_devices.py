@@ -12,7 +12,7 @@ from typer.testing import Result
 from bentray_kernels import opencl
 from bentray_kernels.opencl import Choice, Device, OpenCLFallbackWarning, Verdict
 from bentray_service.cli import opencl_help
-from bentray_service.cli.terminal import show_our_warnings_in_a_line
+from bentray_service.cli.output.terminal import show_our_warnings_in_a_line
 
 GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True, "/usr/lib/libfast.so.1")
 CPU = Device(

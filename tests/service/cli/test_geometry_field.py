@@ -12,8 +12,8 @@ import trimesh
 from PIL import Image
 from typer.testing import Result
 
-from bentray_kernels.phantoms.surfaces import torus
-from bentray_workers import geometry_field
+from bentray_kernels.meshes.example_surfaces import torus
+from bentray_workers.rendering import geometry_field
 
 SMALL = ("--samples", 6, "--inner-samples", 4, "--divisions", 4, "--image-size", 33)
 PICTURE = ("--width", 32, "--height", 24)

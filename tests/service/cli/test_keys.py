@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from typer.testing import Result
 
-from bentray_service.access.token import Token
+from bentray_service.rows.api_key import Token
 
 Run = Callable[..., Result]
 
@@ -65,7 +65,7 @@ def test_what_is_wrong_is_named(bentray: Run, tmp_path: Path, words: list[str], 
 def test_a_service_that_runs_knows_it(
     bentray: Run, start: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bentray_service.access.door.NO_KEYS_S", 0.0)
+    monkeypatch.setattr("bentray_service.access.sign_in.NO_KEYS_S", 0.0)
     http, data = start(), tmp_path / "data"
     assert http.get("/v1/access").json()["how"] == "open"
     key = made(bentray, data, "--tenant", "clinic")

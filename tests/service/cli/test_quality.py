@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from typer.testing import Result
 
-from bentray_workers.dataset_file import read_dataset, write_dataset
+from bentray_workers.files.dataset import read_dataset, write_dataset
 
 from ...kernels.acquisition.traces import blob_delay, scan
 

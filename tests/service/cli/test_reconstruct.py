@@ -17,7 +17,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_service.cli.reconstruct import useful_workers
-from bentray_workers.reconstruction_file import read_reconstruction
+from bentray_workers.files.reconstruction import read_reconstruction
 
 QUICK = ("--nodes", 32, "--sweeps", 2)
 

@@ -15,8 +15,8 @@ from PIL import Image
 from typer.testing import Result
 
 from bentray_kernels.phantoms import ONE_HOLE, sampled
-from bentray_workers import refraction
-from bentray_workers.volume_file import Volume, write_volume
+from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.rendering import refraction
 
 SMALL = ("--width", 32, "--height", 24)
 BALL = sampled(ONE_HOLE, 12).astype(np.float32)

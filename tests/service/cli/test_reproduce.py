@@ -13,9 +13,9 @@ import pytest
 from typer.testing import Result
 
 from bentray_kernels.tomography import Settings
-from bentray_workers.dataset_file import read_dataset, write_dataset
-from bentray_workers.reconstruction_file import read_reconstruction, write_reconstruction
-from bentray_workers.slices import reconstruct
+from bentray_workers.files.dataset import read_dataset, write_dataset
+from bentray_workers.files.reconstruction import read_reconstruction, write_reconstruction
+from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
 
 @pytest.fixture(params=["gauss-newton", "auto"])

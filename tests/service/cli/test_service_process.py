@@ -16,7 +16,7 @@ import httpx
 import pytest
 
 from bentray_service.cli import service_process
-from bentray_service.cli.endings import WorkFailed
+from bentray_service.cli.output.exit_codes import WorkFailed
 from bentray_service.cli.service_process import running_service
 
 # Says that it is there, then works until it is told to stop; the last word ignores being told.

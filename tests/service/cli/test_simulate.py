@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
-from bentray_workers.dataset_file import read_dataset
+from bentray_workers.files.dataset import read_dataset
 
 SOLID = ("--phantom", "table7", "--nodes", 16, "--elements", 8, "--slices", 2)
 SMALL = ("--nodes", 24, "--elements", 12, "--coupling", 1400)

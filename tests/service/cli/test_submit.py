@@ -12,8 +12,8 @@ from typer.testing import Result
 
 from bentray_kernels.tomography import Settings
 from bentray_service.client import ClientError
-from bentray_workers import slices
-from bentray_workers.reconstruction_file import write_reconstruction
+from bentray_workers.files.reconstruction import write_reconstruction
+from bentray_workers.reconstruction import reconstruction_run
 
 
 class StandIn:
@@ -47,7 +47,9 @@ class StandIn:
 
     def download(self, volume: str, format: str, path: Path) -> Path:  # noqa: A002
         assert (volume, format) == ("volume-1", "hdf5")
-        write_reconstruction(path, slices.reconstruct(None, StandIn.scan, Settings(nodes=24, sweeps=1)))
+        write_reconstruction(
+            path, reconstruction_run.reconstruct(None, StandIn.scan, Settings(nodes=24, sweeps=1))
+        )
         return path
 
     def record(self, state: str) -> dict[str, Any]:

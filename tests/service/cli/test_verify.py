@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 from typer.testing import Result
 
-from bentray_service.storage.checked_store import CheckedStore
-from bentray_service.storage.checksums import Checksums
-from bentray_service.storage.database import open_database
-from bentray_service.storage.datasets import Datasets
-from bentray_service.storage.files import Files
-from bentray_service.storage.ids import new_id
-from bentray_service.storage.local_store import LocalStore
-from bentray_service.storage.tenants import LOCAL
+from bentray_service.files.checked_store import CheckedStore
+from bentray_service.files.data_folder import Files
+from bentray_service.files.local_store import LocalStore
+from bentray_service.rows.checksums import Checksums
+from bentray_service.rows.database import open_database
+from bentray_service.rows.datasets import Datasets
+from bentray_service.rows.ids import new_id
+from bentray_service.rows.tenants import LOCAL
 
 Run = Callable[..., Result]
 SUMMARY = {"title": "", "source": "", "license": "", "dimension": 2, "elements": 3, "ntx": 3, "nrx": 3}

@@ -19,8 +19,8 @@ from typer.testing import Result
 
 from bentray_kernels.tomography import Settings
 from bentray_service.healthcheck import check_worker
-from bentray_workers.cluster import Cluster, open_cluster
-from bentray_workers.slices import reconstruct
+from bentray_workers.cluster.connection import Cluster, open_cluster
+from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
 from ...listening import beyond_loopback, listening, pages
 
@@ -150,10 +150,10 @@ def test_the_lane_of_opencl_is_offered_where_a_device_passed(
     bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from bentray_kernels import opencl
-    from bentray_workers import joining
+    from bentray_workers.cluster import local_workers
 
-    asked: list[joining.Joining] = []
-    monkeypatch.setattr(joining, "join", lambda joined, say: asked.append(joined))
+    asked: list[local_workers.Joining] = []
+    monkeypatch.setattr(local_workers, "join", lambda joined, say: asked.append(joined))
     device = opencl.Device(0, "PoCL", "cpu", "cpu", "", "", True)
     for found in (device, None):
         monkeypatch.setattr(opencl, "choose", lambda found=found: opencl.Choice(found, ()))

@@ -5,9 +5,9 @@ import pytest
 
 from bentray_kernels.eikonal import methods
 from bentray_kernels.errors import InvalidInput
-from bentray_service.access.token import Token
 from bentray_service.client import Client, ClientError
-from bentray_workers.dataset_file import read_dataset
+from bentray_service.rows.api_key import Token
+from bentray_workers.files.dataset import read_dataset
 
 
 @pytest.fixture

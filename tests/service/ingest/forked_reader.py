@@ -54,7 +54,7 @@ def main() -> None:
     # What every fork needs is imported once.
     for what in {what for what, _, _ in files}:
         child.convert(what, Path("/dev/null"), Path("/dev/null/none"), {"title": ""})
-    import_module("bentray_workers.reconstruction_file")
+    import_module("bentray_workers.files.reconstruction")
     for what, path, given in files:
         sys.stdout.write(json.dumps(read_one(memory, seconds, what, Path(path), given)) + "\n")
         # Or every fork to come would write it again.

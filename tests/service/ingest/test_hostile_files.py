@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from bentray_workers.dataset_file import write_dataset
+from bentray_workers.files.dataset import write_dataset
 
-from ...workers.datasets import small
+from ...workers.files.datasets import small
 from . import hostile_datasets, hostile_meshes, hostile_volumes
 from .damage import damaged
 from .forked_reader import Read, read_all

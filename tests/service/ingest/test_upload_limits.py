@@ -6,7 +6,7 @@ import pytest
 
 from bentray_service.ingest.upload_limits import UploadLimits
 from bentray_service.refusals import Busy, TooOften
-from bentray_service.storage.tenants import Tenant
+from bentray_service.rows.tenants import Tenant
 
 ONE, OTHER, THIRD = Tenant("one"), Tenant("other"), Tenant("third")
 

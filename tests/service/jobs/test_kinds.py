@@ -11,21 +11,21 @@ from fastapi.testclient import TestClient
 from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.geometry_field.defects import sound
+from bentray_kernels.meshes.defects import sound
+from bentray_kernels.meshes.example_surfaces import torus
 from bentray_kernels.phantoms import TWO_HOLES, sampled
-from bentray_kernels.phantoms.surfaces import torus
 from bentray_kernels.tomography import Progress
 from bentray_service.app import create_app
 from bentray_service.jobs import kinds
+from bentray_service.rows.checksums import Checksums
+from bentray_service.rows.ids import new_id
+from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
-from bentray_service.storage.checksums import Checksums
-from bentray_service.storage.ids import new_id
-from bentray_service.storage.tenants import LOCAL
-from bentray_workers import field_settings, geometry_field
-from bentray_workers.cluster import open_cluster
-from bentray_workers.mesh_file import StoredMesh, summary_of, write_mesh
-from bentray_workers.slices import Cancelled
-from bentray_workers.volume_file import Volume, write_volume
+from bentray_workers.cluster.connection import open_cluster
+from bentray_workers.cluster.task_loop import Cancelled
+from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
+from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.rendering import field_settings, geometry_field
 
 from ..conftest import PATIENCE_S
 

@@ -12,8 +12,8 @@ from sqlalchemy.exc import DataError, OperationalError
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.settings import Settings
-from bentray_service.storage.queue import Queue
-from bentray_service.storage.tenants import LOCAL, Tenant
+from bentray_service.rows.job_queue import Queue
+from bentray_service.rows.tenants import LOCAL, Tenant
 
 
 def test_at_most_so_many_at_a_time(start, uploaded, submitted, until, work):

@@ -9,14 +9,14 @@ import pytest
 from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
-from bentray_service.access.token import Token
 from bentray_service.app import create_app
 from bentray_service.cli import app as command_line
+from bentray_service.rows.api_key import Token
+from bentray_service.rows.keys import Keys
+from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.settings import ServiceSettings
-from bentray_service.storage.keys import Keys
-from bentray_service.storage.tenants import LOCAL, Tenant
-from bentray_workers import simulation_parts
-from bentray_workers.cluster import open_cluster
+from bentray_workers.cluster.connection import open_cluster
+from bentray_workers.simulation import tasks
 
 from ..conftest import PATIENCE_S
 
@@ -51,7 +51,7 @@ def ask(http, **settings):
 def held(monkeypatch):
     """Emissions after the first wait until this event is set."""
     go_on, begun = threading.Event(), []
-    real = simulation_parts.simulate_emission
+    real = tasks.simulate_emission
 
     def slow(settings, emission, poll):
         begun.append(emission)
@@ -59,7 +59,7 @@ def held(monkeypatch):
             go_on.wait()
         return real(settings, emission, poll)
 
-    monkeypatch.setattr(simulation_parts, "simulate_emission", slow)
+    monkeypatch.setattr(tasks, "simulate_emission", slow)
     go_on.begun = begun
     yield go_on
     go_on.set()

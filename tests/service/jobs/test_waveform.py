@@ -14,13 +14,13 @@ from fastapi.testclient import TestClient
 from bentray_kernels.acquisition import pick
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_service.app import create_app
+from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
-from bentray_service.storage.tenants import LOCAL
-from bentray_workers import slices
-from bentray_workers.cluster import open_cluster
-from bentray_workers.dataset_file import write_dataset
+from bentray_workers.cluster.connection import open_cluster
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.reconstruction import reconstruction_run
 
-from ...kernels.wave.scans import scan
+from ...kernels.tomography.waveform.scans import scan
 from ..conftest import ENDED, HDF5
 
 PATIENCE_S = 300.0
@@ -40,7 +40,11 @@ def http(tmp_path):
 @pytest.fixture
 def torn(monkeypatch):
     """The scheduler goes once the waves have kept something; what was restored after it, by name."""
-    restored, real_keep, real_last = [], slices.Checkpoints.keep, slices.Checkpoints.last
+    restored, real_keep, real_last = (
+        [],
+        reconstruction_run.Checkpoints.keep,
+        reconstruction_run.Checkpoints.last,
+    )
     gone = []
 
     def keep(self, name, standing):
@@ -55,8 +59,8 @@ def torn(monkeypatch):
             restored.append(name)
         return found
 
-    monkeypatch.setattr(slices.Checkpoints, "keep", keep)
-    monkeypatch.setattr(slices.Checkpoints, "last", last)
+    monkeypatch.setattr(reconstruction_run.Checkpoints, "keep", keep)
+    monkeypatch.setattr(reconstruction_run.Checkpoints, "last", last)
     return gone, restored
 
 

@@ -7,11 +7,11 @@ from contextlib import contextmanager
 import httpx
 import pytest
 
-from bentray_service.access import door
-from bentray_service.access.token import Token
-from bentray_service.storage import database
-from bentray_service.storage.keys import Keys
-from bentray_service.storage.tenants import LOCAL
+from bentray_service.access import sign_in
+from bentray_service.rows import database
+from bentray_service.rows.api_key import Token
+from bentray_service.rows.keys import Keys
+from bentray_service.rows.tenants import LOCAL
 
 from ..held_database import held
 
@@ -37,7 +37,7 @@ def is_away(answer):
 
 @pytest.mark.parametrize("keyed", [True, False], ids=["with a key", "open"])
 def test_every_route_while_postgresql_is_dead(start, scan, postgresql_server, keyed, monkeypatch):
-    monkeypatch.setattr(door, "NO_KEYS_S", 0.0)
+    monkeypatch.setattr(sign_in, "NO_KEYS_S", 0.0)
     address = postgresql_server.new_database()
     http = start(database_url=address)
     if keyed:

@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from bentray_service.storage.tenants import LOCAL
-from bentray_workers.dataset_file import read_dataset
+from bentray_service.rows.tenants import LOCAL
+from bentray_workers.files.dataset import read_dataset
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
 

@@ -89,7 +89,7 @@ def test_all_streams_share_one_look_at_the_database(start, uploaded, submitted, 
         return news(self, known)
 
     monkeypatch.setattr(feed, "INTERVAL_SECONDS", 0.2)
-    monkeypatch.setattr("bentray_service.storage.jobs.Jobs.news", counted)
+    monkeypatch.setattr("bentray_service.rows.jobs.Jobs.news", counted)
     work.hold.clear()
     dataset = uploaded(http)
     jobs = [submitted(http, dataset)["id"] for _ in range(3)]
@@ -158,7 +158,7 @@ def test_a_database_that_is_away_ends_no_stream(start, uploaded, submitted, unti
         work.hold.set()
         return news(self, known)
 
-    monkeypatch.setattr("bentray_service.storage.jobs.Jobs.news", fails_at_first)
+    monkeypatch.setattr("bentray_service.rows.jobs.Jobs.news", fails_at_first)
     told = parsed(http.get(f"/v1/jobs/{job['id']}/events").text)
     assert json.loads(told[-1]["data"])["state"] == "succeeded"
 

@@ -5,10 +5,11 @@ import io
 import numpy as np
 import pytest
 import trimesh
-from tests.small_disk import fill
 from typer.testing import CliRunner
 
 from bentray_service.cli import app as cli
+
+from ...small_disk import fill
 
 STREAM = {"Content-Type": "application/octet-stream"}
 TUS = {"Tus-Resumable": "1.0.0"}

@@ -10,18 +10,18 @@ from fastapi.testclient import TestClient
 from PIL import Image
 from sqlalchemy import insert
 
-from bentray_kernels.phantoms.surfaces import torus
+from bentray_kernels.meshes.example_surfaces import torus
 from bentray_service.app import create_app
+from bentray_service.rows.ids import field_of, new_id
+from bentray_service.rows.schema import geometry_fields
+from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
-from bentray_service.storage.ids import field_of, new_id
-from bentray_service.storage.schema import geometry_fields
-from bentray_service.storage.tenants import LOCAL
-from bentray_workers.cluster import open_cluster
-from bentray_workers.field_settings import FieldSettings
-from bentray_workers.field_view import FieldView
-from bentray_workers.geometry_field import build, bytes_of
-from bentray_workers.mesh_file import StoredMesh, write_mesh
-from bentray_workers.render_tasks import ThreadTasks
+from bentray_workers.cluster.connection import open_cluster
+from bentray_workers.cluster.task_pool import ThreadTasks
+from bentray_workers.files.mesh import StoredMesh, write_mesh
+from bentray_workers.rendering.field_settings import FieldSettings
+from bentray_workers.rendering.field_view import FieldView
+from bentray_workers.rendering.geometry_field import build, bytes_of
 
 SMALL = {"width": 32, "height": 24}
 COARSE = {"samples": 6, "inner_samples": 4, "divisions": 4, "image_size": 33}

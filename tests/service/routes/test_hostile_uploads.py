@@ -6,9 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 import psutil
 import pytest
 
-from bentray_workers.dataset_file import write_dataset
+from bentray_workers.files.dataset import write_dataset
 
-from ...workers.datasets import small
+from ...workers.files.datasets import small
 from ..ingest import hostile_datasets, hostile_meshes, hostile_volumes
 from ..ingest.damage import damaged
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from bentray_kernels.geometry_field.mesh import TriangleMesh
+from bentray_kernels.meshes.example_surfaces import bumpy_ball, torus
+from bentray_kernels.meshes.mesh import TriangleMesh
 from bentray_kernels.phantoms import ONE_HOLE, sampled
-from bentray_kernels.phantoms.surfaces import bumpy_ball, torus
-from bentray_service.storage.ids import new_id
-from bentray_service.storage.tenants import LOCAL
-from bentray_workers import isosurface_mesh
-from bentray_workers.mesh_file import load_mesh
-from bentray_workers.volume_file import Volume, write_volume
+from bentray_service.rows.ids import new_id
+from bentray_service.rows.tenants import LOCAL
+from bentray_workers.files.mesh import load_mesh
+from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.rendering import isosurface_mesh
 
 STREAM = {"Content-Type": "application/octet-stream"}
 RING = torus(12, 8)

@@ -9,7 +9,7 @@ import pytest
 
 from bentray_kernels.acquisition import PICKERS
 from bentray_service.routes.quality import Picker
-from bentray_workers.dataset_file import write_dataset
+from bentray_workers.files.dataset import write_dataset
 
 from ...kernels.acquisition.traces import blob_delay, scan
 

@@ -13,14 +13,14 @@ from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography.result import Reconstruction
 from bentray_service import pictures
 from bentray_service.app import create_app
+from bentray_service.rows.ids import new_id
+from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
-from bentray_service.storage.ids import new_id
-from bentray_service.storage.tenants import LOCAL
-from bentray_workers import refraction, scene_cache, strips
-from bentray_workers.cluster import open_cluster
-from bentray_workers.lanes import RECONSTRUCTION
-from bentray_workers.refraction_view import RefractionView
-from bentray_workers.volume_file import Volume, write_volume
+from bentray_workers.cluster.connection import open_cluster
+from bentray_workers.cluster.resources import RECONSTRUCTION
+from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.rendering import refraction, scene_cache, tiles
+from bentray_workers.rendering.refraction_view import RefractionView
 
 SMALL = {"width": 32, "height": 24, "iso": 0.5}
 
@@ -136,7 +136,7 @@ def test_several_surfaces(http):
 
 
 def test_a_large_picture_is_cast_in_strips(http, cluster, monkeypatch):
-    monkeypatch.setattr(strips, "TASK_RAYS", 100)
+    monkeypatch.setattr(tiles, "TASK_RAYS", 100)
     answer = http.get(put(http), params=SMALL)
     assert Image.open(io.BytesIO(answer.content)).size == (32, 24)
     assert len(cluster.submitted) == 8 + 1

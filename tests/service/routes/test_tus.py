@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from sqlalchemy import update
 
 from bentray_service.ingest.upload_limits import UploadLimits
-from bentray_service.storage import schema
+from bentray_service.rows import schema
 
 TUS = {"Tus-Resumable": "1.0.0"}
 PIECE = {**TUS, "Content-Type": "application/offset+octet-stream"}

@@ -12,7 +12,7 @@ from bentray_service.ingest.upload_limits import MOST_OF_TENANT
 from bentray_service.refusals import Busy
 from bentray_service.routes import uploads
 from bentray_service.routes.uploads import in_turn
-from bentray_service.storage.tenants import LOCAL, Tenant
+from bentray_service.rows.tenants import LOCAL, Tenant
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
 PATIENCE_S = 20.0

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from bentray_service.storage.deletion import Stored
-from bentray_service.storage.ids import new_id
-from bentray_service.storage.tenants import LOCAL
-from bentray_workers.volume_file import Volume, write_volume
+from bentray_service.files.deletion import Stored
+from bentray_service.rows.ids import new_id
+from bentray_service.rows.tenants import LOCAL
+from bentray_workers.files.volume import Volume, write_volume
 
 from ..conftest import FakeCluster, FakeFuture
 

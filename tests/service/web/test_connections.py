@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from bentray_service.access.addresses import networks
 from bentray_service.web import descriptors, protocol
+from bentray_service.web.addresses import networks
 from bentray_service.web.connections import KEPT, MOST, SPARE, Connections, Limits
 
 from .speaking import connected, read_answer, read_to_end, served

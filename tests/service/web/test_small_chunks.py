@@ -8,8 +8,8 @@ from contextlib import suppress
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.errors import refused
 from bentray_service.web import small_chunks
+from bentray_service.web.errors import refused
 
 from .speaking import connected, read_answer, read_to_end, served
 

@@ -11,12 +11,12 @@ import pytest
 import trimesh
 from playwright.sync_api import expect, sync_playwright
 
+from bentray_kernels.meshes.example_surfaces import torus
 from bentray_kernels.phantoms import ONE_HOLE, sampled
-from bentray_kernels.phantoms.surfaces import torus
 from bentray_kernels.tomography.settings import Settings
-from bentray_service.access.token import Token
 from bentray_service.jobs import kinds
-from bentray_workers.render_tasks import ThreadTasks
+from bentray_service.rows.api_key import Token
+from bentray_workers.cluster.task_pool import ThreadTasks
 
 CHROMIUM = Path("/usr/bin/chromium")
 # The first picture waits for its compiled functions where none are kept from before.

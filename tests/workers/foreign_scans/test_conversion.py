@@ -17,7 +17,7 @@ from scipy.io import savemat
 
 from bentray_kernels.acquisition import speed_from_temperature
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.dataset_file import read_dataset, write_dataset
+from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.foreign_scans import convert_dataset
 from bentray_workers.foreign_scans.matlab5 import Matlab5
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.dataset_file import read_dataset
+from bentray_workers.files.dataset import read_dataset
 from bentray_workers.foreign_scans import convert_dataset
 
 from .scans import ELEMENTS, RATE_HZ, SAMPLES, positions

@@ -6,7 +6,7 @@ from scipy.io import savemat
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.dataset_file import write_dataset
+from bentray_workers.files.dataset import write_dataset
 from bentray_workers.foreign_scans import convert_dataset
 
 from .scans import ELEMENTS, delta_tof, positions, write_matlab73

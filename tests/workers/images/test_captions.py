@@ -9,10 +9,10 @@ import pytest
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Settings, Sweep, Trial
-from bentray_kernels.tomography.stages import stages
+from bentray_kernels.tomography.grid_schedule import stages
 from bentray_workers.images.captions import facts, stage_names
 
-from ..reconstructions import made
+from ..files.reconstructions import made
 
 
 @pytest.mark.parametrize(

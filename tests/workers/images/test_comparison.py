@@ -7,10 +7,10 @@ import pytest
 from matplotlib.contour import ContourSet
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.comparison import compare
 from bentray_workers.images.comparison import comparison_png
+from bentray_workers.images.truth_comparison import compare
 
-from ..reconstructions import made, truth
+from ..files.reconstructions import made, truth
 from .pixels import pixels
 
 

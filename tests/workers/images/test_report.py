@@ -9,11 +9,11 @@ import pytest
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction, Sweep, Trial
-from bentray_kernels.tomography.advice import reason
-from bentray_workers.comparison import compare
+from bentray_kernels.tomography.model_selection.selection import reason
 from bentray_workers.images.report import report_png
+from bentray_workers.images.truth_comparison import compare
 
-from ..reconstructions import SPACING_M, made, truth
+from ..files.reconstructions import SPACING_M, made, truth
 from .pixels import pixels
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.images.look import COLORMAPS
 from bentray_workers.images.slice import slice_png
-from bentray_workers.reconstruction_file import write_reconstruction
 
-from ..reconstructions import made
+from ..files.reconstructions import made
 from .pixels import near, pixels
 
 YELLOW = (253, 231, 37)

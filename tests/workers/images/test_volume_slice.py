@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.images.volume_slice import volume_slice_png
-from bentray_workers.volume_file import Volume, write_volume
 
 
 @pytest.fixture

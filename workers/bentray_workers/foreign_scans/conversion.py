@@ -8,11 +8,11 @@ from pathlib import Path
 
 from bentray_kernels.acquisition import Dataset
 
-from ..bounded_reading import refusing
-from ..dataset_copying import copy_dataset
-from ..dataset_reading import trace_type
-from ..dataset_writing import Piece, bytes_of, write_dataset
-from ..hdf5_reading import SIGNATURE, Limits, opened
+from ..files.bounded_reading import refusing
+from ..files.dataset.copy import copy_dataset
+from ..files.dataset.read import trace_type
+from ..files.dataset.write import Piece, bytes_of, write_dataset
+from ..files.hdf5_reading import SIGNATURE, Limits, opened
 from . import matlab5, npz
 from .arrays import Arrays
 from .kwave import KWave, is_kwave

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bentray_kernels.acquisition import Truth, speed_from_temperature
 from bentray_kernels.errors import InvalidInput
 
-from ..dataset_reading import trace_type
+from ..files.dataset.read import trace_type
 from .arrays import Arrays, small
 
 # Where a file does not say how warm the water is; what is made of it says so.

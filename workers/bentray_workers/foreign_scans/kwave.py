@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from ..bounded_reading import refusing as refusing_zip
-from ..hdf5_reading import Limits, Reader, opened, refusing
+from ..files.bounded_reading import refusing as refusing_zip
+from ..files.hdf5_reading import Limits, Reader, opened, refusing
 from .arrays import LARGEST_ROW, LARGEST_TOTAL, LARGEST_WHOLE
 from .npz import Npz
 from .zip_checks import WHOLE, check_zip

@@ -14,7 +14,7 @@ from bentray_kernels.acquisition.plausibility import check_plausible
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import check_size
 
-from ..dataset_format import NUMBERS, PAIR_ARRAYS
+from ..files.dataset.format import NUMBERS, PAIR_ARRAYS
 from .arrays import Arrays, small
 from .fields import declared, indices, number, stand_in, there, truth, wanted, water
 from .zip_checks import plain_name

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from ..hdf5_reading import Reader, refusing
+from ..files.hdf5_reading import Reader, refusing
 from .arrays import check_row
 
 NUMBERS = "a plain array of real numbers"

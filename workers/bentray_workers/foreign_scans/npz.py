@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from ..bounded_reading import LONGEST_HEADER, at_end, refusing
-from ..npy_headers import PARSING
+from ..files.bounded_reading import LONGEST_HEADER, at_end, refusing
+from ..files.npy_headers import PARSING
 from .arrays import check_declared, check_row
 from .zip_checks import PACKING, check_zip
 

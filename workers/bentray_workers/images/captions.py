@@ -57,7 +57,7 @@ def _of_rays(result: Reconstruction) -> Settings:
 
 
 def stage_names(result: Reconstruction) -> tuple[str, ...]:
-    """What tells the stages apart: those of ``bentray_kernels.tomography.stages``, bands; nothing for one."""
+    """What tells the stages apart: those of ``tomography.grid_schedule``, bands; nothing for one."""
     settings = _of_rays(result)
     grids = [-(-settings.nodes // 2**k) for k in range(settings.coarser_grids, -1, -1)]
     names = [f"{nodes} nodes" for nodes in grids]

@@ -13,12 +13,12 @@ from bentray_kernels.acquisition import Truth
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction
 
-from ..comparison import Comparison, NotComparable, compare
 from .canvas import drawing, new_figure, to_png
 from .captions import LABELS, which_slice
 from .curves import draw_history
 from .cut import cut, slice_index
 from .maps import DIFFERENCE, SPEED, Limits, draw_bar, draw_map, robust_limits, symmetric_limits
+from .truth_comparison import Comparison, NotComparable, compare
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

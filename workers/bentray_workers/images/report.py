@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction
-from bentray_kernels.tomography.advice import told
+from bentray_kernels.tomography.model_selection.selection import told
 
-from ..comparison import Comparison, NotComparable, compare
 from .canvas import drawing, new_figure, to_png
 from .captions import LABELS, NAMES, facts, stage_names, which_slice
 from .curves import draw_history, draw_profiles
@@ -33,6 +32,7 @@ from .maps import (
     symmetric_limits,
 )
 from .residuals import draw_residuals
+from .truth_comparison import Comparison, NotComparable, compare
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -8,7 +8,7 @@ from typing import Any
 
 from bentray_kernels.errors import InvalidInput
 
-from ..reconstruction_file import read_reconstruction
+from ..files.reconstruction import read_reconstruction
 from .captions import LABELS, NAMES, facts
 from .look import COLOUR_VALUE, Look
 from .maps import RECOVERY_LIMITS, Limits, robust_limits

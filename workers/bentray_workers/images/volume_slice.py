@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ..volume_file import read_volume
+from ..files.volume import read_volume
 from .look import Look
 from .maps import robust_limits
 from .plane import UPRIGHT, plane_of
@@ -25,7 +25,7 @@ def volume_slice_png(
     """One slice of an uploaded volume.
 
     Args:
-        path: of a file as ``volume_file.write_volume`` writes it.
+        path: of a file as ``files.volume.write_volume`` writes it.
         axis: the one that the slice cuts across: x, y or z.
         index: along it; None: the middle one.
         low, high: values of the first and the last colour; None: from the slice, but for a few outliers.

@@ -8,9 +8,9 @@ import numpy as np
 
 from ...arrays import Floats
 from ..dataset import Dataset
-from ..match import match
-from ..picking import require_traces
-from ..pulse import BEFORE, measured_pulse
+from ..picking.cross_correlation import match
+from ..picking.first_arrivals import require_traces
+from ..picking.pulse import BEFORE, measured_pulse
 from ..quality.measures import Measures
 
 # How far from the envelope's crest the best match may lie, periods; further on lies the next swing.

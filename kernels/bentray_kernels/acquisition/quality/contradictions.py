@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from ...arrays import Flags, Floats
-from ..consistency import OUTLYING, outliers, unreciprocal
 from ..dataset import Dataset
+from ..picking.consistency import OUTLYING, outliers, unreciprocal
 from .finding import Finding
 
 # A departure counts as whole cycles when it is this near to them, periods.

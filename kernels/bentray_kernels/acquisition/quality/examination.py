@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Flags, Floats
 from ..dataset import Dataset
-from ..picking import pick
+from ..picking.first_arrivals import pick
 from .contradictions import contradictions
 from .correction import apply, stacked
 from .dead import dead

@@ -1,0 +1,112 @@
+"""The picture of waveforms: a gather with the picks, and every image with error and time, a row a scan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from bentray_kernels.acquisition import PICKERS, Dataset, Waveform, pick
+from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
+
+from ..shared._palette import with_a_palette
+
+SHOWN = ("straight", "bent, wide", "waveform")
+
+# Of the gather's panel, over an image's.
+GATHER_WIDTH = 1.9
+
+# Of each picker's marks, and their sizes, points.
+MARKS = ("#e6194b", "#ffe119", "#3cb44b", "#4363d8", "#f58231", "#42d4f4")
+SIZES = (4.5, 3.9, 3.3, 2.7, 2.1, 1.5)
+
+
+def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Any]]], seconds: str) -> bytes:
+    """PNG.
+
+    Args:
+        scans: by name, the dataset with its traces, and images with ``result``, ``rms`` and ``seconds``.
+        seconds: what they are seconds of.
+    """
+    with drawing():
+        figure = new_figure(15.0, 3.1 * len(scans) + 0.4)
+        figure.suptitle(f"Images from raw traces; {seconds}")
+        widths = [GATHER_WIDTH, *(1.0 for _ in range(1 + len(SHOWN)))]
+        panels = figure.subplots(len(scans), len(widths), squeeze=False, width_ratios=widths)
+        for row, (name, (dataset, images)) in zip(panels, scans.items(), strict=True):
+            gather(row[0], name, dataset)
+            truth = dataset.truth
+            assert truth is not None
+            limits = robust_limits([truth.sound_speed_mps])
+            maps = [
+                draw_map(
+                    row[1],
+                    truth.sound_speed_mps,
+                    truth.spacing_m,
+                    truth.origin_m,
+                    limits,
+                    colormap=SPEED,
+                    title="truth",
+                )
+            ]
+            for axes, way in zip(row[2:], SHOWN, strict=True):
+                one = images[way]
+                title = f"{way}: {one.rms:.1f} m/s, {one.seconds:.0f} s"
+                grid = (one.result.spacing_m, one.result.origin_m)
+                maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=title))
+            draw_bar(maps, "speed (m/s)")
+        return with_a_palette(to_png(figure))
+
+
+def gather(axes: Axes, name: str, dataset: Dataset) -> None:
+    """The traces of the first emission about their arrival in water, and what each picker reads of them."""
+    assert dataset.waveform is not None
+    assert dataset.sampling_rate_hz is not None
+    assert dataset.center_frequency_hz is not None
+    water = dataset.distance_m()[0] / dataset.water_speed_mps
+    one, period = first_emission(dataset), 1.0 / dataset.center_frequency_hz
+    picks = {picker: pick(one, picker).differential_tof()[0] for picker in PICKERS}
+    every = np.stack(list(picks.values()))
+    late = np.arange(np.nanmin(every) - 2.0 * period, np.nanmax(every) + 4.0 * period, 0.05 * period)
+    samples = dataset.t0_s + np.arange(dataset.waveform.object.shape[-1]) / dataset.sampling_rate_hz
+    shifted = np.stack(
+        [
+            np.interp(arrival + late, samples, trace)
+            for arrival, trace in zip(water, dataset.waveform.object[0], strict=True)
+        ]
+    )
+    shifted /= np.abs(shifted).max(axis=1, keepdims=True) + 1e-300
+    extent = (0, len(shifted), 1e6 * late[0], 1e6 * late[-1])
+    axes.imshow(shifted.T, aspect="auto", origin="lower", cmap="gray", vmin=-0.8, vmax=0.8, extent=extent)
+    # Smaller marks upon larger ones, so that pickers that agree are all seen.
+    for (picker, times), colour, size in zip(picks.items(), MARKS, SIZES, strict=True):
+        receivers = np.arange(len(times)) + 0.5
+        axes.plot(
+            receivers, 1e6 * times, "o", color=colour, markersize=size, markeredgewidth=0.0, label=picker
+        )
+    axes.set_title(name)
+    axes.set_xlabel("receiver")
+    axes.set_ylabel("time less that in water (µs)")
+    axes.set_ylim(1e6 * late[0], 1e6 * late[-1])
+    legend = axes.legend(fontsize=6, loc="upper left", ncols=3, framealpha=0.9)
+    legend.get_frame().set_facecolor("white")
+    for mark in legend.legend_handles:
+        mark.set_markersize(4.0)
+
+
+def first_emission(dataset: Dataset) -> Dataset:
+    """The dataset with its first emission alone."""
+    traces = dataset.waveform
+    assert traces is not None
+    scales = [None if part is None else part[:1] for part in (traces.object_scale, traces.water_scale)]
+    water = None if traces.water is None else traces.water[:1]
+    return replace(
+        dataset,
+        tx=dataset.tx[:1],
+        valid=None if dataset.valid is None else dataset.valid[:1],
+        waveform=Waveform(traces.object[:1], water, traces.scale, *scales),
+    )

@@ -1,0 +1,133 @@
+"""A scheduler and workers, each a process of this machine, and what sleeping tasks cost them."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+from bentray_workers.cluster.connection import Cluster, open_cluster
+from bentray_workers.cluster.dask_settings import NO_DASHBOARD, ours
+from bentray_workers.cluster.fair_shares import IN_FLIGHT
+from bentray_workers.cluster.resources import RECONSTRUCTION, THREADS
+from bentray_workers.cluster.task_loop import finished
+
+from ._scaling_tasks import pause
+from ._scaling_work import Work
+
+SETTLE_S = 2.0
+
+QUIET = [f"--dashboard-address={NO_DASHBOARD}", "--no-dashboard"]
+
+
+@dataclass(frozen=True)
+class Run:
+    """Sleeping tasks driven through a cluster.
+
+    Attributes:
+        workers: processes.
+        length: of a task, s.
+        tasks: so many; 0: the cluster idled.
+        seconds: by the clock.
+        scheduler: seconds of a processor that the scheduler used.
+        driver: the same of the process that submits, as the service does.
+    """
+
+    workers: int
+    length: float
+    tasks: int
+    seconds: float
+    scheduler: float
+    driver: float
+
+
+class Machine:
+    """A scheduler, a client, and workers that can be added."""
+
+    def __init__(self, scheduler: psutil.Process, cluster: Cluster, start_worker: object) -> None:
+        self._scheduler = scheduler
+        self._cluster = cluster
+        self._start_worker = start_worker
+
+    def grow_to(self, workers: int) -> None:
+        """Start what is missing, and wait until it has joined."""
+        for _ in range(workers - self._cluster.describe()["workers"]):
+            self._start_worker()  # type: ignore[operator]
+        self._cluster.client.wait_for_workers(workers, timeout=120)
+
+    def run(self, work: Work, length: float, tasks: int) -> Run:
+        """Drive so many tasks as slices are driven: a few in flight, the state there and back with each."""
+        client, workers = self._cluster.client, self._cluster.describe()["workers"]
+        window, left = IN_FLIGHT * workers, deque(range(tasks))
+        state = bytes(int(work.sent))
+        before, begun = self._spent(), time.perf_counter()
+        running = []
+        while left or running:
+            while left and len(running) < window:
+                left.popleft()
+                asked = (pause, length, state, int(work.returned))
+                running.append(client.submit(*asked, resources=RECONSTRUCTION, pure=False))
+            for future in finished(client, running):
+                running.remove(future)
+                future.result()
+        seconds = time.perf_counter() - begun
+        scheduler, driver = (now - then for now, then in zip(self._spent(), before, strict=True))
+        return Run(workers, length, tasks, seconds, scheduler, driver)
+
+    def idle(self, seconds: float) -> Run:
+        """What the heartbeats of the workers cost, once what was asked before has died away."""
+        time.sleep(SETTLE_S)
+        before = self._spent()
+        time.sleep(seconds)
+        scheduler, driver = (now - then for now, then in zip(self._spent(), before, strict=True))
+        return Run(self._cluster.describe()["workers"], 0.0, 0, seconds, scheduler, driver)
+
+    def _spent(self) -> tuple[float, float]:
+        times = self._scheduler.cpu_times()
+        return times.user + times.system, time.process_time()
+
+
+@contextmanager
+def machine(folder: Path) -> Iterator[Machine]:
+    """A scheduler on loopback without workers; everything ends with the block."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    environment = {**os.environ, "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False"}
+    # Workers import the sleeping task.
+    environment["PYTHONPATH"] = os.pathsep.join(
+        [str(Path(__file__).resolve().parents[2]), os.environ.get("PYTHONPATH", "")]
+    )
+    processes: list[subprocess.Popen[bytes]] = []
+
+    def start(*words: str) -> psutil.Process:
+        command = [sys.executable, "-m", "dask", *words, *QUIET]
+        with (folder / "log").open("ab") as log:
+            processes.append(subprocess.Popen(command, env=environment, cwd=folder, stdout=log, stderr=log))
+        return psutil.Process(processes[-1].pid)
+
+    address = f"tcp://127.0.0.1:{port}"
+    lanes = " ".join(f"{lane}={amount}" for lane, amount in RECONSTRUCTION.items())
+    try:
+        with ours():
+            scheduler = start("scheduler", "--host=127.0.0.1", f"--port={port}")
+            with open_cluster(address, connect_timeout_s=60.0) as cluster:
+                yield Machine(
+                    scheduler,
+                    cluster,
+                    lambda: start(
+                        "worker", address, "--no-nanny", f"--nthreads={THREADS}", f"--resources={lanes}"
+                    ),
+                )
+    finally:
+        for process in reversed(processes):
+            process.kill()
+            process.wait()

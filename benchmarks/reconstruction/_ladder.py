@@ -1,0 +1,35 @@
+"""The ladder of chapter 6: straight rays, then what each way to propagate in the image gains."""
+
+from __future__ import annotations
+
+from bentray_service.cli.output.terminal import Step
+
+from ._phantom_scan import Found, PhantomScan
+
+FAT_MPS, WATER_MPS = 1375.0, 1500.0
+
+# What the dissertation's ladder of R3 is made of, the worst first.
+LADDER = {
+    "straight": {"rays": "straight"},
+    "fixed": {"eikonal": "hafmm"},
+    "FMM data-driven": {"eikonal": "fmm", "speed_update": "data-driven"},
+    "HAFMM data-driven": {"eikonal": "hafmm", "speed_update": "data-driven"},
+}
+# Rungs that the dissertation timed and did not compare.
+BESIDE = {
+    "FSM": {"eikonal": "fsm"},
+    "FIM": {"eikonal": "fim"},
+    "no rays": {"rays": "adjoint"},
+}
+THEIRS = {"straight": 25.0, "fixed": 19.0, "FMM data-driven": 10.0, "HAFMM data-driven": 3.0}
+
+# What did best of all that was tried: the phantom has flat parts, which ``edge_mps`` says.
+BEST: dict[str, object] = {"method": "gauss-newton", "sweeps": 12, "edge_mps": 7.0, "penalty_strength": 1.0}
+
+
+def ladder_step(scan: PhantomScan, name: str, progress: Step) -> Found:
+    """One rung of R3, with four sweeps as the dissertation has."""
+    changes: dict[str, object] = {"sweeps": 4, **{**LADDER, **BESIDE}[name]}
+    if changes.get("speed_update") == "data-driven":
+        changes["speed_range_mps"] = scan.speed_range
+    return scan.run(progress, name, **changes)

@@ -1,0 +1,79 @@
+"""Where one emitter's pass of SART over a slice spends its time: wave front, rays, update."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from bentray_kernels.eikonal.deviation import deviate
+from bentray_kernels.phantoms import TABLE7_SIDE_M, table7
+from bentray_kernels.tomography.sart.emitter_pass import EmitterPass
+from bentray_workers.simulation.plane import Ring, ring_radius
+
+REPEATS = 60
+
+
+@dataclass(frozen=True)
+class Split:
+    """Least of some runs, s, of one emitter on one core.
+
+    Attributes:
+        front: the wave front.
+        rays: everything else that an emitter takes: tracing, times, back-projection.
+        update: of the image, smoothing included.
+    """
+
+    front: float
+    rays: float
+    update: float
+
+    @property
+    def whole(self) -> float:
+        """All three."""
+        return self.front + self.rays + self.update
+
+    def __str__(self) -> str:
+        parts = {"wave front": self.front, "rays": self.rays, "update": self.update}
+        return ", ".join(f"{name} {1e3 * seconds:.2f} ms" for name, seconds in parts.items())
+
+
+def split(nodes: int, elements: int) -> Split:
+    """Of a pass through the middle slice of the Table 7 phantom in water as fast as fat."""
+    spacing = TABLE7_SIDE_M / (nodes - 1)
+    # As smooth as an image of SART is; the front goes round its grid more often where edges are sharp.
+    slowness = 1.0 / gaussian_filter(table7(1375.0, max(nodes, 128)).at(0.0).speed(nodes, TABLE7_SIDE_M), 2.0)
+    places = Ring(elements, ring_radius(TABLE7_SIDE_M, nodes)).positions() + 0.5 * TABLE7_SIDE_M
+    source, receivers = places[0], places[1:]
+    measured = np.linalg.norm(receivers - source, axis=1) / 1375.0
+    work = EmitterPass.over(slowness.shape, elements)
+    region, coverage = np.ones(slowness.shape, bool), np.zeros(slowness.shape)
+
+    def look() -> None:
+        work.look(slowness, slowness, spacing, source, receivers, measured)
+
+    def front() -> None:
+        # ``look`` leaves what it gave the wave front in the first field.
+        deviate(work.fields[0], source[0] / spacing, source[1] / spacing, work.sheets, work.fields[2])
+
+    def update() -> None:
+        work.update(slowness.copy(), coverage, region, spacing, 0.1, 1.0, (1e-4, 1e-3))
+
+    both, first, last = least(look, front, update)
+    return Split(first, both - first, last)
+
+
+def least(*runs: Callable[[], None]) -> list[float]:
+    """Seconds of the fastest run of each, in turn, after one that compiles."""
+    seconds = []
+    for _ in range(REPEATS + 1):
+        took = []
+        for run in runs:
+            started = time.perf_counter()
+            run()
+            took.append(time.perf_counter() - started)
+        seconds.append(took)
+    return [min(of_one) for of_one in zip(*seconds[1:], strict=True)]

@@ -1,0 +1,42 @@
+"""A sheet of images that share one scale of speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
+
+from ..shared._palette import with_a_palette
+
+
+@dataclass(frozen=True)
+class Panel:
+    """An image, (nx, ny), m/s, and what stands above it."""
+
+    title: str
+    image: np.ndarray
+
+
+def picture(title: str, panels: Sequence[Panel], columns: int) -> bytes:
+    """PNG of all panels, in rows; colours span what the first panel shows."""
+    rows = -(-len(panels) // columns)
+    limits = robust_limits([panels[0].image])
+    with drawing():
+        figure = new_figure(1.9 * columns + 0.9, 2.3 * rows + 0.5)
+        figure.suptitle(title)
+        places = figure.subplots(rows, columns, squeeze=False)
+        maps = []
+        for axes, panel in zip(places.flat, panels, strict=False):
+            maps.append(
+                draw_map(axes, panel.image, (1e-3, 1e-3), (0.0, 0.0), limits, colormap=SPEED, title="")
+            )
+            axes.set_title(panel.title, fontsize=8)
+            axes.set_axis_off()
+        for axes in list(places.flat)[len(panels) :]:
+            axes.set_visible(False)
+        draw_bar(maps, "speed (m/s)")
+        return with_a_palette(to_png(figure))

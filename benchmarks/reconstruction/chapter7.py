@@ -1,0 +1,57 @@
+"""Figures 32 and 33 of the dissertation and its errors: theirs beside ours, with SNR 10, in one picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from bentray_service.cli.output.benchmark_row import Row
+from bentray_service.cli.output.terminal import Step
+from bentray_workers.files.atomic import write_bytes
+
+from ._ladder import BEST, FAT_MPS, WATER_MPS
+from ._phantom_scan import PhantomScan
+from ._sections_picture import Panel, picture
+
+PICTURE = Path(__file__).parents[1] / "results" / "chapter7.png"
+
+# Root mean square errors over the range, on data of a wave equation; ours are on Eikonal times.
+THEIRS = {"straight": 0.25, "default": 0.04, "best": 0.04}
+THEIR_ATTENUATION = 0.075
+
+# Heights of Figure 32, m: near the centre, and near the bottom.
+HEIGHTS = {"centre": 0.0, "bottom": 0.02}
+WAYS: dict[str, dict[str, object]] = {"straight": {"rays": "straight"}, "default": {}, "best": BEST}
+SNR = 10.0
+
+
+def rows(quick: bool, progress: Step) -> Iterable[Row]:
+    """Errors of two slices in two couplings, and of the one at the centre with SNR 10; the goal is theirs."""
+    nodes, elements = (64, 64) if quick else (128, 256)
+    panels: list[Panel] = []
+    cases = [(c, z, None) for c in (FAT_MPS, WATER_MPS) for z in HEIGHTS]
+    cases += [(c, "centre", SNR) for c in (FAT_MPS, WATER_MPS)]
+    for coupling, place, snr in cases:
+        scan = PhantomScan.of_table7(HEIGHTS[place], nodes, elements, coupling, snr, progress)
+        where = f"{place}, coupling {coupling:g}" + ("" if snr is None else f", SNR {snr:g}")
+        panels.append(Panel(f"{place} in {coupling:g} m/s", scan.truth))
+        for name, changes in WAYS.items():
+            found = scan.run(progress, f"{name}, {where}", **changes)
+            noise = "" if snr is None else f", SNR {snr:g}"
+            panels.append(Panel(f"{name}{noise}\n{found.whole_rms:.3f}", found.result.speed))
+            detail = f"whole image; theirs {THEIRS[name]:g}; inside the breast {found.rms:.3f}; {found.how}"
+            yield Row(f"Figure 32 {name}, {where}", found.whole_rms, THEIRS[name], "<=", "of range", detail)
+            if name == "default":
+                detail = f"inside the breast; theirs {THEIR_ATTENUATION:g} of the whole image"
+                yield Row(
+                    f"Figure 33 attenuation, {where}",
+                    found.attenuation_rms,
+                    THEIR_ATTENUATION,
+                    "<=",
+                    "of range",
+                    detail,
+                )
+    if not quick:
+        PICTURE.parent.mkdir(exist_ok=True)
+        title = "Table 7 phantom: what chapter 7 shows, speed in m/s, rms error over the range"
+        write_bytes(PICTURE, picture(title, panels, 2 * (1 + len(WAYS))))

@@ -1,0 +1,180 @@
+"""R5 and rows 3 and 4 of Table 8: seconds of whole volumes slice by slice, where they go, how they grow."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.phantoms import TABLE7_SIDE_M
+from bentray_kernels.tomography import Problem, Settings, rmse
+from bentray_kernels.tomography.gauss_newton.gauss_newton_step import look
+from bentray_kernels.tomography.grid_schedule import start
+from bentray_kernels.tomography.sart.sart_step import advance, begin
+from bentray_kernels.tomography.task_chains import cut
+from bentray_service.cli.output.benchmark_row import Row
+from bentray_service.cli.output.terminal import Step
+from bentray_workers.cluster.connection import Cluster, open_cluster
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.reconstruction.reconstruction_run import reconstruct
+from bentray_workers.simulation.volume import VolumeSimulationSettings, simulate_volume
+
+from ._pass_split import split
+
+COUPLING_MPS = 1375.0
+SWEEPS = 3
+
+# Nodes along a side, slices, transducers, and slices that are simulated; the others repeat them.
+SIZES = ((128, 40, 256, 4), (256, 44, 512, 2))
+QUICK = ((64, 8, 64, 2),)
+
+# Seconds asked for, and those of the dissertation's processors and graphics cards by the solver.
+GOALS = {(128, 40): 15.0, (256, 44): 120.0}
+THEIRS = {
+    (128, 40): "theirs: FMM 2400, FSM 2649 (cluster 506), FIM 3316 (Tesla 30.9) s",
+    (256, 44): "theirs: FMM 19200, FSM 32732 (cluster 6393), FIM 37221 (Tesla 225.76) s",
+}
+
+# Grids and arrays that the growth is fitted over, the other one kept.
+NODES, ELEMENTS = (64, 96, 128, 192, 256), (64, 128, 256, 512)
+QUICK_NODES, QUICK_ELEMENTS = (32, 64), (32, 64)
+
+
+def rows(quick: bool, progress: Step) -> Iterable[Row]:
+    """Seconds of three sweeps over a Table 7 volume on two cores, and how a sweep grows."""
+    for nodes, slices, elements, distinct in QUICK if quick else SIZES:
+        yield from volume(nodes, slices, elements, distinct, progress)
+        yield where(nodes, slices, elements)
+    yield from growth(quick, progress)
+
+
+def where(nodes: int, slices: int, elements: int) -> Row:
+    """What one emitter's pass takes of a core, in parts, against what the time asked for leaves it."""
+    parts = split(nodes, elements)
+    goal = 1e3 * 2 * GOALS.get((nodes, slices), 10.0) / (slices * elements * SWEEPS)
+    label = f"R5 one pass, {nodes}², {elements} transducers"
+    return Row(label, 1e3 * parts.whole, goal, "<=", "ms", str(parts))
+
+
+def volume(nodes: int, slices: int, elements: int, distinct: int, progress: Step) -> Iterable[Row]:
+    """One volume, with straight rays beside, which spend the same on everything but the front."""
+    with open_cluster(workers=2) as cluster:
+        dataset, truth, inside = scan(nodes, slices, elements, distinct, cluster, progress)
+        seconds, error = {}, {}
+        for rays in ("straight", "curved"):
+            settings = Settings(
+                rays=rays, nodes=nodes, side_m=TABLE7_SIDE_M, sweeps=SWEEPS, attenuation=False
+            )
+            seconds[rays], speed = timed(cluster, dataset, settings, progress, f"{nodes}², {rays} rays")
+            error[rays] = rmse(speed, truth, inside) / float(np.ptp(truth[inside]))
+    passes = slices * elements * SWEEPS
+    goal = GOALS.get((nodes, slices), 10.0)
+    detail = (
+        f"{passes} emitter passes, {1e3 * 2 * seconds['curved'] / passes:.2f} ms of a core each, "
+        f"NRMSE {error['curved']:.3f}; straight {seconds['straight']:.1f} s, NRMSE {error['straight']:.3f}; "
+        f"{distinct} slices simulated, the others repeat them"
+    )
+    if (nodes, slices) in THEIRS:
+        detail = f"{THEIRS[nodes, slices]}; {detail}"
+    label = f"R5 {nodes}² by {slices}, {elements} transducers"
+    yield Row(label, seconds["curved"], goal, "<=", "s", detail)
+
+
+def scan(
+    nodes: int, slices: int, elements: int, distinct: int, cluster: Cluster, progress: Step
+) -> tuple[Dataset, np.ndarray, np.ndarray]:
+    """A scan whose slices repeat a few, with the true speed and the inside of the breast."""
+    asked = VolumeSimulationSettings(nodes, distinct, elements, COUPLING_MPS)
+    few = simulate_volume(
+        cluster.client,
+        asked,
+        lambda p: progress(p.done, p.total, f"simulating {distinct} slices of {nodes}²"),
+    )
+    which = np.arange(slices) % distinct
+    many = replace(
+        few,
+        delta_tof_s=few.delta_tof_s[which],
+        slice_z_m=np.arange(slices) * TABLE7_SIDE_M / (nodes - 1),
+        truth=None,
+        roi=None,
+    )
+    return many, few.truth.sound_speed_mps[..., which], few.roi[..., which]
+
+
+def timed(
+    cluster: Cluster, dataset: Dataset, settings: Settings, progress: Step, what: str
+) -> tuple[float, np.ndarray]:
+    """Seconds of a reconstruction by both workers, compiled before, and the speed."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, tiny = Path(folder) / "scan.h5", Path(folder) / "tiny.h5"
+        write_dataset(path, dataset)
+        write_dataset(
+            tiny, replace(dataset, delta_tof_s=dataset.delta_tof_s[:2], slice_z_m=dataset.slice_z_m[:2])
+        )
+        reconstruct(cluster.client, tiny, replace(settings, sweeps=1), work_dir=Path(folder))
+        started = time.perf_counter()
+        result = reconstruct(
+            cluster.client,
+            path,
+            settings,
+            lambda p: progress(p.done, p.total, what),
+            work_dir=Path(folder),
+        )
+        return time.perf_counter() - started, result.speed
+
+
+def growth(quick: bool, progress: Step) -> Iterable[Row]:
+    """Exponents of a sweep's time with nodes along a side and with transducers, and bytes of its rays."""
+    nodes, elements = (QUICK_NODES, QUICK_ELEMENTS) if quick else (NODES, ELEMENTS)
+    times: dict[tuple[int, int], float] = {}
+    sizes: dict[tuple[int, int], int] = {}
+    cases = [(n, elements[0]) for n in nodes] + [(nodes[0], m) for m in elements[1:]]
+    for k, (n, m) in enumerate(cases):
+        progress(k, len(cases), f"growth, {n}² nodes, {m} transducers")
+        times[n, m], sizes[n, m] = sweep(n, m)
+    for name, unit, points in (
+        ("nodes", "nodes along a side", [(n, times[n, elements[0]]) for n in nodes]),
+        ("transducers", "transducers", [(m, times[nodes[0], m]) for m in elements]),
+    ):
+        detail = "; ".join(f"{size} {1e3 * seconds:.0f} ms" for size, seconds in points)
+        detail = f"a sweep over one slice by {unit}: {detail}"
+        yield Row(f"R5 growth of time with {name}", exponent(points), 2.2, "<=", "exponent", detail)
+    for name, points in (
+        ("nodes", [(n, sizes[n, elements[0]]) for n in nodes]),
+        ("transducers", [(m, sizes[nodes[0], m]) for m in elements]),
+    ):
+        detail = "; ".join(f"{size} {size_b / 2**20:.1f} MiB" for size, size_b in points)
+        detail = f"rays that gauss-newton keeps of one slice: {detail}"
+        goal = 1.1 if name == "nodes" else 2.1
+        yield Row(f"R5 growth of rays with {name}", exponent(points), goal, "<=", "exponent", detail)
+
+
+def sweep(nodes: int, elements: int) -> tuple[float, int]:
+    """Seconds of the second SART sweep over a slice, and bytes of the rays of Gauss–Newton through it."""
+    asked = VolumeSimulationSettings(nodes, 2, elements, COUPLING_MPS)
+    # Times of a wrong medium cost what those of the right one do.
+    ring = asked.scan().ring
+    everyone = np.arange(elements)
+    random = np.random.default_rng(0).normal(0.0, 2e-7, (elements, elements))
+    dataset = Dataset(ring.positions(), everyone, everyone, COUPLING_MPS, delta_tof_s=random + random.T)
+    settings = Settings(nodes=nodes, side_m=TABLE7_SIDE_M, sweeps=2)
+    problem = Problem.of(dataset, settings)
+    state = advance(problem, settings, begin(start(problem, None)), elements)
+    started = time.perf_counter()
+    state = advance(problem, settings, state, elements)
+    seconds = time.perf_counter() - started
+    once = problem.each_pair_once()
+    parts = [look(once, settings, state.slowness, emitters) for emitters in cut(once.sounding)[:1]]
+    held = sum(part.columns.nbytes + part.lengths.nbytes + part.pointers.nbytes for part in parts)
+    return seconds, held * len(cut(once.sounding))
+
+
+def exponent(points: list[tuple[int, float]]) -> float:
+    """Of the power law that fits best in logarithms."""
+    size, value = np.log(np.array(points, dtype=np.float64)).T
+    return float(np.polyfit(size, value, 1)[0])

@@ -1,0 +1,122 @@
+"""Table 8 of the dissertation, its two rows of one projection: their seconds beside ours, cell by cell."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from bentray_kernels import eikonal
+from bentray_kernels.opencl import choose
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_service.cli.output.benchmark_row import Row
+from bentray_service.cli.output.terminal import Step
+
+SOURCES = 64
+SIDES = (128, 256)
+
+# A projection is timed until so many seconds have passed, and more than once.
+LEAST_SECONDS = 0.5
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of Table 8.
+
+    Attributes:
+        name: solver and hardware, as the table heads them.
+        hardware: what chapter 7.3 tells of it.
+        seconds: of a projection, by nodes along a side.
+        ours: the method that is put beside it.
+    """
+
+    name: str
+    hardware: str
+    seconds: dict[int, float]
+    ours: str
+
+
+COLUMNS = (
+    Column("FMM CPU", "a 2.8 GHz Pentium 4", {128: 0.025, 256: 0.097}, "fmm"),
+    Column("FSM CPU", "a CPU", {128: 0.031, 256: 0.180}, "fsm"),
+    Column("FSM cluster", "a cluster of 8 nodes", {128: 0.007, 256: 0.039}, "fsm"),
+    Column("FIM CPU", "a CPU", {128: 0.038, 256: 0.189}, "fim"),
+    # The table's heading says 8086GTX, the text 8800 GTX.
+    Column("FIM GPU 8800 GTX", "an NVIDIA 8800 GTX", {128: 0.00082, 256: 0.0023}, "fim-opencl"),
+    Column("FIM GPU Tesla", "an NVIDIA Tesla", {128: 0.00072, 256: 0.0022}, "fim-opencl"),
+)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Our seconds of a projection: alone, and as one of many where the method takes many together."""
+
+    alone: float
+    of_many: float | None
+
+
+def rows(quick: bool, progress: Step) -> Iterable[Row]:
+    """A row a cell and a way to solve; ``quick`` covers 128²."""
+    sides = SIDES[:1] if quick else SIDES
+    names = tuple(dict.fromkeys(column.ours for column in COLUMNS))
+    device, refusal = opencl()
+    for i, nodes in enumerate(sides):
+        found: dict[str, Figures] = {}
+        for k, name in enumerate(names):
+            progress(i * len(names) + k, len(sides) * len(names), f"{name} {nodes}²")
+            if device or not eikonal.METHODS.get(name).on_device:
+                found[name] = measured(name, nodes)
+        for column in COLUMNS:
+            ran_on = device if eikonal.METHODS.get(column.ours).on_device else "one core"
+            yield from beside(column, nodes, found.get(column.ours), ran_on, refusal)
+    progress(len(sides) * len(names), len(sides) * len(names), "done")
+
+
+def beside(column: Column, nodes: int, figures: Figures | None, ran_on: str, refusal: str) -> Iterable[Row]:
+    """Our figures beside one cell of the table."""
+    goal = column.seconds[nodes]
+    theirs = f"theirs {goal * 1e3:g} ms on {column.hardware}, 2008"
+    label = f"Table 8 {nodes}² {column.name}"
+    if figures is None:
+        yield Row(label, None, goal, "<=", "s", f"no OpenCL device: {refusal}; {theirs}")
+        return
+    ways = {"single": figures.alone, f"of {SOURCES}": figures.of_many}
+    for way, seconds in ways.items():
+        if seconds is not None:
+            times = f"{goal / seconds:.3g} times as fast"
+            how = f"{column.ours} {seconds * 1e3:.3g} ms on {ran_on}, {times}; {theirs}"
+            yield Row(f"{label}, {way}", seconds, goal, "<=", "s", how)
+
+
+def measured(name: str, nodes: int) -> Figures:
+    """Projections through the breast of Table 6 in water of 1500 m/s, emitters on a ring."""
+    speed = table6(1500.0).speed(nodes, TABLE6_SIDE_M)
+    spacing = TABLE6_SIDE_M / (nodes - 1)
+    angle = 2.0 * np.pi * np.arange(SOURCES) / SOURCES
+    ring = TABLE6_SIDE_M * (0.5 + 0.475 * np.column_stack((np.cos(angle), np.sin(angle))))
+    alone = least_seconds(lambda: eikonal.solve(speed, spacing, ring[0], name))
+    if eikonal.METHODS.get(name).run_many is None:
+        return Figures(alone, None)
+    together = least_seconds(lambda: eikonal.solve_many(speed[None], spacing, ring, name))
+    return Figures(alone, together / SOURCES)
+
+
+def least_seconds(run: Callable[[], object]) -> float:
+    """Least seconds of one run, after one that is not counted."""
+    run()
+    taken: list[float] = []
+    while len(taken) < 2 or sum(taken) < LEAST_SECONDS:
+        start = time.perf_counter()
+        run()
+        taken.append(time.perf_counter() - start)
+    return min(taken)
+
+
+def opencl() -> tuple[str, str]:
+    """The device that ``fim-opencl`` runs on, empty where there is none, and why it is none."""
+    choice = choose()
+    if choice.device is not None:
+        return choice.device.label, ""
+    return "", "; ".join(choice.refusals) or "this machine has none"

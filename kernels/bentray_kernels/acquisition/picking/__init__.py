@@ -1,0 +1,1 @@
+"""First arrivals: onsets in traces, differences to water, and picks that agree with their neighbours."""

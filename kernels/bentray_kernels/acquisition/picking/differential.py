@@ -1,0 +1,124 @@
+"""The arrivals of one emission: object minus water at every receiver, one trace at a time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...compiled import kernel
+from .cross_correlation import likeliest, match, noise_share, spread
+from .onset import Trace, prepare
+from .pickers import CORRELATION, onset
+
+# Speeds along the straight path that a first arrival may have, m/s: slower than fat, faster than skin.
+SLOWEST_MPS = 1300.0
+FASTEST_MPS = 1700.0
+
+# How far from the straight water time the water pulse may lie, periods: the pulse's own length, with the
+# reference time anywhere in it, and the dispersion of a simulated one.
+WATER_REACH = 4.0
+
+# The part of the water pulse that is sought in the object trace, periods before and after its onset. It
+# ends with the first swings: the coda belongs to other paths.
+PULSE_BEFORE = 0.5
+PULSE_AFTER = 1.5
+
+# How far the match may move the onset, periods; further on lies the next swing.
+MATCH_REACH = 0.5
+
+# Least likeness of the pulse in object and water.
+LEAST_LIKENESS = 0.8
+
+# Independent values of the noise in a period, at most: it is as narrow as the transducers' band.
+INDEPENDENT = 4.0
+
+# A delay is not known better than this part of a sample, whatever the noise.
+FINEST = 0.02
+
+# Receivers nearer than this to the emitter, wavelengths, hear its ringing and no path through an object.
+NEAREST = 2.0
+
+
+@kernel
+def emission(
+    object_: Trace,
+    water: Trace,
+    distance: Trace,
+    water_speed: float,
+    rate: float,
+    start: float,
+    frequency: float,
+    rounding: float,
+    picker: int,
+    predicted: Trace,
+    reach: float,
+    delta: Trace,
+    sigma: Trace,
+) -> None:
+    """Fill ``delta`` and ``sigma``, s, for every receiver of one emitter; NaN where nothing was found.
+
+    Args:
+        object_, water: (nrx, nt) traces.
+        distance: (nrx,), m.
+        water_speed: m/s.
+        rate, start: sampling rate, Hz, and time of the first sample, s.
+        frequency: centre frequency of the pulse, Hz.
+        rounding: standard deviation of the traces' rounding, in their unit.
+        picker: code of a ``picking.pickers.Picker``.
+        predicted: (nrx,), s: what a model says of ``delta``; NaN where it says nothing.
+        reach: how far from the prediction the pick may lie, s.
+        delta, sigma: (nrx,), s, written.
+    """
+    nt = water.shape[1]
+    period = rate / frequency
+    w = np.empty(nt)
+    o = np.empty(nt)
+    for r in range(distance.size):
+        delta[r] = np.nan
+        sigma[r] = np.nan
+        far = distance[r]
+        if not far >= NEAREST * water_speed / frequency:
+            continue
+        straight = (far / water_speed - start) * rate
+        begin, end = clip(straight - WATER_REACH * period, straight + WATER_REACH * period, nt)
+        water_noise = prepare(water[r], begin, rounding, w)
+        if end - begin < 2.0 * period or not math.isfinite(water_noise):
+            continue
+        water_onset, strong = onset(w, begin, end, period, water_noise, picker)
+        if not math.isfinite(water_onset):
+            continue
+        # The object's pulse lies where the water's does, moved by what a plausible speed can move it, or by
+        # what the model says.
+        early = (far / FASTEST_MPS - far / water_speed) * rate
+        late = (far / SLOWEST_MPS - far / water_speed) * rate
+        guided = math.isfinite(predicted[r])
+        if guided:
+            early, late = (predicted[r] - reach) * rate, (predicted[r] + reach) * rate
+        begin, end = clip(water_onset + early - period, strong + late + 0.5 * period, nt)
+        noise = prepare(object_[r], begin, rounding, o)
+        if end - begin < 2.0 * period or not math.isfinite(noise):
+            continue
+        pulse, past = clip(water_onset - PULSE_BEFORE * period, water_onset + PULSE_AFTER * period, nt)
+        object_onset, _ = onset(o, begin, end, period, noise, picker)
+        moved = object_onset - water_onset
+        if picker == CORRELATION:
+            moved = likeliest(w, o, pulse, past, early, late, noise)
+        if not math.isfinite(object_onset) or not math.isfinite(moved):
+            continue
+        shift, same = match(w, o, pulse, past, moved, MATCH_REACH * period)
+        if guided and not early <= shift <= late:
+            continue
+        if math.isfinite(shift) and same >= LEAST_LIKENESS:
+            delta[r] = shift / rate
+            quiet = noise_share(w, pulse, past, water_noise)
+            moved_by = min(max(math.floor(shift + 0.5), -pulse), nt - past)
+            noisy = quiet + noise_share(o, pulse + moved_by, past + moved_by, noise)
+            count = max(1, math.floor(INDEPENDENT * (past - pulse) / period))
+            sigma[r] = math.hypot(spread(same, period, noisy, min(count, past - pulse)), FINEST) / rate
+
+
+@kernel(inline="always")
+def clip(begin: float, end: float, nt: int) -> tuple[int, int]:
+    """The samples of a window inside the trace, as (first, one past the last)."""
+    return min(max(math.floor(begin), 0), nt), min(max(math.ceil(end) + 1, 0), nt)

@@ -1,0 +1,209 @@
+"""First arrivals of a whole scan: travel time object minus water, read from its traces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import InvalidInput
+from .. import rules
+from ..dataset import Dataset, Floats
+from .consistency import consistent
+from .differential import emission
+from .pickers import PICKERS, Picker, picker_named
+from .pulse import Inverse
+
+__all__ = ["PICKERS", "pick"]
+
+# Standard deviation of rounding to whole numbers.
+ROUNDING = 1.0 / math.sqrt(12.0)
+
+
+def pick(
+    dataset: Dataset,
+    picker: str = "aic",
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    predicted_s: Floats | None = None,
+    reach_s: float | None = None,
+    screened: bool = True,
+) -> Dataset:
+    """Read the travel times of a scan from its traces.
+
+    The water and the object trace of a pair are picked in the same way, so that the shape of the pulse
+    and the delay of the electronics cancel. The water onset is sought about the straight time at the
+    water's speed, the object onset where speeds from 1300 to 1700 m/s put it. The delay between the two
+    is then refined: the first one and a half periods of the water pulse are correlated with the object
+    trace, to a fraction of a sample. Pairs are left out (NaN) that are nearer than two wavelengths, have
+    no pulse above four times the noise, do not resemble the water pulse, or contradict their neighbours
+    or their own reverse by more than half a period.
+
+    The standard deviation counts the measured noise as averaged over the pulse, and all else that object and
+    water pulse differ in as pulling one way, at the centre frequency; see ``cross_correlation.spread``.
+
+    Args:
+        dataset: with traces of object and water, a sampling rate and a centre frequency.
+        picker: what finds the onset, see ``picking.pickers.PICKERS``.
+        progress: called with (emissions done, emissions in all).
+        predicted_s: (…, ntx, nrx), s: object minus water as a model has it; the object's window is then
+            about it and not where plausible speeds put it. NaN where the model says nothing.
+        reach_s: how far from the prediction a pick may lie, s; None: a period.
+        screened: false keeps what neighbours or reverse contradict, for ``quality`` to name.
+
+    Returns:
+        The dataset with ``delta_tof_s``, ``sigma_s`` and ``picker`` set, and without its traces and any
+        older absolute travel times.
+
+    Raises:
+        InvalidInput: for an unknown picker, or a dataset that lacks one of the above.
+    """
+    reach = reach_of(dataset, picker, reach_s)
+    nz, every = dataset.slices, range(len(dataset.tx))
+    predicted = _predictions(dataset, predicted_s)
+    parts = []
+    for k in range(nz):
+        one = dataset.slice(k)
+
+        def done(e: int, k: int = k) -> None:
+            if progress is not None:
+                progress(k * len(every) + e + 1, nz * len(every))
+
+        times = read_times(one, every, picker, predicted[k], reach, done)
+        parts.append(settled(one, *times, screened=screened))
+    delta, sigma = (np.stack(both) for both in zip(*parts, strict=True))
+    if dataset.slice_z_m is None:
+        delta, sigma = delta[0], sigma[0]
+    return replace(dataset, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=picker, waveform=None)
+
+
+def reach_of(dataset: Dataset, picker: str, reach_s: float | None = None) -> float:
+    """How far from a prediction a pick may lie, s, of a scan that can be picked.
+
+    Raises:
+        InvalidInput: as ``pick``.
+    """
+    picker_named(picker)
+    require_traces(dataset)
+    assert dataset.center_frequency_hz is not None
+    reach = 1.0 / dataset.center_frequency_hz if reach_s is None else reach_s
+    if not 0.0 < reach < math.inf:
+        raise InvalidInput("reach_s", reach_s, "a finite time > 0 s")
+    return reach
+
+
+def read_times(
+    dataset: Dataset,
+    emissions: Sequence[int],
+    picker: str,
+    predicted_s: Floats,
+    reach_s: float,
+    done: Callable[[int], None] = lambda e: None,
+) -> tuple[Floats, Floats]:
+    """The times of some emissions by themselves, before anything else is asked of them.
+
+    Args:
+        dataset: of one slice, see ``pick``; its traces may be ``Emissions``.
+        emissions: which, counted from 0.
+        picker: one of ``PICKERS``.
+        predicted_s: (ntx, nrx), s; NaN where nothing is predicted.
+        reach_s: see ``reach_of``.
+        done: called after each.
+
+    Returns:
+        Object minus water and its standard deviation, (emissions, nrx), s; NaN where nothing was found.
+    """
+    chosen = picker_named(picker)
+    inverse = Inverse.of(dataset) if chosen.filtered else None
+    delta = np.empty((len(emissions), len(dataset.rx)))
+    sigma = np.empty_like(delta)
+    for row, e in enumerate(emissions):
+        _pick_emission(dataset, e, chosen, inverse, predicted_s[e], reach_s, delta[row], sigma[row])
+        done(e)
+    return delta, sigma
+
+
+def settled(dataset: Dataset, delta: Floats, sigma: Floats, *, screened: bool) -> tuple[Floats, Floats]:
+    """The times of a slice without those of pairs that may not be used, or that others contradict.
+
+    Args:
+        dataset: of one slice.
+        delta, sigma: (ntx, nrx), s, as ``read_times`` gives them.
+        screened: see ``pick``.
+
+    Returns:
+        The same, NaN where there is none.
+    """
+    assert dataset.center_frequency_hz is not None
+    delta = delta.copy()
+    if dataset.valid is not None:
+        delta[~dataset.valid] = np.nan
+    delta[dataset.tx[:, None] == dataset.rx[None, :]] = np.nan
+    if screened:
+        delta = consistent(dataset, delta, 0.5 / dataset.center_frequency_hz)
+    return delta, np.where(np.isfinite(delta), sigma, np.nan)
+
+
+def require_traces(dataset: Dataset) -> None:
+    """What picking needs is there.
+
+    Raises:
+        InvalidInput: naming what is not.
+    """
+    if dataset.waveform is None:
+        raise InvalidInput("waveform/object", "no traces", "traces to pick from")
+    if dataset.waveform.water is None:
+        raise InvalidInput("waveform/water", "no traces", "the same scan without the object, to compare with")
+    if dataset.center_frequency_hz is None:
+        raise InvalidInput(
+            "acquisition@center_frequency_hz", "nothing", "the centre frequency of the pulse, Hz"
+        )
+
+
+def _predictions(dataset: Dataset, predicted_s: Floats | None) -> Floats:
+    """(nz, ntx, nrx), s; NaN without a model."""
+    shape = (dataset.slices, len(dataset.tx), len(dataset.rx))
+    if predicted_s is None:
+        return np.full(shape, np.nan)
+    rules.shape("predicted_s", predicted_s, shape if dataset.slice_z_m is not None else shape[1:])
+    return np.asarray(predicted_s, dtype=np.float64).reshape(shape)
+
+
+def _pick_emission(
+    dataset: Dataset,
+    e: int,
+    picker: Picker,
+    inverse: Inverse | None,
+    predicted: Floats,
+    reach: float,
+    delta: Floats,
+    sigma: Floats,
+) -> None:
+    traces = dataset.waveform
+    assert traces is not None
+    assert traces.water is not None
+    assert dataset.sampling_rate_hz is not None
+    assert dataset.center_frequency_hz is not None
+    rounding = ROUNDING if traces.object.dtype.kind == "i" else 0.0
+    object_, water = (np.ascontiguousarray(t[e]) for t in (traces.object, traces.water))
+    if inverse is not None:
+        object_, water, rounding = inverse(object_), inverse(water), inverse.gain * rounding
+    emission(
+        object_,
+        water,
+        np.linalg.norm(
+            dataset.element_position_m[dataset.rx] - dataset.element_position_m[dataset.tx[e]], axis=1
+        ),
+        float(dataset.water_speed_mps),
+        float(dataset.sampling_rate_hz),
+        float(dataset.t0_s),
+        float(dataset.center_frequency_hz),
+        rounding,
+        picker.code,
+        predicted,
+        reach,
+        delta,
+        sigma,
+    )

@@ -1,0 +1,127 @@
+"""First motion in one trace at a time: noise, the first strong swing, AIC and threshold onsets.
+
+Traces are (nt,) in any unit; places and lengths are in samples and may be fractions. Nothing here
+depends on the unit of a trace, so per-trace scales are not needed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiled import kernel
+from .peak_interpolation import vertex
+
+Trace = NDArray[Any]
+
+# Fewest samples before the arrival that tell the noise.
+LEAD = 16
+
+# Floor of the standard deviations in the AIC, part of the peak. Without it the logarithm of a noiseless
+# lead reacts to the first bit that moves, which an attenuating object hides and water does not.
+AIC_FLOOR = 0.01
+
+# Height of the threshold: part of the peak, or multiples of the noise if that is more.
+THRESHOLD_PART = 0.2
+THRESHOLD_NOISE = 4.0
+
+# The first arrival ends where the trace first comes this near its peak in the window: what follows may be
+# stronger (paths around a lens) but is later.
+STRONG_PART = 0.5
+
+# A peak below this many standard deviations of the noise is none.
+FAINTEST = 4.0
+
+
+@kernel
+def prepare(trace: Trace, lead: int, rounding: float, out: Trace) -> float:
+    """Copy a trace less its offset to ``out``; give the noise, NaN where a sample is not finite.
+
+    Offset and noise are the median and the median deviation of the first ``lead`` samples, which a spike
+    among them, such as the cross-talk of the emission, does not move. Where the lead is too short to
+    tell, the noise is ``rounding``, the standard deviation that whole numbers have by themselves.
+    """
+    n = trace.size
+    for i in range(n):
+        out[i] = trace[i]
+        if not math.isfinite(out[i]):
+            return np.nan
+    known = lead >= LEAD
+    offset = np.median(out[:lead]) if known else np.median(out)
+    for i in range(n):
+        out[i] -= offset
+    return max(1.4826 * np.median(np.abs(out[:lead])), rounding) if known else rounding
+
+
+@kernel
+def first_strong(x: Trace, begin: int, end: int, period: float, noise: float) -> int:
+    """Place of the largest swing of the first arrival in ``x[begin:end]``; −1 if there is none."""
+    peak = 0.0
+    for i in range(begin, end):
+        peak = max(peak, abs(x[i]))
+    if peak <= FAINTEST * noise or peak == 0.0:
+        return -1
+    at = begin
+    while abs(x[at]) < STRONG_PART * peak:
+        at += 1
+    best = at
+    for i in range(at, min(end, at + math.ceil(period))):
+        if abs(x[i]) > abs(x[best]):
+            best = i
+    return best
+
+
+@kernel
+def aic(x: Trace, begin: int, end: int) -> float:
+    """Onset where ``x[begin:end]`` splits best into two stationary parts; NaN at the window's rim.
+
+    AIC(k) = k ln var(before k) + (n − k) ln var(from k), N. Maeda, Zisin 38 (1985) 365-379, with a
+    parabola through the lowest three values for the fraction of a sample.
+    """
+    n = end - begin
+    if n < 8:
+        return np.nan
+    total = 0.0
+    square = 0.0
+    peak = 0.0
+    for i in range(begin, end):
+        total += x[i]
+        square += x[i] * x[i]
+        peak = max(peak, abs(x[i]))
+    floor = (AIC_FLOOR * peak) ** 2
+    value = np.full(n, np.inf)
+    lowest = 2
+    left = 0.0
+    left_square = 0.0
+    for k in range(1, n):
+        left += x[begin + k - 1]
+        left_square += x[begin + k - 1] ** 2
+        if 2 <= k <= n - 2:
+            before = max(left_square / k - (left / k) ** 2, 0.0)
+            m = n - k
+            after = max((square - left_square) / m - ((total - left) / m) ** 2, 0.0)
+            value[k] = k * math.log(before + floor) + m * math.log(after + floor)
+            if value[k] < value[lowest]:
+                lowest = k
+    if lowest == 2 or lowest == n - 2:
+        return np.nan
+    return float(begin + lowest + vertex(value[lowest - 1], value[lowest], value[lowest + 1]))
+
+
+@kernel
+def threshold(x: Trace, begin: int, end: int, noise: float) -> float:
+    """Where ``|x[begin:end]|`` first crosses the threshold, between samples; NaN if it starts above."""
+    peak = 0.0
+    for i in range(begin, end):
+        peak = max(peak, abs(x[i]))
+    height = max(THRESHOLD_PART * peak, THRESHOLD_NOISE * noise)
+    if end - begin < 2 or abs(x[begin]) >= height:
+        return np.nan
+    for i in range(begin + 1, end):
+        if abs(x[i]) >= height:
+            low = abs(x[i - 1])
+            return float(i - 1 + (height - low) / (abs(x[i]) - low))
+    return np.nan

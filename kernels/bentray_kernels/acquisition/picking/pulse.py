@@ -1,0 +1,131 @@
+"""The pulse of a scan, measured in water, and the filter that takes it off the traces."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InvalidInput
+from ..dataset import Dataset, Floats
+
+# Power below this part of the strongest frequency's is left as it is rather than raised to the others.
+WATER_LEVEL = 0.05
+
+# Periods before and after the straight time that the pulse may fill.
+BEFORE, AFTER = 4.0, 4.0
+
+# Emissions, evenly chosen, that the pulse is averaged over.
+EMISSIONS = 16
+
+# A pulse is read where the trace is at least this far, wavelengths: nearer ones are cross-talk.
+FAR = 10.0
+
+
+def measured_pulse(dataset: Dataset, arrival_s: Floats | None = None) -> Floats:
+    """The pulse that water carries, about its arrival: the median over pairs, each scaled to its peak.
+
+    Args:
+        dataset: of one slice, with water traces, sampling rate and centre frequency.
+        arrival_s: (ntx, nrx), s, NaN where unknown; None: the straight times.
+
+    Returns:
+        (n,), the arrival ``BEFORE`` periods after the first sample.
+
+    Raises:
+        InvalidInput: where no water trace holds the pulse whole.
+    """
+    assert dataset.waveform is not None
+    assert dataset.waveform.water is not None
+    assert dataset.sampling_rate_hz is not None
+    assert dataset.center_frequency_hz is not None
+    period = dataset.sampling_rate_hz / dataset.center_frequency_hz
+    before, length = math.ceil(BEFORE * period), math.ceil((BEFORE + AFTER) * period)
+    distance = dataset.distance_m()
+    least = min(FAR * dataset.water_speed_mps / dataset.center_frequency_hz, 0.5 * float(distance.max()))
+    if arrival_s is None:
+        arrival_s = distance / dataset.water_speed_mps
+    found: list[Floats] = []
+    for e in range(0, len(dataset.tx), max(1, len(dataset.tx) // EMISSIONS)):
+        place = (arrival_s[e] - dataset.t0_s) * dataset.sampling_rate_hz
+        heard = (distance[e] >= least) & np.isfinite(place)
+        found += _pieces(dataset.waveform.water[e], place, heard, before, length)
+    if not found:
+        raise InvalidInput(
+            "waveform/water", "no pulse whole in any trace", "traces that hold it about its arrival"
+        )
+    return np.asarray(np.median(found, axis=0), dtype=np.float64)
+
+
+def _pieces(
+    traces: NDArray[Any], place: Floats, heard: NDArray[np.bool_], before: int, length: int
+) -> list[Floats]:
+    """The pulses of one emission, moved by fractions of a sample to the same place, peak 1."""
+    turn = -2j * np.pi * np.fft.rfftfreq(length)
+    pieces = []
+    for r in np.flatnonzero(heard):
+        begin = math.floor(place[r]) - before
+        if begin < 0 or begin + length > traces.shape[1]:
+            continue
+        piece = traces[r, begin : begin + length].astype(np.float64)
+        if not np.isfinite(piece).all():
+            continue
+        # A piece without an offset ends near zero at both sides, so that the move does not wrap a step.
+        piece -= np.median(piece)
+        peak = np.abs(piece).max()
+        if peak == 0.0:
+            continue
+        part = place[r] - math.floor(place[r])
+        pieces.append(np.fft.irfft(np.fft.rfft(piece / peak) * np.exp(-turn * part), length))
+    return pieces
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """Deconvolution with a pulse, its largest swing staying where it is.
+
+    Attributes:
+        spectrum: of the filter, over the frequencies of ``length`` samples.
+        length: samples that traces are padded to.
+        gain: standard deviation of filtered noise over that of the noise, which is white.
+    """
+
+    spectrum: NDArray[np.complex128]
+    length: int
+    gain: float
+
+    @classmethod
+    def of(cls, dataset: Dataset) -> Inverse:
+        """The filter of a scan: with the recorded wavelet where there is one, else with ``measured_pulse``.
+
+        W = S* / (|S|² + ε max |S|²), so what is left of the pulse has no phase and a flat band.
+
+        Raises:
+            InvalidInput: as ``measured_pulse``; for a wavelet without a signal.
+        """
+        assert dataset.waveform is not None
+        pulse = measured_pulse(dataset) if dataset.wavelet is None else dataset.wavelet
+        if not np.any(pulse):
+            raise InvalidInput("acquisition/wavelet", "zeros", "samples of the pulse")
+        length = 2 ** math.ceil(math.log2(dataset.waveform.object.shape[-1] + pulse.size))
+        power = np.fft.rfft(pulse, length)
+        # Time counts from the largest swing, whatever the wavelet's own reference.
+        power = power * np.exp(2j * np.pi * np.fft.rfftfreq(length) * int(np.argmax(np.abs(pulse))))
+        level = WATER_LEVEL * float((np.abs(power) ** 2).max())
+        spectrum = np.conj(power) / (np.abs(power) ** 2 + level)
+        gain = math.sqrt(float(np.mean(np.abs(spectrum) ** 2)))
+        return cls(spectrum, length, gain)
+
+    def __call__(self, traces: NDArray[Any]) -> Floats:
+        """Filtered copies, (nrx, nt); a trace with a value that is not finite becomes NaN."""
+        whole = traces.astype(np.float64)
+        finite = np.isfinite(whole).all(axis=1)
+        whole[~finite] = 0.0
+        whole -= np.median(whole, axis=1, keepdims=True)
+        spectrum = np.fft.rfft(whole, self.length, axis=1) * self.spectrum
+        filtered = np.fft.irfft(spectrum, self.length, axis=1)[:, : whole.shape[1]]
+        filtered[~finite] = np.nan
+        return np.asarray(filtered)

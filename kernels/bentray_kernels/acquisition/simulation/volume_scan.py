@@ -1,0 +1,93 @@
+"""Scans of a volume by a ring at several heights: wave fronts in each plane, or in space."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import InvalidInput
+from ...phantoms import VolumePhantom
+from .fine_medium import FineMedium
+from .ring_scan import Ring, TravelTimeScan
+
+# Nodes of the coarse grid kept above the highest ring and below the lowest, for rays that leave the planes.
+AXIAL_MARGIN_NODES = 3
+
+
+@dataclass(frozen=True)
+class VolumeScan:
+    """A ring moved along z, or as many rings at once (section 7.1).
+
+    Attributes:
+        phantom: sampled afresh on the fine grid.
+        ring: the elements at each height.
+        z_m: heights of the ring, m, rising.
+        side_m: side of the square that holds phantom and ring, m.
+        nodes: nodes along the side of the grid that a reconstruction will use.
+        refinement: how many times finer the simulation is: at least 4 in planes, 2 in space, where each
+            doubling costs more than ten times the work.
+        three_d: wave fronts in space; else each plane is a world of its own.
+    """
+
+    phantom: VolumePhantom
+    ring: Ring
+    z_m: tuple[float, ...]
+    side_m: float
+    nodes: int = 128
+    refinement: int = 4
+    three_d: bool = False
+
+    def __post_init__(self) -> None:
+        heights = np.asarray(self.z_m, dtype=np.float64)
+        if heights.size == 0 or not (np.isfinite(heights).all() and (np.diff(heights) > 0.0).all()):
+            raise InvalidInput("z_m", self.z_m, "one or more finite heights that rise, m")
+        if not self.three_d:
+            self.slice(0)
+            return
+        if self.refinement < 2:
+            raise InvalidInput(
+                "refinement", self.refinement, "at least 2: a coarser grid would be an inverse crime"
+            )
+        if self.ring.radius_m > 0.5 * self.side_m:
+            raise InvalidInput(
+                "radius_m", self.ring.radius_m, f"at most half the side, {0.5 * self.side_m:g} m"
+            )
+
+    def slice(self, index: int) -> TravelTimeScan:
+        """The scan of one plane as a world of its own."""
+        return TravelTimeScan(
+            self.phantom.at(self.z_m[index]), self.ring, self.side_m, self.nodes, self.refinement
+        )
+
+    def positions(self) -> Floats:
+        """Elements, one height after another, (heights · elements, 3), m, origin on the axis."""
+        flat = self.ring.positions()
+        rings = [np.column_stack((flat, np.full(len(flat), z))) for z in self.z_m]
+        return np.concatenate(rings)
+
+    def elements(self) -> Floats:
+        """``positions`` in the coordinates of ``medium``, m."""
+        return np.asarray(self.positions() - (-0.5 * self.side_m, -0.5 * self.side_m, self._fine_z()[0]))
+
+    def medium(self, *, attenuation: bool = False) -> FineMedium:
+        """The phantom on the fine grid of all heights, with its attenuation or without; for ``three_d``."""
+        fine = self.refinement * (self.nodes - 1) + 1
+        z = self._fine_z()
+        return FineMedium(
+            speed=self.phantom.speed(fine, self.side_m, z),
+            spacing=self.side_m / (fine - 1),
+            coupling_mps=self.phantom.coupling_mps,
+            attenuation=self.phantom.attenuation(fine, self.side_m, z) if attenuation else None,
+            coupling_np_m=self.phantom.coupling_np_m,
+        )
+
+    def _fine_z(self) -> Floats:
+        coarse = self.side_m / (self.nodes - 1)
+        first = self.z_m[0] - AXIAL_MARGIN_NODES * coarse
+        height = self.z_m[-1] - self.z_m[0] + 2 * AXIAL_MARGIN_NODES * coarse
+        # A height that is a multiple of the spacing up to rounding needs no further plane.
+        steps = math.ceil(height * self.refinement / coarse - 1e-6)
+        return np.asarray(first + np.arange(steps + 1) * (coarse / self.refinement))

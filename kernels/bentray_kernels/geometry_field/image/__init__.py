@@ -1,0 +1,1 @@
+"""Geometry images: a surface as a square image, and a mesh again."""

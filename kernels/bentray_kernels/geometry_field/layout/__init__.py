@@ -1,0 +1,1 @@
+"""Flat layouts of surfaces: cutting, conformal maps, distortion."""

@@ -1,0 +1,1 @@
+"""The tables of a geometry field, and lookups in them."""

@@ -1,0 +1,159 @@
+"""The samples of the unit cube's surface, in which lines through it are numbered, and where a ray meets it.
+
+Face k = 2a + b is the one across axis a at coordinate b; its x and y are the two other axes in their order.
+Each face has n² samples at the middles of its squares. A sample (x, y) of face k stands in a rectangle of
+6n × n at x₀ = x + kn, x₁ = y, and has the number 6n·x₁ + x₀ (dissertation, section 5.3.3, figure 24).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...arrays import Floats, Ints
+from ...compiled import kernel
+from ...errors import InvalidInput
+from ...float32 import higher, lower, real, whole
+
+# The dissertation's textures end at 24; at 48 a table has 191 million entries.
+MOST_SAMPLES = 48
+
+# What stands for a direction's 0: its reciprocal is finite in float32, and so are products with it.
+ALMOST_ZERO = real(1e-18)
+# How far outside the cube its faces are for rays, so that one that runs along a face is inside.
+MARGIN = real(1e-7)
+
+# Near and far distance along the ray; then face, x and y of the entry, and of the exit.
+Line = tuple[float, float, int, float, float, int, float, float]
+
+
+def check_samples(n: int) -> None:
+    """Raise for a number of samples along an edge that no table has.
+
+    Raises:
+        InvalidInput: for one not between 2 and 48.
+    """
+    if not 2 <= n <= MOST_SAMPLES:
+        raise InvalidInput("samples", n, f"2 to {MOST_SAMPLES} along an edge of the cube")
+
+
+def samples(n: int) -> Floats:
+    """Places of the samples, (6n², 3) in the order of their numbers, edges of the cube.
+
+    Args:
+        n: samples along an edge.
+
+    Raises:
+        InvalidInput: as ``check_samples``.
+    """
+    check_samples(n)
+    middle = (np.arange(n) + 0.5) / n
+    places = np.empty((n, 6, n, 3))
+    for face in range(6):
+        axis, side = divmod(face, 2)
+        first, second = (other for other in range(3) if other != axis)
+        places[:, face, :, axis] = side
+        places[:, face, :, first] = middle[None, :]
+        places[:, face, :, second] = middle[:, None]
+    return places.reshape(-1, 3)
+
+
+def numbers_of(points: ArrayLike, n: int) -> Ints:
+    """Numbers of the samples nearest to points of the cube's surface, on the face that each lies on.
+
+    Args:
+        points: (points, 3), edges of the cube.
+        n: samples along an edge.
+
+    Raises:
+        InvalidInput: as ``check_samples``, and for a point off the surface by more than 1e-6.
+    """
+    check_samples(n)
+    places = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    away = np.stack([np.abs(places), np.abs(1.0 - places)], axis=-1).reshape(-1, 6)
+    face = away.argmin(axis=1)
+    off = away.min(axis=1, initial=np.inf) > 1e-6
+    off |= (places < -1e-6).any(axis=1) | (places > 1.0 + 1e-6).any(axis=1)
+    if off.any():
+        raise InvalidInput("points", places[off][0].tolist(), "points of the unit cube's surface")
+    others = np.array([[1, 2], [0, 2], [0, 1]])[face // 2]
+    x, y = np.clip((np.take_along_axis(places, others, axis=1) * n).astype(np.int64), 0, n - 1).T
+    numbers: Ints = 6 * n * y + face * n + x
+    return numbers
+
+
+@kernel(inline="always")
+def _not_zero(a: float) -> float:
+    return a if abs(a) > ALMOST_ZERO else ALMOST_ZERO
+
+
+@kernel(inline="always")
+def line_of(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float) -> Line:
+    """Where a ray's line enters and leaves the unit cube; without branches, so that loops are vectorised.
+
+    Args:
+        ox, oy, oz: a point of the line, edges of the cube; inside or outside it.
+        dx, dy, dz: its direction, any length.
+
+    Returns:
+        Distances of entry and exit in lengths of the direction, the first below the second where the line
+        meets the cube; face, x and y in [0, 1] of the entry; the same of the exit.
+    """
+    dx, dy, dz = _not_zero(dx), _not_zero(dy), _not_zero(dz)
+    zero, one = real(0.0), real(1.0)
+    ix, iy, iz = one / dx, one / dy, one / dz
+    low, high = -MARGIN, one + MARGIN
+    ax, bx = (low - ox) * ix, (high - ox) * ix
+    ay, by = (low - oy) * iy, (high - oy) * iy
+    az, bz = (low - oz) * iz, (high - oz) * iz
+    near_x, near_y, near_z = lower(ax, bx), lower(ay, by), lower(az, bz)
+    far_x, far_y, far_z = higher(ax, bx), higher(ay, by), higher(az, bz)
+    near = higher(higher(near_x, near_y), near_z)
+    far = lower(lower(far_x, far_y), far_z)
+    into = whole(0) if near_x == near else (whole(1) if near_y == near else whole(2))
+    out = whole(0) if far_x == far else (whole(1) if far_y == far else whole(2))
+    along_into = dx if into == 0 else (dy if into == 1 else dz)
+    along_out = dx if out == 0 else (dy if out == 1 else dz)
+    face_into = whole(2) * into + (whole(0) if along_into > zero else whole(1))
+    face_out = whole(2) * out + (whole(1) if along_out > zero else whole(0))
+    sx, sy, sz = ox + near * dx, oy + near * dy, oz + near * dz
+    tx, ty, tz = ox + far * dx, oy + far * dy, oz + far * dz
+    return (
+        near,
+        far,
+        face_into,
+        sy if into == 0 else sx,
+        sy if into == 2 else sz,
+        face_out,
+        ty if out == 0 else tx,
+        ty if out == 2 else tz,
+    )
+
+
+@kernel(inline="always")
+def number_at(face: int, x: float, y: float, n: int) -> int:
+    """Number of the sample nearest to a place (x, y) in [0, 1] of a face."""
+    # In floats, which hold it exactly: vectors multiply whole numbers slowly.
+    zero, count, last = real(0.0), real(n), real(n - 1)
+    i = real(whole(lower(higher(x * count, zero), last)))
+    j = real(whole(lower(higher(y * count, zero), last)))
+    number: int = whole(real(6.0) * count * j + i + real(face) * count)
+    return number
+
+
+@kernel
+def number_lines(origins: NDArray[np.float32], directions: NDArray[np.float32], n: int, pairs: Ints) -> None:
+    """Numbers of the samples at which lines enter and leave the cube.
+
+    Args:
+        origins, directions: (3, rays) float32, one row an axis.
+        n: samples along an edge.
+        pairs: (2, rays), filled: entry, exit; −1 for lines that miss the cube.
+    """
+    for k in range(origins.shape[1]):
+        near, far, s, sx, sy, t, tx, ty = line_of(
+            origins[0, k], origins[1, k], origins[2, k], directions[0, k], directions[1, k], directions[2, k]
+        )
+        meets = near < far
+        pairs[0, k] = number_at(s, sx, sy, n) if meets else -1
+        pairs[1, k] = number_at(t, tx, ty, n) if meets else -1

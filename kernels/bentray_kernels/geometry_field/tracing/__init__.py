@@ -1,0 +1,1 @@
+"""Ray tracing of scenes with geometry fields."""

@@ -1,0 +1,135 @@
+"""What a ray meets of one shape: asked of its fields, or of the exact intersector."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Vector
+from ...compiled import kernel
+from ...meshes.face_plane import meet_plane
+from ...meshes.intersector import closest
+from ...meshes.surface import Words
+from ..tables.accurate_lookup import STEPS, settle
+from ..tables.cube import line_of, number_at
+from ..tables.linear_lookup import AGREE
+from ..tables.outer_field import beside
+from ..tables.quadrilinear import corner_of, lerp4
+from .packed_scene import World
+
+# Ways to ask: where the entry nearest to the ray ends; its place, averaged where the entries about the ray
+# agree; the plane of its face; a walk from its face; no field at all.
+NEAREST, LINEAR, PLANE, WALK, EXACT = 0, 1, 2, 3, 4
+WAYS = {"nearest": NEAREST, "linear": LINEAR, "plane": PLANE, "walk": WALK, "exact": EXACT}
+
+# A ray that leaves the surface meets it again at this distance or later, edges of the unit cube.
+LEAST = 1e-6
+
+# Face, −1 for none; distance in lengths of the direction; weights of corners 0 and 1.
+Found = tuple[int, float, float, float]
+
+
+@kernel
+def exactly(world: World, shape: int, waiting: Words, origin: Vector, direction: Vector, left: int) -> Found:
+    """The first face of a shape by the exact intersector; ``left`` is the face that the ray leaves, or −1."""
+    length = (direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2) ** 0.5
+    begin = LEAST / length if left >= 0 else 0.0
+    root = world.shapes[shape, 0]
+    face, distance, first, second, _ = closest(
+        world.surface, waiting, root, origin, direction, begin, np.inf, left
+    )
+    return face, distance, first, second
+
+
+@kernel(inline="always")
+def from_outside(
+    world: World, shape: int, way: int, waiting: Words, origin: Vector, direction: Vector
+) -> Found:
+    """The first face of a shape on a ray that leaves another one, or the eye.
+
+    Args:
+        world: ``world_of``.
+        shape: which of its shapes.
+        way: of ``WAYS``.
+        waiting: room for the exact intersector.
+        origin, direction: in the shape's unit cube.
+    """
+    none = (-1, np.inf, 0.0, 0.0)
+    near, far, s, sx, sy, t, tx, ty = line_of(
+        origin[0], origin[1], origin[2], direction[0], direction[1], direction[2]
+    )
+    if not (near < far and far > 0.0):
+        return none
+    n, start = world.shapes[shape, 1], world.shapes[shape, 2]
+    if way == EXACT or n == 0:
+        return exactly(world, shape, waiting, origin, direction, -1)
+    place = start + number_at(s, sx, sy, n) * (6 * n * n) + number_at(t, tx, ty, n)
+    face = world.faces[place] if way != WALK else beside(world.faces[place])
+    if face < 0:
+        return none
+    length = far - near
+    at = (origin[0] + near * direction[0], origin[1] + near * direction[1], origin[2] + near * direction[2])
+    if way == WALK:
+        face, distance, first, second = settle(world.surface, face, 1.0, STEPS, *at, *direction)
+        distance = min(max(distance, 0.0), length)
+        if face < 0:
+            return none
+    else:
+        plane, first, second, _, _ = meet_plane(world.surface.triangles, face, *at, *direction)
+        distance = world.fractions[place] * length
+        if way == PLANE and 0.0 <= plane <= length:
+            distance = plane
+        corner = corner_of(n, s, sx, sy, t, tx, ty)
+        if way == LINEAR and world.known[start + corner[0]] == AGREE:
+            distance = length * lerp4(world.fractions[start:], n, corner, 1, 0)
+        first, second = inside(first, second)
+    if near + distance < 0.0:
+        # The ray starts within the cube, behind what the entry meets first.
+        return exactly(world, shape, waiting, origin, direction, -1)
+    return face, near + distance, first, second
+
+
+@kernel(inline="always")
+def from_the_surface(
+    world: World,
+    shape: int,
+    way: int,
+    waiting: Words,
+    origin: Vector,
+    direction: Vector,
+    left: int,
+    side: float,
+) -> Found:
+    """The next face of the same shape on a ray that leaves one of its faces.
+
+    Args:
+        world, shape, way, waiting: as in ``from_outside``; any way but "exact" walks from the entry's face,
+            since a ray that starts on the surface has no room for the error of the other ways.
+        origin, direction: in the shape's unit cube.
+        left: the face that the ray leaves.
+        side: 1 for rays outside the body, −1 inside.
+    """
+    n, start = world.shapes[shape, 3], world.shapes[shape, 4]
+    if way == EXACT or n == 0:
+        return exactly(world, shape, waiting, origin, direction, left)
+    _, _, _, _, _, t, tx, ty = line_of(
+        origin[0], origin[1], origin[2], direction[0], direction[1], direction[2]
+    )
+    face = world.inner_faces[start + world.starts[left] * (6 * n * n) + number_at(t, tx, ty, n)]
+    if face >= 0:
+        face, distance, first, second = settle(world.surface, face, side, STEPS, *origin, *direction)
+        length = (direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2) ** 0.5
+        if face >= 0 and face != left and distance * length > LEAST:
+            return face, distance, first, second
+    if side < 0.0:
+        # A ray inside a body meets it somewhere: the entry was one of a ray that passed a fold.
+        return exactly(world, shape, waiting, origin, direction, left)
+    return -1, np.inf, 0.0, 0.0
+
+
+@kernel(inline="always")
+def inside(first: float, second: float) -> tuple[float, float]:
+    """Weights of corners 0 and 1 of the point of a triangle close to one in its plane."""
+    first, second = max(first, 0.0), max(second, 0.0)
+    third = max(1.0 - first - second, 0.0)
+    total = first + second + third
+    return first / total, second / total

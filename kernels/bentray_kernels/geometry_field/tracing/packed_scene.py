@@ -1,0 +1,158 @@
+"""A scene as kernels read it: the arrays of all shapes one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Floats, Ints
+from ...meshes.surface import Reals, Surface, Words
+from ..tables.linear_lookup import agreement
+from .scene import Scene, Shape
+
+# Flags of an instance.
+SEES_ITSELF, SINGLE = 1, 2
+
+
+class World(NamedTuple):
+    """Faces and nodes are counted through all shapes.
+
+    Attributes:
+        surface: the surfaces of all shapes.
+        shapes: (shapes, 5): first node; samples of the outer field, 0 for none, and the place of its first
+            entry; the same of the inner field.
+        faces, fractions: all outer tables.
+        known: ``tables.linear_lookup.agreement`` of them.
+        inner_faces: all inner tables.
+        starts: (faces,) row of the inner table in which rays that leave a face are.
+        to_local: (instances, 3, 4) from m to the unit cube.
+        instances: (instances, 3): shape; texture, −1 for none; flags.
+        looks: (instances, 6): RGB, share mirrored, share refracted, refractive index.
+        pictures: all textures.
+        textures: (textures, 3): place of the first number, rows, columns.
+        sky: (rows, columns, 3).
+        ground: (9,): height; edge of the squares, 0 for no ground; RGB of both kinds; radius.
+        light: (4,): unit vector towards the light; ambient share.
+    """
+
+    surface: Surface
+    shapes: Ints
+    faces: Words
+    fractions: Reals
+    known: NDArray[np.uint8]
+    inner_faces: Words
+    starts: Words
+    to_local: Floats
+    instances: Ints
+    looks: Floats
+    pictures: Reals
+    textures: Ints
+    sky: Reals
+    ground: Floats
+    light: Floats
+
+
+def world_of(scene: Scene) -> World:
+    """All arrays of a scene; those of a shape that stands alone are not copied."""
+    shapes = list({id(instance.shape): instance.shape for instance in scene.instances}.values())
+    first_face = np.cumsum([0] + [len(shape.surface.triangles) for shape in shapes])
+    first_node = np.cumsum([0] + [len(shape.surface.nodes) for shape in shapes])
+    table, outer, inner = [], 0, 0
+    for shape, node in zip(shapes, first_node, strict=False):
+        of_outer = (shape.outer.samples, outer) if shape.outer else (0, 0)
+        of_inner = (shape.inner.samples, inner) if shape.inner else (0, 0)
+        table.append((node, *of_outer, *of_inner))
+        outer += shape.outer.faces.size if shape.outer else 0
+        inner += shape.inner.faces.size if shape.inner else 0
+    numbers = {id(shape): number for number, shape in enumerate(shapes)}
+    textures: list[Any] = []
+    instances = []
+    for instance in scene.instances:
+        material = instance.material
+        number = -1
+        if material.texture is not None:
+            number = len(textures)
+            textures.append(np.asarray(material.texture, dtype=np.float32))
+        flags = SEES_ITSELF * material.self_reflection + SINGLE * (material.refraction == "single")
+        instances.append((numbers[id(instance.shape)], number, flags))
+    starts = np.cumsum([0] + [texture.size for texture in textures])
+    to_world = np.array([instance.to_world for instance in scene.instances], dtype=np.float64)
+    back = np.linalg.inv(to_world[:, :, :3])
+    ground = scene.ground
+    light = np.asarray(scene.light) / np.linalg.norm(scene.light)
+    return World(
+        surface=_together(shapes, first_face, first_node),
+        shapes=np.array(table, dtype=np.int64),
+        faces=_shifted(
+            [(shape.outer.faces, k) for shape, k in zip(shapes, first_face, strict=False) if shape.outer]
+        ),
+        fractions=_joined([shape.outer.fractions for shape in shapes if shape.outer], np.float32),
+        known=_joined([agreement(shape.outer) for shape in shapes if shape.outer], np.uint8),
+        inner_faces=_shifted(
+            [(shape.inner.faces, k) for shape, k in zip(shapes, first_face, strict=False) if shape.inner]
+        ),
+        starts=np.concatenate(
+            [
+                shape.inner.starts if shape.inner else np.zeros(len(shape.surface.triangles), np.int32)
+                for shape in shapes
+            ]
+        ),
+        to_local=np.concatenate([back, -back @ to_world[:, :, 3:]], axis=2),
+        instances=np.array(instances, dtype=np.int64),
+        looks=np.array(
+            [
+                (*i.material.colour, i.material.mirror, i.material.glass, i.material.index)
+                for i in scene.instances
+            ],
+            dtype=np.float64,
+        ),
+        pictures=_joined(textures, np.float32),
+        textures=np.array(
+            [(start, *texture.shape[:2]) for start, texture in zip(starts, textures, strict=False)],
+            dtype=np.int64,
+        ).reshape(-1, 3),
+        sky=np.ascontiguousarray(scene.environment, dtype=np.float32),
+        ground=np.array(
+            [ground.height_m, ground.square_m, *np.ravel(ground.colours), ground.radius_m]
+            if ground
+            else [0.0] * 9,
+            dtype=np.float64,
+        ),
+        light=np.array([*light, scene.ambient]),
+    )
+
+
+def _joined(arrays: Sequence[Any], kind: Any) -> Any:
+    if len(arrays) == 1:
+        return np.ravel(arrays[0])
+    return np.concatenate([np.ravel(array) for array in arrays] or [np.zeros(1, dtype=kind)])
+
+
+def _shifted(tables: Sequence[tuple[Words, int]]) -> Words:
+    """Tables of faces, counted through all shapes."""
+    moved = [
+        table if by == 0 else table + np.int32(by) * ((table >= 0).astype(np.int32) - (table < -1))
+        for table, by in tables
+    ]
+    joined: Words = _joined(moved, np.int32)
+    return joined
+
+
+def _together(shapes: Sequence[Shape], first_face: Ints, first_node: Ints) -> Surface:
+    surfaces = [shape.surface for shape in shapes]
+    if len(surfaces) == 1:
+        return surfaces[0]
+    joined = Surface(*(np.concatenate(parts) for parts in zip(*surfaces, strict=True)))
+    triangles, nodes = joined.triangles, joined.nodes
+    links, children = triangles.view(np.int32), nodes.view(np.int32)
+    for k in range(len(shapes)):
+        own = links[first_face[k] : first_face[k + 1], 9:12]
+        own[own >= 0] += np.int32(first_face[k])
+        child = children[first_node[k] : first_node[k + 1], 12:14]
+        leaf = child < 0
+        child[leaf] -= np.int32(8 * first_face[k])
+        child[~leaf] += np.int32(first_node[k])
+    return joined._replace(links=links, children=children)

@@ -1,0 +1,242 @@
+"""Tracing rays through a scene: mirrored, refracted, mirrored by the same body again, to any depth.
+
+Dissertation, section 5.3.2. Its ``TraceRay`` is written as a loop: one ray goes on from each surface, and
+what it finds is weighted by the shares on its way, so that the weights of a picture's colours sum to 1. What
+is left at the last depth sees the environment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Floats, Vector
+from ...compiled import kernel
+from ...errors import InvalidInput
+from ...meshes.intersector import WAITING
+from ...meshes.surface import Words
+from ...refraction.backdrop import Colours
+from ...refraction.camera import Camera
+from ...refraction.optics import refracted
+from .appearance import ground_at, normal_at, shading, sky_at, unit
+from .lookup_scene import WAYS, from_outside, from_the_surface
+from .packed_scene import SEES_ITSELF, SINGLE, World
+
+# Rows of the image traced in one call.
+STRIP = 16
+
+# Numbers of what a ray meets besides instances.
+NOTHING, GROUND = -1, -2
+
+# Stands for the face that a ray leaves when its body is not there for it any more.
+UNSEEN = -2
+
+
+@dataclass(frozen=True)
+class TraceSettings:
+    """How a picture is made.
+
+    Attributes:
+        rows, columns: pixels.
+        depth: most surfaces at which a ray goes on; the dissertation has 2.
+        way: how fields are asked: "nearest", "linear", "plane", "walk"; "exact" for no field.
+        eye: the same for the first surface that the eye sees.
+        threads: strips of rows are traced in so many threads.
+
+    Raises:
+        InvalidInput: for a number out of range, or another name.
+    """
+
+    rows: int = 512
+    columns: int = 512
+    depth: int = 4
+    way: str = "walk"
+    eye: str = "exact"
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        for name, least in (("rows", 1), ("columns", 1), ("depth", 0), ("threads", 1)):
+            if getattr(self, name) < least:
+                raise InvalidInput(name, getattr(self, name), f"a whole number >= {least}")
+        for name in ("way", "eye"):
+            if getattr(self, name) not in WAYS:
+                raise InvalidInput(name, getattr(self, name), "one of " + ", ".join(WAYS))
+
+
+def trace(
+    world: World, camera: Camera, settings: TraceSettings, pause: Callable[[], None] = lambda: None
+) -> Colours:
+    """A picture, (rows, columns, 3) 8-bit RGB.
+
+    Args:
+        world: ``world_of`` a scene.
+        camera: ``refraction.perspective`` or ``orthographic``.
+        settings: the rest.
+        pause: called before every strip, maybe in another thread; what it raises ends the picture.
+    """
+    image = np.empty((settings.rows, settings.columns, 3), dtype=np.uint8)
+    views = camera.origin, camera.direction
+    ways = WAYS[settings.eye], WAYS[settings.way]
+
+    def strip(rows: slice) -> None:
+        pause()
+        _trace_rows(world, views[0], views[1], *ways, settings.depth, rows.start, image.shape[0], image[rows])
+
+    with ThreadPoolExecutor(settings.threads) as pool:
+        list(pool.map(strip, _strips(settings.rows)))
+    return image
+
+
+def _strips(rows: int) -> Iterator[slice]:
+    for first in range(0, rows, STRIP):
+        yield slice(first, min(first + STRIP, rows))
+
+
+@kernel
+def _trace_rows(
+    world: World,
+    origins: Floats,
+    directions: Floats,
+    eye: int,
+    way: int,
+    depth: int,
+    first: int,
+    rows: int,
+    image: Colours,
+) -> None:
+    waiting = np.empty(WAITING, dtype=np.int32)
+    columns = image.shape[1]
+    for i in range(len(image)):
+        for j in range(columns):
+            u, v = (j + 0.5) / columns - 0.5, (first + i + 0.5) / rows - 0.5
+            origin = along(origins, u, v)
+            direction = unit(along(directions, u, v))
+            colour = colour_of(world, waiting, origin, direction, eye, way, depth)
+            for c in range(3):
+                image[i, j, c] = np.uint8(min(max(255.0 * colour[c] + 0.5, 0.0), 255.0))
+
+
+@kernel(inline="always")
+def along(views: Floats, u: float, v: float) -> Vector:
+    """views[0] + u·views[1] + v·views[2]."""
+    return (
+        views[0, 0] + u * views[1, 0] + v * views[2, 0],
+        views[0, 1] + u * views[1, 1] + v * views[2, 1],
+        views[0, 2] + u * views[1, 2] + v * views[2, 2],
+    )
+
+
+@kernel
+def colour_of(
+    world: World, waiting: Words, origin: Vector, direction: Vector, eye: int, way: int, depth: int
+) -> Vector:
+    """RGB at the end of a ray.
+
+    Args:
+        world: ``world_of``.
+        waiting: room for the exact intersector.
+        origin, direction: m and a unit vector, in the world.
+        eye, way: how fields are asked by the first ray, and by those after it.
+        depth: most surfaces at which it goes on.
+    """
+    red, green, blue, weight = 0.0, 0.0, 0.0, 1.0
+    # The instance and face that the ray leaves; within which instance it is.
+    own, left, within = NOTHING, -1, NOTHING
+    for turn in range(depth + 1):
+        ask = eye if turn == 0 else way
+        met, face, distance, first, second = _nearest(
+            world, waiting, origin, direction, ask, own, left, within
+        )
+        if met == NOTHING:
+            break
+        point = (
+            origin[0] + distance * direction[0],
+            origin[1] + distance * direction[1],
+            origin[2] + distance * direction[2],
+        )
+        if met == GROUND:
+            local = ground_at(world, point)
+            return red + weight * local[0], green + weight * local[1], blue + weight * local[2]
+        normal = normal_at(world, met, face, first, second)
+        mirror, glass = world.looks[met, 3], world.looks[met, 4]
+        if within == NOTHING:
+            local = shading(world, met, face, first, second, normal)
+            share = weight * (1.0 - mirror - glass)
+            red, green, blue = red + share * local[0], green + share * local[1], blue + share * local[2]
+            weight *= mirror + glass
+        if weight == 0.0:
+            return red, green, blue
+        origin, left = point, face
+        if mirror > 0.0:
+            direction = _mirrored(direction, normal)
+            own = met
+        else:
+            index = world.looks[met, 5]
+            bent, _, passed = refracted(direction, normal, 1.0 / index if within == NOTHING else index)
+            direction = bent
+            entered = passed == (within == NOTHING)
+            if entered and world.instances[met, 2] & SINGLE:
+                # Straight on from here: the other side of the body is not there.
+                entered, left = False, UNSEEN
+            own, within = met, met if entered else NOTHING
+    sky = sky_at(world, direction)
+    return red + weight * sky[0], green + weight * sky[1], blue + weight * sky[2]
+
+
+@kernel(inline="always")
+def _nearest(
+    world: World,
+    waiting: Words,
+    origin: Vector,
+    direction: Vector,
+    way: int,
+    own: int,
+    left: int,
+    within: int,
+) -> tuple[int, int, float, float, float]:
+    """What a ray meets first: instance, ``GROUND`` or ``NOTHING``; face; distance, m; weights of corners."""
+    met, face, distance, first, second = NOTHING, -1, np.inf, 0.0, 0.0
+    for k in range(len(world.instances)):
+        if within != NOTHING and k != within:
+            continue
+        if k == own and (left == UNSEEN or (within == NOTHING and not world.instances[k, 2] & SEES_ITSELF)):
+            continue
+        shape = world.instances[k, 0]
+        o, d = _to_local(world, k, origin, 1.0), _to_local(world, k, direction, 0.0)
+        if k == own:
+            found = from_the_surface(
+                world, shape, way, waiting, o, d, left, 1.0 if within == NOTHING else -1.0
+            )
+        else:
+            found = from_outside(world, shape, way, waiting, o, d)
+        if found[0] >= 0 and found[1] < distance:
+            met, face, distance, first, second = k, found[0], found[1], found[2], found[3]
+    if world.ground[1] > 0.0 and within == NOTHING and direction[2] != 0.0:
+        down = (world.ground[0] - origin[2]) / direction[2]
+        x, y = origin[0] + down * direction[0], origin[1] + down * direction[1]
+        if 1e-9 < down < distance and x * x + y * y <= world.ground[8] ** 2:
+            met, distance = GROUND, down
+    return met, face, distance, first, second
+
+
+@kernel(inline="always")
+def _to_local(world: World, k: int, a: Vector, place: float) -> Vector:
+    m = world.to_local[k]
+    return (
+        m[0, 0] * a[0] + m[0, 1] * a[1] + m[0, 2] * a[2] + place * m[0, 3],
+        m[1, 0] * a[0] + m[1, 1] * a[1] + m[1, 2] * a[2] + place * m[1, 3],
+        m[2, 0] * a[0] + m[2, 1] * a[1] + m[2, 2] * a[2] + place * m[2, 3],
+    )
+
+
+@kernel(inline="always")
+def _mirrored(direction: Vector, normal: Vector) -> Vector:
+    turn = -2.0 * (direction[0] * normal[0] + direction[1] * normal[1] + direction[2] * normal[2])
+    return (
+        direction[0] + turn * normal[0],
+        direction[1] + turn * normal[1],
+        direction[2] + turn * normal[2],
+    )

@@ -1,0 +1,156 @@
+"""The ray tracer on an OpenCL device: the pictures of ``ray_tracer.trace``, one work-item a pixel."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+
+from ...errors import InvalidInput
+from ...meshes.intersector import WAITING
+from ...opencl import OpenCLFallbackWarning, Session, scene_or_warning
+from ...opencl.session import set_arguments
+from ...refraction.backdrop import Colours
+from ...refraction.camera import Camera
+from ..tables import accurate_lookup, cube
+from . import lookup_scene
+from .packed_scene import World
+from .ray_tracer import TraceSettings, trace
+
+SOURCES = (
+    "refraction/rays",
+    "refraction/optics",
+    "geometry_field/surface",
+    "geometry_field/asking",
+    "geometry_field/tracing",
+)
+
+# Pixels of a work-group.
+GROUP = 64
+
+# Room for rounding at the far side of boxes, and a number whose reciprocal is finite.
+ROUNDING = {"float64": (1.0 + 8.0 * 2.0**-52, 1e300), "float32": (1.0 + 8.0 * 2.0**-23, 1e30)}
+
+# Pixels of the picture that is compared with the CPU's before a device is believed, and the share of them
+# that may differ by more than one level: rays at edges may go either way.
+TRIED = 48
+ODD = {"float64": 0.01, "float32": 0.05}
+
+
+class OpenCLTracer:
+    """A world on a device. If the device fails its trial, ``ray_tracer.trace`` does the work.
+
+    Args:
+        world: ``world_of``; copied to the device, once.
+        session: the device.
+        precision: of places and directions there, "float64" or "float32"; None for the better one that the
+            device has.
+
+    Raises:
+        InvalidInput: for another precision.
+    """
+
+    def __init__(self, world: World, session: Session, precision: str | None = None) -> None:
+        if precision is None:
+            precision = "float64" if "cl_khr_fp64" in session.handle.extensions else "float32"
+        if precision not in ROUNDING:
+            raise InvalidInput("precision", precision, "one of " + ", ".join(ROUNDING))
+        self.world, self.session, self.precision = world, session, precision
+        self._real: Any = np.dtype(precision)
+        self._fault: str | None = None
+        surface = world.surface
+        with session.lock:
+            self._arguments = [
+                *self._there(surface.triangles, surface.links, surface.nodes, surface.children),
+                *self._there(surface.normals, surface.uv),
+                *self._there(world.shapes, world.faces, world.fractions, world.known),
+                *self._there(world.inner_faces, world.starts),
+                *self._there(world.to_local.astype(self._real), world.instances),
+                np.int32(len(world.instances)),
+                *self._there(world.looks.astype(self._real), world.pictures, world.textures, world.sky),
+                *(np.int32(size) for size in world.sky.shape[:2]),
+                *self._there(world.ground.astype(self._real), world.light.astype(self._real)),
+            ]
+
+    def trace(self, camera: Camera, settings: TraceSettings) -> Colours:
+        """As ``tracing.ray_tracer.trace``; ``settings.threads`` counts only where the CPU takes over.
+
+        Warns:
+            OpenCLFallbackWarning: once, where the device fails its trial and ``ray_tracer.trace`` takes over.
+        """
+        if self._fault is None:
+            self._fault = self.fault_of(camera)
+            if self._fault:
+                name = self.session.handle.name
+                message = f"{name} traces rays wrong, tracing.trace takes over: {self._fault}"
+                warnings.warn(OpenCLFallbackWarning(message), stacklevel=2)
+        return trace(self.world, camera, settings) if self._fault else self.follow(camera, settings)
+
+    def fault_of(self, camera: Camera) -> str:
+        """How the device differs from ``ray_tracer.trace`` in a small picture; empty where it does not."""
+        import pyopencl as cl
+
+        settings = TraceSettings(TRIED, TRIED)
+        try:
+            found = self.follow(camera, settings)
+        except cl.Error as error:
+            return f"it ends with {str(error).splitlines()[0]}"
+        off = np.abs(found.astype(int) - trace(self.world, camera, settings)).max(axis=2) > 1
+        allowed = ODD[self.precision]
+        return (
+            "" if off.mean() <= allowed else f"{off.mean():.0%} of its pixels are off, {allowed:.0%} may be"
+        )
+
+    def follow(self, camera: Camera, settings: TraceSettings) -> Colours:
+        """As ``trace``, but on the device, whatever it computes."""
+        image = np.empty((settings.rows, settings.columns, 3), dtype=np.uint8)
+        kernel = self.session.kernel(SOURCES, "trace", *self._defines())
+        with self.session.lock:
+            # Setting an argument does not keep its buffer alive: the names do.
+            views = self.session.upload(np.stack([camera.origin, camera.direction]).astype(self._real))
+            there = self.session.reserve(image.nbytes)
+            ways = (lookup_scene.WAYS[settings.eye], lookup_scene.WAYS[settings.way])
+            numbers = (*ways, settings.depth, settings.rows, settings.columns)
+            set_arguments(kernel, *self._arguments, views, *map(np.int32, numbers), there)
+            pixels = settings.rows * settings.columns
+            self.session.launch(kernel, (-(-pixels // GROUP) * GROUP,), (GROUP,))
+            self.session.download(image, there)
+        return image
+
+    def _there(self, *arrays: Any) -> list[Any]:
+        # No device gives a buffer of no bytes.
+        return [
+            self.session.upload(np.ascontiguousarray(array) if array.size else np.zeros(1, array.dtype))
+            for array in arrays
+        ]
+
+    def _defines(self) -> tuple[str, ...]:
+        later, never = ROUNDING[self.precision]
+        return (
+            "REAL=" + {"float64": "double", "float32": "float"}[self.precision],
+            f"LATER=R({later!r})",
+            f"NEVER=R({never!r})",
+            f"ALMOST_ZERO=R({float(cube.ALMOST_ZERO)!r})",
+            f"MARGIN=R({float(cube.MARGIN)!r})",
+            f"SLACK=R({float(accurate_lookup.SLACK)!r})",
+            f"LEAST=R({lookup_scene.LEAST!r})",
+            f"MOST_STEPS={accurate_lookup.STEPS}",
+            f"WAITING={WAITING}",
+        )
+
+
+def on_the_device(world: World, precision: str | None = None) -> OpenCLTracer | None:
+    """The world on the chosen OpenCL device; None where no device can be trusted.
+
+    Args:
+        world: to look at.
+        precision: as in ``OpenCLTracer``.
+
+    Raises:
+        InvalidInput: for another precision, or where ``BENTRAY_OPENCL_DEVICE`` names no one device.
+
+    Warns:
+        OpenCLFallbackWarning: once, where no device passes its trial; and where it cannot hold the world.
+    """
+    return scene_or_warning(lambda session: OpenCLTracer(world, session, precision), "tracing.trace")

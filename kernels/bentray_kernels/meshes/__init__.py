@@ -1,0 +1,1 @@
+"""Triangle meshes: topology, defects, bounding volume hierarchy, exact intersection, iso-surfaces."""

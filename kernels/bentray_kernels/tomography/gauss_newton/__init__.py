@@ -1,0 +1,1 @@
+"""Gauss–Newton with bent rays, total variation and a robust loss."""

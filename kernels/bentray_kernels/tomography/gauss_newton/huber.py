@@ -1,0 +1,45 @@
+"""Huber's loss: residuals beyond a limit count by their size, so that outliers do not decide."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...arrays import Floats
+
+# The median of |x| over the standard deviation of x, for a normal distribution.
+MEDIAN_PART = 0.6745
+
+# The limit is at least this part of the mean size. Of a small object in exact times most rays pass nothing
+# but water and fit from the start; were the spread theirs alone, the others would have no say.
+LEAST_PART = 0.7
+
+
+def limit(residual: Floats, spreads: float, most: float = math.inf) -> float:
+    """Beyond which residuals count by their size, in their unit.
+
+    Args:
+        residual: any number of them.
+        spreads: how many of their standard deviations; 0: as far as ``most``.
+        most: no more than this.
+    """
+    if spreads > 0.0:
+        size = np.abs(residual)
+        spread = float(np.median(size)) / MEDIAN_PART
+        most = min(most, max(spreads * spread, LEAST_PART * float(size.mean())))
+    # All residuals zero: none is an outlier.
+    return most or math.inf
+
+
+def loss(residual: Floats, limit: float) -> float:
+    """As a root mean square, which it is for residuals within the limit; the others add less to it."""
+    size = np.abs(residual)
+    inner = np.minimum(size, limit)
+    outer = np.maximum(size - limit, 0.0)
+    return math.sqrt(float((inner * (inner + 2.0 * outer)).mean()))
+
+
+def clipped_rms(residual: Floats, limit: float) -> float:
+    """Root mean square of residuals of which none counts as more than the limit."""
+    return math.sqrt(float((np.minimum(np.abs(residual), limit) ** 2).mean()))

@@ -1,0 +1,198 @@
+"""What some emitters say about an image: their rays as rows of a matrix, and the times that are left over."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Floats, Ints
+from ...compiled import kernel
+from ...eikonal import solve
+from ...rays.bending import STRIDE, bend, bending
+from ...rays.descent import PARTS, curved_ray, merge, straight_ray, walk
+from ...rays.fan import Fan, Kind
+from ...splines import coefficients
+from ..problem import Problem
+from ..sart.sart_update import smoothed
+
+# A piece of a bent ray is STRIDE nodes long; its parts are as short as those of other rays.
+BENT_PARTS = 3
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The rays of some emitters, one row each, as a compressed sparse matrix over the nodes.
+
+    Attributes:
+        pointers: (rays + 1,), where each row begins.
+        columns: (entries,), flat node, C order.
+        lengths: (entries,), nodes of ray; multiplied by the spacing they are the sensitivities.
+        residual: (rays,), s, measured minus predicted travel time.
+        emitters: how many emitters the rays belong to.
+    """
+
+    pointers: Ints
+    columns: NDArray[np.int32]
+    lengths: NDArray[np.float32]
+    residual: Floats
+    emitters: int
+
+
+def linearise(
+    problem: Problem, slowness: Floats, emitters: Ints, *, rays: Kind, eikonal: str, front: float = 0.0
+) -> Rows:
+    """Rows of some emitters' rays through an image.
+
+    Curved rays are bent to the stationary path in the image's cubic spline, and their times are the spline's.
+    Times read off unbent rays by linear interpolation are wrong where rays graze an edge, and a Gauss–Newton
+    step that believes them puts the error into the image.
+
+    Args:
+        problem: the slice or volume.
+        slowness: of the region's shape, s/m.
+        emitters: rows of the problem's data, at least one.
+        rays: ``curved`` or ``straight``.
+        eikonal: method of the wave front.
+        front: standard deviation, nodes, of the Gaussian on the speed that rays bend in; with one, times are
+            integrals of the image along those rays.
+    """
+
+    def lacking(emitter: int, heard: Ints, distance: Floats, predicted: Floats, _: Floats) -> Floats:
+        water = distance / problem.water_speed
+        return np.asarray(problem.delta_tof[emitter, heard] + water - predicted)
+
+    return _trace(problem, slowness, emitters, problem.delta_tof, lacking, rays, eikonal, front)
+
+
+def linearise_losses(
+    problem: Problem, slowness: Floats, emitters: Ints, *, rays: Kind, eikonal: str, front: float = 0.0
+) -> Rows:
+    """As ``linearise`` for the amplitudes: the residual, Np, is what water along the same rays does not take.
+
+    Raises:
+        ValueError: for a problem without amplitudes.
+    """
+    ratio, water = problem.log_ratio, problem.water_attenuation
+    if ratio is None:
+        raise ValueError("no amplitudes")
+
+    def lacking(emitter: int, heard: Ints, distance: Floats, _: Floats, length: Floats) -> Floats:
+        return np.asarray(ratio[emitter, heard] + water * (distance - length))
+
+    return _trace(problem, slowness, emitters, ratio, lacking, rays, eikonal, front)
+
+
+def _trace(
+    problem: Problem,
+    slowness: Floats,
+    emitters: Ints,
+    data: Floats,
+    lacking: Callable[[int, Ints, Floats, Floats, Floats], Floats],
+    rays: Kind,
+    eikonal: str,
+    front: float,
+) -> Rows:
+    """Rows of the pairs that have data.
+
+    Args:
+        lacking: residual from the emitter, the receivers heard, their distances, m, predicted times, s, and
+            the lengths of the rays, m.
+    """
+    speed = smoothed(1.0 / slowness, front)
+    found, splines = [], {}
+    for emitter in emitters:
+        heard = np.flatnonzero(np.isfinite(data[emitter]))
+        slab = problem.slab(int(emitter))
+        foot = np.zeros(slowness.ndim)
+        foot[-1] = slab.start * problem.spacing
+        source = problem.emitters[emitter] - foot
+        receivers = problem.receivers_of(int(emitter))[heard] - foot
+        distance = np.linalg.norm(receivers - source, axis=1)
+        inside, tof = np.ascontiguousarray(slowness[..., slab]), np.ascontiguousarray(speed[..., slab])
+        spline = np.empty((0,) * slowness.ndim)
+        if rays == "curved":
+            # Emitters of one height share a slab.
+            if (slab.start, slab.stop) not in splines:
+                splines = {(slab.start, slab.stop): coefficients(-np.log(tof))}
+            spline = splines[slab.start, slab.stop]
+            tof = solve(tof, problem.spacing, source, eikonal)
+        fan = Fan.checked(tof, problem.spacing, receivers, source, rays)
+        counts, columns, lengths, predicted = _rows(
+            fan.receivers,
+            fan.source,
+            fan.tof,
+            fan.gradient,
+            fan.shape,
+            fan.strides,
+            fan.curved,
+            front > 0.0,
+            fan.room,
+            inside.ravel(),
+            spline,
+        )
+        if inside.shape != slowness.shape:
+            column, height = np.divmod(columns, inside.shape[-1])
+            columns = (column * slowness.shape[-1] + height + slab.start).astype(np.int32)
+        ends = np.concatenate(([0], np.cumsum(counts)))
+        length = np.array([lengths[a:b].sum(dtype=np.float64) for a, b in itertools.pairwise(ends)])
+        residual = lacking(
+            int(emitter), heard, distance, predicted * problem.spacing, length * problem.spacing
+        )
+        found.append((counts, columns, lengths, residual))
+    counts, columns, lengths, residual = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return Rows(np.concatenate(([0], np.cumsum(counts))), columns, lengths, residual, len(emitters))
+
+
+@kernel
+def _rows(
+    receivers: Floats,
+    source: Floats,
+    tof: Floats,
+    gradient: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    curved: bool,
+    smooth: bool,
+    room: int,
+    slowness: Floats,
+    spline: Floats,
+) -> tuple[Ints, NDArray[np.int32], NDArray[np.float32], Floats]:
+    """Entries a ray, flat node and nodes of ray of each entry, and predicted times for a spacing of 1."""
+    axes = len(shape)
+    path = np.empty((room, axes))
+    scratch = np.empty((3, axes))
+    space = bending(room, shape)
+    nodes = np.empty((BENT_PARTS * room) << axes, np.int64)
+    weights = np.empty((BENT_PARTS * room) << axes)
+    total = np.zeros(tof.size)
+    counts = np.zeros(len(receivers), np.int64)
+    predicted = np.zeros(len(receivers))
+    capacity = max(16, len(receivers) * 4 * sum(shape))
+    columns = np.empty(capacity, np.int32)
+    lengths = np.empty(capacity, np.float32)
+    filled = 0
+    for row in range(len(receivers)):
+        if curved:
+            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, STRIDE, path, scratch)
+            predicted[row], count = bend(path, count, spline, shape, space)
+            entries = walk(path, count, shape, strides, BENT_PARTS, nodes, weights, scratch)
+        else:
+            count = straight_ray(receivers[row], source, axes, path)
+            entries = walk(path, count, shape, strides, PARTS, nodes, weights, scratch)
+        if smooth or not curved:
+            # The spline is not that of the image.
+            predicted[row] = 0.0
+            for k in range(entries):
+                predicted[row] += weights[k] * slowness[nodes[k]]
+        while filled + entries > capacity:
+            columns = np.concatenate((columns, np.empty(capacity, np.int32)))
+            lengths = np.concatenate((lengths, np.empty(capacity, np.float32)))
+            capacity *= 2
+        start = filled
+        filled = merge(nodes, weights, entries, total, columns, lengths, filled)
+        counts[row] = filled - start
+    return counts, columns[:filled].copy(), lengths[:filled].copy(), predicted

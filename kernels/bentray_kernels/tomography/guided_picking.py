@@ -1,0 +1,123 @@
+"""Picking and reconstruction in turn: the image says where the next picks are to be sought."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..acquisition import Dataset, pick
+from ..acquisition.picking.amplitudes import with_log_ratios
+from ..arrays import Floats
+from ..errors import InvalidInput
+from .gauss_newton.gauss_newton_step import look
+from .problem import Problem
+from .reconstruct import reconstruct
+from .result import Progress, Reconstruction
+from .settings import Settings
+
+# Picks that move less than this between rounds, s, would give the same image again.
+SETTLED_S = 1e-9
+
+
+def alternate(
+    dataset: Dataset,
+    settings: Settings,
+    rounds: int = 2,
+    *,
+    reach_s: float | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> tuple[Dataset, Reconstruction]:
+    """Pick, reconstruct, and pick again about the arrivals that the image predicts.
+
+    A first arrival that noise or a weak path hides from a picker on its own is found where the image of
+    the others expects it; one that was taken from the wrong swing is not looked for there again.
+
+    Args:
+        dataset: with traces; see ``acquisition.pick``.
+        settings: of the reconstructions, slice by slice, with the picker.
+        rounds: how often times are picked again; it ends sooner once they stay.
+        reach_s: how far from the prediction a pick may lie, s; None: a period.
+        progress: of each reconstruction.
+
+    Returns:
+        The dataset as last picked, and its reconstruction.
+
+    Raises:
+        InvalidInput: as ``pick`` and ``reconstruct``; for a negative number of rounds, or a volume.
+    """
+    if rounds < 0:
+        raise InvalidInput("rounds", rounds, "a number >= 0")
+    picked = _listened(dataset, pick(dataset, settings.picker), settings)
+    result = reconstruct(_with_traces(picked, dataset, settings), settings, progress)
+    for _ in range(rounds):
+        expected = predicted_delta(picked, result)
+        again = pick(dataset, settings.picker, predicted_s=expected, reach_s=reach_s)
+        again = _listened(dataset, again, settings)
+        settled = same_picks(picked, again)
+        picked = again
+        if settled:
+            break
+        result = reconstruct(_with_traces(picked, dataset, settings), settings, progress)
+    return picked, result
+
+
+def _listened(dataset: Dataset, picked: Dataset, settings: Settings) -> Dataset:
+    """What was picked, with the amplitudes that the settings want from the traces."""
+    if not settings.listens:
+        return picked
+    heard = with_log_ratios(replace(picked, waveform=dataset.waveform), settings.amplitudes)
+    return replace(heard, waveform=None)
+
+
+def _with_traces(picked: Dataset, dataset: Dataset, settings: Settings) -> Dataset:
+    """What was picked, with the traces by which trials are judged."""
+    return replace(picked, waveform=dataset.waveform) if settings.tries else picked
+
+
+def predicted_delta(dataset: Dataset, result: Reconstruction) -> Floats:
+    """Travel time object minus water of every pair as an image has it, (…, ntx, nrx), s.
+
+    Along the rays that the image was made with, bent to the stationary path where they are curved.
+
+    Args:
+        dataset: whose elements and slices the image is of.
+        result: made slice by slice.
+
+    Raises:
+        InvalidInput: for a volume, or an array in space.
+    """
+    settings = result.settings
+    if settings.decomposition != "slices":
+        raise InvalidInput("decomposition", repr(settings.decomposition), "slices, to pick with a prediction")
+    if dataset.element_position_m.shape[1] != 2:
+        raise InvalidInput(
+            "geometry/element_position_m",
+            "elements in space",
+            "elements in a plane, to pick with a prediction",
+        )
+    shape = (len(dataset.tx), len(dataset.rx))
+    level = dataset.tx[:, None] == dataset.rx[None, :]
+    whole = shape if dataset.slice_z_m is None else (dataset.slices, *shape)
+    # With a difference of 0 asked of every pair, what is left over is the prediction, less its sign.
+    asked = replace(
+        dataset, delta_tof_s=np.zeros(whole), tof_s=None, sigma_s=None, valid=None, log_ratio_np=None
+    )
+    found = np.full((dataset.slices, *shape), np.nan)
+    for index in range(dataset.slices):
+        problem = Problem.of(asked, replace(settings, reciprocity=False), index)
+        speed = result.speed if result.speed.ndim == 2 else result.speed[:, :, index]
+        rows = look(problem, settings, 1.0 / speed, np.arange(len(dataset.tx)))
+        found[index][~level] = -rows.residual
+    return found[0] if dataset.slice_z_m is None else found
+
+
+def same_picks(before: Dataset, after: Dataset) -> bool:
+    """Whether the picks are those of the round before."""
+    was, found = before.differential_tof(), after.differential_tof()
+    known = np.isfinite(was)
+    if (known != np.isfinite(found)).any():
+        return False
+    change = (found - was)[known]
+    return not change.size or float(np.sqrt(np.mean(change**2))) < SETTLED_S

@@ -1,0 +1,1 @@
+"""Automatic choice of rays and method by held-out validation."""

@@ -1,0 +1,63 @@
+"""Parts of the pairs of a scan: what trials are shown, and what is held out to judge them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from ...acquisition import Dataset
+from ...arrays import Flags, Ints
+
+Part = Literal["all", "shown", "held-out", "shown-views", "held-out-views"]
+
+# One pair in so many is held out, both directions together.
+HELD_OUT = 10
+
+# Views: all pairs between two sectors of the array, an eighth of the turn each. These three pairs of sectors
+# lie across the object and hold three pairs in thirty-two.
+SECTORS = 8
+VIEWS = ((0, 3), (1, 6), (2, 5))
+
+
+def part_of(dataset: Dataset, part: Part) -> Dataset:
+    """The dataset with the pairs of one part only, the others invalid.
+
+    A pair and its reverse belong to the same part, in all slices. ``held-out`` are pairs here and there,
+    whose neighbours are shown, so that any smooth model does well on them; ``held-out-views`` are whole
+    views, of which only other views tell.
+    """
+    if part == "all":
+        return dataset
+    held = _views(dataset) if part.endswith("views") else _scattered(dataset)
+    kept = held if part.startswith("held-out") else ~held
+    shape = kept.shape if dataset.slice_z_m is None else (dataset.slices, *kept.shape)
+    valid = np.broadcast_to(kept, shape)
+    return replace(dataset, valid=valid.copy() if dataset.valid is None else valid & dataset.valid)
+
+
+def _scattered(dataset: Dataset) -> Flags:
+    """(ntx, nrx): pairs held out here and there."""
+    first = np.minimum(dataset.tx[:, None], dataset.rx[None, :]).astype(np.uint64)
+    second = np.maximum(dataset.tx[:, None], dataset.rx[None, :]).astype(np.uint64)
+    # A mix of both numbers, so that no direction or ring is held out as a whole.
+    mixed = (first * np.uint64(0x9E3779B1) + second * np.uint64(0x85EBCA77)) >> np.uint64(11)
+    return np.asarray((mixed % np.uint64(HELD_OUT)) == 0)
+
+
+def _views(dataset: Dataset) -> Flags:
+    """(ntx, nrx): pairs of the views that are held out."""
+    sector = _sectors(dataset)
+    first = np.minimum(sector[dataset.tx][:, None], sector[dataset.rx][None, :])
+    second = np.maximum(sector[dataset.tx][:, None], sector[dataset.rx][None, :])
+    return np.asarray(np.any([(first == a) & (second == b) for a, b in VIEWS], axis=0))
+
+
+def _sectors(dataset: Dataset) -> Ints:
+    """(elements,): the eighth of the turn about the array's middle that each lies in."""
+    flat = dataset.element_position_m[:, :2]
+    x, y = (flat - 0.5 * (flat.min(axis=0) + flat.max(axis=0))).T
+    # Half a millionth of a turn more, so that rounding does not part what lies on an edge.
+    turn = np.arctan2(y, x) / (2.0 * np.pi) + 5e-7
+    return np.asarray(np.floor(turn % 1.0 * SECTORS), dtype=np.int64)

@@ -1,0 +1,244 @@
+"""One SART update of an image from some emitters: compiled as a whole for slices, traced one by one else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from ...arrays import Flags, Floats, Ints
+from ...compiled import kernel
+from ...eikonal import adjoint, solve
+from ...rays.descent import PARTS, STEP, curved_ray, straight_ray, walk
+from ...rays.fan import Fan
+from ..problem import Problem
+from ..settings import DEVIATION, Settings
+from .emitter_pass import EmitterPass
+
+# One update in place: problem, settings, slowness, coverage, emitters and sweep in, residuals out.
+Use = Callable[[Problem, Settings, Floats, Floats, Ints, int], Floats]
+
+
+def update_of(problem: Problem, settings: Settings) -> Use:
+    """How images of the problem are updated: compiled where the settings allow it."""
+    known = settings.rays == "straight" or (settings.rays == "curved" and settings.eikonal == DEVIATION)
+    return _compiled(problem) if problem.region.ndim == 2 and known else _traced
+
+
+def propagation_speed(slowness: Floats, region: Flags, settings: Settings, *, warm: bool) -> Floats:
+    """The speed F that the wave front runs in (chapter 6, equations 5 and 6, with k = 1).
+
+    ``fixed`` is the image itself. ``data-driven`` stretches the image's own range to the range that the
+    object is known to have, so that shapes bend the rays in full before the values have grown; until one
+    pass has made a shape (``warm``) there is nothing to stretch.
+    """
+    speed = smoothed(1.0 / slowness, settings.front_smoothing_nodes)
+    if settings.speed_update == "fixed" or settings.speed_range_mps is None or not warm:
+        return speed
+    low, high = settings.speed_range_mps
+    inside = speed[region]
+    if not inside.size:
+        return speed
+    least, most = float(inside.min()), float(inside.max())
+    if most - least <= 0.0:
+        return speed
+    speed[region] = low + (inside - least) / (most - least) * (high - low)
+    return speed
+
+
+def smoothed(speed: Floats, nodes: float) -> Floats:
+    """The speed as a wave front of finite width meets it: under a Gaussian of that standard deviation.
+
+    A wave does not feel what is narrower than its Fresnel zone; a ray follows every edge.
+    """
+    return np.asarray(gaussian_filter(speed, nodes, mode="nearest") if nodes > 0.0 else speed)
+
+
+def _compiled(problem: Problem) -> Use:
+    """As ``_traced`` for a slice, several times as fast: see ``EmitterPass``."""
+    rows, columns = problem.region.shape
+    work = EmitterPass.over((rows, columns), problem.delta_tof.shape[1])
+
+    def use(
+        problem: Problem,
+        settings: Settings,
+        slowness: Floats,
+        coverage: Floats,
+        emitters: Ints,
+        sweep: int,
+    ) -> Floats:
+        left = []
+        for emitter in emitters:
+            source, receivers, measured, _ = _heard(problem, int(emitter))
+            front = None
+            if settings.rays == "curved":
+                front = slowness
+                if settings.speed_update != "fixed" or settings.front_smoothing_nodes > 0.0:
+                    front = 1.0 / propagation_speed(slowness, problem.region, settings, warm=sweep > 0)
+            huber = _huber(settings, sweep)
+            left.append(work.look(slowness, front, problem.spacing, source, receivers, measured, huber))
+        work.update(
+            slowness,
+            coverage,
+            problem.region,
+            problem.spacing,
+            _relaxation(settings, sweep),
+            settings.smoothing_nodes,
+            _bounds(settings),
+        )
+        return np.concatenate(left)
+
+    return use
+
+
+def _traced(
+    problem: Problem, settings: Settings, slowness: Floats, coverage: Floats, emitters: Ints, sweep: int
+) -> Floats:
+    """One SART update in place, from some emitters; returns their residuals, s."""
+    corrections, weights = np.zeros_like(slowness), np.zeros_like(slowness)
+    left = []
+    for emitter in emitters:
+        source, receivers, measured, slab = _heard(problem, int(emitter))
+        inside = np.ascontiguousarray(slowness[..., slab])
+        tof = inside  # only the shape counts: straight rays need no travel time
+        if settings.rays != "straight":
+            speed = propagation_speed(inside, problem.region[..., slab], settings, warm=sweep > 0)
+            tof = solve(speed, problem.spacing, source, settings.front)
+        if settings.rays == "adjoint":
+            more, passed, residual = _adjoint(
+                tof, problem.spacing, source, receivers, measured, _huber(settings, sweep)
+            )
+        else:
+            fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays)
+            more, passed, residual = _back_project(
+                fan.receivers,
+                fan.source,
+                fan.tof,
+                fan.gradient,
+                fan.shape,
+                fan.strides,
+                fan.curved,
+                fan.room,
+                inside.ravel() * problem.spacing,
+                measured,
+                _huber(settings, sweep),
+            )
+        corrections[..., slab] += more.reshape(inside.shape)
+        weights[..., slab] += passed.reshape(inside.shape)
+        left.append(residual)
+    seen = weights > 0.0
+    update = np.zeros_like(slowness)
+    update[seen] = corrections[seen] / (weights[seen] * problem.spacing)
+    update[~problem.region] = 0.0
+    if settings.smoothing_nodes > 0.0:
+        update = gaussian_filter(update, settings.smoothing_nodes, mode="nearest")
+    moved = slowness + _relaxation(settings, sweep) * update
+    slowness[problem.region] = np.clip(moved, *_bounds(settings))[problem.region]
+    coverage += weights * problem.spacing
+    return np.concatenate(left)
+
+
+def _heard(problem: Problem, emitter: int) -> tuple[Floats, Floats, Floats, slice]:
+    """An emitter and its receivers in its slab, m, the times measured, s, and the slab."""
+    slab = problem.slab(emitter)
+    delta = problem.delta_tof[emitter]
+    heard = np.flatnonzero(np.isfinite(delta))
+    source, receivers = problem.emitters[emitter], problem.receivers_of(emitter)[heard]
+    away = receivers - source
+    measured = delta[heard] + np.sqrt((away * away).sum(axis=1)) / problem.water_speed
+    if slab.start:
+        foot = np.zeros(source.size)
+        foot[-1] = slab.start * problem.spacing
+        source, receivers = source - foot, receivers - foot
+    return source, receivers, measured, slab
+
+
+def _relaxation(settings: Settings, sweep: int) -> float:
+    return settings.relaxation * settings.relaxation_decay**sweep
+
+
+def _huber(settings: Settings, sweep: int) -> float:
+    """Residual, s, that no larger one counts for; none in the first sweep, where all are those of water."""
+    return settings.huber_s if settings.huber_s > 0.0 and sweep > 0 else math.inf
+
+
+def _bounds(settings: Settings) -> tuple[float, float]:
+    """Lowest and highest slowness, s/m."""
+    low, high = settings.speed_bounds_mps
+    return 1.0 / high, 1.0 / low
+
+
+def _adjoint(
+    tof: Floats, spacing: float, source: Floats, receivers: Floats, measured: Floats, huber: float
+) -> tuple[Floats, Floats, Floats]:
+    """As ``_back_project``, without rays: what each node is worth to each time comes by the adjoint state."""
+    residual = measured - _read(tof, receivers / spacing)
+    away = receivers - source
+    length = np.sqrt((away * away).sum(axis=1))
+    # A receiver on the emitter has no length to share its residual out over.
+    apart = length > 0.0
+    share = np.clip(residual[apart], -huber, huber) / length[apart]
+    corrections = adjoint(tof, spacing, source, receivers[apart], share)
+    weights = adjoint(tof, spacing, source, receivers[apart], np.ones(share.size))
+    return corrections, weights / spacing, residual
+
+
+def _read(tof: Floats, nodes: Floats) -> Floats:
+    """Multilinear between nodes."""
+    return np.asarray(map_coordinates(tof, nodes.T, order=1, mode="nearest"))
+
+
+@kernel
+def _back_project(
+    receivers: Floats,
+    source: Floats,
+    tof: Floats,
+    gradient: Floats,
+    shape: tuple[int, ...],
+    strides: tuple[int, ...],
+    curved: bool,
+    room: int,
+    crossing: Floats,
+    measured: Floats,
+    huber: float,
+) -> tuple[Floats, Floats, Floats]:
+    """Sums of equation 1 over the rays of one emitter.
+
+    Args:
+        crossing: slowness times spacing, flat, s per node.
+        measured: (k,), travel times, s.
+        huber: a residual corrects by no more than this, s.
+
+    Returns:
+        Σ c·w (s), Σ w (nodes of ray), both flat over the nodes, and measured − predicted, s.
+    """
+    axes = len(shape)
+    path = np.empty((room, axes))
+    scratch = np.empty((3, axes))
+    nodes = np.empty((PARTS * room) << axes, np.int64)
+    lengths = np.empty((PARTS * room) << axes)
+    corrections = np.zeros(tof.size)
+    weights = np.zeros(tof.size)
+    residuals = np.empty(len(receivers))
+    for row in range(len(receivers)):
+        if curved:
+            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, STEP, path, scratch)
+        else:
+            count = straight_ray(receivers[row], source, axes, path)
+        entries = walk(path, count, shape, strides, PARTS, nodes, lengths, scratch)
+        predicted = 0.0
+        length = 0.0
+        for k in range(entries):
+            predicted += lengths[k] * crossing[nodes[k]]
+            length += lengths[k]
+        residual = measured[row] - predicted
+        residuals[row] = residual
+        if length == 0.0:
+            continue
+        correction = min(max(residual, -huber), huber) / length
+        for k in range(entries):
+            corrections[nodes[k]] += correction * lengths[k]
+            weights[nodes[k]] += lengths[k]
+    return corrections, weights, residuals

@@ -1,0 +1,137 @@
+"""A problem from a dataset: grid, clock, pairs, the draw of emitters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...acquisition import Dataset, Waveform
+from ...arrays import Flags, Ints
+from ...errors import InvalidInput
+from ...wave.points import REACH
+from ...wave.time_blocks import Poll, unheeded
+from ..roi import inside
+from .band_grid import Extent
+from .source_calibration import Mapping, WaterShots, levelled, sounded
+from .trace_resampling import Clock, Water
+from .waveform_problem import WaveProblem
+from .waveform_settings import WaveSettings
+
+
+def prepare(
+    dataset: Dataset,
+    settings: WaveSettings,
+    number: int,
+    *,
+    run: Mapping = map,
+    poll: Poll = unheeded,
+) -> WaveProblem:
+    """The problem of a slice in band ``number``, its wavelet and its water's phase read from water shots.
+
+    It holds the object's traces of the emitters that the band uses, no others and none of the water: traces
+    given as ``acquisition.emissions.Emissions`` are read one emission at a time.
+
+    Args:
+        dataset: one slice with traces of object and water.
+        settings: how to refine.
+        number: of the band, from 0.
+        run: what runs the simulated water shots.
+        poll: of these and of all simulations of the problem, see ``time_blocks``.
+
+    Raises:
+        InvalidInput: for a dataset that lacks one of the above or, where it is asked for, a region of
+            interest; with all emitters held out, no node inside the array, or traces of zeros alone.
+    """
+    recorded = dataset.waveform
+    if recorded is None or recorded.water is None or dataset.sampling_rate_hz is None:
+        raise InvalidInput("waveform/water", "none", "traces of object and water to refine from")
+    if recorded.object.ndim != 3 or dataset.element_position_m.shape[1] != 2:
+        raise InvalidInput("waveform/object", f"shape {recorded.object.shape}", "one slice in a plane")
+    band, spacing = settings.bands[number], settings.bands[number].spacing_m
+    flat = dataset.element_position_m
+    centre = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
+    samples = dataset.t0_s + np.arange(recorded.object.shape[-1]) / dataset.sampling_rate_hz
+    reach = float(np.abs(flat - centre).max())
+    extent = Extent.of(band, reach, float(samples[-1] - samples[0]), settings.speed_bounds_mps[1])
+    nodes = extent.nodes
+    axis = spacing * (np.arange(nodes) - 0.5 * (nodes - 1))
+    nearest = float(np.linalg.norm(flat - centre, axis=1).min()) - REACH * spacing
+    origin = centre + axis[0]
+    place = (float(origin[0]), float(origin[1]))
+    region = np.hypot(axis[:, None], axis[None, :]) <= nearest
+    if settings.roi:
+        region &= inside(dataset, region.shape, spacing, place)
+    if not region.any():
+        raise InvalidInput("spacing_m", spacing, "nodes inside the array and the region of interest")
+    clock = Clock(dataset.t0_s - extent.lead_s, extent.step_s, extent.steps)
+    gain, water_gain = (
+        recorded.scale * (np.ones(recorded.object.shape[:2]) if factor is None else factor)
+        for factor in (recorded.object_scale, recorded.water_scale)
+    )
+    use = dataset.distance_m() >= settings.nearest_m
+    use &= np.isfinite(gain) & np.isfinite(water_gain)
+    if dataset.valid is not None:
+        use &= dataset.valid
+    used, held = _drawn(np.flatnonzero(use.any(axis=1)), settings, number)
+    traces, use = _alive(recorded, use, np.concatenate((used, held)))
+    used, held = (some[use[some].any(axis=1)] for some in (used, held))
+    if used.size == 0:
+        raise InvalidInput(
+            "waveform/object, waveform/water", "zeros alone", "traces of both for some emitters"
+        )
+    problem = WaveProblem(
+        band=band,
+        emitters=flat[dataset.tx] - origin,
+        receivers=flat[dataset.rx] - origin,
+        region=region,
+        origin=place,
+        clock=clock,
+        wavelet=np.zeros(clock.steps),
+        water=Water(dataset.water_speed_mps),
+        likeness=0.0,
+        weight=use.astype(np.float64),
+        arrival_s=dataset.distance_m() / dataset.water_speed_mps,
+        traces=traces,
+        gain=gain,
+        sampler=np.empty((0, 0), dtype=np.float32),
+        used=used,
+        held=held,
+        every=extent.every,
+        poll=poll,
+    )
+    shots = WaterShots(recorded.water, water_gain, samples, settings.window_s)
+    found = sounded(problem, shots, run)
+    return found if band.of == "speed" else levelled(found, shots)
+
+
+def _alive(recorded: Waveform, use: Flags, emitters: Ints) -> tuple[dict[int, NDArray[Any]], Flags]:
+    """The object's traces of some emitters, and (ntx, nrx) the pairs to use without those of dead traces.
+
+    The traces are copies, for an emission that is read may be part of a larger block.
+    """
+    assert recorded.water is not None
+    found, use = {}, use.copy()
+    for emitter in np.sort(emitters).tolist():
+        found[emitter] = recorded.object[emitter].copy()
+        for traces in (found[emitter], recorded.water[emitter]):
+            use[emitter] &= (traces != 0).any(axis=-1)
+    return found, use
+
+
+def _drawn(sounding: Ints, settings: WaveSettings, number: int) -> tuple[Ints, Ints]:
+    """The emitters of a band, other ones in each, and those held out, the same in all.
+
+    The circle is cut into as many parts as emitters are wanted, and one is drawn from each.
+    """
+    places = np.linspace(0, sounding.size, settings.held_out, endpoint=False).astype(np.int64)
+    held = sounding[np.unique(places)] if sounding.size else sounding
+    rest = np.setdiff1d(sounding, held)
+    if rest.size == 0:
+        raise InvalidInput("held_out", settings.held_out, f"fewer than the {sounding.size} emitters")
+    wanted = min(settings.bands[number].emitters, rest.size)
+    edges = np.linspace(0, rest.size, wanted + 1)
+    chance = np.random.default_rng((settings.seed, number)).random(wanted)
+    drawn = (edges[:-1] + chance * np.diff(edges)).astype(np.int64)
+    return rest[np.unique(np.minimum(drawn, rest.size - 1))], held

@@ -1,0 +1,189 @@
+"""What waveforms make of a reconstruction along rays: chains that begin with its image, and the result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...acquisition import Dataset
+from .. import pairs
+from ..model_selection.selection import CLEARLY
+from ..result import Reconstruction
+from ..settings import Settings
+from ..task_chains import Drive, measured
+from .automatic_settings import check_traces, wave_settings
+from .inversion_state import BandEnd, Image
+from .validation import Judge, judging, passes
+from .waveform_chain import WaveChain, WaveScan, resampled
+from .waveform_cost import core_seconds, worth
+from .waveform_settings import WaveSettings
+
+# Makes what tells the calls of one slice their data.
+WaveScanOf = Callable[[WaveSettings, int], WaveScan]
+
+
+class Following:
+    """A refinement that is to come.
+
+    Args:
+        dataset: its traces may still lie in its file.
+        settings: as they were asked for.
+        samples: of each trace of object and water; 0: none.
+        scan_of: see ``WaveScanOf``.
+
+    Attributes:
+        total: emitter passes that it takes at most.
+        minutes: about how long a core works on it.
+
+    Raises:
+        InvalidInput: for a scan that lacks what waves need.
+    """
+
+    def __init__(self, dataset: Dataset, settings: Settings, samples: int, scan_of: WaveScanOf) -> None:
+        check_traces(samples)
+        self._settings, self._scan_of = settings, scan_of
+        self._water_np_m = dataset.water_attenuation_np_m or 0.0
+        self._plan = wave_settings(dataset, settings)
+        slices = pairs.count(dataset, settings)
+        self.minutes = slices * core_seconds(dataset, self._plan, samples) / 60.0
+        self.total = slices * sum(band.looks(self._plan.held_out) for band in self._plan.bands)
+
+    def refined(self, rays: Reconstruction, drive: Drive, before: int) -> Reconstruction:
+        """The image of the rays, refined slice after slice: the emitters of one are enough for many workers.
+
+        Args:
+            rays: the reconstruction.
+            drive: runs chains to their end.
+            before: emitter passes that were made.
+        """
+        images = _slices(rays, rays.speed)
+        each = self.total // len(images)
+        history, chains = rays.history, []
+        for index, image in enumerate(images):
+            scan = self._scan_of(self._plan, index)
+            chains.append(WaveChain(scan, image, index, history, self._stage(rays)))
+            drive(chains[-1:], before + each * index, self.total - each * (index + 1))
+            history = chains[-1].history
+        if self._settings.method == "auto" and not preferred(chains):
+            told = f"{_told(rays, self._plan, chains)}; not clearly better, so the image of the rays is given"
+            return replace(rays, history=history, provenance={**rays.provenance, "waveform": told})
+        return self._result(rays, chains)
+
+    @property
+    def passes(self) -> int:
+        """Emitter passes of ``advised``."""
+        return passes(self._plan)
+
+    def advised(self, rays: Reconstruction, noise_s: float, drive: Drive, before: int) -> Reconstruction:
+        """The reconstruction with a sentence whether waves are advised, by what they miss through its image.
+
+        Args:
+            rays: the reconstruction, with its trials; of several slices the middle one is looked at.
+            noise_s: standard deviation of the travel times, s.
+            drive: runs chains to their end.
+            before: emitter passes that were made.
+        """
+        images = _slices(rays, rays.speed)
+        index = len(images) // 2
+        judge = Judge(self._scan_of(judging(self._plan), index), images[index], rays.history)
+        drive([judge], before, 0)
+        told = worth(judge.judgement, rays.trials[0], noise_s, self.minutes)
+        return replace(rays, provenance={**rays.provenance, "waveform": told})
+
+    def _stage(self, rays: Reconstruction) -> int:
+        return 1 + max(sweep.stage for sweep in rays.history)
+
+    def _result(self, rays: Reconstruction, chains: Sequence[WaveChain]) -> Reconstruction:
+        """The result of finished chains, on the finest grid that one of them reached."""
+        finest = min((chain.image for chain in chains), key=lambda image: image.spacing)
+
+        def laid(images: Sequence[Image]) -> NDArray[np.float64]:
+            grid = _at(finest)
+            parts = [image.speed if _at(image) == grid else resampled(image, *grid) for image in images]
+            return np.ascontiguousarray(np.stack(parts, axis=-1)) if rays.speed.ndim == 3 else parts[0]
+
+        def of_rays(values: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+            return None if values is None else laid(_slices(rays, values))
+
+        def losses(image: Image) -> Image:
+            assert image.attenuation is not None
+            return replace(image, speed=image.attenuation + self._water_np_m)
+
+        refined = None
+        if all(chain.image.attenuation is not None for chain in chains):
+            refined = laid([losses(chain.image) for chain in chains])
+        coverage = of_rays(rays.coverage)
+        assert coverage is not None
+        return replace(
+            rays,
+            speed=laid([chain.image for chain in chains]),
+            coverage=coverage,
+            attenuation=refined if refined is not None else of_rays(rays.attenuation),
+            recovery=of_rays(rays.recovery),
+            spacing_m=(finest.spacing, finest.spacing, *rays.spacing_m[2:]),
+            origin_m=(*finest.origin, *rays.origin_m[2:]),
+            settings=replace(self._settings, method="waveform"),
+            history=measured(chains[-1:]).history,
+            # They are of the rays' image.
+            residuals=None,
+            provenance={**rays.provenance, "waveform": _told(rays, self._plan, chains)},
+        )
+
+
+def preferred(chains: Sequence[WaveChain]) -> bool:
+    """Whether held-out emitters are predicted clearly better by what waves made, over all slices.
+
+    A band begins with the image that the one before left, so that what bands of the speed gain multiplies.
+    """
+    gains = [
+        math.prod(
+            end.held / end.history[0].held
+            for end in chain.ends
+            if end.history and end.image.attenuation is None
+        )
+        for chain in chains
+    ]
+    return sum(gains) / len(gains) < CLEARLY
+
+
+def _at(image: Image) -> tuple[float, tuple[float, float], tuple[int, ...]]:
+    """The grid of an image."""
+    return image.spacing, image.origin, image.speed.shape
+
+
+def _slices(rays: Reconstruction, values: NDArray[np.float64]) -> list[Image]:
+    """An array of a reconstruction as an image a slice."""
+    origin = (rays.origin_m[0], rays.origin_m[1])
+    every = np.moveaxis(np.atleast_3d(values), -1, 0)
+    return [Image(np.ascontiguousarray(image), rays.spacing_m[0], origin) for image in every]
+
+
+def _told(rays: Reconstruction, plan: WaveSettings, chains: Sequence[WaveChain]) -> str:
+    """What it began with and how each band predicted the emitters that were held out."""
+    used = rays.settings
+    text = f"begun from the image of {used.rays} rays ({used.method})"
+    for number, band in enumerate(plan.bands):
+        ends = [end for end in (chain.ends[number] for chain in chains) if end.history or not end.skipped]
+        if ends:
+            what = "attenuation (experimental), " if band.of == "attenuation" else ""
+            corners = f"{1e-3 * band.low_hz:.0f} to {1e-3 * band.high_hz:.0f} kHz"
+            text += f"; {what}{corners}: {_band_told(ends)}"
+    return text
+
+
+def _band_told(ends: Sequence[BandEnd]) -> str:
+    """What a band gave, over all slices that reached it."""
+    looked = [end for end in ends if end.history]
+    if not looked:
+        return "passed over, for its water shots could not be simulated"
+    first, last = np.mean([(end.history[0].held, end.held) for end in looked], axis=0)
+    text = f"misfit of held-out emitters {first:.2g}, then {last:.2g}"
+    skipped = sum(end.skipped for end in looked)
+    if skipped:
+        where = f" in {skipped} slices" if len(ends) > 1 else ""
+        text += f", stopped{where} as it rose: cycles were skipped, or noise was fitted"
+    return text

@@ -1,0 +1,53 @@
+"""Phase speed in the water, fitted to water shots: what the simulation must share with the recording."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import InvalidInput
+from .trace_resampling import Water
+
+# Frequencies weaker than this part of the strongest are left out.
+WEAK = 0.05
+
+# Pairs of one emitter that the line of phase over distance is drawn through, at least.
+LEAST_PAIRS = 8
+
+
+def fitted(water: Water, distance: Floats, simulated: Floats, recorded: Floats, time_step_s: float) -> Water:
+    """The water in which simulated traces would have the phases of the recorded ones.
+
+    At each frequency the phase between the two is a straight line over distance, whose slope is the error of
+    the wave number; over frequency it is fitted as ``Water`` has it.
+
+    Args:
+        water: that the simulation and the resampling assumed.
+        distance: (pairs,), m, of one emitter's receivers, rising.
+        simulated, recorded: (pairs, nt), at the same times.
+        time_step_s: s.
+
+    Raises:
+        InvalidInput: with fewer than ``LEAST_PAIRS`` pairs.
+    """
+    if distance.size < LEAST_PAIRS:
+        raise InvalidInput(
+            "waveform/water", f"{distance.size} pairs", f"{LEAST_PAIRS} pairs at least of one emitter"
+        )
+    padded = 4 * simulated.shape[1]
+    frequency = np.fft.rfftfreq(padded, time_step_s)
+    model, data = (np.fft.rfft(traces, padded, axis=1) for traces in (simulated, recorded))
+    power = (np.abs(model) * np.abs(data)).sum(axis=0)
+    used = np.flatnonzero(power > WEAK * power.max())
+    across = np.exp(1j * np.angle(data[:, used] * np.conj(model[:, used])))
+    # Steps between neighbours are small, so that they add up without a jump.
+    phase = np.cumsum(np.angle(across[1:] * np.conj(across[:-1])), axis=0)
+    phase = np.concatenate((np.zeros((1, used.size)), phase))
+    apart = distance - distance.mean()
+    slope = apart @ (phase - phase.mean(axis=0)) / (apart @ apart)
+    scatter = (phase - phase.mean(axis=0) - apart[:, None] * slope).std(axis=0)
+    weight = 2.0 * np.pi * frequency[used] / (scatter + 0.01)
+    error = slope * water.speed / (2.0 * np.pi * frequency[used])
+    columns = np.column_stack((np.ones(used.size), frequency[used] ** 2 * 1e-12))
+    lead, bend = np.linalg.lstsq(weight[:, None] * columns, weight * error, rcond=None)[0]
+    return Water(water.speed, water.lead + float(lead), water.bend + 1e-12 * float(bend))

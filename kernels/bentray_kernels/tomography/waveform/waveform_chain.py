@@ -1,0 +1,224 @@
+"""A refinement through all its bands, as calls that may run anywhere; see ``tomography.chains``."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from ...arrays import Floats
+from ..result import Sweep
+from ..task_chains import Call
+from . import band_inversion
+from .band_inversion import Look, Model, WaveIterate
+from .inversion_state import BandEnd, Entered, Image, WaveStanding
+from .iterations import sweeps
+from .waveform_problem import WaveProblem
+from .waveform_settings import WaveSettings
+
+# A band whose water shots are simulated with a lower correlation than this with the recorded ones is passed
+# over: its waves are too long for the array and its absorbing edges, or were not sent.
+LEAST_LIKENESS = 0.9
+
+
+class WaveScan(Protocol):
+    """Where calls find their data; it travels with them, so it holds a path or the dataset itself."""
+
+    def settings(self) -> WaveSettings:
+        """How to band_inversion."""
+
+    def problem(self, number: int) -> WaveProblem:
+        """The problem of a band, from 0; made once in a process."""
+
+
+class WaveChain:
+    """The calls of all bands: looks of single emitters in any order, then one step, again and again.
+
+    Args:
+        scan: see ``WaveScan``.
+        start: the image to begin with.
+        index: of the slice, for the history.
+        earlier: what led to the start, and other slices; it comes first in the history.
+        stage: number of the first band among all stages.
+
+    Attributes:
+        ends: where bands ended.
+        total: emitter passes that it takes at most, but for shortened steps, which count as none.
+    """
+
+    def __init__(
+        self,
+        scan: WaveScan,
+        start: Image,
+        index: int = 0,
+        earlier: tuple[Sweep, ...] = (),
+        stage: int = 0,
+    ) -> None:
+        self._scan, self._start = scan, start
+        self._index, self._earlier, self._stage = index, earlier, stage
+        self._sizes = [band.looks(scan.settings().held_out) for band in scan.settings().bands]
+        self.ends: tuple[BandEnd, ...] = ()
+        self._band: Entered | None = None
+        self._looks: dict[int, Any] = {}
+        self.total = sum(self._sizes)
+
+    @property
+    def number(self) -> int:
+        """Of the band under way, from 0."""
+        return len(self.ends)
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing is left to do."""
+        return self.number == len(self._sizes)
+
+    @property
+    def done(self) -> int:
+        """Emitter passes that are made, or that an early end made needless."""
+        if self.over:
+            return self.total
+        passed = sum(self._sizes[: self.number])
+        if self._band is None:
+            return passed
+        band = self._scan.settings().bands[self.number]
+        each = band.emitters + self._scan.settings().held_out
+        seen = each * len(self._band.state.history) + len(self._looks)
+        return passed + min(seen, self._sizes[self.number])
+
+    @property
+    def history(self) -> tuple[Sweep, ...]:
+        """What led to the start, then of each band a stage."""
+        passes = [end.history for end in self.ends]
+        if self._band is not None:
+            passes.append(self._band.state.history)
+        found = list(self._earlier)
+        for number, of_band in enumerate(passes):
+            skipped = number < self.number and self.ends[number].skipped
+            over = number < self.number
+            found += sweeps(
+                self._scan.settings(),
+                number,
+                of_band,
+                self._index,
+                self._stage + number,
+                over=over,
+                skipped=skipped,
+                kept_s=next((s.residual_rms_s for s in reversed(found) if s.given), math.nan),
+            )
+        return tuple(found)
+
+    @property
+    def image(self) -> Image:
+        """The image that the last finished band left."""
+        return self.ends[-1].image if self.ends else self._start
+
+    @property
+    def standing(self) -> WaveStanding:
+        """Where it stands, to be kept, without looks that wait for others."""
+        return WaveStanding(self.ends, self._band)
+
+    def restore(self, standing: WaveStanding) -> None:
+        """Go on from where a chain of the same scan stood; to be called before ``first``."""
+        self.ends, self._band = standing.ends, standing.band
+
+    def first(self) -> list[Call]:
+        """Calls to begin with, or to go on with after ``restore``."""
+        if self.over:
+            return []
+        if self._band is None:
+            return [Call(enter, (self._scan, self.number, self.image))]
+        model = self._band.model
+        return [
+            Call(look_at_waves, (self._scan, self.number, model, place), keep=True)
+            for place in range(self._band.emitters)
+        ]
+
+    def after(self, call: Call, given: Any) -> list[Call]:
+        """Calls that may follow one that has finished.
+
+        Args:
+            call: the one that has finished.
+            given: what it gave, or its handle where ``call.keep``.
+        """
+        if call.function is enter:
+            self._band = given
+            if given is None:
+                self.ends = (*self.ends, BandEnd(self.image, skipped=False, history=()))
+            return self.first()
+        assert self._band is not None
+        if call.function is look_at_waves:
+            self._looks[call.arguments[-1]] = given
+            if len(self._looks) < self._band.emitters:
+                return []
+            # In the order of the emitters, never in that of their coming.
+            looks = [found for _, found in sorted(self._looks.items())]
+            return [Call(step_by_waves, (self._scan, self.number, self._band.state, looks))]
+        self._looks = {}
+        self._band = replace(self._band, state=given)
+        if given.done:
+            spacing = self._scan.settings().bands[self.number].spacing_m
+            image = self._left(Image(given.image, spacing, self._band.origin))
+            # The band is over, so that pairs of changes are not kept any longer.
+            self.ends = (*self.ends, BandEnd(image, given.skipped, given.history))
+            if given.skipped:
+                self._leave_out()
+            self._band = None
+        return self.first()
+
+    def _leave_out(self) -> None:
+        """Go past further bands of the speed, which would skip more cycles or fit more noise."""
+        while not self.over and self._scan.settings().bands[self.number].of == "speed":
+            self.ends = (*self.ends, BandEnd(self.image, skipped=True, history=()))
+
+    def _left(self, found: Image) -> Image:
+        """The image after a band: the speed that it found, or the last one with the attenuation found."""
+        if self._scan.settings().bands[self.number].of == "speed":
+            return found
+        last = self.image
+        on_it = resampled(found, last.spacing, last.origin, last.speed.shape)
+        return replace(last, attenuation=on_it)
+
+
+def enter(scan: WaveScan, number: int, image: Image) -> Entered | None:
+    """Call: what a band begins with; None where it is passed over, see ``LEAST_LIKENESS``."""
+    problem = scan.problem(number)
+    if problem.likeness < LEAST_LIKENESS:
+        return None
+    speed, count = on_grid(image, problem), len(band_inversion.emitters(problem))
+    if problem.band.of == "speed":
+        return Entered(band_inversion.begin(speed), problem.origin, count)
+    return Entered(band_inversion.begin(np.zeros_like(speed)), problem.origin, count, speed)
+
+
+def look_at_waves(scan: WaveScan, number: int, model: Model, place: int) -> Look:
+    """Call: one emitter's look at an image, by its place among the band's emitters."""
+    problem = scan.problem(number)
+    return band_inversion.look(
+        problem, scan.settings(), model, band_inversion.emitters(problem)[place : place + 1]
+    )
+
+
+def step_by_waves(scan: WaveScan, number: int, state: WaveIterate, looks: list[Look]) -> WaveIterate:
+    """Call: the next image."""
+    return band_inversion.step(scan.problem(number), scan.settings(), state, looks)
+
+
+def on_grid(image: Image, problem: WaveProblem) -> Floats:
+    """An image on the grid of a problem, (nx, ny), m/s; water where nothing may change."""
+    speed = resampled(image, problem.band.spacing_m, problem.origin, problem.region.shape)
+    return np.where(problem.region, speed, problem.water.speed)
+
+
+def resampled(image: Image, spacing: float, origin: tuple[float, float], shape: tuple[int, ...]) -> Floats:
+    """An image on another grid, (nx, ny), m/s; beyond its own its outermost nodes go on."""
+    lines = [
+        (origin[axis] + spacing * np.arange(nodes) - image.origin[axis]) / image.spacing
+        for axis, nodes in enumerate(shape)
+    ]
+    places = np.meshgrid(*lines, indexing="ij")
+    # Cubic, for linear interpolation takes sharpness off at every change of grid; it may overshoot.
+    speed = map_coordinates(image.speed, places, order=3, mode="nearest")
+    return np.asarray(np.clip(speed, image.speed.min(), image.speed.max()))

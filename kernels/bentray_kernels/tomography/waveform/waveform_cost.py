@@ -1,0 +1,61 @@
+"""What a refinement takes, and whether it is worth that: known before it begins."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...acquisition import Dataset
+from ..result import Trial
+from .band_grid import Extent
+from .validation import Judgement
+from .waveform_settings import WaveSettings
+
+# Seconds a node and time step of a look, there and back, with all that belongs to it; a core of 2020.
+NODE_STEP_S = 4e-9
+
+# What waves through an image miss by so many times what they miss in water is the image's fault. Through the
+# truth it is one to two times, for traces of the object are weaker and noise counts more on them.
+MUCH = 3.0
+
+# Where no waves were simulated: what rays miss by so many times the noise is not noise.
+MUCH_OF_NOISE = 1.5
+
+
+def core_seconds(dataset: Dataset, plan: WaveSettings, samples: int) -> float:
+    """About how long a core works on one slice, s.
+
+    Args:
+        dataset: its traces may still lie in its file.
+        plan: how it is refined.
+        samples: of each trace.
+    """
+    assert dataset.sampling_rate_hz is not None
+    reach = 0.5 * float(np.ptp(dataset.element_position_m, axis=0).max())
+    record_s = (samples - 1) / dataset.sampling_rate_hz
+    found = 0.0
+    for band in plan.bands:
+        extent = Extent.of(band, reach, record_s, plan.speed_bounds_mps[1])
+        found += NODE_STEP_S * extent.padded**2 * extent.steps * band.looks(plan.held_out)
+    return found
+
+
+def worth(judgement: Judgement, rays: Trial, noise_s: float, minutes: float) -> str:
+    """One sentence: whether waves are advised after rays, and what they take.
+
+    Args:
+        judgement: of the image of the rays.
+        rays: the trial with the best ones, for where waves say nothing.
+        noise_s: standard deviation of the travel times, s.
+        minutes: that a core would work on waves.
+    """
+    if judgement.misfit is not None and judgement.water is not None:
+        gain = judgement.misfit > MUCH * judgement.water
+        found = f"waves through the image of rays miss held-out emitters by {judgement.misfit:.2g}"
+        found += f", those in water by {judgement.water:.2g}"
+    else:
+        gain = rays.held_out_rms_s > MUCH_OF_NOISE * noise_s
+        found = f"rays miss held-out times by {1e9 * rays.held_out_rms_s:.0f} ns"
+        found += f", whose noise is {1e9 * noise_s:.0f} ns"
+    takes = "a minute" if minutes < 1.5 else f"{minutes:.0f} minutes"
+    advice = "is advised" if gain else "would gain little"
+    return f"method waveform {advice}, for {found}; it takes about {takes} of a core"

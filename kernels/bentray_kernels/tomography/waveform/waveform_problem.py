@@ -1,0 +1,88 @@
+"""The inverse problem of a scan in one band: elements on a grid, traces in the simulator's time, wavelet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Flags, Floats, Ints
+from ...wave.adjoint import stored_bytes
+from ...wave.medium import Medium
+from ...wave.time_blocks import Poll, unheeded
+from .misfits import around
+from .trace_resampling import Clock, Water
+from .waveform_settings import Band
+
+
+@dataclass(frozen=True)
+class WaveProblem:
+    """What a refinement in one band needs, once; ``waveform.preparation.prepare`` makes it from a dataset.
+
+    Attributes:
+        band: the band.
+        emitters: (ntx, 2), m, node 0 of the image at 0.
+        receivers: (nrx, 2), m.
+        region: (nodes, nodes), nodes that may change.
+        origin: position of node 0 in the dataset's coordinates, m.
+        clock: of the simulator.
+        wavelet: (steps,), the source.
+        water: as the water shots have it.
+        likeness: mean correlation of simulated with recorded water shots.
+        weight: (ntx, nrx), 1 for the pairs that are used, else 0.
+        arrival_s: (ntx, nrx), predicted, s.
+        traces: of the object by emitter, (nrx, nt) each, as recorded; of those used and held.
+        gain: (ntx, nrx), pressure per count of each trace; for the attenuation such that the water shots of
+            each pair have the amplitude that is simulated.
+        sampler: (nt, steps), see ``resampler``.
+        used, held: emitters that make the image, and that only judge.
+        every: time steps from one stored field to the next.
+        poll: of its simulations, see ``time_blocks``.
+    """
+
+    band: Band
+    emitters: Floats
+    receivers: Floats
+    region: Flags
+    origin: tuple[float, float]
+    clock: Clock
+    wavelet: Floats
+    water: Water
+    likeness: float
+    weight: Floats
+    arrival_s: Floats
+    traces: Mapping[int, NDArray[Any]]
+    gain: Floats
+    sampler: NDArray[np.float32]
+    used: Ints
+    held: Ints
+    every: int
+    poll: Poll = unheeded
+
+    def medium(self, speed: Floats, attenuation: Floats | None = None) -> Medium:
+        """The medium of images on this grid."""
+        return Medium.of(speed, self.band.spacing_m, self.clock.step_s, attenuation=attenuation)
+
+    @property
+    def look_bytes(self) -> int:
+        """Bytes of wave field that one emitter's look keeps; as many looks may run at once as fit."""
+        still = self.medium(np.full(self.region.shape, self.water.speed))
+        return stored_bytes(still, self.clock.steps, self.every)
+
+    def recorded(self, emitter: int, heard: Ints) -> Floats:
+        """Traces of some receivers in the simulator's time, (heard, steps)."""
+        sampled = self.traces[emitter][heard] @ self.sampler
+        return np.asarray(self.gain[emitter][heard][:, None] * sampled, dtype=np.float64)
+
+    def heard(self, emitter: int) -> Ints:
+        """Receivers whose traces of an emitter are used."""
+        return np.flatnonzero(self.weight[emitter] > 0.0)
+
+    def window(self, emitter: int, heard: Ints, reach_s: tuple[float, float]) -> Floats:
+        """Weight of each sample, (heard, steps): about the arrival, and fading before the record ends."""
+        times = self.clock.begin_s + self.clock.step_s * np.arange(self.clock.steps, dtype=np.float64)
+        ending = np.clip((times[-1] - times) * 0.5 * self.band.high_hz, 0.0, 1.0)
+        return np.asarray(around(self.arrival_s[emitter][heard], times, *reach_s) * ending)

@@ -1,0 +1,99 @@
+"""A batch as a person sees it: a live table while it runs, and what became of each dataset at the end."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from .exit_codes import WorkFailed
+from .terminal import print_json, print_lines, print_table, remark, residual_note
+
+if TYPE_CHECKING:
+    from bentray_workers.reconstruction.batch import Entry
+
+COLUMNS = ("name", "state", "progress", "misfit", "seconds")
+NUMBERS = ("progress", "misfit", "seconds")
+
+# Lines of a terminal that the table needs beside its rows.
+FRAME = 6
+
+
+@contextmanager
+def watching(entries: Sequence[Entry]) -> Iterator[Callable[[], None]]:
+    """What to call while a batch runs: on a terminal it renews a table, else it tells of each that ended."""
+    console = Console(stderr=True)
+    if console.is_terminal:
+        with Live(console=console, transient=True, auto_refresh=False) as live:
+            yield lambda: live.update(live_table(entries, console.height), refresh=True)
+        return
+    told = {entry.name for entry in entries if entry.state == "skipped"}
+
+    def tell() -> None:
+        for entry in entries:
+            if entry.state in ("succeeded", "failed") and entry.name not in told:
+                told.add(entry.name)
+                remark(f"{entry.name} {entry.state} after {entry.seconds:.1f} s {entry.reason}".rstrip())
+
+    yield tell
+
+
+def live_table(entries: Sequence[Entry], height: int) -> Table:
+    """What runs, then what ended last, as many as fit; above them how many there are of each."""
+    counts = Counter(entry.state for entry in entries)
+    running = [entry for entry in entries if entry.state == "running"]
+    ended = [entry for entry in entries if entry.state in ("succeeded", "failed")]
+    shown = [*running, *reversed(ended)][: max(1, height - FRAME)]
+    title = f"{len(entries)} datasets: " + ", ".join(f"{n} {state}" for state, n in sorted(counts.items()))
+    table = Table(title=title, title_justify="left")
+    for name in COLUMNS:
+        table.add_column(name, justify="right" if name in NUMBERS else "left", no_wrap=True)
+    for entry in shown:
+        table.add_row(*(Text(cell) for cell in cells(entry)))
+    return table
+
+
+def cells(entry: Entry) -> tuple[str, ...]:
+    """One row of the table."""
+    part = 100 * entry.done // entry.total if entry.total else 0
+    progress = f"{part} %" if entry.state in ("running", "failed") else ""
+    misfit = residual_note(entry.residual_rms_s).removeprefix("residual ")
+    seconds = "" if entry.state == "waiting" else f"{entry.seconds:.1f}"
+    return entry.name, entry.state, progress, misfit, seconds
+
+
+def report(folder: Path, results: Path, entries: Sequence[Entry], *, as_json: bool) -> None:
+    """The end of a batch: every dataset in a table, and why some failed; or all as JSON.
+
+    Raises:
+        WorkFailed: when one failed.
+    """
+    counts = Counter(entry.state for entry in entries)
+    failed = [entry for entry in entries if entry.state == "failed"]
+    if as_json:
+        states = {state: counts[state] for state in ("succeeded", "skipped", "failed")}
+        print_json({"folder": str(folder), **states, "datasets": [_figures(results, one) for one in entries]})
+    else:
+        print_table(f"Batch of {folder.name}", COLUMNS, [cells(entry) for entry in entries], NUMBERS)
+        print_lines([*(f"{entry.name}: {entry.reason}" for entry in failed), str(results)])
+    if failed:
+        raise WorkFailed(f"{len(failed)} of {len(entries)} datasets failed: the reasons are above")
+
+
+def _figures(results: Path, entry: Entry) -> dict[str, Any]:
+    return {
+        "name": entry.name,
+        "file": str(entry.source),
+        "state": entry.state,
+        "seconds": round(entry.seconds, 3),
+        "residual_rms_s": entry.residual_rms_s,
+        "reason": entry.reason,
+        "output": None if entry.state == "failed" else str(results / entry.name),
+    }

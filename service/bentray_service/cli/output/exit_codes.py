@@ -1,0 +1,70 @@
+"""How a command ends: exit code 0 when done, 1 when the work failed, 2 for bad input, 130 after Ctrl-C."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, NoReturn
+
+import typer
+from typer.core import TyperGroup
+
+WORK_FAILED = 1
+BAD_INPUT = 2
+
+
+class WorkFailed(Exception):  # noqa: N818 - the command's ending, not a fault of the program
+    """The work could not be done although the input was good; the message is all the user needs."""
+
+
+class Commands(TyperGroup):
+    """The group of all commands; turns what they raise into one line on stderr and an exit code.
+
+    A fault of the program itself is not hidden: its traceback is printed, with exit code 1.
+    """
+
+    def main(self, *args: Any, **options: Any) -> Any:
+        from bentray_kernels.errors import InvalidInput
+
+        options["standalone_mode"] = False
+        try:
+            code = super().main(*args, **options)
+        except InvalidInput as error:
+            from ...refusals import DatabaseAway, StorageAway, StorageFull
+
+            away = isinstance(error, DatabaseAway | StorageAway | StorageFull)
+            _end(str(error), WORK_FAILED if away else BAD_INPUT)
+        except WorkFailed as error:
+            _end(str(error), WORK_FAILED)
+        except typer.TyperException as error:
+            context = getattr(error, "ctx", None)
+            hint = f" (see {context.command_path} --help)" if context is not None else ""
+            _end(error.format_message().rstrip(".") + hint, error.exit_code)
+        except MemoryError as error:
+            _end(f"memory is too short: {str(error) or 'no more can be had'}", WORK_FAILED)
+        except OSError as error:
+            _end(f"{error.filename or 'the system'}: {error.strerror or error}", WORK_FAILED)
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+@contextmanager
+def service_answers() -> Iterator[None]:
+    """Turn what the service refuses into bad input, and what it cannot do into failed work."""
+    from bentray_kernels.errors import InvalidInput
+
+    from ...client import ClientError
+
+    try:
+        yield
+    except ClientError as error:
+        refused = error.status is not None and 400 <= error.status < 500
+        if refused and error.field and error.found and error.accepted:
+            raise InvalidInput(error.field, error.found, error.accepted) from error
+        raise WorkFailed(str(error)) from error
+
+
+def _end(message: str, code: int) -> NoReturn:
+    line = " ".join(message.split())
+    sys.stderr.write(f"bentray: {line}\n")
+    sys.exit(code)

@@ -1,0 +1,110 @@
+"""The figures of a reconstruction: what `reconstruction.json` holds and the closing tables show."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.acquisition.dataset import Dataset, Truth
+from bentray_kernels.acquisition.quality.finding import NOTHING_FOUND
+from bentray_kernels.tomography import Reconstruction
+from bentray_kernels.tomography.model_selection.selection import told
+from bentray_workers.images.residuals import within
+from bentray_workers.images.truth_comparison import NotComparable, compare
+
+# Shares of the residuals, per cent, whose size the figures tell.
+SHARES = (50, 90, 99)
+
+
+def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[str, Any]:
+    """Plain values for JSON, SI units, the unit in the name.
+
+    Args:
+        result: what was reconstructed.
+        dataset: what it was reconstructed from; its truth, if any, gives the errors.
+        seconds: wall-clock time of the reconstruction, s.
+
+    Returns:
+        Settings, residual history, speed range, time and provenance; ``residual_within_s`` tells the size
+        that a share of the last sweep's residuals does not exceed, by per cent; ``recovery_mean`` is that of
+        the resolution check inside the array; ``trials`` and ``reason`` say how ``auto`` chose.
+        What there is not is None, or empty for trials and reason.
+    """
+    return {
+        "seconds": round(seconds, 3),
+        "slices": dataset.slices,
+        "shape": list(result.speed.shape),
+        "spacing_m": list(result.spacing_m),
+        "origin_m": list(result.origin_m),
+        "water_speed_mps": result.water_speed_mps,
+        "speed_range_mps": [float(result.speed.min()), float(result.speed.max())],
+        "residual_rms_s": result.residual_rms_s,
+        "residual_within_s": (
+            None
+            if result.residuals is None
+            else {str(share): within(result.residuals, share / 100.0) for share in SHARES}
+        ),
+        "history": [asdict(sweep) for sweep in result.history],
+        "recovery_mean": _recovery_mean(result),
+        "reason": told(result),
+        "trials": [asdict(trial) for trial in result.trials],
+        "truth": None if dataset.truth is None else errors(result, dataset.truth, dataset.roi),
+        "settings": result.settings.to_dict(),
+        "provenance": dict(result.provenance),
+    }
+
+
+def errors(result: Reconstruction, truth: Truth, roi: NDArray[np.bool_] | None = None) -> dict[str, Any]:
+    """What ``images.truth_comparison.compare`` found, or why nothing was compared, as plain values."""
+    try:
+        found = compare(result, truth, roi)
+    except NotComparable as reason:
+        return {"region": f"not compared: {reason}", "region_nodes": 0, "axes": truth.axes}
+    return {
+        "region": found.region_choice,
+        "region_nodes": int(found.region.sum()),
+        "true_range_mps": list(found.true_range_mps),
+        "mean_absolute_error_of_range": found.mean_absolute_error_of_range,
+        "rmse_mps": found.rmse_mps,
+        "registration": "none",
+        "axes": truth.axes,
+    }
+
+
+def _recovery_mean(result: Reconstruction) -> float | None:
+    if result.recovery is None:
+        return None
+    # Exactly 0 is what lies outside of what was reconstructed.
+    inside = result.recovery != 0.0
+    return float(result.recovery[inside].mean()) if inside.any() else 0.0
+
+
+def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
+    """Rows (name, value) of the closing table, from what ``figures`` gave."""
+    low, high = found["speed_range_mps"]
+    rows = [
+        ("rays", found["settings"]["rays"]),
+        ("method", found["settings"]["method"]),
+        ("image", " by ".join(map(str, found["shape"])) + f" nodes of {found['spacing_m'][0] * 1e3:.3g} mm"),
+        ("speed", f"{low:.0f} to {high:.0f} m/s"),
+        ("time", f"{found['seconds']:.1f} s"),
+    ]
+    if found["residual_rms_s"] is not None:
+        rows.insert(4, ("residual", f"{found['residual_rms_s'] * 1e9:.0f} ns rms"))
+    if found["recovery_mean"] is not None:
+        rows.append(("resolution check", f"{100 * found['recovery_mean']:.0f} % of a checkerboard recovered"))
+    if found["provenance"].get("quality", NOTHING_FOUND) != NOTHING_FOUND:
+        rows.append(("scan", found["provenance"]["quality"]))
+    truth = found["truth"]
+    if truth is not None:
+        if truth.get("mean_absolute_error_of_range") is not None:
+            rows.append(
+                ("mean absolute error", f"{100 * truth['mean_absolute_error_of_range']:.1f} % of the range")
+            )
+        if "rmse_mps" in truth:
+            rows.append(("rms error", f"{truth['rmse_mps']:.1f} m/s"))
+        rows.append(("errors read", truth["region"]))
+    return rows

@@ -1,0 +1,57 @@
+"""The three files of a result: `reconstruction.h5`, `.png` and `.json` in one folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bentray_workers.files.atomic import write_bytes
+
+from .terminal import print_json, print_lines, print_table, without_nan
+
+if TYPE_CHECKING:
+    from bentray_kernels.acquisition import Dataset
+    from bentray_kernels.tomography import Reconstruction
+
+
+def write_results(
+    folder: Path,
+    result: Reconstruction,
+    dataset: Dataset,
+    seconds: float,
+    draw: Callable[[], bytes] | None = None,
+    **more: object,
+) -> dict[str, Any]:
+    """Write the three files, each whole or not at all, and return the figures, ``more`` first among them.
+
+    The picture is drawn here, unless ``draw`` gives it once the ``.h5`` is there; the ``.json`` comes last.
+    """
+    from bentray_workers.files.reconstruction import write_reconstruction
+    from bentray_workers.images.report import report_png
+
+    from .figures import figures
+
+    paths = {kind: folder / f"reconstruction.{kind}" for kind in ("h5", "png", "json")}
+    found = {
+        **more,
+        **figures(result, dataset, seconds),
+        "outputs": {kind: str(path) for kind, path in paths.items()},
+    }
+    write_reconstruction(paths["h5"], result)
+    png = report_png(result, dataset.truth, dataset.roi) if draw is None else draw()
+    write_bytes(paths["png"], png)
+    write_bytes(paths["json"], (json.dumps(without_nan(found), indent=2, allow_nan=False) + "\n").encode())
+    return found
+
+
+def show_results(title: str, found: dict[str, Any], *, as_json: bool) -> None:
+    """The figures as a table, why ``auto`` chose what it chose, and the three paths; or all as JSON."""
+    from .figures import summary
+
+    if as_json:
+        print_json(found)
+        return
+    print_table(title, ("figure", "value"), summary(found))
+    print_lines([*([found["reason"]] if found["reason"] else []), *found["outputs"].values()])

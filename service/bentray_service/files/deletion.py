@@ -1,0 +1,187 @@
+"""Deleting what is stored, with all that was made of it: the rows first, then the files."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Collection, Iterator
+from typing import NamedTuple
+
+from sqlalchemy import ColumnElement, Connection, Table, and_, delete, or_, select, update
+
+from ..refusals import DatabaseAway, InUse, StorageAway, UnknownId
+from ..rows import usage
+from ..rows.checksums import forget
+from ..rows.database import Database
+from ..rows.ids import checked
+from ..rows.schema import (
+    ENDED,
+    datasets,
+    events,
+    geometry_fields,
+    jobs,
+    meshes,
+    too_old,
+    uploaded_volumes,
+    uploads,
+    volumes,
+)
+from ..rows.tenants import Tenant
+from .data_folder import Files
+
+log = logging.getLogger("bentray.storage")
+
+
+class Stored(NamedTuple):
+    """One thing that can be deleted; ``what`` is ``dataset``, ``volume``, ``mesh`` or ``job``."""
+
+    tenant: Tenant
+    what: str
+    id: str
+
+
+class Deletion:
+    """Deletes datasets, volumes, meshes and jobs of a tenant.
+
+    A dataset goes with the simulation that made it, its jobs and their volumes, a volume with the job that
+    made it, its turntables and its exports, a mesh with its jobs and their fields. A mesh made of a volume
+    stays. A job by itself is one that none of them takes along: it read nothing that is stored, and made
+    nothing, as a simulation that was cancelled or failed.
+
+    Whoever reads a file meanwhile has it open, or finds neither file nor row. A death on the way leaves
+    files that no row knows; see ``Orphans``.
+    """
+
+    def __init__(self, database: Database, files: Files) -> None:
+        self._database = database
+        self._files = files
+
+    def delete(self, stored: Stored) -> None:
+        """Delete one thing and all that was made of it.
+
+        Raises:
+            UnknownId: when the tenant has no such one.
+            InUse: when a job that needs it is not at its end; nothing is deleted then.
+            StorageAway: when files cannot be removed now; nothing is deleted then.
+        """
+        name = checked(stored.what, stored.id)
+        if fault := self._files.store.fault():
+            # Said before the database is held.
+            raise StorageAway(fault)
+        with self._database.write() as connection:
+            if not any(_has(connection, table, stored.tenant, name) for table in _TABLES[stored.what]):
+                raise UnknownId(stored.what, stored.id)
+            gone = _JOBS[stored.what](connection, stored.tenant, name)
+            results = set(
+                connection.execute(select(volumes.c.id).where(volumes.c.job_id.in_(gone))).scalars()
+            )
+            gone |= _of(connection, stored.tenant, jobs.c.volume_id.in_(results))
+            self._refuse_unfinished(connection, stored, gone)
+            fields = _fields(connection, stored.tenant, name, gone)
+            _forget(connection, stored.tenant, {name, *results}, fields, gone)
+            usage.forget(connection, stored.tenant, [name, *results, *fields, *gone])
+        try:
+            self._files.of(stored.tenant).remove([name, *results, *fields, *gone])
+        except (StorageAway, DatabaseAway, OSError):
+            log.warning("files of %s stay until they are found as orphans", stored.id, exc_info=True)
+
+    def older_than(self, time: float) -> Iterator[Stored]:
+        """What every tenant has from before a time, in seconds since 1970."""
+        for what, tables in _TABLES.items():
+            for table in tables:
+                old = _ended_with_nothing(time) if table is jobs else table.c.created < time
+                query = select(table.c.tenant, table.c.id).where(old)
+                with self._database.read() as connection:
+                    found = connection.execute(query).all()
+                yield from (Stored(Tenant(tenant), what, name) for tenant, name in found)
+
+    def _refuse_unfinished(self, connection: Connection, stored: Stored, gone: Collection[str]) -> None:
+        needing = jobs.c.id.in_(gone), jobs.c.state.not_in(ENDED)
+        busy = connection.execute(select(jobs.c.id, jobs.c.state).where(*needing)).first()
+        if busy is not None:
+            found = f"{stored.id}, which {busy.id} needs ({busy.state})"
+            raise InUse(stored.what, found, "one that no unfinished job needs; cancel the job first")
+
+
+def _has(connection: Connection, table: Table, tenant: Tenant, name: str) -> bool:
+    mine = select(table.c.id).where(table.c.tenant == tenant, table.c.id == name)
+    # Jobs that are submitted now wait, and find it gone; SQLite lets one write at a time anyway.
+    return connection.execute(mine.with_for_update()).first() is not None
+
+
+def _of(connection: Connection, tenant: Tenant, condition: ColumnElement[bool]) -> set[str]:
+    """The ids of the jobs of a tenant for which a condition holds."""
+    return set(connection.execute(select(jobs.c.id).where(jobs.c.tenant == tenant, condition)).scalars())
+
+
+def _of_dataset(connection: Connection, tenant: Tenant, name: str) -> set[str]:
+    made_it = select(datasets.c.job_id).where(datasets.c.id == name)
+    return _of(connection, tenant, or_(jobs.c.dataset_id == name, jobs.c.id.in_(made_it)))
+
+
+def _of_volume(connection: Connection, tenant: Tenant, name: str) -> set[str]:
+    made_it = select(volumes.c.job_id).where(volumes.c.id == name)
+    return _of(connection, tenant, or_(jobs.c.volume_id == name, jobs.c.id.in_(made_it)))
+
+
+def _ended_with_nothing(time: float) -> ColumnElement[bool]:
+    """Jobs that ended before a time and that nothing stored takes along when it is deleted."""
+    read = jobs.c.dataset_id, jobs.c.volume_id, jobs.c.mesh_id
+    made = select(datasets.c.id).where(datasets.c.job_id == jobs.c.id).exists()
+    return and_(jobs.c.finished < time, *(one.is_(None) for one in read), ~made)
+
+
+def _fields(connection: Connection, tenant: Tenant, mesh: str, gone: Collection[str]) -> set[str]:
+    """The geometry fields that go with a mesh; one that a job on another mesh shares is given to that."""
+    mine = geometry_fields.c.tenant == tenant
+    found = connection.execute(
+        select(geometry_fields.c.id).where(
+            mine, or_(geometry_fields.c.mesh_id == mesh, geometry_fields.c.job_id.in_(gone))
+        )
+    )
+    going = set()
+    for field in found.scalars().all():
+        sharing = jobs.c.tenant == tenant, jobs.c.field_id == field, jobs.c.id.not_in(gone)
+        heir = connection.execute(
+            select(jobs.c.id, jobs.c.mesh_id).where(*sharing, jobs.c.state == "succeeded").limit(1)
+        ).first()
+        if heir is None:
+            going.add(field)
+        else:
+            now = {"job_id": heir.id, "mesh_id": heir.mesh_id}
+            connection.execute(update(geometry_fields).where(mine, geometry_fields.c.id == field).values(now))
+    return going
+
+
+def _forget(
+    connection: Connection,
+    tenant: Tenant,
+    names: Collection[str],
+    fields: Collection[str],
+    gone: Collection[str],
+) -> None:
+    """Delete the rows, those that point at others first."""
+    mine = geometry_fields.c.tenant == tenant, geometry_fields.c.id.in_(fields)
+    connection.execute(delete(geometry_fields).where(*mine))
+    forget(connection, tenant, {*names, *fields, *gone})
+    connection.execute(delete(too_old).where(too_old.c.tenant == tenant, too_old.c.id.in_(names)))
+    connection.execute(delete(events).where(events.c.job_id.in_(gone)))
+    connection.execute(delete(volumes).where(volumes.c.id.in_(names)))
+    connection.execute(delete(jobs).where(jobs.c.id.in_(gone)))
+    for table in (datasets, uploaded_volumes, meshes):
+        connection.execute(delete(table).where(table.c.id.in_(names)))
+    connection.execute(delete(uploads).where(uploads.c.result_id.in_(names), uploads.c.state == "done"))
+    connection.execute(update(meshes).where(meshes.c.volume_id.in_(names)).values(volume_id=None))
+
+
+_TABLES = {
+    "dataset": (datasets,),
+    "volume": (volumes, uploaded_volumes),
+    "mesh": (meshes,),
+    "job": (jobs,),
+}
+_JOBS: dict[str, Callable[[Connection, Tenant, str], set[str]]] = {
+    "dataset": _of_dataset,
+    "volume": _of_volume,
+    "mesh": lambda connection, tenant, name: _of(connection, tenant, jobs.c.mesh_id == name),
+    "job": lambda connection, tenant, name: {name},
+}

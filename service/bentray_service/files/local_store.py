@@ -1,0 +1,45 @@
+"""The default store: the data folder itself, without a second copy of anything."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Callable, Collection
+from pathlib import Path
+
+from bentray_workers.files.atomic import sync
+
+from .disk import bytes_in
+
+
+class LocalStore:
+    """Keeps things where they lie; see :class:`Store`."""
+
+    def publish(self, path: Path) -> None:
+        """What writes a file makes its content durable; this does so for its name."""
+        sync(path.parent)
+
+    def bring(self, path: Path) -> Path:
+        if not path.exists():
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
+        return path
+
+    def again(self, path: Path) -> bool:
+        return False
+
+    def remove(self, paths: Collection[Path]) -> None:
+        for path in paths:
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink(missing_ok=True)
+
+    def bytes_used(self, folder: Path) -> int:
+        return bytes_in(folder)
+
+    def fault(self) -> str | None:
+        return None
+
+    def tidy(self, stop: Callable[[], bool]) -> None:
+        """There is one place only, so nothing can be out of line."""

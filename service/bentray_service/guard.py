@@ -1,0 +1,132 @@
+"""The one place that every request passes: who asks, whether it may, and what is written down of it."""
+
+from __future__ import annotations
+
+import logging
+import time
+from typing import Any, cast
+
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from bentray_kernels.errors import InvalidInput
+
+from .access.caller import Caller
+from .access.key_watch import answer_while_valid
+from .web.errors import refused
+from .wiring import Parts
+
+log = logging.getLogger("bentray.access")
+
+# What anybody may see: the pages, which hold no data, and whether the service works. All else is closed.
+PUBLIC = frozenset({"/", "/docs", "/openapi.json", "/health/live", "/health/ready"})
+PUBLIC_FOLDERS = ("/static/", "/problems/")
+
+UNMATCHED = "unmatched"
+
+
+class Guard:
+    """ASGI middleware: puts the caller into ``request.state.caller``, or refuses before the body is read."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        seen = _Seen(scope)
+        caller = None
+        try:
+            if not _public(scope["path"]):
+                caller = await run_in_threadpool(_let_in, scope, seen)
+                scope.setdefault("state", {})["caller"] = caller
+        except InvalidInput as error:
+            await refused(error, scope["path"])(scope, receive, seen.sending(send))
+        else:
+            given = scope, seen.receiving(receive), seen.sending(send)
+            if caller is not None and caller.how == "key":
+                await answer_while_valid(self.app, *given, _parts(scope).key_watch, caller.who)
+            else:
+                await self.app(*given)
+        finally:
+            seen.tell()
+
+
+def _let_in(scope: Scope, seen: _Seen) -> Caller:
+    door = _parts(scope).door
+    headers, peer = Headers(scope=scope), scope.get("client")
+    seen.caller = door.caller(headers, peer[0] if peer else "")
+    door.check(seen.caller, scope["method"], scope["path"])
+    return seen.caller
+
+
+def _public(path: str) -> bool:
+    return path in PUBLIC or path.startswith(PUBLIC_FOLDERS)
+
+
+def _parts(scope: Scope) -> Parts:
+    return cast(Parts, scope["app"].state.parts)
+
+
+class _Seen:
+    """What went past of one request."""
+
+    def __init__(self, scope: Scope) -> None:
+        self._scope = scope
+        self._begun = time.perf_counter()
+        self.caller: Caller | None = None
+        self.status = 500
+        self.received = self.sent = 0
+        self.location = ""
+
+    def receiving(self, receive: Receive) -> Receive:
+        async def counted() -> Message:
+            message = await receive()
+            self.received += len(message.get("body", b""))
+            return message
+
+        return counted
+
+    def sending(self, send: Send) -> Send:
+        async def counted(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                self.status = message["status"]
+                self.location = Headers(raw=message["headers"]).get("location", "")
+            self.sent += len(message.get("body", b""))
+            await send(message)
+
+        return counted
+
+    def tell(self) -> None:
+        """A line for the log, and an entry for the audit where somebody was let in."""
+        route = str(getattr(self._scope.get("route"), "path", UNMATCHED))
+        figures: dict[str, Any] = {
+            "method": self._scope["method"],
+            "route": route,
+            "status": self.status,
+            "received": self.received,
+            "sent": self.sent,
+        }
+        if self.caller is not None:
+            who = {"tenant": self.caller.tenant, "how": self.caller.how, "who": self.caller.who}
+            figures |= who
+            number = self._scope["state"]["request_id"]
+            _parts(self._scope).audit.note({"request": number, **figures, "ids": self._ids()})
+        seconds = round(time.perf_counter() - self._begun, 4)
+        words = "%s %s %d in %.3f s"
+        log.info(
+            words,
+            self._scope["method"],
+            self._scope["path"],
+            self.status,
+            seconds,
+            extra={"figures": {**figures, "seconds": seconds}},
+        )
+
+    def _ids(self) -> list[str]:
+        """What was named in the path, and what was made."""
+        named = [str(value) for value in self._scope.get("path_params", {}).values()]
+        made = self.location.rpartition("/")[2]
+        return [one[:80] for one in (*named, made) if one]

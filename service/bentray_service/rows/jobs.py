@@ -1,0 +1,242 @@
+"""The rows of jobs as their tenants see them: asked for, listed, watched, called off."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from sqlalchemy import Connection, func, insert, select
+from sqlalchemy.exc import IntegrityError
+
+from ..refusals import Finished, KeyReused, QueueFull, UnknownId
+from . import schema, usage
+from .database import Database
+from .ids import checked, new_id
+from .job_states import change, tell
+from .schema import ENDED, jobs
+from .tenants import Tenant
+
+Row = dict[str, Any]
+
+BATCH = 500
+
+
+class Jobs:
+    """Jobs of a tenant; who runs them is :class:`bentray_service.rows.job_queue.Queue`."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(
+        self,
+        tenant: Tenant,
+        kind: str,
+        settings: Row,
+        dataset_id: str | None = None,
+        volume_id: str | None = None,
+        mesh_id: str | None = None,
+        field_id: str | None = None,
+        *,
+        plan: Row | None = None,
+        reserve: tuple[int, int] | None = None,
+        most_queued: int | None = None,
+        key: str | None = None,
+    ) -> Row:
+        """Store a queued job on its dataset, volume or mesh; it survives a crash once this returns.
+
+        Args:
+            tenant: whose it is.
+            kind: a key of ``rows.jobs.kinds.KINDS``.
+            settings: as its kind reads them.
+            dataset_id, volume_id, mesh_id: what it reads.
+            field_id: what it makes, where that is named before.
+            plan: how a reconstruction is cut into tasks.
+            reserve: bytes that it will store at most while it runs, and that the tenant may store over all.
+            most_queued: how many may wait.
+            key: what the client calls the request.
+
+        With a ``key`` that this tenant has used before, the job of that time is returned, and none is made.
+
+        Raises:
+            KeyReused: when something else was asked under this key.
+            QuotaUsedUp: when the tenant has less room than is to be reserved.
+            QueueFull: when ``most_queued`` jobs of this tenant wait already.
+            UnknownId: when the dataset has been deleted meanwhile.
+        """
+        job_id = new_id("job")
+        asked = json.dumps([kind, settings, dataset_id, volume_id, mesh_id], sort_keys=True)
+        digest = hashlib.sha256(asked.encode()).hexdigest()
+        with _still_there(dataset_id), self._database.write() as connection:
+            if key is not None and connection.dialect.name != "sqlite":
+                # SQLite's writers wait for each other from the start; elsewhere this makes them.
+                lock = int.from_bytes(hashlib.sha256(f"{tenant}/{key}".encode()).digest()[:8], signed=True)
+                connection.execute(select(func.pg_advisory_xact_lock(lock)))
+            before = _of_key(connection, tenant, key) if key is not None else None
+            if before is not None:
+                if before["request_sha256"] != digest:
+                    accepted = "a key of its own for every request; this one came with another before"
+                    raise KeyReused("Idempotency-Key", repr(key), accepted)
+                return before
+            if most_queued is not None:
+                mine = select(func.count()).where(jobs.c.tenant == tenant, jobs.c.state == "queued")
+                waiting = connection.execute(mine).scalar_one()
+                if waiting >= most_queued:
+                    raise QueueFull(
+                        "jobs", f"{waiting} that wait", f"fewer than {most_queued}; try again later"
+                    )
+            if reserve is not None:
+                usage.reserve(connection, tenant, job_id, *reserve)
+            connection.execute(
+                insert(jobs).values(
+                    id=job_id,
+                    kind=kind,
+                    dataset_id=dataset_id,
+                    volume_id=volume_id,
+                    mesh_id=mesh_id,
+                    field_id=field_id,
+                    settings=settings,
+                    plan=plan,
+                    tenant=tenant,
+                    idempotency_key=key,
+                    request_sha256=digest,
+                    state="queued",
+                    created=time.time(),
+                )
+            )
+            tell(connection, job_id, "queued")
+        return self.get(tenant, job_id)
+
+    def get(self, tenant: Tenant, job_id: str) -> Row:
+        """One job of this tenant.
+
+        Raises:
+            UnknownId: when it has no such one.
+        """
+        mine = select(jobs).where(jobs.c.tenant == tenant, jobs.c.id == checked("job", job_id))
+        with self._database.read() as connection:
+            row = connection.execute(mine).mappings().one_or_none()
+        if row is None:
+            raise UnknownId("job", job_id)
+        return dict(row)
+
+    def newest(
+        self,
+        tenant: Tenant,
+        limit: int,
+        state: str | None = None,
+        kind: str | None = None,
+        before: str | None = None,
+    ) -> list[Row]:
+        """Up to ``limit`` jobs of this tenant, newest first.
+
+        Args:
+            tenant: whose.
+            limit: at most how many.
+            state, kind: only those.
+            before: only those older than the job of this id.
+
+        Raises:
+            UnknownId: when it has no such job.
+        """
+        query = select(jobs).where(jobs.c.tenant == tenant).order_by(jobs.c.number.desc()).limit(limit)
+        if state is not None:
+            query = query.where(jobs.c.state == state)
+        if kind is not None:
+            query = query.where(jobs.c.kind == kind)
+        if before is not None:
+            query = query.where(jobs.c.number < self.get(tenant, before)["number"])
+        with self._database.read() as connection:
+            return [dict(row) for row in connection.execute(query).mappings()]
+
+    def events(self, tenant: Tenant, job_id: str, after: int = 0) -> list[Row]:
+        """The events of one job of this tenant, oldest first, from the one after number ``after``."""
+        table = schema.events
+        mine = (
+            select(table)
+            .join(jobs, jobs.c.id == table.c.job_id)
+            .where(jobs.c.tenant == tenant, table.c.job_id == job_id, table.c.number > after)
+            .order_by(table.c.number)
+        )
+        with self._database.read() as connection:
+            return [dict(row) for row in connection.execute(mine).mappings()]
+
+    def news(self, known: Mapping[str, int]) -> tuple[dict[str, Row], dict[str, list[Row]]]:
+        """How jobs are, and their events after those that are known, whoever's they are.
+
+        Args:
+            known: by the id of each job the number of its last event that is known; 0 where none is.
+
+        Returns:
+            the jobs that there are, by id, with ``state``, ``done``, ``total`` and ``phase``; and, of those
+            that have new ones, the events, oldest first.
+        """
+        found: dict[str, Row] = {}
+        events: dict[str, list[Row]] = {}
+        table = schema.events
+        # The jobs first: an event that comes in between is told next time, never left out at the end.
+        for ids in _batches(list(known)):
+            with self._database.read() as connection:
+                columns = jobs.c.id, jobs.c.state, jobs.c.done, jobs.c.total, jobs.c.phase
+                rows = connection.execute(select(*columns).where(jobs.c.id.in_(ids))).mappings()
+                found.update({row["id"]: dict(row) for row in rows})
+                last = (
+                    select(table.c.job_id, func.max(table.c.number))
+                    .where(table.c.job_id.in_(ids))
+                    .group_by(table.c.job_id)
+                )
+                newer = [job for job, number in connection.execute(last) if number > known[job]]
+                if not newer:
+                    continue
+                least = min(known[job] for job in newer)
+                query = select(table).where(table.c.job_id.in_(newer), table.c.number > least)
+                for row in connection.execute(query.order_by(table.c.number)).mappings():
+                    if row["number"] > known[row["job_id"]]:
+                        events.setdefault(row["job_id"], []).append(dict(row))
+        return found, events
+
+    def request_cancel(self, tenant: Tenant, job_id: str) -> Row:
+        """Ask a job to stop: a queued one ends at once, a running one when it next looks.
+
+        Raises:
+            UnknownId: when this tenant has no such job.
+            Finished: when it has ended already.
+        """
+        with self._database.write() as connection:
+            mine = jobs.c.tenant == tenant, jobs.c.id == checked("job", job_id)
+            query = select(jobs.c.state).where(*mine).with_for_update()
+            state = connection.execute(query).scalar_one_or_none()
+            if state is None:
+                raise UnknownId("job", job_id)
+            if state in ENDED:
+                raise Finished("state", state, "queued or running; the job has ended")
+            change(connection, job_id, ("queued",), "cancelled", finished=time.time())
+            change(connection, job_id, ("running",), "cancelling")
+        return self.get(tenant, job_id)
+
+
+def _batches(ids: list[str]) -> Iterator[list[str]]:
+    """Not more at a time than any database takes in one query."""
+    for begin in range(0, len(ids), BATCH):
+        yield ids[begin : begin + BATCH]
+
+
+def _of_key(connection: Connection, tenant: Tenant, key: str) -> Row | None:
+    """The job that was asked for under a key."""
+    mine = select(jobs).where(jobs.c.tenant == tenant, jobs.c.idempotency_key == key)
+    found = connection.execute(mine).mappings().one_or_none()
+    return None if found is None else dict(found)
+
+
+@contextmanager
+def _still_there(dataset_id: str | None) -> Iterator[None]:
+    """Tell of a dataset that was deleted after the request had been checked, as of one that never was."""
+    try:
+        yield
+    except IntegrityError:
+        if dataset_id is None:
+            raise
+        raise UnknownId("dataset", dataset_id) from None

@@ -1,0 +1,148 @@
+"""From the schema of an older version to the present one, in one transaction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Column,
+    Connection,
+    Float,
+    Integer,
+    MetaData,
+    String,
+    Table,
+    text,
+    update,
+)
+
+from . import schema
+
+# SQLite rebuilds a table to change a column; what points at the old table must not follow it meanwhile.
+SQLITE_PRAGMAS = ("foreign_keys=OFF", "legacy_alter_table=ON")
+
+# As SQLite kept it.
+JOBS_OF_VERSION_2 = """
+CREATE TABLE jobs (
+    number INTEGER NOT NULL, id VARCHAR(32) NOT NULL, kind VARCHAR(32) NOT NULL, dataset_id VARCHAR(32),
+    volume_id VARCHAR(32), settings JSON NOT NULL, state VARCHAR(16) NOT NULL, attempts INTEGER NOT NULL,
+    done INTEGER NOT NULL, total INTEGER NOT NULL, history JSON NOT NULL, error JSON, created FLOAT NOT NULL,
+    started FLOAT, finished FLOAT,
+    PRIMARY KEY (number),
+    CONSTRAINT known_state CHECK (
+        state IN ('queued', 'running', 'cancelling', 'succeeded', 'failed', 'cancelled')),
+    UNIQUE (id), FOREIGN KEY(dataset_id) REFERENCES datasets (id))
+"""
+
+STORED_IN_VERSION_3 = ("datasets", "uploaded_volumes", "volumes", "meshes", "geometry_fields")
+
+UPLOADED_VOLUMES_OF_VERSION_2 = Table(
+    "uploaded_volumes",
+    MetaData(),
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(32), nullable=False, unique=True),
+    Column("created", Float, nullable=False),
+    Column("bytes", BigInteger, nullable=False),
+    Column("sha256", String(64), nullable=False),
+    Column("title", String(200), nullable=False),
+    Column("shape", JSON, nullable=False),
+    Column("spacing_m", JSON, nullable=False),
+    Column("origin_m", JSON, nullable=False),
+    Column("value_range", JSON, nullable=False),
+)
+
+
+def migrate(connection: Connection, found: int) -> None:
+    """Bring the tables of version ``found``, a key of ``STEPS`` or a later one, to ``rows.schema.VERSION``.
+
+    Args:
+        connection: in a transaction, which the caller ends; with SQLite under ``SQLITE_PRAGMAS``.
+        found: the version of the tables.
+
+    Raises:
+        RuntimeError: when a row would point at nothing afterwards; nothing has been changed then.
+    """
+    for version in range(found, schema.VERSION):
+        STEPS[version](connection)
+    if connection.dialect.name == "sqlite":
+        lost: list[Any] = list(connection.execute(text("PRAGMA foreign_key_check")))
+        if lost:
+            raise RuntimeError(f"{len(lost)} rows would point at nothing")
+    connection.execute(update(schema.about).values(version=schema.VERSION))
+
+
+def _to_2(connection: Connection) -> None:
+    """Jobs may read a volume in place of a dataset; uploaded volumes have a table."""
+    UPLOADED_VOLUMES_OF_VERSION_2.create(connection)
+    if connection.dialect.name != "sqlite":
+        connection.execute(text("ALTER TABLE jobs ALTER COLUMN dataset_id DROP NOT NULL"))
+        connection.execute(text("ALTER TABLE jobs ADD COLUMN volume_id VARCHAR(32)"))
+        return
+    kept = (
+        "number, id, kind, dataset_id, settings, state, attempts, done, total, history, error, created, "
+        "started, finished"
+    )
+    connection.execute(text("DROP INDEX jobs_by_state"))
+    connection.execute(text("ALTER TABLE jobs RENAME TO jobs_of_version_1"))
+    connection.execute(text(JOBS_OF_VERSION_2))
+    connection.execute(text("CREATE INDEX jobs_by_state ON jobs (state, number)"))
+    connection.execute(text(f"INSERT INTO jobs ({kept}) SELECT {kept} FROM jobs_of_version_1"))  # noqa: S608
+    connection.execute(text("DROP TABLE jobs_of_version_1"))
+
+
+def _to_3(connection: Connection) -> None:
+    """Every row has a tenant, jobs a lease; meshes, geometry fields, keys and uploads have tables."""
+    for table in ("datasets", "uploaded_volumes", "volumes", "jobs"):
+        tenant = "tenant VARCHAR(64) NOT NULL DEFAULT 'local'"
+        connection.execute(text(f"ALTER TABLE {table} ADD COLUMN {tenant}"))
+    for column in (
+        "idempotency_key VARCHAR(200)",
+        "request_sha256 VARCHAR(64)",
+        "lease_owner VARCHAR(64)",
+        "lease_until FLOAT",
+        "phase VARCHAR(32)",
+        "plan JSON",
+        "advice VARCHAR(2000)",
+        "mesh_id VARCHAR(32)",
+        "field_id VARCHAR(32)",
+    ):
+        connection.execute(text(f"ALTER TABLE jobs ADD COLUMN {column}"))
+    connection.execute(text("ALTER TABLE datasets ADD COLUMN job_id VARCHAR(32)"))
+    connection.execute(text("CREATE INDEX jobs_by_tenant ON jobs (tenant, state)"))
+    connection.execute(text("CREATE UNIQUE INDEX jobs_by_key ON jobs (tenant, idempotency_key)"))
+    for name, table, order in (
+        ("datasets_by_tenant", "datasets", "number"),
+        ("uploaded_volumes_by_tenant", "uploaded_volumes", "created"),
+        ("volumes_by_tenant", "volumes", "created"),
+        ("jobs_by_age", "jobs", "number"),
+    ):
+        connection.execute(text(f"CREATE INDEX {name} ON {table} (tenant, {order})"))
+    for new in (schema.meshes, schema.geometry_fields, schema.keys, schema.uploads, schema.bucket_mark):
+        new.create(connection)
+
+
+def _to_4(connection: Connection) -> None:
+    """Files have checksums, what is too old is marked before it goes, and what tenants store is counted."""
+    connection.execute(text("ALTER TABLE about ADD COLUMN observed_s FLOAT NOT NULL DEFAULT 0"))
+    connection.execute(text("ALTER TABLE about ADD COLUMN begun INTEGER NOT NULL DEFAULT 0"))
+    connection.execute(text("ALTER TABLE datasets ADD COLUMN counts JSON"))
+    for new in (schema.checksums, schema.too_old, schema.storage):
+        new.create(connection)
+    _count_what_is_stored(connection)
+
+
+def _count_what_is_stored(connection: Connection) -> None:
+    """As far as rows tell; the service corrects the sizes by those of the files when it starts."""
+    rows = [f"SELECT tenant, id, bytes, false FROM {table}" for table in STORED_IN_VERSION_3]  # noqa: S608
+    # A service that died may have stored what an upload became.
+    coming = "state IN ('receiving', 'reading') AND result_id NOT IN (SELECT name FROM storage)"
+    rows.append(f"SELECT tenant, result_id, length, true FROM uploads WHERE {coming}")  # noqa: S608
+    for query in rows:
+        connection.execute(text(f"INSERT INTO storage (tenant, name, bytes, reserved) {query}"))
+
+
+STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType({1: _to_2, 2: _to_3, 3: _to_4})

@@ -1,0 +1,306 @@
+"""Every error as RFC 9457 problem+json: one table from exception to status, and the handlers that use it."""
+
+from __future__ import annotations
+
+import errno
+import json
+import logging
+import math
+import secrets
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import Response
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.routing import Match, Mount
+
+from bentray_kernels.errors import InvalidInput
+
+from .. import refusals
+from .headers import HEADERS as SECURITY
+from .request_id import REQUEST_ID
+
+log = logging.getLogger("bentray.errors")
+
+MEDIA_TYPE = "application/problem+json"
+LONGEST_FOUND = 120
+# Seconds after which it is worth another try, where workers or the queue are full, or the storage is away.
+RETRY_AFTER = "10"
+METHODS = ("DELETE", "GET", "HEAD", "OPTIONS", "PATCH", "POST", "PUT")
+
+JOB_KINDS = ("reconstruction", "simulation", "refraction", "geometry-field")
+
+
+class Fault(BaseModel):
+    """One wrong value."""
+
+    field: str = Field(description="The name of what is wrong.")
+    found: str = Field(description="What was there.")
+    accepted: str = Field(description="What would have been taken.")
+
+
+class Problem(BaseModel):
+    """An error in the form of RFC 9457."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "type": "/problems/invalid-input",
+                    "title": "A value cannot be used",
+                    "status": 422,
+                    "detail": "index: found 99; accepted: 0 to 29",
+                    "instance": "/v1/volumes/vol-0123456789abcdef0123/slice.png",
+                    "field": "index",
+                    "found": "99",
+                    "accepted": "0 to 29",
+                }
+            ]
+        }
+    )
+
+    type: str = Field(description="Relative address that names the kind of problem.")
+    title: str
+    status: int
+    detail: str = Field(description="What went wrong, in words.")
+    instance: str | None = Field(None, description="The path that was asked for.")
+    field: str | None = None
+    found: str | None = None
+    accepted: str | None = None
+    errors: list[Fault] | None = Field(None, description="Every wrong value, where there may be several.")
+    correlation_id: str | None = Field(None, description="Quote it to find the error in the log.")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of problem: its HTTP status, the last part of its address and its title."""
+
+    status: int
+    slug: str
+    title: str
+
+
+PROBLEMS: Mapping[type[Exception], Kind] = {
+    InvalidInput: Kind(422, "invalid-input", "A value cannot be used"),
+    refusals.UnknownId: Kind(404, "unknown-id", "There is nothing with this id"),
+    refusals.Deleted: Kind(404, "deleted", "It has been deleted"),
+    refusals.Damaged: Kind(500, "stored-data-damaged", "What was stored has changed on the disk"),
+    refusals.WrongMediaType: Kind(415, "wrong-media-type", "The media type is not accepted"),
+    refusals.EmptyBody: Kind(422, "empty-body", "The request has no body"),
+    refusals.TooLarge: Kind(413, "too-large", "The body is too large"),
+    refusals.TooSlow: Kind(408, "too-slow", "The body came too slowly"),
+    refusals.TinyChunks: Kind(400, "tiny-chunks", "The body comes in too many small chunks"),
+    refusals.MalformedRequest: Kind(400, "malformed-request", "The request is no HTTP"),
+    refusals.UnknownMethod: Kind(501, "unknown-method", "The method is unknown"),
+    refusals.HeadTooLarge: Kind(431, "head-too-large", "The head of the request is too long"),
+    refusals.TooManyConnections: Kind(503, "too-many-connections", "Too many connections are open"),
+    refusals.WrongProtocol: Kind(412, "wrong-protocol", "The upload protocol is another"),
+    refusals.WrongOffset: Kind(409, "wrong-offset", "The upload stands elsewhere"),
+    refusals.Locked: Kind(423, "locked", "Another request is at work on it"),
+    # The number is that of tus, which HTTP does not know.
+    refusals.WrongChecksum: Kind(460, "wrong-checksum", "What came is not what was sent"),
+    refusals.UnknownChecksum: Kind(400, "unknown-checksum", "The checksum is of an unknown kind"),
+    refusals.InUse: Kind(409, "in-use", "A job needs it"),
+    refusals.Finished: Kind(409, "job-finished", "The job has ended already"),
+    refusals.KeyReused: Kind(409, "key-reused", "The key belongs to another request"),
+    refusals.QueueFull: Kind(429, "queue-full", "Too many jobs wait"),
+    refusals.NotLetIn: Kind(401, "not-let-in", "A key is needed"),
+    refusals.NotAllowed: Kind(403, "not-allowed", "This is not allowed"),
+    refusals.TooOften: Kind(429, "too-often", "Too many requests"),
+    refusals.TooManyStreams: Kind(429, "too-many-streams", "Too many event streams are open"),
+    refusals.QuotaUsedUp: Kind(507, "quota-used-up", "The tenant stores as much as it may"),
+    refusals.NoSuchPart: Kind(416, "no-such-part", "The part of the file is not there"),
+    refusals.NoAnimation: Kind(409, "no-animation", "The job has no animation"),
+    refusals.StorageFull: Kind(507, "storage-full", "The disk of the service is full"),
+    refusals.StorageAway: Kind(503, "storage-away", "The storage of the service does not answer"),
+    refusals.DatabaseAway: Kind(503, "database-away", "The database of the service does not answer"),
+    refusals.Busy: Kind(503, "busy", "No worker was free in time"),
+    refusals.NotReady: Kind(503, "not-ready", "The service cannot work now"),
+}
+# What may go well after a while.
+LATER = (
+    refusals.Busy,
+    refusals.DatabaseAway,
+    refusals.QueueFull,
+    refusals.StorageAway,
+    refusals.TooManyConnections,
+    refusals.TooManyStreams,
+)
+INVALID_REQUEST = Kind(422, "invalid-request", "The request is not as it should be")
+UNREADABLE = Kind(400, "unreadable-body", "The body cannot be read")
+NOT_FOUND = Kind(404, "not-found", "There is nothing at this address")
+INTERNAL = Kind(500, "internal", "The service failed")
+FAILED = Kind(500, "job-failed", "The job failed")
+
+
+def make(kind: Kind, detail: str, faults: Sequence[Fault] = (), **more: Any) -> Problem:
+    """A problem of one kind; the first fault also stands at the top level."""
+    first = faults[0].model_dump() if faults else {}
+    return Problem(
+        type=f"/problems/{kind.slug}", title=kind.title, status=kind.status, detail=detail, **first, **more
+    )
+
+
+def from_exception(error: InvalidInput, instance: str | None = None) -> Problem:
+    """The problem that says what an :class:`InvalidInput` (or a refusal) says."""
+    kind = next(PROBLEMS[cls] for cls in type(error).__mro__ if cls in PROBLEMS)
+    fault = Fault(field=error.field, found=error.value, accepted=error.accepted)
+    return make(kind, str(error), [fault], instance=instance)
+
+
+def described(*statuses: int | str) -> dict[int | str, dict[str, Any]]:
+    """The problems of a route, for its OpenAPI description."""
+    content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
+    titles: dict[int | str, list[str]] = {"default": ["A problem"]}
+    for kind in (*PROBLEMS.values(), INVALID_REQUEST, UNREADABLE):
+        titles.setdefault(kind.status, []).append(kind.title)
+    words = {status: "; or: ".join(dict.fromkeys(said)) for status, said in titles.items()}
+    return {status: {"description": words[status], "content": content} for status in statuses}
+
+
+def fault_of(error: Mapping[str, Any]) -> Fault:
+    """One entry of ``ValidationError.errors()`` as field, found, accepted."""
+    where = [str(part) for part in error["loc"]]
+    if where and where[0] in ("body", "query", "path", "header") and len(where) > 1:
+        where = where[1:]
+        # Pydantic names the kind of a job in the place of an error; the user wrote none there.
+        if where[0] in JOB_KINDS:
+            where = where[1:] or ["body"]
+    context = error.get("ctx", {})
+    if error["type"] in ("union_tag_invalid", "union_tag_not_found"):
+        field = str(context["discriminator"]).strip("'")
+        found = repr(context["tag"])[:LONGEST_FOUND] if "tag" in context else "nothing"
+        return Fault(field=field, found=found, accepted=" or ".join(map(repr, JOB_KINDS)))
+    cause = context.get("error")
+    if isinstance(cause, InvalidInput):
+        return Fault(field=".".join([*where, cause.field]), found=cause.value, accepted=cause.accepted)
+    if error["type"] == "json_invalid":
+        return Fault(field="body", found=f"no JSON ({cause})", accepted="a JSON object")
+    if error["type"] in ("model_attributes_type", "dataclass_type"):
+        return Fault(field=".".join(where), found=_short(error["input"]), accepted="a JSON object")
+    if error["type"] == "missing":
+        return Fault(field=".".join(where), found="nothing", accepted="a value; it is required")
+    if error["type"] == "extra_forbidden":
+        return Fault(field=".".join(where), found=_short(error["input"]), accepted="no such field; see /docs")
+    said = error["msg"].removeprefix("Input should be ").partition(", unable to parse")[0]
+    accepted = str(context.get("expected") or said)
+    return Fault(field=".".join(where), found=_short(error["input"]), accepted=accepted)
+
+
+def install(app: FastAPI) -> None:
+    """Make every error of ``app`` a problem."""
+    app.add_exception_handler(InvalidInput, _refused)
+    app.add_exception_handler(refusals.NotReady, _not_ready)
+    app.add_exception_handler(RequestValidationError, _invalid_request)
+    app.add_exception_handler(ClientDisconnect, _gone)
+    app.add_exception_handler(HTTPException, _http)
+    app.add_exception_handler(OSError, _of_the_system)
+    app.add_exception_handler(Exception, _unexpected)
+
+
+def _respond(problem: Problem, headers: Mapping[str, str] | None = None) -> Response:
+    # Escaped to ASCII: what was found may hold half characters, which UTF-8 cannot carry.
+    body = json.dumps(problem.model_dump(exclude_none=True))
+    return Response(body, problem.status, headers=headers, media_type=MEDIA_TYPE)
+
+
+def _refused(request: Request, error: Exception) -> Response:
+    assert isinstance(error, InvalidInput)
+    return refused(error, request.url.path)
+
+
+def refused(error: InvalidInput, path: str | None) -> Response:
+    """The answer that says what an :class:`InvalidInput` (or a refusal) says."""
+    headers: dict[str, str] = {}
+    if isinstance(error, LATER):
+        headers["Retry-After"] = RETRY_AFTER
+    if isinstance(error, refusals.TooOften):
+        headers["Retry-After"] = str(math.ceil(error.wait_s))
+    if isinstance(error, refusals.NotLetIn):
+        headers["WWW-Authenticate"] = 'Bearer realm="bentray"'
+    if isinstance(error, refusals.NoSuchPart):
+        headers["Content-Range"] = f"bytes */{error.size}"
+    return _respond(from_exception(error, path), headers)
+
+
+def _of_the_system(request: Request, error: Exception) -> Response:
+    """A full disk, whatever was to be written; all else is unexpected."""
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        full = refusals.StorageFull("disk", "no space left", "another try, once there is room")
+        return refused(full, request.url.path)
+    raise error
+
+
+def _not_ready(request: Request, error: Exception) -> Response:
+    assert isinstance(error, refusals.NotReady)
+    faults = [Fault(field=part, found=found, accepted=needed) for part, found, needed in error.faults]
+    problem = make(PROBLEMS[refusals.NotReady], str(error), faults, errors=faults, instance=request.url.path)
+    return _respond(problem, {"Retry-After": "5"})
+
+
+def _invalid_request(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    faults = [fault_of(one) for one in error.errors()]
+    words = "; ".join(f"{one.field}: found {one.found}; accepted: {one.accepted}" for one in faults)
+    return _respond(make(INVALID_REQUEST, words, faults, errors=faults, instance=request.url.path))
+
+
+def _http(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    path = request.url.path
+    if error.status_code == NOT_FOUND.status:
+        return _respond(make(NOT_FOUND, f"nothing is at {path}; /docs lists every address", instance=path))
+    if error.status_code == UNREADABLE.status:
+        fault = Fault(
+            field="body", found="no readable JSON", accepted="a JSON object in UTF-8, not nested deeply"
+        )
+        words = f"{fault.field}: found {fault.found}; accepted: {fault.accepted}"
+        return _respond(make(UNREADABLE, words, [fault], instance=path))
+    phrase = HTTPStatus(error.status_code).phrase
+    kind = Kind(error.status_code, phrase.lower().replace(" ", "-"), phrase)
+    if error.status_code != HTTPStatus.METHOD_NOT_ALLOWED:
+        return _respond(make(kind, str(error.detail), instance=path), error.headers)
+    allowed = ", ".join(_methods(request))
+    detail = f"{request.method} is not possible at {path}; accepted: {allowed}"
+    return _respond(make(kind, detail, instance=path), {"Allow": allowed})
+
+
+def _methods(request: Request) -> list[str]:
+    """What can be asked of this address; the router itself names the first route alone."""
+    # A mount takes every method at first; it holds static files, which can only be read.
+    routes = [route for route in request.app.routes if not isinstance(route, Mount)]
+    found = [
+        method
+        for method in METHODS
+        if any(route.matches({**request.scope, "method": method})[0] is Match.FULL for route in routes)
+    ]
+    return found or ["GET", "HEAD"]
+
+
+def _gone(request: Request, error: Exception) -> Response:
+    """Nobody is left to read an answer; it is no fault of the service either."""
+    log.info("%s %s was broken off by the client", request.method, request.url.path)
+    return Response(status_code=UNREADABLE.status)
+
+
+def _unexpected(request: Request, error: Exception) -> Response:
+    # The id of the request is in every line that it logged, and the client has it or gave it.
+    number = getattr(request.state, "request_id", None) or secrets.token_hex(8)
+    figures = {"request": number}
+    words = "%s %s failed [%s]"
+    log.error(words, request.method, request.url.path, number, exc_info=error, extra={"figures": figures})
+    detail = f"an error of the service, not of the request; it is in the log under {number}"
+    # This answer passes by every middleware.
+    headers = {**SECURITY, REQUEST_ID: number}
+    return _respond(make(INTERNAL, detail, instance=request.url.path, correlation_id=number), headers)
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= LONGEST_FOUND else text[: LONGEST_FOUND - 1] + "…"

@@ -1,0 +1,172 @@
+"""Log ratios from traces: of pulses that lost exactly so much, however high they are, and under noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.acquisition import Waveform
+from bentray_kernels.acquisition.picking.amplitudes import (
+    MOST_UNSURE_NP,
+    WAYS,
+    Powers,
+    read_log_ratios,
+    with_log_ratios,
+)
+from bentray_kernels.errors import InvalidInput
+
+from ..traces import FREQUENCY_HZ, RATE_HZ, absorbed, scan
+
+ELEMENTS, DELAY_S = 10, 2.3e-7
+EVERY = np.arange(ELEMENTS)
+APART = EVERY[:, None] != EVERY
+SPECTRA = ("spectrum", "centroid")
+
+
+@cache
+def plain():
+    return scan(DELAY_S, elements=ELEMENTS)
+
+
+def heard(loss_np, way, *, height=1.0, noise=0.0, seed=0, **changes):
+    """Log ratios of the scan whose object takes so much at the centre frequency, and leaves that height."""
+    random = np.random.default_rng(seed)
+    traces = plain().waveform
+    weak = height * absorbed(traces.object, np.broadcast_to(loss_np, APART.shape), RATE_HZ, FREQUENCY_HZ)
+    both = (x + noise * random.standard_normal(x.shape) for x in (weak, traces.water))
+    dataset = replace(plain(), waveform=Waveform(*(x.astype(np.float32) for x in both), **changes))
+    delta = np.full(APART.shape, DELAY_S)
+    return read_log_ratios(dataset, range(ELEMENTS), delta, way)
+
+
+@settings(max_examples=8, deadline=None)
+@given(
+    loss=st.floats(0.0, 2.0),
+    height=st.floats(0.05, 20.0),
+    seed=st.integers(0, 2**31),
+)
+@pytest.mark.parametrize("way", SPECTRA)
+def test_the_spectrum_tells_the_loss_whatever_the_height(way, loss, height, seed):
+    """Each pair of another height, as if focused, or as if its transducers were unlike."""
+    heights = height * np.exp(np.random.default_rng(seed).normal(0.0, 0.7, APART.shape))[..., None]
+    found = heard(loss, way, height=heights)
+    # What the gate cuts off the pulse blurs its spectrum, and takes a part.
+    assert found[APART] == pytest.approx(loss, rel=0.1, abs=0.005)
+    ratios = heard(loss, "ratio", height=heights)
+    expected = np.broadcast_to(loss - np.log(heights[..., 0]), APART.shape)
+    assert np.abs(ratios - expected)[APART].max() < 0.15 * loss + 0.01
+
+
+@settings(max_examples=5, deadline=None)
+@given(loss=st.floats(0.0, 1.5), noise=st.floats(1e-3, 0.02), seed=st.integers(0, 2**31))
+@pytest.mark.parametrize("way", WAYS)
+def test_noise_spreads_the_values_and_moves_their_mean_little(way, loss, noise, seed):
+    found = heard(loss, way, noise=noise, seed=seed)[APART]
+    known = found[np.isfinite(found)]
+    assert known.size > 0.95 * found.size
+    # At a loss of a neper the object's SNR is a third of the water's.
+    spread = (10.0 if way in SPECTRA else 2.0) * noise * np.exp(loss)
+    assert known.std() < spread
+    assert abs(known.mean() - loss) < 0.13 * loss + 0.01 + 0.4 * spread
+
+
+@pytest.mark.parametrize("way", SPECTRA)
+def test_what_loses_all_frequencies_alike_is_invisible_to_the_spectrum(way):
+    assert np.abs(heard(0.0, way, height=np.exp(-1.0))[APART]).max() < 1e-3
+    assert heard(0.0, "ratio", height=np.exp(-1.0))[APART] == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_louder_noise_leaves_out_and_never_lies(way):
+    counts = []
+    for noise in (0.0, 0.05, 0.2, 1.0):
+        found = heard(1.0, way, noise=noise)[APART]
+        known = found[np.isfinite(found)]
+        counts.append(known.size)
+        if known.size:
+            assert abs(np.median(known) - 1.0) < 2.0 * MOST_UNSURE_NP
+    assert counts[0] == APART.sum()
+    assert counts[-1] < 0.05 * APART.sum()
+    assert sorted(counts, reverse=True) == counts
+
+
+@settings(max_examples=20, deadline=None)
+@given(loss=st.floats(0.0, 3.0), middle=st.floats(0.7, 1.3), width=st.floats(0.05, 0.25))
+def test_the_centroid_of_a_gaussian_tells_the_loss_exactly(loss, middle, width):
+    """Quan and Harris: it keeps its width, and moves by the loss times its variance."""
+    frequency = np.linspace(-2.0, 4.0, 400)
+    water = np.exp(-(((frequency - middle) / width) ** 2))[None]
+    nothing = np.zeros((1, 1))
+    powers = Powers(
+        water, water * np.exp(-2.0 * loss * frequency), nothing, nothing, frequency, np.eye(frequency.size)
+    )
+    with np.errstate(invalid="ignore"):
+        value, sigma = WAYS["centroid"](powers)
+    assert value[0] == pytest.approx(loss, abs=1e-9)
+    assert sigma[0] == 0.0
+
+
+@pytest.mark.parametrize("way", SPECTRA)
+def test_the_deviation_that_is_told_is_the_one_that_noise_makes(way):
+    """White noise on the values of a spectrum, independent of each other: many draws against the estimate."""
+    random = np.random.default_rng(11)
+    frequency = np.linspace(0.6, 1.4, 24)
+    clean = np.exp(-(((frequency - 1.0) / 0.3) ** 2) / 2.0)
+    level = 1e-3
+
+    def heard_as(amplitude):
+        noise = random.standard_normal((4000, 24)) + 1j * random.standard_normal((4000, 24))
+        return np.abs(amplitude + np.sqrt(0.5 * level) * noise) ** 2
+
+    noises = np.full((4000, 1), level)
+    powers = Powers(heard_as(clean), heard_as(clean), noises, noises, frequency, np.eye(24))
+    value, sigma = WAYS[way](powers)
+    assert np.median(sigma) == pytest.approx(value.std(), rel=0.1)
+    assert abs(value.mean()) < 0.1 * value.std()
+
+
+def test_factors_of_single_traces_count_for_heights_only():
+    random = np.random.default_rng(5)
+    scales = {name: random.uniform(0.5, 2.0, APART.shape) for name in ("object_scale", "water_scale")}
+    change = np.log(scales["water_scale"] / scales["object_scale"])
+    for way, expected in (("ratio", change), ("spectrum", 0.0 * change), ("centroid", 0.0 * change)):
+        moved = heard(0.5, way, **scales) - heard(0.5, way)
+        np.testing.assert_allclose(moved[APART], expected[APART], atol=1e-9)
+
+
+def test_pairs_without_a_time_and_slices_of_their_own():
+    delta = np.full((2, *APART.shape), DELAY_S)
+    delta[0, 2, 7] = np.nan
+    traces = plain().waveform
+    lossy = absorbed(traces.object, np.full(APART.shape, 0.8), RATE_HZ, FREQUENCY_HZ).astype(np.float32)
+    both = replace(
+        plain(),
+        slice_z_m=np.array([0.0, 0.01]),
+        delta_tof_s=delta,
+        waveform=Waveform(np.stack([traces.object, lossy]), np.stack([traces.water] * 2)),
+    )
+    found = with_log_ratios(both, "spectrum")
+    assert found.amplitude_frequency_hz == FREQUENCY_HZ
+    assert np.isnan(found.log_ratio_np[0, 2, 7])
+    assert np.isnan(np.diagonal(found.log_ratio_np, axis1=1, axis2=2)).all()
+    assert np.abs(found.log_ratio_np[0][APART & np.isfinite(delta[0])]).max() < 1e-3
+    assert found.log_ratio_np[1][APART] == pytest.approx(0.8, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "way", "field"),
+    [
+        ({}, "height", "amplitudes"),
+        ({}, "recorded", "amplitudes"),
+        ({"waveform": None}, "ratio", "waveform/object"),
+        ({"center_frequency_hz": None}, "spectrum", "center_frequency_hz"),
+    ],
+)
+def test_what_is_lacking_is_named(changes, way, field):
+    with pytest.raises(InvalidInput, match=field):
+        read_log_ratios(replace(plain(), **changes), range(ELEMENTS), np.zeros(APART.shape), way)

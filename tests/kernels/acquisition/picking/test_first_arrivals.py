@@ -1,0 +1,267 @@
+"""Every picker: known delays come back, sigma tells the noise, and what cannot be picked is NaN."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.acquisition import PICKERS, Waveform, pick
+from bentray_kernels.errors import InvalidInput
+
+from ..traces import FREQUENCY_HZ, RATE_HZ, WATER_MPS, scan, smooth_delay
+
+every_picker = pytest.mark.parametrize("picker", PICKERS)
+
+
+def far(dataset):
+    return dataset.distance_m() > 2.5 * WATER_MPS / FREQUENCY_HZ
+
+
+@every_picker
+@given(largest=st.floats(-1.5e-6, 1.5e-6), seed=st.integers(0, 99))
+@settings(max_examples=15, deadline=None)
+def test_known_delays_come_back_to_a_hundredth_of_a_sample(picker, largest, seed):
+    delay = smooth_delay(32, largest, seed)
+    dataset = scan(delay)
+    # Of the delays, only those that a plausible speed can make.
+    possible = far(dataset) & (np.abs(delay) < 0.1 * dataset.distance_m() / WATER_MPS)
+    error = pick(dataset, picker).delta_tof_s - delay
+    assert np.isfinite(error[possible]).mean() > 0.99
+    assert np.nanmax(np.abs(error[possible])) < 0.02 / RATE_HZ
+
+
+@every_picker
+def test_noise_is_told_by_sigma(picker):
+    delay = smooth_delay(48, 1.0e-6)
+    dataset = scan(delay, elements=48, noise=0.1)
+    picked = pick(dataset, picker)
+    possible = far(dataset) & (np.abs(delay) < 0.1 * dataset.distance_m() / WATER_MPS)
+    error = (picked.delta_tof_s - delay)[possible]
+    assert np.isfinite(error).mean() > 0.95
+    assert np.nanstd(error) < 0.05 / FREQUENCY_HZ
+    assert 0.4 < np.nanstd(error / picked.sigma_s[possible]) < 1.5
+    assert np.isfinite(picked.sigma_s).tolist() == np.isfinite(picked.delta_tof_s).tolist()
+    quiet = pick(scan(delay, elements=48, noise=0.003), picker)
+    assert np.nanmedian(quiet.sigma_s) < 0.6 * np.nanmedian(picked.sigma_s)
+
+
+@every_picker
+@pytest.mark.parametrize("gain", [0.05, 0.5, 3.0, -1.0])
+def test_a_weaker_pulse_is_picked_at_the_same_time_and_a_reversed_one_not_at_all(picker, gain):
+    dataset = scan(3.0e-7, gain=gain)
+    delta = pick(dataset, picker).delta_tof_s[far(dataset)]
+    if gain < 0:
+        # Its swings resemble the water's half a period off, which the likeness and the reach refuse.
+        assert np.isnan(delta).mean() > 0.9
+    else:
+        np.testing.assert_allclose(delta, 3.0e-7, atol=0.02 / RATE_HZ)
+
+
+@every_picker
+@pytest.mark.parametrize(("rate", "frequency"), [(2.8e6, 4.0e5), (2.5e7, 2.5e6), (1.0e7, 1.0e6)])
+def test_the_windows_follow_frequency_and_rate(picker, rate, frequency):
+    dataset = scan(-2.0e-7, rate_hz=rate, frequency_hz=frequency)
+    wide = dataset.distance_m() > 4.0 * WATER_MPS / frequency
+    delta = pick(dataset, picker).delta_tof_s[wide]
+    np.testing.assert_allclose(delta, -2.0e-7, atol=0.03 / rate)
+
+
+@every_picker
+@pytest.mark.parametrize("which", ["object", "water"])
+@pytest.mark.parametrize("broken", ["zeros", "constant", "nan", "infinite", "noise"])
+def test_dead_and_broken_traces_are_missing_and_harm_no_other(picker, which, broken):
+    dataset = scan(2.0e-7)
+    traces = getattr(dataset.waveform, which).copy()
+    random = np.random.default_rng(3)
+    fill = {"zeros": 0.0, "constant": 7.0, "nan": np.nan, "infinite": np.inf}.get(broken)
+    traces[3, 17] = random.standard_normal(traces.shape[-1]) if fill is None else fill
+    harmed = replace(dataset, waveform=replace(dataset.waveform, **{which: traces}))
+    delta = pick(harmed, picker).delta_tof_s
+    whole = far(dataset)
+    assert np.isnan(delta[3, 17])
+    whole[3, 17] = False
+    np.testing.assert_allclose(delta[whole], 2.0e-7, atol=0.02 / RATE_HZ)
+
+
+@every_picker
+def test_an_offset_clipping_and_cross_talk_do_not_move_the_picks(picker):
+    dataset = scan(2.0e-7)
+    traces = [
+        np.clip(np.rint(9000.0 * t), -3000, 3000) + 120
+        for t in (dataset.waveform.object, dataset.waveform.water)
+    ]
+    for t in traces:
+        t[..., 28:34] += [2000, -2000, 2000, -2000, 2000, -2000]
+    made = replace(dataset, waveform=Waveform(traces[0].astype(np.int16), traces[1].astype(np.int16)))
+    wide = dataset.distance_m() > 0.02
+    delta = pick(made, picker).delta_tof_s[wide]
+    np.testing.assert_allclose(delta, 2.0e-7, atol=0.1 / RATE_HZ)
+
+
+@every_picker
+def test_a_pulse_outside_the_plausible_speeds_is_not_picked(picker):
+    dataset = scan(1.5e-5)
+    straight = dataset.distance_m() / WATER_MPS
+    out = far(dataset) & (straight * (WATER_MPS / 1300.0 - 1.0) + 3.0e-6 < 1.5e-5)
+    assert np.isnan(pick(dataset, picker).delta_tof_s[out]).all()
+
+
+def test_a_skipped_swing_contradicts_its_neighbours():
+    delay = np.zeros((32, 32))
+    delay[5, 20] = 1.0e-6
+    delta = pick(scan(delay), "aic").delta_tof_s
+    assert np.isnan(delta[5, 20])
+    assert np.isfinite(delta[5, 21])
+
+
+def test_a_pair_that_differs_from_its_reverse_goes_both_ways():
+    # A whole corner of the scan is late, so that the neighbours agree and only the reverse does not.
+    delay = np.zeros((32, 32))
+    delay[4:12, 16:26] = 0.8e-6
+    delta = pick(scan(delay), "aic").delta_tof_s
+    assert np.isnan(delta[8, 21])
+    assert np.isnan(delta[21, 8])
+    assert np.isfinite(delta[16, 28])
+
+
+def test_the_emitter_its_neighbours_and_masked_pairs_are_missing():
+    dataset = scan(0.0, elements=128)
+    valid = np.ones((128, 128), dtype=bool)
+    valid[10, 70] = False
+    delta = pick(replace(dataset, valid=valid)).delta_tof_s
+    assert np.isnan(delta[np.arange(128), np.arange(128)]).all()
+    assert np.isnan(delta[0, 1])
+    assert np.isnan(delta[10, 70])
+    assert np.isfinite(delta[70, 10])
+
+
+def test_slices_are_picked_one_by_one_and_progress_counts_emissions():
+    one, two = scan(1.0e-7, elements=8), scan(-3.0e-7, elements=8)
+    both_slices = replace(
+        one,
+        slice_z_m=np.array([0.0, 0.01]),
+        waveform=Waveform(
+            np.stack([one.waveform.object, two.waveform.object]),
+            np.stack([one.waveform.water, two.waveform.water]),
+        ),
+    )
+    seen = []
+    picked = pick(both_slices, "threshold", lambda done, total: seen.append((done, total)))
+    assert seen == [(k, 16) for k in range(1, 17)]
+    np.testing.assert_array_equal(picked.delta_tof_s[0], pick(one, "threshold").delta_tof_s)
+    np.testing.assert_array_equal(picked.delta_tof_s[1], pick(two, "threshold").delta_tof_s)
+    assert picked.picker == "threshold"
+    assert picked.waveform is None
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"waveform": None}, "waveform/object"),
+        ({"center_frequency_hz": None}, "acquisition@center_frequency_hz"),
+    ],
+)
+def test_what_is_missing_is_named(change, field):
+    with pytest.raises(InvalidInput) as refused:
+        pick(replace(scan(elements=4), **change))
+    assert refused.value.field == field
+
+
+def test_a_scan_without_water_and_an_unknown_picker_are_refused():
+    dataset = scan(elements=4)
+    with pytest.raises(InvalidInput, match="waveform/water"):
+        pick(replace(dataset, waveform=replace(dataset.waveform, water=None)))
+    with pytest.raises(InvalidInput, match="aic, threshold, energy-ratio, sta-lta, correlation, matched"):
+        pick(dataset, "eye")
+
+
+@every_picker
+@given(moved=st.floats(-1.5, 1.5), gain=st.floats(1e-3, 1e3))
+@settings(max_examples=6, deadline=None)
+def test_a_shift_of_both_scans_and_any_gain_leave_the_differences(picker, moved, gain):
+    dataset = scan(2.0e-7, elements=12)
+    # A later start of the recording is a shift of every pulse in it; the windows allow for some periods.
+    traces = [(gain * t).astype(np.float32) for t in (dataset.waveform.object, dataset.waveform.water)]
+    late = replace(dataset, waveform=Waveform(*traces), t0_s=dataset.t0_s + moved / FREQUENCY_HZ)
+    delta = pick(late, picker).delta_tof_s[far(dataset)]
+    np.testing.assert_allclose(delta, 2.0e-7, atol=0.02 / RATE_HZ)
+
+
+@every_picker
+def test_noise_alone_is_not_picked(picker):
+    dataset = scan(0.0, elements=24)
+    random = np.random.default_rng(5)
+    noise = [random.standard_normal(dataset.waveform.object.shape).astype(np.float32) for _ in range(2)]
+    delta = pick(replace(dataset, waveform=Waveform(*noise)), picker).delta_tof_s
+    assert np.isnan(delta).mean() > 0.995
+
+
+@every_picker
+def test_a_prediction_leads_past_an_earlier_pulse(picker):
+    """What comes early by a path that the model does not have, and louder, is not taken."""
+    dataset, early = scan(8.0e-7, elements=16), scan(-26.0e-7, elements=16, gain=1.5)
+    wide = dataset.distance_m() > 0.05
+    both = Waveform(dataset.waveform.object + early.waveform.object, dataset.waveform.water)
+    mixed = replace(dataset, waveform=both)
+    expected = np.full(wide.shape, 7.0e-7)
+    guided = pick(mixed, picker, predicted_s=expected, reach_s=5.0e-7).delta_tof_s[wide]
+    alone = pick(mixed, picker).delta_tof_s[wide]
+    assert np.isfinite(guided).mean() > 0.9
+    assert np.nanmax(np.abs(guided - 8.0e-7)) < 2.0e-7
+    assert not (np.abs(alone - 8.0e-7) < 2.0e-7).any()
+
+
+def test_a_prediction_says_nothing_where_it_is_missing_and_must_fit():
+    dataset = scan(3.0e-7, elements=16)
+    wide = far(dataset)
+    nothing = np.full(wide.shape, np.nan)
+    np.testing.assert_array_equal(pick(dataset, predicted_s=nothing).delta_tof_s, pick(dataset).delta_tof_s)
+    wrong = pick(dataset, predicted_s=np.full(wide.shape, 1.5e-6), reach_s=5.0e-7).delta_tof_s
+    assert np.isnan(wrong).all()
+    with pytest.raises(InvalidInput, match="predicted_s"):
+        pick(dataset, predicted_s=nothing[1:])
+    with pytest.raises(InvalidInput, match="reach_s"):
+        pick(dataset, predicted_s=nothing, reach_s=0.0)
+
+
+@every_picker
+@pytest.mark.real
+def test_a_scan_by_another_teams_wave_solver(picker):
+    """Through the breast the picks follow the wave front of the true map, as far as 2 mm of skin allow."""
+    from scipy.ndimage import gaussian_filter, map_coordinates
+
+    from bentray_kernels.eikonal import solve
+    from bentray_workers.files.dataset import read_dataset
+
+    path = Path(__file__).parents[5] / "shared" / "data" / "ring_wave_a.h5"
+    if not path.exists():
+        pytest.skip(f"NOT CHECKED: {path} is absent")
+    dataset = read_dataset(path)
+    picked = pick(dataset, picker)
+    truth = dataset.truth
+    spacing = truth.spacing_m[0]
+    wavelength = dataset.water_speed_mps / dataset.center_frequency_hz
+    # A pulse sees the slowness averaged over about two wavelengths (the width of its Fresnel zone).
+    sigma = 2.0 * wavelength / 2.355 / spacing
+    maps = [
+        1.0 / gaussian_filter(1.0 / truth.sound_speed_mps, sigma),
+        np.full_like(truth.sound_speed_mps, 1500.0),
+    ]
+    place = (dataset.element_position_m - np.array(truth.origin_m)) / spacing
+    distance = dataset.distance_m()
+    error = []
+    for e in range(0, 128, 16):
+        seen, water = (
+            map_coordinates(solve(m, spacing, place[dataset.tx[e]] * spacing), place[dataset.rx].T, order=1)
+            for m in maps
+        )
+        error.append(np.where(distance[e] > 0.17, picked.delta_tof_s[e] - (seen - water), np.inf))
+    central = np.array(error)[np.array(error) != np.inf]
+    assert np.isfinite(central).mean() > (0.95 if picker in ("aic", "threshold", "correlation") else 0.9)
+    assert abs(np.nanmedian(central)) < 50e-9
+    assert np.sqrt(np.nanmean(central**2)) < 200e-9

@@ -1,0 +1,80 @@
+"""Onsets of single traces: where they are, to a fraction of a sample, and when there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.acquisition.picking.cross_correlation import match
+from bentray_kernels.acquisition.picking.differential import LEAST_LIKENESS
+from bentray_kernels.acquisition.picking.onset import aic, prepare, threshold
+from bentray_kernels.acquisition.picking.pickers import AIC, ENERGY_RATIO, STA_LTA, THRESHOLD, onset
+
+from ..traces import ricker
+
+PERIOD = 8.0
+
+
+def trace(place: float, length: int = 200) -> np.ndarray:
+    return ricker((np.arange(length) - place) / PERIOD, 1.0)
+
+
+@given(shift=st.floats(-12.0, 12.0))
+@settings(max_examples=30, deadline=None)
+def test_the_match_finds_a_shift_to_a_hundredth_of_a_sample(shift):
+    found, likeness = match(trace(90.0), 0.3 * trace(90.0 + shift), 82, 98, shift + 2.0, 4.0)
+    assert found == pytest.approx(shift, abs=0.01)
+    assert likeness > 0.99
+
+
+def test_the_match_refuses_what_lies_beyond_its_reach():
+    rising, _ = match(trace(90.0), trace(94.0), 82, 98, 0.0, 2.0)
+    assert np.isnan(rising)
+    _, likeness = match(trace(90.0), trace(97.0), 82, 98, 0.0, 2.0)
+    assert likeness < LEAST_LIKENESS
+
+
+@pytest.mark.parametrize("picker", [AIC, THRESHOLD, ENERGY_RATIO, STA_LTA])
+@given(shift=st.floats(0.0, 40.0))
+@settings(max_examples=30, deadline=None)
+def test_an_onset_moves_with_the_pulse(picker, shift):
+    first, _ = onset(trace(90.0), 40, 120, PERIOD, 0.0, picker)
+    moved, strong = onset(trace(90.0 + shift), 40, 160, PERIOD, 0.0, picker)
+    assert moved - first == pytest.approx(shift, abs=1.0)
+    assert strong == pytest.approx(90.0 + shift, abs=1.0)
+
+
+@pytest.mark.parametrize("picker", [AIC, THRESHOLD, ENERGY_RATIO, STA_LTA])
+def test_a_later_stronger_pulse_does_not_hide_the_first(picker):
+    alone, _ = onset(trace(60.0), 20, 180, PERIOD, 0.0, picker)
+    both, _ = onset(trace(60.0) + 1.6 * trace(120.0), 20, 180, PERIOD, 0.0, picker)
+    assert both == pytest.approx(alone, abs=1.5)
+
+
+@pytest.mark.parametrize("picker", [AIC, THRESHOLD, ENERGY_RATIO, STA_LTA])
+def test_silence_has_no_onset(picker):
+    found, strong = onset(np.zeros(100), 10, 90, PERIOD, 0.0, picker)
+    assert np.isnan(found)
+    assert strong == -1
+    faint, _ = onset(trace(50.0, 100), 10, 90, PERIOD, 0.5, picker)
+    assert np.isnan(faint)
+
+
+def test_an_onset_at_the_rim_of_the_window_is_none():
+    assert np.isnan(threshold(trace(50.0), 50, 60, 0.0))
+    assert np.isnan(aic(trace(50.0), 50, 54))
+
+
+def test_offset_and_noise_come_from_before_the_arrival():
+    random = np.random.default_rng(1)
+    noisy = trace(150.0) + 5.0 + 0.01 * random.standard_normal(200)
+    noisy[20] += 3.0
+    out = np.empty(200)
+    noise = prepare(noisy, 120, 0.0, out)
+    assert noise == pytest.approx(0.01, rel=0.3)
+    assert np.median(out[:120]) == pytest.approx(0.0, abs=1e-3)
+    noisy[7] = np.nan
+    assert np.isnan(prepare(noisy, 120, 0.0, out))
+    assert prepare(np.zeros(200, np.int16), 120, 0.29, out) == 0.29

@@ -1,0 +1,75 @@
+"""Measures of distortion on maps whose distortion is known."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.geometry_field.layout.distortion import (
+    area_stretch,
+    crosses_itself,
+    quasi_conformal_factors,
+    signed_areas,
+)
+
+CORNERS = np.array([[(0.0, 0.0, 0.0), (2.0, 0.0, 1.0), (0.5, 1.0, 0.0)]])
+
+
+def flat(angle=0.0, stretch=1.0):
+    """The triangle in its own plane, turned and pulled along x."""
+    first, second = CORNERS[0, 1] - CORNERS[0, 0], CORNERS[0, 2] - CORNERS[0, 0]
+    x = first / np.linalg.norm(first)
+    y = second - (second @ x) * x
+    y /= np.linalg.norm(y)
+    places = np.array([(0.0, 0.0), (first @ x, first @ y), (second @ x, second @ y)])
+    c, s = math.cos(angle), math.sin(angle)
+    return (places @ np.array([(c, s), (-s, c)]) * (stretch, 1.0))[np.newaxis]
+
+
+@given(st.floats(0.0, 7.0), st.floats(1.0, 50.0), st.floats(1e-3, 1e3))
+def test_the_factor_is_the_ratio_of_the_stretches(angle, stretch, scale):
+    found = quasi_conformal_factors(CORNERS, scale * flat(angle, stretch))
+    assert found[0] == pytest.approx(stretch, rel=1e-6, abs=1e-6)
+
+
+def test_flipped_and_flat_faces_have_no_factor():
+    assert quasi_conformal_factors(CORNERS, flat()[:, ::-1])[0] == math.inf
+    assert quasi_conformal_factors(CORNERS, flat() * (1.0, 0.0))[0] == math.inf
+    assert signed_areas(flat())[0] == pytest.approx(np.linalg.norm(np.cross(*(CORNERS[0, 1:]))) / 2)
+    assert signed_areas(flat()[:, ::-1])[0] < 0.0
+
+
+def test_area_stretch_is_one_at_best():
+    areas = np.array([1.0, 3.0])
+    assert area_stretch(areas, areas / 4.0) == pytest.approx(1.0)
+    # Half of the square is enough for twice; uneven is worse than even.
+    assert area_stretch(areas, areas / 8.0) == pytest.approx(2.0)
+    assert area_stretch(areas, np.array([0.5, 0.5])) > 1.1
+    assert area_stretch(areas, np.array([0.5, -0.1])) == math.inf
+
+
+@given(st.lists(st.floats(0.1, 1.0), min_size=4, max_size=40), st.floats(0.0, 6.0))
+@settings(deadline=None)
+def test_stars_do_not_cross_themselves(radii, turn):
+    angle = turn + 2 * np.pi * np.arange(len(radii)) / len(radii)
+    star = np.array(radii)[:, np.newaxis] * np.column_stack((np.cos(angle), np.sin(angle)))
+    assert not crosses_itself(star)
+    assert not crosses_itself(star[::-1].copy())
+
+
+@given(st.integers(4, 60), st.floats(0.0, 6.0), st.data())
+@settings(deadline=None)
+def test_two_corners_of_a_round_polygon_that_change_places_make_it_cross_itself(number, turn, data):
+    angle = turn + 2 * np.pi * np.arange(number) / number
+    polygon = np.column_stack((np.cos(angle), 0.5 * np.sin(angle)))
+    one = data.draw(st.integers(0, number - 1))
+    pair = [one, (one + 1) % number]
+    polygon[pair] = polygon[pair[::-1]]
+    assert crosses_itself(polygon)
+
+
+def test_an_eight_crosses_itself():
+    assert crosses_itself(np.array([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]))
+    assert not crosses_itself(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]))

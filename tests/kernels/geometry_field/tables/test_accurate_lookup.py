@@ -1,0 +1,129 @@
+"""The walk from the nearest entry: how far from the exact answer, and that it never makes faces up."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bentray_kernels.geometry_field.tables.accurate_lookup import STEPS, find
+from bentray_kernels.geometry_field.tables.outer_field import OuterField
+from bentray_kernels.meshes.mesh import Chart
+from bentray_kernels.meshes.surface import Surface, surface_of
+
+from ...meshes.examples import bunny
+from ...meshes.test_intersector import first_faces
+from ..shapes import ball, dented, field_of, over_the_poles
+
+
+def rays_through_the_cube(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """From points of the cube's surface to points of another of its faces."""
+    random = np.random.default_rng(seed)
+    ends = random.random((2, count, 3))
+    faces = random.integers(6, size=count), random.integers(1, 6, size=count)
+    for end, face in zip(ends, (faces[0], (faces[0] + faces[1]) % 6), strict=True):
+        end[np.arange(count), face // 2] = face % 2
+    return ends[0], ends[1] - ends[0]
+
+
+def found(
+    surface: Surface, field: OuterField, origins: np.ndarray, directions: np.ndarray, steps: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    n = len(origins)
+    faces, distances = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.float32)
+    weights = np.empty((2, n), dtype=np.float32)
+    o, d = (np.ascontiguousarray(a.T, dtype=np.float32) for a in (origins, directions))
+    find(surface, field, o, d, steps, faces, distances, weights)
+    return faces, distances, weights
+
+
+def off(surface: Surface, field: OuterField, steps: int, count: int = 20000) -> tuple[np.ndarray, float]:
+    """Errors of place, edges of the cube, and the share of rays whose hit or miss is wrong."""
+    origins, directions = rays_through_the_cube(count, 1)
+    expected, at, _, _ = first_faces(surface, origins, directions)
+    faces, distances, _ = found(surface, field, origins, directions, steps)
+    both = (faces >= 0) & (expected >= 0)
+    length = np.linalg.norm(directions[both], axis=1)
+    return np.abs(distances[both] - at[both]) * length, float(((faces >= 0) != (expected >= 0)).mean())
+
+
+def test_a_ball_is_found_where_it_is():
+    surface = ball(5)
+    field = field_of(surface, 16)
+    errors, wrong = off(surface, field, STEPS)
+    assert np.median(errors) < 1e-6
+    assert (errors < 1e-5).mean() > 0.99
+    assert wrong < 0.01
+
+
+def test_the_walk_ends_in_the_face_that_the_exact_intersector_meets():
+    surface = ball(4)
+    field = field_of(surface, 12)
+    origins, directions = rays_through_the_cube(5000, 2)
+    expected, _, exact, _ = first_faces(surface, origins, directions)
+    faces, _, weights = found(surface, field, origins, directions, 60)
+    both = (faces >= 0) & (expected >= 0)
+    # A convex body: a walk that ends, ends in the only face there is. Points close to an edge may lie on
+    # either side of it in float32.
+    assert not (expected[faces >= 0] < 0).any()
+    inside = exact.min(axis=1) > 1e-3
+    inside &= exact.sum(axis=1) < 1.0 - 1e-3
+    np.testing.assert_array_equal(faces[both & inside], expected[both & inside])
+    np.testing.assert_allclose(weights.T[both & inside], exact[both & inside], atol=2e-3)
+
+
+def test_the_entry_itself_is_told_exactly():
+    from bentray_kernels.geometry_field.tables.cube import samples
+
+    n, surface = 6, ball(3)
+    field = field_of(surface, n)
+    places = samples(n)
+    i, j = np.nonzero(field.faces >= 0)
+    for steps in (20, STEPS):
+        faces, distances, _ = found(surface, field, places[i], places[j] - places[i], steps)
+        at_an_edge = faces != field.faces[i, j]
+        assert at_an_edge.mean() < 0.05
+        np.testing.assert_allclose(distances, field.fractions[i, j], atol=1e-5)
+
+
+def test_rays_that_start_before_the_cube_are_the_same_rays():
+    surface = ball(4)
+    field = field_of(surface, 8)
+    origins, directions = rays_through_the_cube(2000, 3)
+    faces, distances, _ = found(surface, field, origins, directions, STEPS)
+    before, later, _ = found(surface, field, origins - directions, directions, STEPS)
+    # Moved starts are rounded differently: at the border of an entry a ray may get the other one.
+    same = before == faces
+    assert same.mean() > 0.995
+    np.testing.assert_allclose(later[same] - 1.0, distances[same], atol=1e-5)
+
+
+def test_places_lie_on_the_faces_told():
+    surface = surface_of(over_the_poles(dented(4)))
+    field = field_of(surface, 10)
+    origins, directions = rays_through_the_cube(5000, 4)
+    faces, distances, weights = found(surface, field, origins, directions, 100)
+    met = faces >= 0
+    corners = surface.triangles[faces[met], :9].reshape(-1, 3, 3)
+    share = np.column_stack([weights.T[met], 1.0 - weights.T[met].sum(axis=1)])
+    on_face = np.einsum("kc,kcx->kx", share, corners)
+    on_ray = origins[met] + distances[met, None] * directions[met]
+    assert np.quantile(np.linalg.norm(on_face - on_ray, axis=1), 0.99) < 1e-5
+
+
+def test_a_field_that_meets_nothing_finds_nothing():
+    surface = ball(1)
+    empty = field_of(surface, 4)
+    empty.faces[:] = -1
+    faces, distances, _ = found(surface, empty, *rays_through_the_cube(300, 5), STEPS)
+    assert (faces == -1).all()
+    assert np.isinf(distances).all()
+
+
+@pytest.mark.real
+@pytest.mark.slow
+def test_the_bunny_keeps_target_g2():
+    mesh = bunny().in_unit_cube()
+    surface = surface_of(Chart(mesh, np.zeros((len(mesh.faces), 3, 2))))
+    errors, wrong = off(surface, field_of(surface, 24), STEPS, 100_000)
+    assert np.median(errors) < 1e-6
+    assert wrong <= 0.021

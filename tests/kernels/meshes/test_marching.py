@@ -1,0 +1,84 @@
+"""Iso-surfaces as meshes: closed, oriented, in the right place."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.meshes.marching import isosurface_mesh
+from bentray_kernels.meshes.pieces import pieces_of
+from bentray_kernels.meshes.topology import topology_of
+
+UNIT = np.ones(3)
+
+
+def volume_of(surface):
+    first, second, third = np.moveaxis(surface.corners, 1, 0)
+    return (first * np.cross(second, third)).sum() / 6.0
+
+
+def grid(number):
+    return np.indices((number,) * 3) - (number - 1) / 2
+
+
+def test_a_ball():
+    surface = isosurface_mesh(8.0 - np.linalg.norm(grid(24), axis=0), np.full(3, 0.5), 0.0)
+    radius = np.linalg.norm(surface.vertices - 0.25 * 23, axis=1)
+    # Linear interpolation of the distance is short by an eighth of a squared edge over the radius at most.
+    np.testing.assert_allclose(radius, 4.0, atol=0.5 * 3 / 8 / 8)
+    assert volume_of(surface) == pytest.approx(4 / 3 * np.pi * 64, rel=0.01)
+    assert topology_of(surface.faces).genus == 0
+
+
+def test_a_plane_has_no_error():
+    x, y, z = grid(8)
+    surface = isosurface_mesh(1.3 * x + 0.4 * y - 0.2 * z, np.array([1.0, 2.0, 3.0]), 0.123)
+    place = surface.vertices / (1.0, 2.0, 3.0) - 3.5
+    inner = (np.abs(place) < 3.4).all(axis=1)
+    assert inner.sum() > 50
+    np.testing.assert_allclose(place[inner] @ (1.3, 0.4, -0.2), 0.123, atol=0.02 * 2)
+    assert np.median(np.abs(place[inner] @ (1.3, 0.4, -0.2) - 0.123)) < 1e-12
+
+
+@given(arrays.arrays(np.int8, st.tuples(*(st.integers(2, 5),) * 3), elements=st.integers(0, 2)))
+@settings(deadline=None, max_examples=60)
+def test_any_volume_gives_closed_surfaces_about_what_is_above(values):
+    """Even where values lie on the iso-value and cells touch in corners alone."""
+    if values.max() <= 1 or values.min() > 1:
+        with pytest.raises(InvalidInput, match="iso: found 1"):
+            isosurface_mesh(values, UNIT, 1)
+        return
+    surface = isosurface_mesh(values, UNIT, 1)
+    topology = topology_of(surface.faces)
+    assert not topology.on_boundary.any()
+    assert topology.fans(~topology.on_boundary).max() + 1 == len(surface.vertices)
+    assert volume_of(surface) > 0.0
+    assert (np.linalg.norm(surface.face_normals, axis=1) > 0.0).all()
+
+
+def test_the_torus_has_its_handle_and_two_balls_are_two_pieces():
+    x, y, z = grid(20)
+    ring = 2.0 - np.hypot(np.hypot(x, y) - 6.0, z)
+    assert topology_of(isosurface_mesh(ring, UNIT, 0.0).faces).genus == 1
+    balls = np.maximum(4.0 - np.hypot(np.hypot(x - 5.0, y), z), 2.0 - np.hypot(np.hypot(x + 5.0, y), z))
+    large, small = (volume_of(piece) for piece in pieces_of(isosurface_mesh(balls, UNIT, 0.0)))
+    assert large / small == pytest.approx(8.0, rel=0.2)
+
+
+def test_what_reaches_the_border_is_closed_there():
+    values = np.zeros((6, 7, 8), np.uint8)
+    values[:3] = 255
+    surface = isosurface_mesh(values, UNIT, 127.5)
+    assert not topology_of(surface.faces).on_boundary.any()
+    np.testing.assert_allclose(surface.vertices.min(axis=0), 0.0, atol=0.011)
+    np.testing.assert_allclose(surface.vertices.max(axis=0), (2.5, 6.0, 7.0), atol=0.011)
+
+
+@pytest.mark.parametrize("iso", [-1.0, 1.0, 2.0])
+def test_an_iso_value_out_of_range_is_refused(iso):
+    values = np.zeros((4, 4, 4))
+    values[1, 1, 1] = 1.0
+    with pytest.raises(InvalidInput, match=r"accepted: a value in \[0, 1\)"):
+        isosurface_mesh(values, UNIT, iso)

@@ -1,0 +1,88 @@
+"""Rows of rays: exact data leave no residual, and their change with the medium is what the rows say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels import eikonal, rays
+from bentray_kernels.tomography.gauss_newton.linearisation import linearise
+from bentray_kernels.tomography.problem import Problem
+
+NODES, SPACING, WATER = 48, 2e-3, 1500.0
+
+
+def medium(bump_mps=60.0):
+    """Slowness of a smooth bump in water."""
+    x = (np.arange(NODES) - 0.5 * (NODES - 1)) * SPACING
+    return 1.0 / (WATER + bump_mps * np.exp(-(x[:, None] ** 2 + (x[None, :] - 6e-3) ** 2) / (2 * 0.012**2)))
+
+
+@pytest.fixture
+def problem():
+    """A ring of 12 elements around ``medium``, its times along bent rays."""
+    angle = 2.0 * np.pi * np.arange(12) / 12
+    centre = 0.5 * (NODES - 1) * SPACING
+    ring = centre + 0.04 * np.column_stack((np.cos(angle), np.sin(angle)))
+    slowness = medium()
+    delta = np.full((12, 12), np.nan)
+    for k, source in enumerate(ring):
+        others = np.arange(12) != k
+        tof = eikonal.solve(1.0 / slowness, SPACING, source)
+        times = rays.travel_times(tof, 1.0 / slowness, SPACING, ring[others], source)
+        delta[k, others] = times - np.linalg.norm(ring[others] - source, axis=1) / WATER
+    region = np.ones((NODES, NODES), dtype=bool)
+    return Problem(ring, ring[None], np.zeros(12, int), delta, region, SPACING, (0.0, 0.0), WATER)
+
+
+def dense(rows):
+    matrix = np.zeros((len(rows.residual), NODES * NODES))
+    for k in range(len(rows.residual)):
+        entries = slice(rows.pointers[k], rows.pointers[k + 1])
+        matrix[k, rows.columns[entries]] = rows.lengths[entries]
+    return matrix
+
+
+def test_exact_data_leave_nothing(problem):
+    rows = linearise(problem, medium(), np.arange(12), rays="curved", eikonal="accurate")
+    assert np.abs(rows.residual).max() < 1e-11
+    assert rows.emitters == 12
+
+
+def test_one_by_one_is_all_at_once(problem):
+    whole = linearise(problem, medium(), np.arange(12), rays="curved", eikonal="accurate")
+    single = [
+        linearise(problem, medium(), np.array([k]), rays="curved", eikonal="accurate") for k in range(12)
+    ]
+    assert np.array_equal(np.concatenate([part.residual for part in single]), whole.residual)
+    assert np.array_equal(np.concatenate([part.columns for part in single]), whole.columns)
+    assert np.array_equal(np.concatenate([part.lengths for part in single]), whole.lengths)
+
+
+def test_rows_are_the_derivative_of_the_times(problem):
+    """Fermat: the times change by Σ length·δslowness, the path's own change being of second order."""
+    x = np.linspace(-1.0, 1.0, NODES)
+    change = 1e-3 / WATER * np.exp(-((x[:, None] - 0.2) ** 2 + (x[None, :] + 0.1) ** 2) / 0.2)
+    here = linearise(problem, medium(), np.arange(12), rays="curved", eikonal="accurate")
+    there = linearise(problem, medium() + change, np.arange(12), rays="curved", eikonal="accurate")
+    predicted = dense(here) @ change.ravel() * SPACING
+    moved = here.residual - there.residual
+    assert np.abs(moved - predicted).max() < 5e-3 * np.abs(predicted).max()
+
+
+@pytest.mark.parametrize("kind", ["curved", "straight"])
+def test_rows_sum_to_the_length_of_the_ray(problem, kind):
+    rows = linearise(problem, medium(), np.array([3]), rays=kind, eikonal="accurate")
+    lengths = np.add.reduceat(rows.lengths, rows.pointers[:-1]) * SPACING
+    straight = np.linalg.norm(np.delete(problem.receivers[0], 3, axis=0) - problem.emitters[3], axis=1)
+    assert (lengths >= straight * (1.0 - 1e-5)).all()
+    assert (lengths <= straight * (1.02 if kind == "curved" else 1.0 + 1e-5)).all()
+
+
+def test_pairs_without_data_have_no_row(problem):
+    gaps = problem.delta_tof.copy()
+    gaps[3, 5:] = np.nan
+    rows = linearise(
+        replace(problem, delta_tof=gaps), medium(), np.array([3]), rays="straight", eikonal="fmm"
+    )
+    assert len(rows.residual) == 4

@@ -1,0 +1,48 @@
+"""Parts of the pairs: what is held out and what is shown make the whole, both ways alike."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
+from bentray_kernels.tomography.model_selection.held_out import part_of
+
+PAIRS = ("shown", "held-out")
+VIEWS = ("shown-views", "held-out-views")
+
+
+def ring(elements, tx=None):
+    every = np.arange(elements)
+    tx = every if tx is None else tx
+    return Dataset(
+        Ring(elements, 0.1).positions(), tx, every, 1500.0, delta_tof_s=np.zeros((len(tx), elements))
+    )
+
+
+@pytest.mark.parametrize("parts", [PAIRS, VIEWS], ids=["pairs", "views"])
+@given(elements=st.integers(16, 96))
+@settings(max_examples=20, deadline=None)
+def test_the_parts_are_the_whole_and_share_no_pair(parts, elements):
+    scan = ring(elements)
+    shown, held = (np.isfinite(part_of(scan, part).differential_tof()) for part in parts)
+    assert not (shown & held).any()
+    assert np.array_equal(shown | held, np.isfinite(scan.differential_tof()))
+    assert np.array_equal(held, held.T)
+
+
+def test_views_are_a_tenth_and_whole_sectors():
+    held = np.isfinite(part_of(ring(64), "held-out-views").differential_tof())
+    assert held.mean() == pytest.approx(6 / 64)
+    blocks = held.reshape(8, 8, 8, 8).sum(axis=(1, 3))
+    assert set(blocks.ravel()) == {0, 64}
+    # No sector loses more than one of its eight views, and none that looks along the edge.
+    assert (blocks > 0).sum(axis=1).max() == 1
+    sent, received = np.nonzero(blocks)
+    assert {3, 5} == set(np.abs(sent - received).tolist())
+
+
+def test_all_is_the_scan_itself():
+    scan = ring(16)
+    assert part_of(scan, "all") is scan

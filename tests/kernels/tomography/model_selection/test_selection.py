@@ -1,0 +1,225 @@
+"""Advice: pairs are held out both ways, the better model wins, noise says where to stop."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.tomography import Settings, Trial, reconstruct
+from bentray_kernels.tomography.gauss_newton.gauss_newton_step import look
+from bentray_kernels.tomography.model_selection.finite_frequency_candidates import choose_wide, wide
+from bentray_kernels.tomography.model_selection.held_out import part_of
+from bentray_kernels.tomography.model_selection.selection import (
+    BANDED,
+    CANDIDATES,
+    choose,
+    reason,
+    told,
+    tried,
+)
+from bentray_kernels.tomography.reconstruct import Here
+from bentray_kernels.tomography.stopping import noise_of, stopped
+
+WATER = 1375.0
+RING = Ring(48, 0.09)
+PLAN = Settings(method="auto", nodes=48)
+
+
+@pytest.fixture(scope="module")
+def scan():
+    data = TravelTimeScan(table6(WATER), RING, TABLE6_SIDE_M, nodes=48)
+    everyone = np.arange(RING.elements)
+    return Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=data.delta_tof(everyone))
+
+
+def test_the_parts_are_the_whole_and_share_no_pair(scan):
+    shown, held = (np.isfinite(part_of(scan, part).differential_tof()) for part in ("shown", "held-out"))
+    assert not (shown & held).any()
+    assert np.array_equal(shown | held, np.isfinite(scan.differential_tof()))
+    assert np.array_equal(held, held.T)
+    assert 0.05 < held.sum() / (shown | held).sum() < 0.2
+    # No element loses more than a few of its pairs.
+    assert held.sum(axis=1).max() < 0.4 * RING.elements
+
+
+def test_invalid_pairs_stay_so(scan):
+    valid = np.random.default_rng(0).random(scan.delta_tof_s.shape) < 0.5
+    held = part_of(replace(scan, valid=valid), "held-out").valid
+    assert not (held & ~valid).any()
+
+
+def test_eikonal_times_ask_for_bent_rays(scan):
+    seen = []
+    result = reconstruct(scan, PLAN, seen.append)
+    assert result.settings.rays == "curved"
+    done = [progress.done for progress in seen]
+    assert done == sorted(done)
+    parts = [progress.done / progress.total for progress in seen]
+    assert parts == sorted(parts)
+    assert done[-1] == seen[-1].total
+    assert seen[-1].history == result.history
+    assert result.settings.method in ("sart", "gauss-newton")
+    assert len(result.trials) == len(CANDIDATES)
+    assert reason(result.trials).startswith("auto chose curved")
+    # What was chosen gives the same bits when asked for by itself.
+    again = reconstruct(scan, result.settings)
+    assert np.array_equal(again.speed, result.speed)
+    assert again.trials == ()
+    assert reason(again.trials) == ""
+
+
+@pytest.mark.parametrize(("count", "part"), [(1, "held-out"), (None, "shown")])
+def test_too_few_pairs_to_hold_some_out_are_refused(scan, count, part):
+    """One pair that would be shown, or none but those that would be held out."""
+    kept = np.zeros(scan.delta_tof_s.shape, bool)
+    other = "shown" if part == "held-out" else "held-out"
+    kept[tuple(np.argwhere(np.isfinite(part_of(scan, other).differential_tof()))[:count].T)] = True
+    with pytest.raises(InvalidInput) as refusal:
+        reconstruct(replace(scan, valid=kept), PLAN)
+    assert refusal.value.field == "method"
+    assert part in str(refusal.value)
+
+
+def test_straight_times_ask_for_straight_rays(scan):
+    """Times integrated along straight lines, as a picker of late arrivals gives them."""
+    straight = replace(PLAN, method="sart", rays="straight", sweeps=1)
+
+    problem = Here(scan, straight, "all").problem(0)
+    axis = np.arange(48) * problem.spacing
+    x, y = np.meshgrid(axis - axis.mean(), axis - axis.mean(), indexing="ij")
+    image = 1.0 / (WATER + 100.0 * (np.hypot(x, y) < 0.05) + 60.0 * (np.hypot(x - 0.02, y) < 0.01))
+    rows = look(problem, straight, image, problem.sounding)
+    delta = np.full(scan.delta_tof_s.shape, np.nan)
+    delta[np.isfinite(problem.delta_tof)] = problem.delta_tof[np.isfinite(problem.delta_tof)] - rows.residual
+    for frequency in (None, 4e5):
+        asked = replace(scan, delta_tof_s=delta, center_frequency_hz=frequency)
+        assert reconstruct(asked, PLAN).settings.rays == "straight"
+
+
+def test_exact_times_ask_for_thin_bent_rays_whatever_the_frequency(scan):
+    seen = []
+    result = reconstruct(replace(scan, center_frequency_hz=4e5), PLAN, seen.append)
+    assert result.settings.rays == "curved"
+    assert result.settings.ray_width_m == 0.0
+    assert len(result.trials) == len(BANDED)
+    assert [p.done / p.total for p in seen] == sorted(p.done / p.total for p in seen)
+    assert seen[-1].done == seen[-1].total
+
+
+def test_a_frequency_offers_rays_as_wide_as_its_waves(scan):
+    assert wide(scan, PLAN) == []
+    told = replace(scan, center_frequency_hz=5e5)
+    assert wide(told, replace(PLAN, decomposition="volume")) == []
+    offered = wide(told, PLAN)
+    assert [one.get("ray_width_m", 0.0) for one in offered] == [WATER / 5e5, WATER / 5e5, 0.0]
+    assert {one["rays"] for one in offered[:2]} == {"straight", "curved"}
+    # As stiff on the coarser grid of a trial as on that of the image.
+    plans = tried(replace(PLAN, nodes=128), offered)
+    assert [plan.penalty_strength for plan in plans] == pytest.approx([0.3, 0.3, 0.3])
+    assert [one.get("penalty_strength", 0.3) for one in offered] == pytest.approx([0.6, 0.6, 0.3])
+
+
+def test_of_wide_rays_those_that_predict_views_better_are_chosen_unless_thin_ones_are_exact():
+    def of(held_out, **changes):
+        return Trial({"method": "gauss-newton", **changes}, 9.0 * held_out, held_out, held_out)
+
+    straight = of(80e-9, rays="straight", ray_width_m=0.003)
+    bent = of(75e-9, rays="curved", ray_width_m=0.003)
+    thin = of(70e-9, rays="curved")
+    assert choose_wide([straight, bent, thin], 3e-7) is bent
+    worse = replace(bent, held_out_mean_s=85e-9)
+    assert choose_wide([straight, worse, thin], 3e-7) is straight
+    # Both explain the times.
+    assert choose_wide([straight, worse, thin], 1e-6) is worse
+    assert choose_wide([straight, replace(bent, held_out_mean_s=101e-9), thin], 2e-6) is straight
+    assert "straight ones must be 20 % better" in reason([worse, straight, thin])
+    exact = replace(thin, held_out_mean_s=20e-9)
+    assert choose_wide([straight, bent, exact], 3e-7) is None
+    assert reason([bent, straight, thin]) == (
+        "auto chose curved gauss-newton (ray_width_m 0.003) 75 ns (mean misfit of held-out views, for rays "
+        "as wide as waves); the others: straight gauss-newton (ray_width_m 0.003) 80 ns, "
+        "curved gauss-newton 70 ns"
+    )
+
+
+def test_where_no_view_can_be_held_out_pairs_are(scan):
+    """Emitters of one half of a ring of which no view is held out."""
+    sent = np.array([0, 1, 2])
+    few = replace(
+        scan,
+        tx=sent,
+        rx=np.arange(3, 16),
+        delta_tof_s=scan.delta_tof_s[np.ix_(sent, np.arange(3, 16))],
+        center_frequency_hz=4e5,
+    )
+    result = reconstruct(few, replace(PLAN, nodes=24, sweeps=1))
+    assert len(result.trials) == len(BANDED)
+    # By SART alone, for the frequency is known.
+    straight = [trial.settings for trial in result.trials if trial.settings["rays"] == "straight"]
+    assert straight == [{"rays": "straight", "method": "sart"}]
+
+
+def trial(rays, held_out):
+    return Trial({"rays": rays}, held_out, held_out)
+
+
+def test_bent_rays_must_be_clearly_better():
+    straight, bent = trial("straight", 100e-9), trial("curved", 99e-9)
+    assert choose([straight, bent]) is straight
+    assert choose([straight, replace(bent, held_out_rms_s=80e-9)]).settings["rays"] == "curved"
+    assert choose([trial("straight", 110e-9), straight, bent]) is straight
+
+
+def test_noise_says_where_to_stop():
+    chosen = trial("straight", 100e-9)
+    assert stopped(PLAN, chosen, 90e-9).stop_rms_s == pytest.approx(99e-9)
+    # What predicts better than the noise estimate shows that there is less of it.
+    assert stopped(PLAN, chosen, 120e-9).stop_rms_s == 0.0
+    asked = replace(PLAN, stop_rms_s=5e-9)
+    assert stopped(asked, chosen, 90e-9) == asked
+
+
+def test_the_noise_is_told_or_estimated(scan):
+    clean = noise_of(scan)
+    random = np.random.default_rng(3)
+    noisy = replace(scan, delta_tof_s=scan.delta_tof_s + random.normal(0.0, 3e-7, scan.delta_tof_s.shape))
+    assert clean < 2.2e-7
+    assert 2.7e-7 < noise_of(noisy) < 4.5e-7
+    told = replace(scan, sigma_s=np.full(scan.delta_tof_s.shape, 5e-8))
+    assert noise_of(told) == pytest.approx(5e-8)
+    # A pair without a time says nothing, whatever its sigma.
+    told.sigma_s[0, 1:] = 1.0
+    gaps = replace(told, delta_tof_s=np.where(told.sigma_s < 1.0, told.delta_tof_s, np.nan))
+    assert noise_of(gaps) == pytest.approx(5e-8)
+
+
+def test_trials_are_coarser_and_speed_alone():
+    for plan, changes in zip(tried(replace(PLAN, nodes=200)), CANDIDATES, strict=True):
+        assert plan.nodes == 100
+        assert not plan.attenuation
+        assert plan.method == changes["method"]
+    assert {plan.nodes for plan in tried(PLAN)} == {48}
+
+
+def test_what_is_told_of_a_result_are_rays_and_waves(scan):
+    result = reconstruct(scan, replace(PLAN, method="sart", sweeps=1))
+    assert told(result) == ""
+    chosen = replace(result, trials=(trial("straight", 1e-7), trial("curved", 2e-7)))
+    assert told(chosen) == reason(chosen.trials)
+    both = replace(chosen, provenance={**result.provenance, "waveform": "method waveform is advised"})
+    assert told(both) == f"{reason(chosen.trials)}; method waveform is advised"
+
+
+def test_the_reason_names_what_differs():
+    plain, more = trial("straight", 100e-9), trial("curved", 120e-9)
+    smooth = replace(more, settings={**more.settings, "front_smoothing_nodes": 4.0})
+    close = replace(more, held_out_rms_s=95e-9)
+    assert "100 ns (misfit of held-out pairs; bent rays must be 8 % better);" in reason([plain, close])
+    assert reason([plain, smooth]) == (
+        "auto chose straight 100 ns (misfit of held-out pairs); "
+        "the others: curved (front_smoothing_nodes 4) 120 ns"
+    )

@@ -1,0 +1,137 @@
+"""Updates of an image: speeds are stretched as published, the compiled pass is the traced one, options do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
+from bentray_kernels.tomography.grid_schedule import start
+from bentray_kernels.tomography.sart.sart_step import advance, begin
+from bentray_kernels.tomography.sart.sart_update import propagation_speed
+
+NODES, WATER = 64, 1375.0
+PHANTOM = table6(WATER)
+RING = Ring(64, 0.09)
+
+
+@pytest.fixture(scope="module")
+def scan():
+    everyone = np.arange(RING.elements)
+    data = TravelTimeScan(PHANTOM, RING, TABLE6_SIDE_M, nodes=NODES).delta_tof(everyone)
+    return Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=data)
+
+
+def plan(**changes):
+    return Settings(nodes=NODES, side_m=TABLE6_SIDE_M, **{"sweeps": 2, **changes})
+
+
+def test_data_driven_update_stretches_the_range():
+    region = np.ones((4, 4), bool)
+    region[0] = False
+    slowness = 1.0 / np.linspace(1480.0, 1520.0, 16).reshape(4, 4)
+    wanted = Settings(speed_update="data-driven", speed_range_mps=(1375.0, 1560.0))
+    stretched = propagation_speed(slowness, region, wanted, warm=True)
+    assert stretched[region].min() == pytest.approx(1375.0)
+    assert stretched[region].max() == pytest.approx(1560.0)
+    assert np.allclose(stretched[0], 1.0 / slowness[0])
+    assert np.allclose(propagation_speed(slowness, region, wanted, warm=False), 1.0 / slowness)
+    flat = np.full((4, 4), 1 / 1500.0)
+    assert np.allclose(propagation_speed(flat, region, wanted, warm=True), 1500.0)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"subset": 4, "relaxation": 0.4, "huber_s": 2e-7},
+        {"speed_update": "data-driven", "speed_range_mps": (1375.0, 1560.0), "relaxation_decay": 0.5},
+        {"front_smoothing_nodes": 1.5, "smoothing_nodes": 1.5},
+    ],
+    ids=lambda changes: "-".join(changes) or "plain",
+)
+def test_the_compiled_pass_gives_the_images_of_the_traced_one(scan, changes):
+    fast = reconstruct(scan, plan(**changes))
+    slow = reconstruct(scan, plan(eikonal="accurate", **changes))
+    inside = PHANTOM.inside(NODES, TABLE6_SIDE_M)
+    spread = float(np.std(slow.speed[inside]))
+    assert np.abs(fast.speed - slow.speed)[inside].mean() < 0.03 * spread
+    assert fast.residual_rms_s == pytest.approx(slow.residual_rms_s, rel=0.05)
+    assert fast.coverage.sum() == pytest.approx(slow.coverage.sum(), rel=1e-2)
+    assert fast.residuals.sum() == slow.residuals.sum()
+    assert [sweep.emitters for sweep in fast.history] == [sweep.emitters for sweep in slow.history]
+
+
+@pytest.mark.parametrize("changes", [{"cut": 3}, {"cut": 7, "subset": 5}], ids=["one", "subsets"])
+def test_cuts_of_the_compiled_pass_change_no_bit(scan, changes):
+
+    wanted = plan(subset=changes.get("subset", 1))
+    problem = Problem.of(scan, wanted)
+    whole = cut = begin(start(problem, None))
+    before = whole.slowness.copy()
+    while not whole.done:
+        whole = advance(problem, wanted, whole, 10**6)
+    while not cut.done:
+        cut = advance(problem, wanted, cut, changes["cut"])
+    for name in ("slowness", "coverage", "residuals"):
+        assert np.array_equal(getattr(whole, name), getattr(cut, name)), name
+    assert whole.history == cut.history
+    assert np.array_equal(before, begin(start(problem, None)).slowness)
+
+
+def test_without_rays_the_image_comes_back_too(scan):
+    truth, inside = PHANTOM.speed(NODES, TABLE6_SIDE_M), PHANTOM.inside(NODES, TABLE6_SIDE_M)
+    error = {
+        rays: rmse(reconstruct(scan, plan(rays=rays, sweeps=4)).speed, truth, inside)
+        for rays in ("straight", "adjoint", "curved")
+    }
+    assert error["curved"] < error["adjoint"] < error["straight"]
+
+
+def test_a_subset_is_one_update(scan):
+    """With all emitters in one subset, nothing of the first hides from the last: seeds give the same."""
+    one, other = (reconstruct(scan, plan(subset=64, seed=seed, sweeps=1)).speed for seed in (0, 1))
+    assert np.allclose(one, other, atol=1e-2)
+    alone = [reconstruct(scan, plan(seed=seed, sweeps=1)).speed for seed in (0, 1)]
+    assert np.abs(alone[0] - alone[1]).max() > 0.5
+
+
+def test_relaxation_decays(scan):
+    """A decay that leaves nothing makes the second sweep change nothing."""
+    first = reconstruct(scan, plan(sweeps=1)).speed
+    second = reconstruct(scan, plan(sweeps=2, relaxation_decay=1e-9)).speed
+    assert np.allclose(first, second, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("method", "limit"),
+    [
+        ("sart", {"huber_s": 2e-7}),
+        ("gauss-newton", {"huber_s": 2e-7}),
+        ("gauss-newton", {"huber_spreads": 3.0}),
+    ],
+)
+def test_huber_makes_wrong_picks_count_less(scan, method, limit):
+    truth, inside = PHANTOM.speed(NODES, TABLE6_SIDE_M), PHANTOM.inside(NODES, TABLE6_SIDE_M)
+    random = np.random.default_rng(5)
+    wrong = random.random(scan.delta_tof_s.shape) < 0.05
+    spoiled = np.where(wrong, scan.delta_tof_s + random.normal(0.0, 4e-6, wrong.shape), scan.delta_tof_s)
+    bad = replace(scan, delta_tof_s=spoiled)
+    plain, robust = (
+        rmse(reconstruct(bad, plan(method=method, sweeps=4, **huber)).speed, truth, inside)
+        for huber in ({"huber_spreads": 0.0}, {"huber_spreads": 0.0, **limit})
+    )
+    assert robust < 0.9 * plain
+
+
+def test_a_smoothed_front_follows_edges_less(scan):
+    region = np.ones((NODES, NODES), bool)
+    slowness = 1.0 / PHANTOM.speed(NODES, TABLE6_SIDE_M)
+    sharp = propagation_speed(slowness, region, plan(), warm=True)
+    smooth = propagation_speed(slowness, region, plan(front_smoothing_nodes=4.0), warm=True)
+    assert np.array_equal(sharp, 1.0 / slowness)
+    assert np.abs(np.diff(smooth, axis=0)).max() < 0.3 * np.abs(np.diff(sharp, axis=0)).max()
+    assert smooth.mean() == pytest.approx(sharp.mean(), rel=1e-3)

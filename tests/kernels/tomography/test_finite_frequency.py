@@ -1,0 +1,78 @@
+"""Wide rays: their image and its adjoint, thin ones as before, and what they mend in wide times."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
+from bentray_kernels.tomography.finite_frequency import BENDS_WIDER, bending, blurred, nodes_wide, seen
+from bentray_kernels.tomography.gauss_newton import gauss_newton_step
+
+WATER = 1500.0
+RING = Ring(32, 0.08)
+WIDTH = 0.009
+PLAN = Settings(method="gauss-newton", nodes=40, ray_width_m=WIDTH)
+
+
+def scan(delta=None):
+    every = np.arange(RING.elements)
+    delta = np.zeros((RING.elements, RING.elements)) if delta is None else delta
+    return Dataset(RING.positions(), every, every, WATER, delta_tof_s=delta)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 6.0))
+@settings(max_examples=20, deadline=None)
+def test_the_blur_is_linear_and_its_own_adjoint(seed, width):
+    random = np.random.default_rng(seed)
+    one, two = random.normal(size=(2, 13, 17))
+    assert np.vdot(blurred(one, width), two) == pytest.approx(np.vdot(one, blurred(two, width)), abs=1e-9)
+    both = blurred(one + 2.0 * two, width)
+    assert np.allclose(both, blurred(one, width) + 2.0 * blurred(two, width), atol=1e-12)
+
+
+def test_thin_rays_see_the_image_itself_and_water_stays_water():
+    problem = Problem.of(scan(), PLAN)
+    image = np.full(problem.region.shape, 1.0 / WATER)
+    assert np.array_equal(seen(problem, PLAN, image), image)
+    image[20, 20] *= 1.1
+    assert seen(problem, replace(PLAN, ray_width_m=0.0), image) is image
+    wide = seen(problem, PLAN, image)
+    assert 1.0 / WATER < wide[20, 20] < image[20, 20]
+    assert (wide - 1.0 / WATER).sum() == pytest.approx((image - 1.0 / WATER).sum(), rel=1e-3)
+
+
+def test_rays_bend_in_what_twice_the_width_leaves_unless_told_otherwise():
+    problem = Problem.of(scan(), PLAN)
+    width = nodes_wide(problem, PLAN)
+    assert width == pytest.approx(WIDTH / problem.spacing)
+    assert np.hypot(width, bending(problem, PLAN)) == pytest.approx(BENDS_WIDER * width)
+    assert bending(problem, replace(PLAN, front_smoothing_nodes=3.0)) == 3.0
+    assert bending(problem, replace(PLAN, ray_width_m=0.0)) == 0.0
+
+
+def test_wide_times_ask_for_wide_rays():
+    """Times that rays of this width would take: thin ones make a blurred disc of them."""
+    plan = replace(PLAN, rays="straight")
+    problem = Problem.of(scan(), plan)
+    axis = (np.arange(40) - 19.5) * problem.spacing
+    far = np.hypot(axis[:, None] - 0.01, axis[None, :])
+    true = WATER + 60.0 * (far < 0.02)
+    rows = gauss_newton_step.look(problem, plan, 1.0 / true, problem.sounding)
+    delta = np.full(problem.delta_tof.shape, np.nan)
+    delta[np.isfinite(problem.delta_tof)] = -rows.residual
+    wide = reconstruct(scan(delta), plan)
+    thin = reconstruct(scan(delta), replace(plan, ray_width_m=0.0))
+    errors = [rmse(one.speed, true, problem.region) for one in (wide, thin)]
+    assert errors[0] < 0.75 * errors[1]
+
+
+@pytest.mark.parametrize("method", ["sart", "auto", "waveform"])
+def test_other_methods_refuse_a_width(method):
+    with pytest.raises(InvalidInput, match="ray_width_m"):
+        Settings(method=method, ray_width_m=1e-3)

@@ -1,0 +1,83 @@
+"""Stages: coarse grids and straight rays first, each from the image before, all in the history."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.tomography import Problem, Settings, reconstruct
+from bentray_kernels.tomography.grid_schedule import stages, start
+
+WATER = 1375.0
+RING = Ring(32, 0.09)
+PLAN = Settings(nodes=48, sweeps=2)
+
+
+@pytest.fixture(scope="module")
+def scan():
+    data = TravelTimeScan(table6(WATER), RING, TABLE6_SIDE_M, nodes=48)
+    everyone = np.arange(RING.elements)
+    return Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=data.delta_tof(everyone))
+
+
+def test_without_wishes_there_is_one_stage(scan):
+    assert stages(scan, PLAN) == (PLAN,)
+
+
+def test_coarse_before_fine_and_straight_before_bent(scan):
+    found = stages(scan, replace(PLAN, coarser_grids=1, straight_sweeps=3))
+    assert [(plan.nodes, plan.rays, plan.sweeps) for plan in found] == [
+        (24, "straight", 3),
+        (24, "curved", 2),
+        (48, "curved", 2),
+    ]
+    assert len({plan.side_m for plan in found}) == 1
+
+
+def test_sensitivities_without_rays_begin_from_straight_rays_too(scan):
+    found = stages(scan, replace(PLAN, rays="adjoint", straight_sweeps=3))
+    assert [plan.rays for plan in found] == ["straight", "adjoint"]
+
+
+@pytest.mark.parametrize("method", ["sart", "gauss-newton"])
+def test_each_stage_is_in_the_history_and_better_than_water(scan, method):
+    plan = replace(PLAN, method=method, coarser_grids=1, straight_sweeps=1)
+    seen = []
+    result = reconstruct(scan, plan, seen.append)
+    assert [(s.stage, s.sweep) for s in result.history] == [(0, 1), (1, 1), (1, 2), (2, 1), (2, 2)]
+    first = {s.stage: s.residual_rms_s for s in result.history if s.sweep == 1}
+    assert first[2] < 0.5 * first[0]
+    assert seen[-1].done == seen[-1].total == 5 * RING.elements
+    assert result.speed.shape == (48, 48)
+    assert result.residual_rms_s == min(s.residual_rms_s for s in result.history if s.stage == 2)
+
+
+def test_a_finer_grid_begins_with_the_same_image(scan):
+    coarse, fine = (Problem.of(scan, replace(PLAN, nodes=n, side_m=0.2)) for n in (25, 49))
+    x = np.linspace(-1.0, 1.0, 25)
+    image = 1.0 / WATER * (1.0 + 0.02 * np.exp(-((x[:, None] - 0.2) ** 2 + x[None, :] ** 2) / 0.05))
+    found = start(fine, image, coarse)
+    again = found[::2, ::2]
+    inside = coarse.region & fine.region[::2, ::2]
+    assert np.allclose(again[inside], image[inside], rtol=0.0, atol=1e-12)
+    assert np.allclose(found[~fine.region], 1.0 / WATER)
+    assert np.array_equal(start(fine, None), np.full((49, 49), 1.0 / WATER))
+
+
+def test_a_finer_grid_of_a_volume_begins_with_the_same_image_at_the_same_heights():
+    """Heights that no grid's spacing divides, so that every grid ends elsewhere."""
+    heights, everyone = np.array([-0.01, 0.0, 0.0137]), np.arange(RING.elements)
+    delta = np.zeros((3, RING.elements, RING.elements))
+    scan = Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=delta, slice_z_m=heights)
+    plan = replace(PLAN, decomposition="volume", side_m=0.2)
+    coarse, fine = (Problem.of(scan, replace(plan, nodes=n)) for n in (25, 48))
+
+    def tilted(problem):
+        z = problem.origin[2] + problem.spacing * np.arange(problem.region.shape[2])
+        return np.broadcast_to((1.0 + z) / WATER, problem.region.shape)
+
+    found = start(fine, tilted(coarse), coarse)
+    assert np.allclose(found[fine.region], tilted(fine)[fine.region], rtol=0.0, atol=1e-12)

@@ -1,0 +1,145 @@
+"""One step of a refinement, from looks that were made up: shortening, the guard, the end."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from bentray_kernels.tomography.waveform.band_inversion import (
+    MOST_SHORTENINGS,
+    PATIENCE,
+    Look,
+    begin,
+    given_by,
+    step,
+)
+from bentray_kernels.tomography.waveform.preparation import prepare
+from bentray_kernels.tomography.waveform.total_variation import variation
+from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings
+
+from .scans import WATER, scan
+
+SETTINGS = WaveSettings((Band(8e4, 1.7e5, 2e-3, iterations=6, emitters=6),), nearest_m=0.012, held_out=2)
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return prepare(scan(), SETTINGS, 0)
+
+
+def told(problem, misfit, held, seed=0):
+    """A look of all emitters with a mean misfit and some gradient."""
+    shape = problem.region.shape
+    return [Look(misfit * problem.used.size, held * problem.held.size, change(seed, shape), np.ones(shape))]
+
+
+def first(problem):
+    state = begin(np.full(problem.region.shape, WATER))
+    return step(problem, SETTINGS, state, told(problem, 1.0, 1.0))
+
+
+def test_the_first_step_has_the_asked_size_and_goes_downhill(problem):
+    state = first(problem)
+    way = state.image - WATER
+    assert np.sqrt((way[problem.region] ** 2).mean()) == pytest.approx(SETTINGS.first_step_mps)
+    assert (way * state.gradient).sum() < 0.0
+    assert not way[~problem.region].any()
+
+
+def test_a_step_that_makes_it_worse_is_shortened_and_then_given_up(problem):
+    state = first(problem)
+    sizes = [np.abs(state.way).max()]
+    while not state.done:
+        state = step(problem, SETTINGS, state, told(problem, 2.0, 1.0))
+        sizes.append(np.abs(state.way).max())
+    assert len(state.history) == 2 + MOST_SHORTENINGS
+    assert all(later < earlier for earlier, later in pairwise(sizes[:-1]))
+    assert (state.image == WATER).all()
+    assert not state.skipped
+
+
+def test_it_stops_and_says_so_when_held_out_emitters_are_predicted_worse(problem):
+    state = step(problem, SETTINGS, first(problem), told(problem, 0.9, 0.9, 1))
+    liked = state.base
+    for k in range(PATIENCE):
+        assert not state.done
+        state = step(problem, SETTINGS, state, told(problem, 0.8 - 0.1 * k, 1.5, 2 + k))
+    assert state.done
+    assert state.skipped
+    assert np.array_equal(state.image, liked)
+
+
+def test_of_the_attenuation_held_out_emitters_choose_the_image():
+    band = replace(SETTINGS.bands[0], iterations=2, of="attenuation")
+    plan = replace(SETTINGS, bands=(band,))
+    problem = prepare(scan(), plan, 0)
+    state = begin(np.zeros(problem.region.shape))
+    liked = None
+    for k, held in enumerate((1.0, 0.9, 0.95)):
+        liked = state.image if held == 0.9 else liked
+        state = step(problem, plan, state, told(problem, 1.0 - 0.1 * k, held, k))
+    assert state.done
+    assert not state.skipped
+    assert np.array_equal(state.image, liked)
+    assert liked.min() >= 0.0
+    assert given_by(state.history, judged=True) == 1
+    assert given_by(state.history, judged=False) == 2
+
+
+def test_without_held_out_emitters_the_last_image_counts():
+    band = replace(SETTINGS.bands[0], iterations=1, of="attenuation")
+    plan = replace(SETTINGS, bands=(band,), held_out=0)
+    problem = prepare(scan(), plan, 0)
+    state = begin(np.zeros(problem.region.shape))
+    for k in range(2):
+        last = state.image
+        shape = problem.region.shape
+        look = Look((1.0 - 0.1 * k) * problem.used.size, 0.0, change(k, shape), np.ones(shape))
+        state = step(problem, plan, state, [look])
+    assert np.array_equal(state.image, last)
+    assert given_by(state.history, judged=True) == 1
+
+
+def change(seed, shape):
+    return np.random.default_rng(seed).standard_normal(shape) * 1e-4
+
+
+def test_one_rise_alone_does_not_stop_it(problem):
+    state = step(problem, SETTINGS, first(problem), told(problem, 0.9, 1.5, 1))
+    state = step(problem, SETTINGS, state, told(problem, 0.8, 0.9, 2))
+    state = step(problem, SETTINGS, state, told(problem, 0.7, 1.5, 3))
+    assert not state.done
+
+
+def test_it_ends_after_its_iterations(problem):
+    state = first(problem)
+    for k in range(SETTINGS.bands[0].iterations):
+        assert not state.done
+        state = step(problem, SETTINGS, state, told(problem, 0.9 - 0.1 * k, 0.9, k + 1))
+    assert state.done
+    assert np.array_equal(state.image, state.base)
+
+
+def test_bounds_hold(problem):
+    tight = WaveSettings(SETTINGS.bands, nearest_m=0.012, held_out=2, speed_bounds_mps=(1499.5, 1500.5))
+    state = begin(np.full(problem.region.shape, WATER))
+    state = step(problem, tight, state, told(problem, 1.0, 1.0))
+    assert state.image.min() == 1499.5
+    assert state.image.max() == 1500.5
+
+
+def test_total_variation_is_weighed_by_the_first_misfit_and_pulls_towards_flat_parts(problem):
+    plan = replace(SETTINGS, variation=0.3)
+    start = np.where(problem.region, WATER + change(5, problem.region.shape) * 1e5, WATER)
+    shape, none = problem.region.shape, np.zeros(problem.region.shape)
+    looks = [Look(1.0 * problem.used.size, 1.0 * problem.held.size, none, np.ones(shape))]
+    state = step(problem, plan, begin(start), looks)
+    assert state.weight * variation(start)[0] == pytest.approx(0.3)
+    assert state.misfit == pytest.approx(1.3)
+    # What is told is the misfit of the traces alone.
+    assert state.history[0].misfit == 1.0
+    assert variation(state.image)[0] < variation(start)[0]
+    # The attenuation has none.
+    of_loss = replace(problem, band=replace(problem.band, of="attenuation"))
+    assert step(of_loss, plan, begin(none), looks).weight == 0.0

@@ -1,0 +1,84 @@
+"""The whole refinement: it finds a blob, through noise, in any number of threads."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Waveform
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography.waveform.frequency_continuation import refine
+from bentray_kernels.tomography.waveform.inversion_state import Image
+
+from .scans import SETTINGS, blob, error, lossy, refined, scan, water
+
+
+def test_the_blob_is_found():
+    start, found = water(), refined()
+    assert error(found.image) < 0.5 * error(start)
+    assert not found.skipped
+    first, last = found.bands[1].history[0], found.bands[1].history[-1]
+    assert last.misfit < 0.6 * first.misfit
+    assert last.held < 0.8 * first.held
+
+
+def test_it_is_found_through_noise():
+    assert error(refine(scan(noise=0.05), SETTINGS, water()).image) < 0.6 * error(water())
+
+
+def true_speed():
+    """What refined speeds come near to, on a grid of its own."""
+    line = 1e-3 * np.arange(-28, 29)
+    return Image(blob(*np.meshgrid(line, line, indexing="ij")), 1e-3, (line[0], line[0]))
+
+
+def losses(image):
+    """Attenuation found and true inside 12 mm, Np/m."""
+    lines = [o + image.spacing * np.arange(n) for o, n in zip(image.origin, image.speed.shape, strict=True)]
+    x, y = np.meshgrid(*lines, indexing="ij")
+    inside = np.hypot(x, y) < 0.012
+    return image.attenuation[inside], lossy(x, y)[inside]
+
+
+def test_the_loss_is_found_and_the_speed_stays():
+    plan = replace(SETTINGS, bands=(replace(SETTINGS.bands[2], iterations=6),))
+    start = true_speed()
+    found = refine(scan(loss=True), plan, start)
+    assert found.image.speed is start.speed
+    image, true = losses(found.image)
+    assert np.corrcoef(image, true)[0, 1] > 0.9
+    assert np.sqrt(((image - true) ** 2).mean()) < 0.4 * true.std()
+    none = losses(refine(scan(), plan, start).image)[0]
+    assert none.max() < 0.15 * image.max()
+
+
+def test_what_elements_send_and_hear_is_not_taken_for_loss():
+    plan = replace(SETTINGS, bands=(SETTINGS.bands[2],))
+    data = scan(loss=True)
+    gain = np.random.default_rng(0).uniform(0.5, 2.0, data.waveform.object.shape[:2]).astype(np.float32)
+    traces = (data.waveform.object, data.waveform.water)
+    uneven = Waveform(*(gain[:, :, None] * part for part in traces))
+    images = [
+        refine(replace(data, waveform=waves), plan, true_speed()).image.attenuation
+        for waves in (data.waveform, uneven)
+    ]
+    assert np.abs(images[1] - images[0]).max() < 0.05 * images[0].max()
+
+
+def test_threads_give_the_same_bits():
+    alone = refined()
+    with ThreadPoolExecutor(3) as pool:
+        assert np.array_equal(refine(scan(), SETTINGS, water(), run=pool.map).image.speed, alone.image.speed)
+
+
+def test_progress_is_told_of_every_image():
+    told = []
+    found = refine(scan(), SETTINGS, water(), progress=lambda problem, state: told.append(len(state.history)))
+    assert len(told) == sum(len(end.history) for end in found.bands)
+
+
+def test_a_start_out_of_bounds_is_refused():
+    start = replace(water(), speed=np.full((60, 60), 3000.0))
+    with pytest.raises(InvalidInput, match="start"):
+        refine(scan(), SETTINGS, start)

@@ -1,0 +1,65 @@
+"""Misfits: derivatives against differences, what they are blind to, silent traces, windows."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography.waveform import misfits
+
+
+@given(seed=st.integers(0, 2**32 - 1), name=st.sampled_from(sorted(misfits.MEASURES)))
+def test_derivative_is_that_of_finite_differences(seed, name):
+    rng = np.random.default_rng(seed)
+    simulated, recorded, way = rng.standard_normal((3, 4, 20))
+    weight = rng.uniform(0.1, 1.0, (4, 20))
+    kind = misfits.measure(name)
+    small = 1e-5
+    rise = (
+        kind(simulated + small * way, recorded, weight)[0]
+        - kind(simulated - small * way, recorded, weight)[0]
+    )
+    assert (kind(simulated, recorded, weight)[1] * way).sum() == pytest.approx(
+        rise / (2.0 * small), rel=1e-5, abs=1e-8
+    )
+
+
+@pytest.mark.parametrize("name", sorted(misfits.MEASURES))
+def test_nothing_is_wrong_with_equal_traces(name):
+    traces = np.random.default_rng(1).standard_normal((3, 30))
+    value, slope = misfits.measure(name)(traces, traces, np.ones((3, 1)))
+    assert value == pytest.approx(0.0, abs=1e-14)
+    assert np.abs(slope).max() < 1e-14
+
+
+def test_correlation_is_blind_to_the_size_of_each_trace():
+    rng = np.random.default_rng(2)
+    simulated, recorded = rng.standard_normal((2, 3, 30))
+    factor = np.array([[0.1], [3.0], [40.0]])
+    one = misfits.correlation(simulated, recorded, np.ones((3, 1)))[0]
+    assert misfits.correlation(simulated, factor * recorded, np.ones((3, 1)))[0] == pytest.approx(one)
+
+
+def test_silent_traces_say_nothing():
+    traces = np.random.default_rng(3).standard_normal((3, 30))
+    silent = traces.copy()
+    silent[1] = 0.0
+    for a, b in ((traces, silent), (silent, traces)):
+        value, slope = misfits.correlation(a, b, np.ones((3, 1)))
+        assert np.isfinite(value)
+        assert np.isfinite(slope).all()
+        assert not slope[1].any()
+
+
+def test_window_holds_the_arrival_and_ends():
+    times = np.arange(100.0)
+    found = misfits.around(np.array([40.0]), times, 20.0, 30.0)[0]
+    assert (found[26:62] == 1.0).all()
+    assert not found[:20].any()
+    assert not found[71:].any()
+
+
+def test_unknown_names_are_refused():
+    with pytest.raises(InvalidInput, match="correlation"):
+        misfits.measure("phase")

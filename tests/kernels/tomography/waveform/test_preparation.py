@@ -1,0 +1,154 @@
+"""Preparation: wavelet and water from water shots, the draw of emitters, gains, what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition.emissions import Emissions
+from bentray_kernels.acquisition.simulation.phantom_truth import Truth
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography.waveform.preparation import prepare
+from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings
+from bentray_kernels.wave.simulation import simulate
+
+from .scans import scan
+
+SETTINGS = WaveSettings(
+    (Band(8e4, 2.5e5, 1.3e-3, emitters=6), Band(8e4, 2.5e5, 1.5e-3, emitters=6)), nearest_m=0.012, held_out=3
+)
+
+
+def test_water_shots_are_simulated_as_recorded():
+    problem = prepare(scan(), SETTINGS, 0)
+    assert problem.likeness > 0.99
+    assert abs(problem.water.lead) < 1e-3
+    emitter = int(problem.held[0])
+    heard = problem.heard(emitter)
+    medium = problem.medium(np.full(problem.region.shape, 1500.0))
+    found = simulate(medium, problem.emitters[emitter], problem.receivers[heard], problem.wavelet)
+    recorded = scan().waveform.water[emitter][heard] @ problem.sampler
+    # Size as well as shape.
+    assert np.sqrt(((found - recorded) ** 2).sum() / (recorded**2).sum()) < 0.15
+
+
+def test_a_wrong_speed_of_water_is_found():
+    wrong = replace(scan(), water_speed_mps=1503.0)
+    problem = prepare(wrong, SETTINGS, 0)
+    assert 1503.0 / (1.0 - problem.water.lead) == pytest.approx(1500.0, abs=1.0)
+
+
+def test_emitters_that_judge_are_the_same_in_every_band_and_make_no_image():
+    first, second = (prepare(scan(), SETTINGS, number) for number in (0, 1))
+    assert np.array_equal(first.held, second.held)
+    assert not np.array_equal(first.used, second.used)
+    for problem in (first, second):
+        assert problem.used.size == 6
+        assert not set(problem.used) & set(problem.held)
+
+
+def test_the_draw_hangs_on_the_seed_alone():
+    again = prepare(scan(), SETTINGS, 0)
+    assert np.array_equal(again.used, prepare(scan(), SETTINGS, 0).used)
+    others = [prepare(scan(), replace(SETTINGS, seed=k), 0).used for k in range(1, 4)]
+    assert any(not np.array_equal(again.used, other) for other in others)
+
+
+def test_dead_traces_and_near_pairs_are_left_out():
+    data = scan()
+    traces = data.waveform.object.copy()
+    traces[3, 7] = 0.0
+    problem = prepare(replace(data, waveform=replace(data.waveform, object=traces)), SETTINGS, 0)
+    assert 7 not in problem.heard(3)
+    distance = data.distance_m()
+    assert not (problem.weight * (distance < 0.012)).any()
+
+
+def test_no_other_emissions_are_read_than_the_band_uses():
+    data, read = scan(), []
+
+    def lazily(traces):
+        def one(emitter):
+            read.append(emitter)
+            return traces[emitter]
+
+        return Emissions.of(one, traces.shape, traces.dtype)
+
+    recorded = data.waveform
+    apart = replace(recorded, object=lazily(recorded.object), water=lazily(recorded.water))
+    settings = replace(SETTINGS, bands=(replace(SETTINGS.bands[0], emitters=3),), held_out=2)
+    found, expected = (prepare(replace(data, waveform=one), settings, 0) for one in (apart, recorded))
+    drawn = {*found.used.tolist(), *found.held.tolist()}
+    assert set(read) == set(found.traces) == drawn
+    assert len(drawn) == 5
+    assert np.array_equal(found.wavelet, expected.wavelet)
+    assert np.array_equal(
+        found.recorded(int(found.held[0]), np.arange(24)), expected.recorded(0, np.arange(24))
+    )
+    # What is kept is no part of a block of emissions.
+    assert all(traces.base is None for traces in found.traces.values())
+
+
+def test_dead_emitters_are_not_used():
+    data = scan()
+    whole = prepare(data, SETTINGS, 0)
+    dead = [int(whole.used[1]), int(whole.held[2])]
+    traces = data.waveform.object.copy()
+    traces[dead] = 0.0
+    found = prepare(replace(data, waveform=replace(data.waveform, object=traces)), SETTINGS, 0)
+    assert sorted({*whole.used, *whole.held} - {*found.used, *found.held}) == sorted(dead)
+    silent = replace(data, waveform=replace(data.waveform, water=np.zeros_like(traces)))
+    with pytest.raises(InvalidInput, match="waveform/object, waveform/water: found zeros alone"):
+        prepare(silent, SETTINGS, 0)
+
+
+def test_gains_of_traces_are_used():
+    data = scan()
+    rng = np.random.default_rng(0)
+    gains = rng.uniform(0.5, 2.0, (2, *data.waveform.object.shape[:2]))
+    waveform = replace(
+        data.waveform,
+        object=(data.waveform.object / gains[0][:, :, None]).astype(np.float32),
+        water=(data.waveform.water / gains[1][:, :, None]).astype(np.float32),
+        object_scale=gains[0],
+        water_scale=gains[1],
+    )
+    plain, scaled = (prepare(replace(data, waveform=w), SETTINGS, 0) for w in (data.waveform, waveform))
+    assert np.allclose(scaled.wavelet, plain.wavelet, atol=1e-4 * np.abs(plain.wavelet).max())
+    heard = plain.heard(1)
+    assert np.allclose(scaled.recorded(1, heard), plain.recorded(1, heard), atol=1e-9)
+
+
+def test_only_the_region_of_interest_may_change():
+    roi = np.zeros((50, 50), dtype=np.bool_)
+    roi[20:30, 10:40] = True
+    truth = Truth(np.full((50, 50), 1500.0), (1e-3, 1e-3), (-0.0245, -0.0245))
+    problem = prepare(replace(scan(), roi=roi, truth=truth), replace(SETTINGS, roi=True), 0)
+    x, y = (
+        problem.origin[axis] + problem.band.spacing_m * np.flatnonzero(problem.region.any(axis=1 - axis))
+        for axis in (0, 1)
+    )
+    assert np.abs(x).max() < 0.006
+    assert np.abs(y).max() > 0.010
+    with pytest.raises(InvalidInput, match="mask/roi"):
+        prepare(scan(), replace(SETTINGS, roi=True), 0)
+
+
+def test_memory_of_a_look_is_known():
+    problem = prepare(scan(), SETTINGS, 0)
+    stored = -(-problem.clock.steps // problem.every)
+    assert problem.look_bytes == stored * problem.region.size * 4
+
+
+@pytest.mark.parametrize("lacking", ["water", "all"])
+def test_a_scan_without_water_shots_is_refused(lacking):
+    data = scan()
+    waveform = replace(data.waveform, water=None) if lacking == "water" else None
+    tof = None if lacking == "water" else np.ones(data.waveform.object.shape[:2])
+    with pytest.raises(InvalidInput, match="waveform/water"):
+        prepare(replace(data, waveform=waveform, tof_s=tof), SETTINGS, 0)
+
+
+def test_emitters_must_be_left_to_make_the_image():
+    with pytest.raises(InvalidInput, match="held_out"):
+        prepare(scan(), replace(SETTINGS, held_out=12), 0)

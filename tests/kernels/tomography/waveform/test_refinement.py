@@ -1,0 +1,112 @@
+"""Advice on waves: given after rays, followed where it may be, and not against held-out emitters."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import pick
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Settings, Trial, reconstruct
+from bentray_kernels.tomography.waveform.band_inversion import WavePass
+from bentray_kernels.tomography.waveform.inversion_state import BandEnd, Image
+from bentray_kernels.tomography.waveform.refinement import preferred
+from bentray_kernels.tomography.waveform.validation import Judgement
+from bentray_kernels.tomography.waveform.waveform_cost import worth
+
+from .scans import error, scan
+
+PLAN = Settings(method="auto", nodes=32, sweeps=2, wave_bands=3, wave_emitters=6, wave_minutes=60.0)
+
+
+def heard(noise=0.0):
+    made = scan(seed=3, noise=noise)
+    return replace(pick(made), waveform=made.waveform, water_attenuation_np_m=0.25)
+
+
+def error_of(result):
+    return error(Image(result.speed, result.spacing_m[0], result.origin_m))
+
+
+@pytest.fixture(scope="module")
+def rays():
+    return reconstruct(heard(), replace(PLAN, wave_minutes=0.0))
+
+
+def test_auto_goes_on_with_waves_where_it_may_and_they_predict_better(rays):
+    seen = []
+    found = reconstruct(heard(), PLAN, seen.append)
+    assert found.settings == replace(PLAN, method="waveform")
+    assert error_of(found) < 0.9 * error_of(rays)
+    # What is refined comes on top of the water's.
+    assert rays.attenuation is None
+    assert found.attenuation.shape == found.speed.shape
+    assert (found.attenuation[0] == 0.25).all()
+    assert found.attenuation.min() == 0.25
+    assert seen[-1].done == seen[-1].total
+    # What was chosen gives the same bits when asked for by itself.
+    again = reconstruct(heard(), found.settings)
+    assert np.array_equal(again.speed, found.speed)
+    assert again.history == found.history
+
+
+def test_without_leave_it_only_says_so(rays):
+    assert rays.settings.method in ("sart", "gauss-newton")
+    assert rays.provenance["waveform"].startswith("method waveform ")
+    assert rays.provenance["waveform"].endswith("it takes about a minute of a core")
+    # A second is too little.
+    hurried = reconstruct(heard(), replace(PLAN, wave_minutes=1.0 / 60.0))
+    assert np.array_equal(hurried.speed, rays.speed)
+    assert hurried.provenance == rays.provenance
+
+
+def test_waves_are_advised_where_the_image_explains_less_than_water_does(rays):
+    """The image of rays leaves four times what is left in water; beside noise that is nothing."""
+    advised = rays.provenance["waveform"]
+    assert advised.startswith("method waveform is advised, for waves through the image of rays miss")
+    noisy = reconstruct(heard(0.05), replace(PLAN, wave_minutes=0.0))
+    assert noisy.provenance["waveform"].startswith("method waveform would gain little, for waves through")
+
+
+def test_without_waves_times_tell_whether_they_are_advised():
+    missed = Trial({}, held_out_rms_s=100e-9, shown_rms_s=50e-9)
+    assert worth(Judgement(), missed, 10e-9, 3.4) == (
+        "method waveform is advised, for rays miss held-out times by 100 ns, whose noise is 10 ns; "
+        "it takes about 3 minutes of a core"
+    )
+    assert worth(Judgement(), missed, 80e-9, 0.2).startswith(
+        "method waveform would gain little, for rays miss"
+    )
+
+
+def test_held_out_emitters_decide_against_it():
+    """Noise as high as the signal: what waves make of it predicts nothing."""
+    loud = heard(0.3)
+    found = reconstruct(loud, PLAN)
+    rays = reconstruct(loud, replace(PLAN, wave_minutes=0.0))
+    assert found.settings == replace(rays.settings, wave_minutes=60.0)
+    assert np.array_equal(found.speed, rays.speed)
+    assert found.provenance["waveform"].endswith("not clearly better, so the image of the rays is given")
+    assert any(sweep.band_hz for sweep in found.history)
+
+
+def test_a_scan_without_traces_is_not_advised():
+    deaf = replace(heard(), waveform=None)
+    assert "waveform" not in reconstruct(deaf, PLAN).provenance
+    with pytest.raises(InvalidInput, match="traces of object and water"):
+        reconstruct(deaf, replace(PLAN, method="waveform"))
+
+
+@pytest.mark.parametrize(
+    ("held", "expected"),
+    [([(1.0, 0.9)], True), ([(1.0, 0.95)], False), ([(1.0, 0.95), (0.5, 0.48)], True), ([(1.0, 1.1)], False)],
+)
+def test_what_bands_gain_multiplies(held, expected):
+    image = Image(np.zeros((2, 2)), 1.0, (0.0, 0.0))
+    ends = [BandEnd(image, skipped=False, history=())]
+    for before, after in held:
+        passes = (WavePass(1.0, before, taken=True), WavePass(0.5, after, taken=True))
+        ends.append(BandEnd(image, skipped=False, history=passes))
+    assert preferred([SimpleNamespace(ends=ends)]) is expected
+    assert not preferred([SimpleNamespace(ends=ends[:1])])

@@ -1,0 +1,82 @@
+"""Judging by waves: images are ranked as the truth ranks them, noise is told apart, a judge goes on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography.checkpoint import packed, unpacked
+from bentray_kernels.tomography.waveform.automatic_settings import wave_settings
+from bentray_kernels.tomography.waveform.frequency_continuation import Here
+from bentray_kernels.tomography.waveform.inversion_state import Image
+from bentray_kernels.tomography.waveform.validation import (
+    LEAST_LIKENESS,
+    SHOTS,
+    Judge,
+    Judgement,
+    judge_by_waves,
+    judging,
+    passes,
+)
+from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
+
+from .scans import WATER, blob, scan
+
+
+def images():
+    """The truth, half of it, water and the truth upside down."""
+    axis = 1e-3 * np.arange(-30, 31)
+    truth = blob(*np.meshgrid(axis, axis, indexing="ij"))
+    parts = truth, 0.5 * (WATER + truth), np.full_like(truth, WATER), 2.0 * WATER - truth
+    return [Image(part, 1e-3, (-0.03, -0.03)) for part in parts]
+
+
+@pytest.fixture(scope="module")
+def heard():
+    data = scan()
+    return Here(data, judging(wave_settings(data, Settings(method="waveform"))))
+
+
+def test_images_are_ranked_as_the_truth_ranks_them(heard):
+    found = [judge_by_waves(heard, image) for image in images()]
+    assert [one.misfit for one in found] == sorted(one.misfit for one in found)
+    assert found[1].misfit > 5.0 * found[0].misfit
+    assert {one.water for one in found} == {1.0 - heard.problem(0).likeness}
+    # Through the truth no more is left than in water, but for what the grid does to it.
+    assert found[0].misfit < 3.0 * found[0].water
+
+
+def test_noise_counts_as_it_does_in_water():
+    data = scan(seed=1, noise=0.1)
+    noisy = Here(data, judging(wave_settings(data, Settings(method="waveform"))))
+    found = judge_by_waves(noisy, images()[0])
+    assert 0.5 * found.water < found.misfit < 2.0 * found.water
+
+
+def test_nothing_is_said_where_water_shots_cannot_be_simulated():
+    data = scan()
+    random = np.random.default_rng(0).normal(size=data.waveform.water.shape).astype(np.float32)
+    deaf = replace(data, waveform=replace(data.waveform, water=random))
+    here = Here(deaf, judging(wave_settings(deaf, Settings(method="waveform"))))
+    assert here.problem(0).likeness < LEAST_LIKENESS
+    assert judge_by_waves(here, images()[0]) == Judgement()
+
+
+def test_few_emitters_are_read(heard):
+    plan = heard.settings()
+    assert passes(plan) == SHOTS + plan.held_out
+    assert len(heard.problem(0).traces) == passes(plan)
+    assert [band.of for band in plan.bands] == ["speed"]
+
+
+def test_a_judge_goes_on_from_its_checkpoint(heard):
+    judge = Judge(heard, images()[1], ())
+    (call,) = judge.first()
+    assert (judge.done, judge.standing.passed) == (0, (False,))
+    assert judge.after(call, call.function(*call.arguments)) == []
+    assert judge.done == judge.total
+    again = Judge(heard, images()[1], ())
+    again.restore(unpacked(*packed(judge.standing), TYPES))
+    assert again.first() == []
+    assert again.judgement == judge.judgement

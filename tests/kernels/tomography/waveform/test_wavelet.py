@@ -1,0 +1,29 @@
+"""The matched wavelet: found again from traces, quiet where nothing was recorded, refused without any."""
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography.waveform.wavelet import matched
+
+
+def pulses(shift=0.0, width=4.0):
+    time = np.arange(200.0)
+    return np.exp(-(((time - 40.0 - shift) / width) ** 2))
+
+
+def test_the_wavelet_is_found_again():
+    rng = np.random.default_rng(0)
+    green = rng.standard_normal((5, 60)) * np.exp(-np.arange(60) / 10.0)
+    pulse = pulses()
+    true = pulses(3.0, 6.0) - 0.5 * pulses(9.0, 6.0)
+
+    def heard(wavelet):
+        return np.stack([np.convolve(row, wavelet)[:200] for row in green])
+
+    assert np.abs(matched(pulse, heard(pulse), heard(true)) - true).max() < 0.02
+
+
+def test_silence_is_refused():
+    with pytest.raises(InvalidInput, match="waveform/water"):
+        matched(pulses(), np.ones((3, 200)), np.zeros((3, 200)))

@@ -1,0 +1,176 @@
+"""Waves in space: against the Green function, orders, edges, loss, reciprocity, mirrored objects, memory."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.wave.adjoint import slope
+from bentray_kernels.wave.medium import Medium
+from bentray_kernels.wave.memory import emission_bytes
+from bentray_kernels.wave.simulation import simulate
+from bentray_kernels.wave.simulation_opencl import simulate_opencl
+from bentray_kernels.wave.stencil import longest_step, symbol
+
+WATER = 1500.0
+SPACING = 1e-3
+STEP = 2.7e-7
+
+
+def pulse(time, centre):
+    """A Gaussian pulse, as good as nothing beyond twice its centre frequency."""
+    late = (time - 3.0 / centre) * centre
+    return np.exp(-((0.8 * late) ** 2)) * np.sin(2.0 * np.pi * late)
+
+
+def green(across, time, wavelet, grid=None):
+    """The wavelet delayed by its way and divided by 4 pi times it.
+
+    Args:
+        across: from emitter to receiver, (3,), m.
+        grid: order in space of the grid at whose speed waves shall run this way; 0: of its time steps alone;
+            None: at that of water.
+    """
+    way, step = float(np.linalg.norm(across)), time[1]
+    number = 2.0 * np.pi * np.fft.rfftfreq(4 * time.size, step) / WATER
+    if grid is not None:
+        along = np.minimum(number, np.pi / SPACING)[:, None] * SPACING * across / way
+        square = (symbol(along, grid) if grid else along**2).sum(axis=1)
+        courant = WATER * step / SPACING
+        turned = 2.0 / courant * np.arcsin(np.minimum(0.5 * courant * np.sqrt(square), 1.0))
+        number[1:] *= number[1:] * SPACING / turned[1:]
+    late = np.fft.rfft(wavelet, 4 * time.size) * np.exp(-1j * number * way)
+    return np.fft.irfft(late, 4 * time.size)[: time.size] / (4.0 * np.pi * way)
+
+
+def water(shape, step=STEP, edge_nodes=16, loss=0.0):
+    return Medium.of(
+        np.full(shape, WATER), SPACING, step, attenuation=np.full(shape, loss), edge_nodes=edge_nodes
+    )
+
+
+def off(found, expected):
+    """Relative rms error."""
+    return np.linalg.norm(found - expected) / np.linalg.norm(expected)
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=6, deadline=None)
+def test_traces_are_those_of_the_green_function(seed):
+    """Waves of 5.4 nodes and more between elements between nodes, at the speed that the grid has."""
+    nodes = np.array([24, 18, 18])
+    places = np.random.default_rng(seed).uniform(4.0, nodes - 5.0, (2, 3)) * SPACING
+    across = places[1] - places[0]
+    assume(np.linalg.norm(across) > 5.0 * SPACING)
+    time = np.arange(130) * STEP
+    found = simulate(water(nodes, edge_nodes=20), places[0], places[1:], pulse(time, 1.8e5))[0]
+    assert off(found, green(across, time, pulse(time, 1.8e5), 8)) < 0.015
+
+
+@pytest.mark.parametrize(("order", "other"), [(8, 6), (6, 8)])
+def test_the_order_in_space_is_the_one_asked_for(order, other):
+    """Waves of 3.5 nodes and more: their speed is that of the stencil, which a test of its own holds."""
+    source, receiver = np.array([6e-3, 12e-3, 12e-3]), np.array([30e-3, 12e-3, 12e-3])
+    time = np.arange(148) * STEP
+    wavelet = pulse(time, 2.8e5)
+    found = simulate(water((37, 25, 25), edge_nodes=20), source, receiver[None], wavelet, order)[0]
+    assert off(found, green(receiver - source, time, wavelet, order)) < 0.008
+    assert off(found, green(receiver - source, time, wavelet, other)) > 0.05
+
+
+def test_error_falls_as_the_square_of_the_time_step():
+    source, receiver = np.array([4e-3, 5e-3, 5e-3]), np.array([11e-3, 7e-3, 8e-3])
+    traces = []
+    for finer in (1, 2, 4):
+        time = STEP / finer * np.arange(110 * finer)
+        found = simulate(water((16, 13, 13), STEP / finer), source, receiver[None], pulse(time, 1.8e5))
+        traces.append(found[0, ::finer])
+    ratio = np.linalg.norm(traces[0] - traces[1]) / np.linalg.norm(traces[1] - traces[2])
+    assert np.log2(ratio) == pytest.approx(2.0, abs=0.2)
+
+
+def test_energy_leaves_through_the_edges():
+    time = np.arange(400) * STEP
+    trace = simulate(
+        water((16, 16, 16)), np.full(3, 7e-3), np.array([[3e-3, 11e-3, 9e-3]]), pulse(time, 2e5)
+    )[0]
+    assert (trace[-200:] ** 2).sum() < 1e-5 * (trace**2).sum()
+
+
+def test_loss_is_the_given_one():
+    time = np.arange(120) * STEP
+    source, receivers = np.array([4e-3, 9e-3, 9e-3]), np.array([[9e-3, 9e-3, 9e-3], [19e-3, 9e-3, 9e-3]])
+    without, damped = (
+        np.linalg.norm(
+            simulate(water((24, 19, 19), loss=loss), source, receivers, pulse(time, 1.8e5)), axis=1
+        )
+        for loss in (0.0, 20.0)
+    )
+    assert np.log(without / damped) == pytest.approx(20.0 * (receivers - source)[:, 0], rel=0.02)
+
+
+def test_emitter_and_receiver_may_change_places_in_any_object():
+    rng = np.random.default_rng(5)
+    shape = (14, 20, 16)
+    medium = Medium.of(
+        rng.uniform(1400.0, 1500.0, shape),
+        SPACING,
+        STEP,
+        attenuation=rng.uniform(0.0, 20.0, shape),
+        edge_nodes=10,
+    )
+    time = np.arange(120) * STEP
+    a, b = np.array([3.3, 15.4, 5.2]) * SPACING, np.array([10.1, 2.7, 9.6]) * SPACING
+    there, back = (
+        simulate(medium, one, other[None], pulse(time, 1.8e5))[0] for one, other in ((a, b), (b, a))
+    )
+    assert np.abs(there - back).max() < 1e-5 * np.abs(there).max()
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_what_is_the_same_on_both_sides_sounds_the_same(axis):
+    speed = np.full((14, 14, 14), WATER)
+    speed[4:10, 4:9, 4:8] = 1400.0
+    speed = np.minimum(speed, np.flip(speed, axis))
+    medium = Medium.of(speed, SPACING, STEP, edge_nodes=10)
+    time = np.arange(110) * STEP
+    middle = np.array([3.2, 4.1, 9.4])
+    middle[axis] = 6.5
+    sides = np.tile([10.3, 8.8, 3.1], (2, 1))
+    sides[1, axis] = 13.0 - sides[0, axis]
+    heard = simulate(medium, middle * SPACING, sides * SPACING, pulse(time, 1.8e5))
+    assert off(heard[1], heard[0]) < 1e-5
+    in_water = simulate(
+        water((14, 14, 14), edge_nodes=10), middle * SPACING, sides * SPACING, pulse(time, 1.8e5)
+    )
+    assert off(heard, in_water) > 0.05
+
+
+def test_memory_is_known_before_and_refused_beyond_the_room():
+    speed, loss = np.full((30, 24, 20), WATER), np.full((30, 24, 20), 3.0)
+    known = emission_bytes(speed.shape, 16)
+    tracemalloc.start()
+    medium = Medium.of(speed, SPACING, STEP, attenuation=loss, edge_nodes=16, room_bytes=known)
+    simulate(medium, np.full(3, 8e-3), np.full((1, 3), 9e-3), pulse(np.arange(130) * STEP, 1.8e5))
+    _, taken = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert 0.7 * known < taken < known
+    with pytest.raises(InvalidInput, match=str(known)):
+        Medium.of(speed, SPACING, STEP, edge_nodes=16, room_bytes=known - 1)
+
+
+def test_what_space_does_not_have_is_refused():
+    medium, time = water((14, 14, 14), edge_nodes=8), np.arange(130) * STEP
+    wavelet, at = pulse(time, 1.8e5), np.full((1, 3), 5e-3)
+    for wrong in (
+        lambda: slope(medium, at[0], at, wavelet, lambda traces: (0.0, traces)),
+        lambda: simulate_opencl(medium, at[0], at, wavelet),
+        lambda: simulate(medium, at[0], at[:, :2], wavelet),
+        lambda: simulate(medium, at[0], at + 9e-3, wavelet),
+        lambda: water((14, 14, 14), 1.01 * longest_step(WATER, SPACING, dimensions=3)),
+    ):
+        with pytest.raises(InvalidInput):
+            wrong()

@@ -1,0 +1,63 @@
+"""Strips of time steps: all steps once, the bits of one piece, and an end as soon as nobody waits."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bentray_kernels.tomography.waveform.misfits import correlation
+from bentray_kernels.wave import time_blocks as cut
+from bentray_kernels.wave.adjoint import slope
+from bentray_kernels.wave.simulation import simulate
+
+from .test_adjoint import EMITTER, RECEIVERS, STEPS, WAVELET, medium, speeds
+
+
+class Unheard(Exception):
+    """What a poll raises."""
+
+
+@given(steps=st.integers(0, 5000), nodes=st.integers(1, 10**9))
+def test_all_steps_are_in_one_strip_each_and_all_but_the_last_are_even(steps, nodes):
+    polled = []
+    found = list(cut.strips(steps, nodes, lambda: polled.append(None)))
+    assert [n for first, end in found for n in range(first, end)] == list(range(steps))
+    assert all((end - first) % 2 == 0 for first, end in found[:-1])
+    assert all((end - first - 2) * nodes <= cut.STRIP for first, end in found)
+    assert len(polled) == len(found)
+
+
+@pytest.mark.parametrize("by", ["speed", "attenuation"])
+def test_strips_give_the_bits_of_one_piece(monkeypatch, by):
+    recorded = simulate(medium(speeds(1)), EMITTER, RECEIVERS, WAVELET)
+    compare = partial(correlation, recorded=recorded, weight=np.ones((3, 1)))
+    whole = slope(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, 3, by)
+    monkeypatch.setattr(cut, "STRIP", 4 * medium(speeds()).keep.size)
+    parts = slope(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, 3, by)
+    assert parts.misfit == whole.misfit
+    np.testing.assert_array_equal(parts.gradient, whole.gradient)
+    np.testing.assert_array_equal(parts.illumination, whole.illumination)
+    again = simulate(medium(speeds(1)), EMITTER, RECEIVERS, WAVELET)
+    np.testing.assert_array_equal(again, recorded)
+
+
+@pytest.mark.parametrize("most", [3, STEPS // 4 + 3])
+def test_what_the_poll_raises_ends_both_directions(monkeypatch, most):
+    monkeypatch.setattr(cut, "STRIP", 4 * medium(speeds()).keep.size)
+    polled = []
+
+    def poll():
+        polled.append(None)
+        if len(polled) == most:
+            raise Unheard
+
+    def compare(traces):
+        return 0.0, traces
+
+    with pytest.raises(Unheard):
+        slope(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, poll=poll)
+    assert len(polled) == most

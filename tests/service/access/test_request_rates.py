@@ -1,0 +1,49 @@
+"""Buckets: so many in a minute, never more, and each tenant by itself."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bentray_service.access import request_rates
+from bentray_service.access.request_rates import Rates
+
+
+class Clock:
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+@given(st.integers(1, 50), st.lists(st.floats(0.0, 40.0), max_size=120))
+def test_never_more_than_a_full_bucket_and_what_came_since(per_minute, waits):
+    clock = Clock()
+    found, taken = Rates(per_minute, clock), 0
+    for wait in waits:
+        clock.now += wait
+        delay = found.take("a")
+        taken += delay == 0.0
+        assert taken <= per_minute * (1.0 + clock.now / 60.0) + 1e-6
+        if delay:
+            clock.now += delay * (1.0 + 1e-9) + 1e-9
+            assert found.take("a") == 0.0, "what it says is enough"
+            taken += 1
+    assert found.take("b") == 0.0
+
+
+def test_nought_is_any_number():
+    found = Rates(0)
+    assert {found.take("a") for _ in range(1000)} == {0.0}
+
+
+def test_buckets_that_are_full_again_are_forgotten(monkeypatch):
+    monkeypatch.setattr(request_rates, "MANY", 10)
+    clock = Clock()
+    found = Rates(60, clock)
+    for number in range(9):
+        found.take(str(number))
+    for _ in range(60):
+        found.take("busy")
+    clock.now = 2.0
+    found.take("new")
+    assert found.take("busy") == 0.0
+    assert len(found._buckets) == 2

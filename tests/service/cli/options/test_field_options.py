@@ -1,0 +1,39 @@
+"""The options of a geometry field: one for each field of its settings and its view, with the same default."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.cli.options.field_options import OPTIONS, SETTINGS, VIEW, AskedField
+from bentray_workers.rendering.field_settings import FieldSettings
+from bentray_workers.rendering.field_view import CHOICES, FieldView
+
+
+@pytest.mark.parametrize(("options", "kind"), [(SETTINGS, FieldSettings), (VIEW, FieldView)])
+def test_every_field_has_an_option_that_tells_its_default(options, kind) -> None:
+    assert list(options) == [field.name for field in fields(kind)]
+    assert {name: option.default for name, option in options.items()} == {
+        field.name: str(field.default) for field in fields(kind)
+    }
+
+
+def test_the_help_names_every_choice() -> None:
+    for name, choices in CHOICES.items():
+        if name != "eye":
+            assert all(choice in OPTIONS[name].help for choice in choices), name
+
+
+def test_each_takes_its_own() -> None:
+    asked = AskedField({"samples": 8, "mode": "refract"})
+    assert asked.settings() == FieldSettings(samples=8)
+    assert asked.view() == FieldView(mode="refract")
+
+
+def test_a_wrong_value_is_named() -> None:
+    with pytest.raises(InvalidInput, match="scene"):
+        AskedField({"scene": "moon"}).view()
+    with pytest.raises(InvalidInput, match="samples"):
+        AskedField({"samples": 99}).settings()

@@ -1,0 +1,54 @@
+"""The live table of a batch: what runs first, never longer than the terminal, and what the columns say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.console import Console
+
+from bentray_kernels.tomography import Progress, Sweep
+from bentray_service.cli.output.batch_view import cells, live_table
+from bentray_workers.reconstruction.batch import Entry
+
+
+def entry(name: str, state: str) -> Entry:
+    found = Entry(Path(f"{name}.h5"))
+    if state != "waiting":
+        found.begin()
+        found.show(Progress(3, 8, (Sweep(0, 1, 250e-9, 8),)))
+    if state == "failed":
+        found.end(state, "a reason")
+    elif state == "succeeded":
+        found.end(state)
+    elif state == "skipped":
+        found.skip(7.0, 1e-7)
+    return found
+
+
+STATES = st.sampled_from(["waiting", "running", "succeeded", "failed", "skipped"])
+
+
+@settings(deadline=None)
+@given(states=st.lists(STATES, min_size=1, max_size=60), height=st.integers(10, 40))
+def test_it_fits_the_terminal_and_shows_what_runs_first(states: list[str], height: int) -> None:
+    entries = [entry(f"scan{number}", state) for number, state in enumerate(states)]
+    console = Console(width=100, height=height, record=True, quiet=True)
+    with console.capture() as said:
+        console.quiet = False
+        console.print(live_table(entries, height))
+    lines = said.get().splitlines()
+    assert len(lines) <= height
+    assert lines[0].startswith(f"{len(states)} datasets: ")
+    running = [one.name for one in entries if one.state == "running"]
+    rows = [line.split("│")[1].strip() for line in lines if line.startswith("│")]
+    assert rows[: len(running)] == running[: len(rows)]
+
+
+def test_a_row_tells_progress_misfit_and_seconds() -> None:
+    assert cells(entry("a", "waiting")) == ("a", "waiting", "", "", "")
+    name, state, progress, misfit, seconds = cells(entry("b", "running"))
+    assert (name, state, progress, misfit) == ("b", "running", "37 %", "250 ns")
+    assert float(seconds) < 5.0
+    assert cells(entry("c", "skipped")) == ("c", "skipped", "", "100 ns", "7.0")

@@ -1,0 +1,159 @@
+"""The figures of a result: plain values, and the same errors as in the pictures."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset, Truth
+from bentray_kernels.acquisition.quality.finding import words
+from bentray_kernels.tomography import Reconstruction, Settings, Sweep, Trial
+from bentray_kernels.tomography.result import residual_counts
+from bentray_service.cli.output.figures import errors, figures, summary
+from bentray_workers.images.comparison import comparison_png
+from bentray_workers.images.report import report_png
+
+WATER = 1500.0
+STEP = 1e-3
+
+
+def image(speed: np.ndarray, origin: tuple[float, ...] = (0.0, 0.0)) -> Reconstruction:
+    return Reconstruction(
+        speed=speed,
+        coverage=np.ones_like(speed),
+        spacing_m=(STEP,) * speed.ndim,
+        origin_m=origin,
+        water_speed_mps=WATER,
+        settings=Settings(nodes=16),
+    )
+
+
+def truth(speed: np.ndarray, spacing: float = STEP) -> Truth:
+    axes = ",".join("xyz"[: speed.ndim])
+    return Truth(speed, (spacing,) * speed.ndim, (0.0,) * speed.ndim, axes=axes)
+
+
+def disc(nodes: int = 17) -> np.ndarray:
+    """Water with a square of 1450 and 1550 m/s in it."""
+    speed = np.full((nodes, nodes), WATER)
+    speed[4:9, 4:13], speed[9:13, 4:13] = 1450.0, 1550.0
+    return speed
+
+
+def test_the_errors_are_those_of_compare_as_plain_values() -> None:
+    found = errors(image(disc() + 10.0), truth(disc()))
+    assert json.loads(json.dumps(found)) == {
+        "region": "the outline of what is not water in the truth",
+        "region_nodes": 81,
+        "true_range_mps": [1450.0, 1550.0],
+        "mean_absolute_error_of_range": pytest.approx(0.1),
+        "rmse_mps": pytest.approx(10.0),
+        "registration": "none",
+        "axes": "x,y",
+    }
+
+
+def test_what_cannot_be_compared_is_said() -> None:
+    assert errors(image(disc()), replace(truth(disc()), axes="as displayed")) == {
+        "region": "not compared: the truth must be registered with the image first",
+        "region_nodes": 0,
+        "axes": "as displayed",
+    }
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_table_and_pictures_tell_the_same_errors(drawn: Any, wide: bool) -> None:
+    """Fat as fast as the water lies in the region of the file and outside the outline."""
+    roi = np.zeros((17, 17), dtype=bool)
+    roi[2:15, 2:15] = True
+    speed = disc() + 7.0
+    speed[2:4] += 30.0
+    scan = replace(dataset(truth(disc())), roi=roi if wide else None)
+    rows = dict(summary(figures(image(speed), scan, 1.0)))
+    shown = f"{rows['mean absolute error'].removesuffix(' the range')} range, {rows['rms error']} rms"
+    assert scan.truth is not None
+    comparison_png(scan.truth, {"bent": image(speed)}, scan.roi)
+    assert f"Bent: {shown}" in drawn.words()
+    assert f"Errors read: {rows['errors read']}" in drawn.words()
+    report_png(image(speed), scan.truth, scan.roi)
+    assert f"Difference: {shown}" in drawn.words()
+    assert rows["errors read"].startswith("mask/roi" if wide else "the outline")
+
+
+def dataset(known: Truth | None) -> Dataset:
+    ring = np.array([[0.0, 0.0], [0.016, 0.0], [0.0, 0.016]])
+    everyone = np.arange(3)
+    return Dataset(ring, everyone, everyone, WATER, delta_tof_s=np.zeros((3, 3)), truth=known)
+
+
+def test_the_residual_is_that_of_the_last_sweep_over_all_slices() -> None:
+    history = (Sweep(0, 1, 9e-7, 3), Sweep(1, 1, 9e-7, 3), Sweep(0, 2, 3e-7, 3), Sweep(1, 2, 4e-7, 3))
+    found = figures(replace(image(disc()), history=history), dataset(None), 1.25)
+    assert found["residual_rms_s"] == pytest.approx(math.sqrt((9 + 16) / 2) * 1e-7)
+    assert len(found["history"]) == 4
+    last = {"slice": 1, "sweep": 2, "residual_rms_s": 4e-7, "emitters": 3, "stage": 0, "given": True}
+    assert found["history"][3] == last | {
+        "band_hz": None,
+        "misfit": None,
+        "held_out_misfit": None,
+        "of_attenuation": False,
+    }
+    assert found["truth"] is None
+    assert found["seconds"] == 1.25
+    assert found["speed_range_mps"] == [1450.0, 1550.0]
+    assert Settings(**found["settings"]) == Settings(nodes=16)
+
+
+def test_the_summary_tells_the_errors_and_their_region_only_with_a_truth() -> None:
+    without = dict(summary(figures(image(disc()), dataset(None), 1.0)))
+    assert not {"rms error", "errors read", "residual"} & set(without)
+    with_truth = dict(summary(figures(image(disc() + 10.0), dataset(truth(disc())), 1.0)))
+    assert with_truth["rms error"] == "10.0 m/s"
+    assert with_truth["mean absolute error"] == "10.0 % of the range"
+    assert with_truth["errors read"] == "the outline of what is not water in the truth"
+
+
+def test_what_a_result_lacks_is_none_or_empty() -> None:
+    found = figures(image(disc()), dataset(None), 1.0)
+    assert (found["residual_within_s"], found["recovery_mean"]) == (None, None)
+    assert (found["reason"], found["trials"]) == ("", [])
+    assert "resolution check" not in dict(summary(found))
+
+
+def test_the_summary_tells_what_was_found_in_the_scan() -> None:
+    def row(found: str) -> str | None:
+        result = replace(image(disc()), provenance={"quality": found})
+        return dict(summary(figures(result, dataset(None), 1.0))).get("scan")
+
+    assert row("dead elements: 1 without a pulse in reception (4), left out").startswith("dead elements: 1")
+    assert row(words([])) is None
+
+
+def test_residuals_resolution_and_trials_are_told() -> None:
+    speed = disc()
+    recovery = np.zeros_like(speed)
+    recovery[:, :5] = 0.5
+    recovery[:, 3] = -0.75
+    trials = (Trial({"rays": "straight"}, 4e-8, 3e-8), Trial({"rays": "curved"}, 6e-8, 5e-8))
+    residuals = residual_counts(np.random.default_rng(0).normal(0.0, 1e-7, 10_000))
+    result = replace(image(speed), recovery=recovery, trials=trials, residuals=residuals)
+    found = json.loads(json.dumps(figures(result, dataset(None), 1.0)))
+    assert found["residual_within_s"] == {
+        "50": pytest.approx(0.67e-7, rel=0.1),
+        "90": pytest.approx(1.64e-7, rel=0.1),
+        "99": pytest.approx(2.58e-7, rel=0.1),
+    }
+    assert found["recovery_mean"] == pytest.approx(0.25)
+    assert dict(summary(found))["resolution check"] == "25 % of a checkerboard recovered"
+    assert found["reason"].startswith("auto chose straight 40 ns")
+    assert found["trials"][1] == {
+        "settings": {"rays": "curved"},
+        "held_out_rms_s": 6e-8,
+        "shown_rms_s": 5e-8,
+        "held_out_mean_s": None,
+    }

@@ -1,0 +1,57 @@
+"""Objects in a bucket: lists longer than a page, and removals that S3 refuses one by one."""
+
+import pytest
+
+from bentray_service.files import bucket as module
+from bentray_service.files.bucket import Bucket
+from bentray_service.refusals import StorageAway
+
+
+def test_lists_and_removals_go_beyond_a_page(bucket_url, monkeypatch):
+    bucket = Bucket(bucket_url)
+    call = bucket._call
+    short = lambda method, **how: call(method, **({"MaxKeys": 2} if "list" in method else {}), **how)  # noqa: E731
+    monkeypatch.setattr(bucket, "_call", short)
+    monkeypatch.setattr(module, "MOST_REMOVED", 2)
+    names = [f"a/{number}" for number in range(5)]
+    for name in (*names, "b"):
+        bucket.note(name, {})
+    assert [one.key for one in bucket.listed("a/")] == names
+    bucket.remove([*names, "c"])
+    assert [one.key for one in bucket.listed()] == ["b"]
+
+
+def test_two_prefixes_of_a_bucket_do_not_meet(bucket_url):
+    one, two = Bucket(bucket_url), Bucket(f"{bucket_url}-2/")
+    one.note("a", {"of": "one"})
+    two.note("a", {"of": "two"})
+    assert (one.told("a")["of"], two.told("a")["of"]) == ("one", "two")
+    assert [held.key for held in one.listed()] == ["a"]
+
+
+def test_a_removal_that_is_refused_is_no_removal(bucket_url, monkeypatch):
+    bucket = Bucket(bucket_url)
+    monkeypatch.setattr(bucket, "_call", lambda *_, **__: {"Errors": [{"Key": "a", "Code": "AccessDenied"}]})
+    with pytest.raises(StorageAway):
+        bucket.remove(["a"])
+
+
+@pytest.mark.parametrize(
+    "ask", [lambda it: list(it.listed()), lambda it: it.note("a", {}), lambda it: it.remove("a")]
+)
+def test_a_bucket_that_is_not_there_is_no_missing_object(bucket_url, ask):
+    with pytest.raises(StorageAway):
+        ask(Bucket(f"{bucket_url.removesuffix('/scans')}-missing"))
+
+
+def test_a_bucket_that_says_nothing_is_given_up(bucket_url, s3_server, monkeypatch):
+    monkeypatch.setattr(module, "ANSWER_S", 0.5)
+    bucket = Bucket(bucket_url)
+    s3_server.silent.set()
+    try:
+        with pytest.raises(StorageAway):
+            bucket.told("a")
+    finally:
+        s3_server.silent.clear()
+    monkeypatch.setattr(module, "ANSWER_S", 20.0)
+    assert bucket.told("a") is None

@@ -1,0 +1,200 @@
+"""A bucket as the store: what every store does, and what happens when it is away, damaged or too large."""
+
+import os
+import secrets
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from bentray_service.files import bucket as bucket_module
+from bentray_service.files import bucket_store
+from bentray_service.files.bucket import Bucket
+from bentray_service.files.bucket_store import FORGOTTEN_S, LEFT_S, MARK, BucketStore
+from bentray_service.files.cache import RECENT_S
+from bentray_service.files.data_folder import Files
+from bentray_service.refusals import StorageAway
+from bentray_service.rows.ids import new_id
+from bentray_service.rows.tenants import LOCAL
+
+from ... import s3
+from .store_suite import StoreSuite
+
+AGES_AGO = time.time() - 10 * RECENT_S
+
+
+class Nothing:
+    """In place of a database: tells what it is told to."""
+
+    def __init__(self):
+        self.known, self.needs = set(), set()
+
+    def names(self):
+        return self.known
+
+    def needed(self):
+        return self.needs
+
+
+class TestBucketStore(StoreSuite):
+    @pytest.fixture
+    def bucket(self, bucket_url):
+        bucket = Bucket(bucket_url)
+        bucket.note(MARK, {"database": "mine"})
+        return bucket
+
+    @pytest.fixture
+    def known(self):
+        return Nothing()
+
+    @pytest.fixture
+    def opened(self, tmp_path, bucket, known):
+        def go(folder, cache_bytes=10**9):
+            Files(tmp_path / folder).prepare()
+            return Files(
+                tmp_path / folder, BucketStore(tmp_path / folder, bucket, "mine", known, cache_bytes)
+            )
+
+        return go
+
+    @pytest.fixture
+    def files(self, opened):
+        return opened("one")
+
+    @pytest.fixture
+    def elsewhere(self, opened):
+        return opened("two")
+
+    def forget(self, *paths):
+        """Empty the cache."""
+        for path in paths:
+            path.unlink()
+
+    def test_nothing_but_the_thing_is_left_by_publishing_and_bringing(self, files, elsewhere):
+        path = self.folder(files)
+        elsewhere.store.bring(self.there(elsewhere, path))
+        for one in (files, elsewhere):
+            assert not list(one.scratch.iterdir())
+
+    def test_many_who_ask_at_once_share_one_transfer(self, files, s3_server):
+        path = self.file(files, secrets.token_bytes(100_000))
+        content = path.read_bytes()
+        self.forget(path)
+        s3_server.asked.clear()
+        barrier = threading.Barrier(8)
+
+        def ask(_):
+            barrier.wait()
+            return files.store.bring(path).read_bytes()
+
+        with ThreadPoolExecutor(8) as pool:
+            assert set(pool.map(ask, range(8))) == {content}
+        assert len([path for method, path in s3_server.asked if method == "GET"]) == 1
+
+    def test_a_large_file_goes_and_comes_in_parts(self, files, monkeypatch, s3_server):
+        monkeypatch.setattr(bucket_module, "PART_BYTES", 5 * 2**20)
+        files.store._bucket._s3.default_block_size = 5 * 2**20
+        content = secrets.token_bytes(12 * 2**20)
+        s3_server.asked.clear()
+        path = self.file(files, content)
+        # It is begun, then come the parts, then it is put together.
+        assert [method for method, _ in s3_server.asked].count("PUT") == 3
+        self.forget(path)
+        assert files.store.bring(path).read_bytes() == content
+
+    def test_while_it_is_away_nothing_is_kept_fetched_or_removed_and_nothing_lost(
+        self, files, s3_server, caplog
+    ):
+        there, gone = self.file(files), self.file(files)
+        self.forget(gone)
+        new = files.of(LOCAL).dataset(new_id("dataset"))
+        new.write_bytes(b"new")
+        s3_server.away.set()
+        for ask in (
+            lambda: files.store.publish(new),
+            lambda: files.store.bring(gone),
+            lambda: files.store.remove([there]),
+            lambda: files.of(LOCAL).bytes_used(),
+            lambda: files.store.tidy(lambda: False),
+        ):
+            with pytest.raises(StorageAway):
+                ask()
+        assert "bucket" in files.store.fault()
+        assert files.store.bring(there).read_bytes() == b"abc"
+        assert s3.SECRET not in caplog.text
+        s3_server.away.clear()
+        assert files.store.fault() is None
+        files.store.publish(new)
+        assert files.store.bring(gone).read_bytes() == b"abc"
+        assert not list(files.scratch.iterdir())
+
+    def test_an_upload_that_cannot_be_kept_leaves_nothing(self, files, s3_server):
+        mine, name = files.of(LOCAL), new_id("dataset")
+        mine.candidate(name).write_bytes(b"checked")
+        s3_server.away.set()
+        with pytest.raises(StorageAway):
+            mine.adopt(name)
+        assert not mine.dataset(name).exists()
+
+    def test_what_was_damaged_in_the_bucket_is_not_brought(self, files, bucket):
+        path = self.file(files)
+        key = path.relative_to(files.root).as_posix()
+        told = bucket.told(key)
+        self.forget(path)
+        (files.scratch / "damaged").write_bytes(b"abd")
+        bucket.put(files.scratch / "damaged", key, {name: told[name] for name in told if name != "size"})
+        with pytest.raises(OSError, match="SHA-256"):
+            files.store.bring(path)
+        assert not path.exists()
+
+    def test_what_was_used_longest_ago_makes_room(self, opened, known):
+        files = opened("small", cache_bytes=250)
+        oldest, needed, older, newer = (self.file(files, bytes(100)) for _ in range(4))
+        export = files.of(LOCAL).export("vol-" + "0" * 20, "npy")
+        export.write_bytes(bytes(10))
+        unpublished = files.of(LOCAL).dataset(new_id("dataset"))
+        unpublished.write_bytes(bytes(5))
+        for age, path in enumerate([newer, older, needed, oldest, export, unpublished]):
+            os.utime(path, (AGES_AGO - age, AGES_AGO))
+        known.needs = {needed.stem}
+        recent = self.file(files, bytes(45))
+        assert {
+            path for path in (oldest, needed, older, newer, export, unpublished, recent) if path.exists()
+        } == {
+            needed,
+            newer,
+            unpublished,
+            recent,
+        }
+        # What went comes back when somebody asks for it, and what is in use may be more than was allowed.
+        assert all(files.store.bring(path).exists() for path in (oldest, older, newer))
+
+    def test_what_nobody_knows_goes_and_what_lies_here_only_is_published(
+        self, files, elsewhere, known, bucket, monkeypatch
+    ):
+        kept, orphan, forgotten = self.file(files), self.file(files), self.file(files)
+        alone = files.of(LOCAL).volume(new_id("volume"))
+        alone.write_bytes(b"from before there was a bucket")
+        self.forget(orphan)
+        known.known = {(LOCAL, kept.stem), (LOCAL, alone.stem)}
+        # Young as they are, they may be about to have rows.
+        files.store.tidy(lambda: False)
+        assert files.store.bring(orphan).exists()
+        assert forgotten.exists()
+        now = time.time()
+        monkeypatch.setattr(bucket_store.time, "time", lambda: now + max(FORGOTTEN_S, LEFT_S) + 60.0)
+        files.store.tidy(lambda: False)
+        left = {one.key.rpartition("/")[2] for one in bucket.listed("tenants/")}
+        assert left == {kept.name, alone.name}
+        assert not forgotten.exists()
+        assert not orphan.exists()
+        assert elsewhere.store.bring(self.there(elsewhere, alone)).read_bytes() == alone.read_bytes()
+
+    def test_a_bucket_that_lost_its_mark_is_a_fault(self, files, bucket):
+        path = self.file(files)
+        self.forget(path)
+        bucket.remove([MARK, path.relative_to(files.root).as_posix()])
+        assert "not the one of this database" in files.store.fault()
+        with pytest.raises(StorageAway):
+            files.store.bring(path)

@@ -1,0 +1,55 @@
+"""Opening a store: a bucket belongs to one database, and has to answer."""
+
+import sys
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.files.bucket import Bucket
+from bentray_service.files.bucket_store import BucketStore
+from bentray_service.files.local_store import LocalStore
+from bentray_service.files.open_store import open_store
+from bentray_service.rows.database import open_database
+
+
+@pytest.fixture
+def databases(tmp_path):
+    opened = [open_database(f"sqlite:///{tmp_path / name}") for name in ("a.sqlite", "b.sqlite")]
+    yield opened
+    for one in opened:
+        one.close()
+
+
+def test_without_an_address_it_is_the_data_folder(databases, tmp_path):
+    assert isinstance(open_store(None, tmp_path, databases[0], 0), LocalStore)
+
+
+def test_a_bucket_belongs_to_one_database(databases, tmp_path, bucket_url):
+    mine, other = databases
+    for _ in range(2):
+        assert isinstance(open_store(bucket_url, tmp_path, mine, 0), BucketStore)
+    with pytest.raises(InvalidInput, match="another database"):
+        open_store(bucket_url, tmp_path, other, 0)
+    assert open_store(f"{bucket_url}/other", tmp_path, other, 0).fault() is None
+
+
+def test_a_prefix_that_others_use_is_left_alone(databases, tmp_path, bucket_url):
+    Bucket(bucket_url).note("photographs/1.jpg", {})
+    with pytest.raises(InvalidInput, match="where other things lie"):
+        open_store(bucket_url, tmp_path, databases[0], 0)
+
+
+def test_one_that_does_not_answer_or_is_not_there_is_refused(databases, tmp_path, bucket_url, s3_server):
+    with pytest.raises(InvalidInput, match="BENTRAY_STORAGE_URL"):
+        open_store("s3://nobody-made-this-one", tmp_path, databases[0], 0)
+    s3_server.away.set()
+    with pytest.raises(InvalidInput, match="does not do what it is asked"):
+        open_store(bucket_url, tmp_path, databases[0], 0)
+
+
+def test_what_has_to_be_installed_is_named(databases, tmp_path, monkeypatch):
+    for name in ("bucket", "bucket_store"):
+        monkeypatch.delitem(sys.modules, f"bentray_service.storage.{name}", raising=False)
+    monkeypatch.setitem(sys.modules, "s3fs", None)
+    with pytest.raises(InvalidInput, match=r"without the module s3fs.*bentray\[s3\]"):
+        open_store("s3://somewhere", tmp_path, databases[0], 0)

@@ -1,0 +1,67 @@
+"""Every kind of database that the service can use, and what jobs need to be in one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bentray_service.rows.database import Database, open_database
+from bentray_service.rows.datasets import Datasets
+from bentray_service.rows.ids import new_id
+from bentray_service.rows.job_queue import Queue
+from bentray_service.rows.jobs import Jobs
+from bentray_service.rows.tenants import LOCAL
+
+SUMMARY = {
+    "title": "",
+    "source": "",
+    "license": "",
+    "dimension": 2,
+    "elements": 3,
+    "ntx": 3,
+    "nrx": 3,
+    "slices": 1,
+    "has_traces": False,
+    "has_travel_times": True,
+    "has_truth": False,
+    "water_speed_mps": 1500.0,
+}
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def address(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    """The address of a new database of each kind."""
+    if request.param == "sqlite":
+        yield f"sqlite:///{tmp_path / 'db.sqlite'}"
+        return
+    server = request.getfixturevalue("postgresql_server")
+    found = server.new_database()
+    yield found
+    server.drop(found)
+
+
+@pytest.fixture
+def database(address: str) -> Iterator[Database]:
+    """The same, open and with its tables."""
+    opened = open_database(address)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def jobs(database: Database) -> Jobs:
+    return Jobs(database)
+
+
+@pytest.fixture
+def queue(database: Database) -> Queue:
+    return Queue(database)
+
+
+@pytest.fixture
+def dataset(database: Database) -> str:
+    """The id of a dataset of the local tenant."""
+    row = Datasets(database).add(LOCAL, new_id("dataset"), size=1, sha256="0" * 64, summary=SUMMARY)
+    return str(row["id"])

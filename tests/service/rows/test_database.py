@@ -1,0 +1,88 @@
+"""The database: durable settings, checked version, plain refusals."""
+
+import threading
+from contextlib import closing
+
+import pytest
+from sqlalchemy import insert, select, text, update
+from sqlalchemy.dialects import postgresql
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.schema import CreateTable
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.rows import schema
+from bentray_service.rows.database import open_database
+
+
+def test_pragmas(tmp_path):
+    with (
+        closing(open_database(f"sqlite:///{tmp_path / 'db.sqlite'}")) as database,
+        database.read() as connection,
+    ):
+        found = {
+            name: connection.execute(text(f"PRAGMA {name}")).scalar()
+            for name in ("journal_mode", "synchronous")
+        }
+    assert found == {"journal_mode": "wal", "synchronous": 2}
+
+
+def test_foreign_keys_hold(database):
+    row = {"job_id": "job-none", "time": 0.0, "state": "queued"}
+    with pytest.raises(IntegrityError), database.write() as connection:
+        connection.execute(insert(schema.events).values(**row))
+
+
+def test_a_write_that_fails_leaves_nothing(database):
+    def spoil():
+        with database.write() as connection:
+            connection.execute(update(schema.about).values(probed=-1.0))
+            raise RuntimeError("stop")
+
+    with pytest.raises(RuntimeError):
+        spoil()
+    with database.read() as connection:
+        assert connection.execute(select(schema.about.c.probed)).scalar_one() > 0
+
+
+def test_a_reader_does_not_wait_for_a_writer(database):
+    read = threading.Event()
+
+    def reader():
+        with database.read() as connection:
+            connection.execute(select(schema.about)).all()
+        read.set()
+
+    with database.write() as connection:
+        connection.execute(update(schema.about).values(probed=1.0))
+        thread = threading.Thread(target=reader)
+        thread.start()
+        assert read.wait(10)
+    thread.join()
+
+
+def test_another_version_is_refused(address):
+    database = open_database(address)
+    with database.write() as connection:
+        connection.execute(update(schema.about).values(version=99))
+    database.close()
+    with pytest.raises(InvalidInput, match="schema version 99"):
+        open_database(address)
+
+
+def test_a_file_that_is_no_database(tmp_path):
+    (tmp_path / "db.sqlite").write_bytes(b"certainly not a database, " * 100)
+    with pytest.raises(InvalidInput, match="not a database"):
+        open_database(f"sqlite:///{tmp_path / 'db.sqlite'}")
+
+
+@pytest.mark.parametrize("address", ["nonsense", "nosuch://x/y", "postgresql://user:secret@127.0.0.1:1/x"])
+def test_a_wrong_address_is_refused_without_its_password(address):
+    with pytest.raises(InvalidInput) as caught:
+        open_database(address)
+    assert caught.value.field == "database_url"
+    assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize("table", schema.metadata.sorted_tables, ids=lambda table: table.name)
+def test_postgres_takes_the_schema(table):
+    assert table.name in str(CreateTable(table).compile(dialect=postgresql.dialect()))

@@ -1,0 +1,134 @@
+"""A database that is held, stopped, killed or full is refused in time, and used again once it is back."""
+
+import os
+import signal
+import subprocess
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
+
+import pytest
+from sqlalchemy import select
+
+from bentray_service.refusals import DatabaseAway, DatabaseFull
+from bentray_service.rows import admission, database, postgresql_patience, schema
+from bentray_service.rows.database import open_database
+from bentray_service.rows.jobs import Jobs
+from bentray_service.rows.tenants import LOCAL
+
+from ..held_database import held
+
+# A request that waits longer than this would be one that hangs.
+BOUNDED_S = 8.0
+
+
+def ask(opened):
+    with opened.read() as connection:
+        return connection.execute(select(schema.about.c.version)).scalar_one()
+
+
+@contextmanager
+def stopped(server):
+    """PostgreSQL with all its processes, that take in what is sent and say nothing."""
+    listed = subprocess.run(["pgrep", "-P", str(server.process.pid)], capture_output=True, text=True)
+    everything = [server.process.pid, *map(int, listed.stdout.split())]
+    for number in everything:
+        os.kill(number, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for number in everything:
+            os.kill(number, signal.SIGCONT)
+
+
+def test_held_by_another_program(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(database, "BUSY_SECONDS", 0.2)
+    with closing(open_database(f"sqlite:///{tmp_path / 'db.sqlite'}")) as opened:
+        jobs = Jobs(opened)
+        with held(tmp_path / "db.sqlite"):
+            for _ in range(3):
+                with pytest.raises(DatabaseAway, match="locked by another program"):
+                    jobs.add(LOCAL, "simulation", {})
+            assert jobs.newest(LOCAL, 9) == [], "reading goes on"
+        assert jobs.add(LOCAL, "simulation", {})["state"] == "queued"
+    assert [record.message for record in caplog.records] == [
+        "the database cannot be used: database is locked"
+    ], "once a minute, not once a request"
+
+
+def test_few_threads_wait_while_it_is_held(tmp_path, monkeypatch):
+    monkeypatch.setattr(database, "BUSY_SECONDS", 2.0)
+    monkeypatch.setattr(admission, "SLOW_SECONDS", 0.1)
+    with closing(open_database(f"sqlite:///{tmp_path / 'db.sqlite'}")) as opened:
+        jobs, took = Jobs(opened), []
+
+        def submit(number):
+            # One after the other, as requests come.
+            time.sleep(0.02 * number)
+            begun = time.monotonic()
+            with pytest.raises(DatabaseAway):
+                jobs.add(LOCAL, "simulation", {})
+            took.append(time.monotonic() - begun)
+
+        with held(tmp_path / "db.sqlite"), ThreadPoolExecutor(40) as pool:
+            list(pool.map(submit, range(40)))
+    assert sum(seconds > 1.0 for seconds in took) <= admission.MOST_WHILE_SLOW
+
+
+def test_a_full_disk(tmp_path):
+    with closing(open_database(f"sqlite:///{tmp_path / 'db.sqlite'}")) as opened:
+        with opened.read() as connection:
+            connection.exec_driver_sql("PRAGMA max_page_count = 1")
+        with pytest.raises(DatabaseFull):
+            Jobs(opened).add(LOCAL, "simulation", {"much": "x" * 100_000})
+
+
+def test_postgresql_that_is_killed(postgresql_server):
+    address = postgresql_server.new_database()
+    with closing(open_database(address)) as opened:
+        assert ask(opened) == schema.VERSION
+        postgresql_server.kill()
+        try:
+            begun = time.monotonic()
+            for _ in range(3):
+                with pytest.raises(DatabaseAway) as caught:
+                    ask(opened)
+                assert str(postgresql_server.port) not in str(caught.value), (
+                    "its address is nobody's business"
+                )
+            assert time.monotonic() - begun < BOUNDED_S
+        finally:
+            postgresql_server.start()
+        assert ask(opened) == schema.VERSION
+    postgresql_server.drop(address)
+
+
+def test_postgresql_that_stands_still(postgresql_server, monkeypatch):
+    monkeypatch.setattr(database, "BUSY_SECONDS", 2.0)
+    monkeypatch.setattr(postgresql_patience, "ANSWER_SECONDS", 0.5)
+    address = postgresql_server.new_database()
+    with closing(open_database(address)) as opened:
+        assert ask(opened) == schema.VERSION
+        threads = threading.active_count()
+        with stopped(postgresql_server), ThreadPoolExecutor(30) as pool:
+            begun = time.monotonic()
+            asked = [pool.submit(ask, opened) for _ in range(30)]
+            ends = [one.exception(timeout=30.0) for one in asked]
+            assert time.monotonic() - begun < BOUNDED_S
+        assert {type(end) for end in ends} == {DatabaseAway}
+        assert ask(opened) == schema.VERSION
+        assert threading.active_count() <= threads, "nobody still waits"
+    postgresql_server.drop(address)
+
+
+def test_a_row_that_another_holds_on_postgresql(postgresql_server, monkeypatch):
+    monkeypatch.setattr(database, "BUSY_SECONDS", 0.2)
+    address = postgresql_server.new_database()
+    with closing(open_database(address)) as opened, closing(open_database(address)) as other:
+        with other.write() as connection:
+            connection.execute(schema.about.update().values(probed=1.0))
+            with pytest.raises(DatabaseAway, match="locked by another program"):
+                opened.probe()
+        opened.probe()
+    postgresql_server.drop(address)

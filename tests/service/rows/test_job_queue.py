@@ -1,0 +1,209 @@
+"""The queue: jobs claimed in order and by turns, their states, leases and ends."""
+
+import math
+import threading
+import time
+
+import pytest
+
+from bentray_service.refusals import UnknownId
+from bentray_service.rows.ids import volume_of
+from bentray_service.rows.job_queue import LEASE_S, Queue
+from bentray_service.rows.tenants import LOCAL, Tenant
+from bentray_service.rows.volumes import Volumes
+
+PROBLEM = {"type": "/problems/x", "title": "t", "status": 500, "detail": "why"}
+
+
+def volume(job_id):
+    return {
+        "id": volume_of(job_id),
+        "bytes": 1,
+        "axes": "x,y",
+        "shape": [2, 2],
+        "spacing_m": [1.0, 1.0],
+        "origin_m": [0.0, 0.0],
+        "speed_range_mps": [1.0, 2.0],
+        "water_speed_mps": 1500.0,
+        "provenance": {},
+    }
+
+
+def test_claimed_in_order(jobs, queue, dataset):
+    made = [jobs.add(LOCAL, "reconstruction", {}, dataset)["id"] for _ in range(3)]
+    assert [queue.claim()["id"] for _ in range(3)] == made
+    assert queue.claim() is None
+
+
+def test_no_job_is_claimed_twice(jobs, queue, dataset):
+    made = {jobs.add(LOCAL, "reconstruction", {}, dataset)["id"] for _ in range(12)}
+    claimed = []
+
+    def take():
+        while (job := queue.claim()) is not None:
+            claimed.append(job["id"])
+
+    threads = [threading.Thread(target=take) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(claimed) == 12
+    assert set(claimed) == made
+
+
+def test_success_comes_with_its_volume(database, jobs, queue, dataset):
+    job = jobs.add(LOCAL, "reconstruction", {"nodes": 16}, dataset)
+    queue.claim()
+    queue.progress(job["id"], 4, 4, [{"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 4}])
+    assert queue.succeed(job["id"], volume(job["id"]))
+    row = jobs.get(LOCAL, job["id"])
+    assert (row["state"], row["done"], row["history"][0]["emitters"]) == ("succeeded", 4, 4)
+    assert row["finished"] >= row["started"]
+    assert Volumes(database).get(LOCAL, volume_of(job["id"]))["dataset_id"] == dataset
+    assert [event["state"] for event in jobs.events(LOCAL, job["id"])] == ["queued", "running", "succeeded"]
+
+
+def test_a_cancelled_job_cannot_succeed(database, jobs, queue, dataset):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    queue.claim()
+    assert jobs.request_cancel(LOCAL, job["id"])["state"] == "cancelling"
+    assert not queue.succeed(job["id"], volume(job["id"]))
+    with pytest.raises(UnknownId):
+        Volumes(database).get(LOCAL, volume_of(job["id"]))
+    queue.cancelled(job["id"])
+    assert queue.state(job["id"]) == "cancelled"
+
+
+def test_failure_keeps_the_reason(jobs, queue, dataset):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    queue.claim()
+    queue.fail(job["id"], PROBLEM)
+    assert jobs.get(LOCAL, job["id"])["error"] == PROBLEM
+    assert jobs.events(LOCAL, job["id"])[-1]["note"] == "why"
+
+
+def test_release_is_no_attempt(jobs, queue, dataset):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    queue.claim()
+    queue.progress(job["id"], 3, 9, [])
+    queue.release(job["id"], "a reason")
+    row = jobs.get(LOCAL, job["id"])
+    assert (row["state"], row["attempts"], row["started"]) == ("queued", 0, None)
+    assert queue.claim()["done"] == 0
+
+
+def test_a_job_that_kills_the_service_is_given_up(database, jobs, queue, dataset):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    ends = []
+    for _ in range(3):
+        Queue(database).claim()
+        queue.recover(PROBLEM, alone=True)
+        ends.append(queue.state(job["id"]))
+    assert ends == ["queued", "queued", "failed"]
+
+
+def test_a_job_that_gets_further_is_taken_up_again_and_again(database, jobs, queue, dataset):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    for _ in range(8):
+        dying = Queue(database)
+        assert dying.claim()["id"] == job["id"]
+        dying.got_further(job["id"])
+        assert queue.recover(PROBLEM, alone=True) == 1
+    assert jobs.get(LOCAL, job["id"])["attempts"] == 1
+    assert [event["state"] for event in jobs.events(LOCAL, job["id"])] == [
+        "queued",
+        *8 * ["running", "queued"],
+    ]
+
+
+def test_a_service_beside_others_takes_only_what_is_given_up(database, jobs, queue, dataset, monkeypatch):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    other = Queue(database)
+    other.claim()
+    assert queue.recover(PROBLEM, alone=False) == 0
+    later = time.time() + LEASE_S + 1.0
+    monkeypatch.setattr("bentray_service.rows.job_queue.time.time", lambda: later)
+    other.renew([job["id"]])
+    assert queue.recover(PROBLEM, alone=False) == 0
+    monkeypatch.setattr("bentray_service.rows.job_queue.time.time", lambda: later + LEASE_S + 1.0)
+    assert other.recover(PROBLEM, alone=False, held=[job["id"]]) == 0, "its own job is at work"
+    assert queue.recover(PROBLEM, alone=False) == 1
+    assert queue.claim()["id"] == job["id"]
+    # The first one wakes up and has lost its job.
+    assert other.told(job["id"]) is None
+    other.progress(job["id"], 7, 9, [])
+    other.fail(job["id"], PROBLEM)
+    other.release(job["id"], "late")
+    assert not other.succeed(job["id"], volume(job["id"]))
+    row = jobs.get(LOCAL, job["id"])
+    assert (row["state"], row["done"], queue.told(job["id"])) == ("running", 0, "running")
+    assert queue.succeed(job["id"], volume(job["id"]))
+
+
+def test_a_claim_whose_answer_was_lost_is_taken_up_again(jobs, queue, dataset, monkeypatch):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    queue.claim()
+    queue.renew([])
+    assert queue.recover(PROBLEM, alone=True) == 0, "it may be on its way"
+    later = time.time() + LEASE_S + 1.0
+    monkeypatch.setattr("bentray_service.rows.job_queue.time.time", lambda: later)
+    assert queue.recover(PROBLEM, alone=True) == 1
+    assert queue.claim()["id"] == job["id"]
+
+
+def test_tenants_take_turns(jobs, queue, dataset):
+    for tenant, count in (("a", 5), ("b", 2), ("c", 1)):
+        for _ in range(count):
+            jobs.add(tenant, "reconstruction", {}, dataset)
+    order = []
+    for _ in range(8):
+        job = queue.claim()
+        order.append(job["tenant"])
+        queue.fail(job["id"], PROBLEM)
+        # A clock too coarse to tell two starts apart would leave the order to the numbers.
+        time.sleep(0.002)
+    assert order == ["a", "b", "c", "a", "b", "a", "a", "a"]
+    for _ in range(3):
+        jobs.add(Tenant("a"), "reconstruction", {}, dataset)
+    jobs.add(Tenant("b"), "reconstruction", {}, dataset)
+    assert [queue.claim()["tenant"] for _ in range(3)] == ["b", "a", "a"]
+
+
+def test_only_tenants_without_a_running_job_where_that_is_asked(jobs, queue, dataset):
+    for tenant in ("a", "a", "b"):
+        jobs.add(Tenant(tenant), "reconstruction", {}, dataset)
+    assert queue.claim(idle_only=True)["tenant"] == "a"
+    job = queue.claim(idle_only=True)
+    assert job["tenant"] == "b"
+    assert queue.claim(idle_only=True) is None
+    queue.fail(job["id"], PROBLEM)
+    assert queue.claim(idle_only=True) is None
+    assert queue.claim()["tenant"] == "a"
+
+
+def test_a_job_on_a_volume_ends_without_one(jobs, queue, database):
+    job = jobs.add(LOCAL, "refraction", {"frames": 3}, volume_id="vol-" + "0" * 20)
+    assert (job["dataset_id"], job["volume_id"]) == (None, "vol-" + "0" * 20)
+    queue.claim()
+    assert queue.succeed(job["id"], None)
+    assert queue.state(job["id"]) == "succeeded"
+    with pytest.raises(UnknownId):
+        Volumes(database).get(LOCAL, volume_of(job["id"]))
+
+
+def test_a_result_with_numbers_that_json_has_not_is_null_there(jobs, queue, dataset, database):
+    job = jobs.add(LOCAL, "reconstruction", {"weight": math.inf}, dataset)
+    queue.claim()
+    result = volume(job["id"])
+    result |= {"speed_range_mps": [math.nan, 1500.0], "provenance": {"fit": {"rms": -math.inf, "n": 3}}}
+    queue.progress(job["id"], 1, 2, [{"residual_rms_s": math.nan}])
+    assert queue.succeed(job["id"], result)
+    row = jobs.get(LOCAL, job["id"])
+    assert (row["state"], row["settings"], row["history"]) == (
+        "succeeded",
+        {"weight": None},
+        [{"residual_rms_s": None}],
+    )
+    kept = Volumes(database).get(LOCAL, volume_of(job["id"]))
+    assert (kept["speed_range_mps"], kept["provenance"]) == ([None, 1500.0], {"fit": {"rms": None, "n": 3}})

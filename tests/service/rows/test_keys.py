@@ -1,0 +1,65 @@
+"""The rows of keys: a digest in place of the secret, and an end that holds at once."""
+
+import time
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_service.rows import schema
+from bentray_service.rows.api_key import Token
+from bentray_service.rows.keys import USED_S, Keys
+from bentray_service.rows.tenants import LOCAL, Tenant
+
+ACME = Tenant("acme")
+
+
+@pytest.fixture
+def keys(database):
+    return Keys(database)
+
+
+def test_the_secret_is_nowhere(database, keys):
+    token = Token.new()
+    assert not keys.any()
+    keys.add(token, ACME, "one", ("read",))
+    assert keys.any()
+    with database.read() as connection:
+        stored = str(connection.execute(schema.keys.select()).all())
+    assert token.shown().rpartition("_")[2] not in stored
+    assert keys.owner(token)["tenant"] == ACME
+
+
+def test_another_secret_under_the_same_id_is_none(keys):
+    token = Token.new()
+    keys.add(token, ACME, "one", ("read",))
+    assert keys.owner(Token(token.id, Token.new().shown()[-40:])) is None
+    assert keys.owner(Token.new()) is None
+    with pytest.raises(InvalidInput, match="which exists"):
+        keys.add(token, ACME, "again", ("read",))
+
+
+def test_it_ends_when_it_expires_or_is_revoked(keys, monkeypatch):
+    soon, never = Token.new(), Token.new()
+    now = time.time()
+    keys.add(soon, ACME, "soon", ("read",), now + 100.0)
+    keys.add(never, LOCAL, "never", ("read",))
+    assert [row["name"] for row in keys.all()] == ["soon", "never"]
+    assert [row["name"] for row in keys.all(LOCAL)] == ["never"]
+    monkeypatch.setattr("bentray_service.rows.keys.time.time", lambda: now + 101.0)
+    assert keys.owner(soon) is None
+    assert keys.owner(never) is not None
+    first = keys.revoke(never.id)["revoked"]
+    monkeypatch.setattr("bentray_service.rows.keys.time.time", lambda: now + 200.0)
+    assert keys.revoke(never.id)["revoked"] == first
+    assert keys.owner(never) is None
+    with pytest.raises(InvalidInput, match="bentray keys list"):
+        keys.revoke("0" * 12)
+
+
+def test_its_last_use_is_known_to_the_minute(keys, monkeypatch):
+    token, now = Token.new(), time.time()
+    keys.add(token, ACME, "one", ("read",))
+    for later, expected in ((0.0, 0.0), (USED_S - 1.0, 0.0), (USED_S + 1.0, USED_S + 1.0)):
+        monkeypatch.setattr("bentray_service.rows.keys.time.time", lambda at=now + later: at)
+        keys.owner(token)
+        assert keys.all()[0]["used"] == pytest.approx(now + expected, abs=1e-3)

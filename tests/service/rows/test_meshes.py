@@ -1,0 +1,46 @@
+"""The rows of meshes: kept as given, newest first, closed to invented ids."""
+
+import pytest
+
+from bentray_service.refusals import UnknownId
+from bentray_service.rows.database import open_database
+from bentray_service.rows.ids import new_id
+from bentray_service.rows.meshes import Meshes
+from bentray_service.rows.tenants import LOCAL
+
+SUMMARY = {
+    "title": "a ball",
+    "format": "ply",
+    "vertices": 6,
+    "faces": 8,
+    "genus": 0,
+    "holes": 0,
+    "coloured": False,
+    "repairs": {"merged": 18},
+    "content": "c" * 64,
+}
+
+
+@pytest.fixture
+def meshes(tmp_path):
+    database = open_database(f"sqlite:///{tmp_path / 'a.sqlite'}")
+    yield Meshes(database)
+    database.close()
+
+
+def test_a_row_is_kept_as_given(meshes):
+    mesh = new_id("mesh")
+    row = meshes.add(LOCAL, mesh, size=9, sha256="f" * 64, summary=SUMMARY)
+    assert SUMMARY.items() <= row.items()
+    assert (row["id"], row["bytes"], row["volume_id"], row["iso"]) == (mesh, 9, None, None)
+    assert meshes.get(LOCAL, mesh) == row
+
+
+def test_newest_first(meshes):
+    made = [meshes.add(LOCAL, new_id("mesh"), size=1, sha256="f", summary=SUMMARY)["id"] for _ in range(3)]
+    assert [row["id"] for row in meshes.newest(LOCAL, 2)] == made[:0:-1]
+
+
+def test_what_is_not_there(meshes):
+    with pytest.raises(UnknownId, match="GET /v1/meshes"):
+        meshes.get(LOCAL, new_id("mesh"))

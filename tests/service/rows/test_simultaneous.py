@@ -1,0 +1,109 @@
+"""Many at once, on every database: one job a key, one end a job, and nobody is told anything else."""
+
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
+import pytest
+
+from bentray_service.files.data_folder import Files
+from bentray_service.files.deletion import Deletion, Stored
+from bentray_service.refusals import Finished, InUse, KeyReused, UnknownId
+from bentray_service.rows import admission
+from bentray_service.rows.tenants import LOCAL
+
+AT_ONCE = 50
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """More threads than a service has, on a machine that may be slow, are not to be sent away here."""
+    monkeypatch.setattr(admission, "MOST_AT_ONCE", AT_ONCE)
+    monkeypatch.setattr(admission, "SLOW_SECONDS", 60.0)
+
+
+def at_once(ask):
+    """What each of many simultaneous calls gave: its result, or the refusal that it raised."""
+    begin = Barrier(AT_ONCE)
+
+    def call(number):
+        begin.wait()
+        try:
+            return ask(number)
+        except (Finished, InUse, KeyReused, UnknownId) as refusal:
+            return refusal
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        return list(pool.map(call, range(AT_ONCE)))
+
+
+def states(jobs, job_id):
+    return [event["state"] for event in jobs.events(LOCAL, job_id)]
+
+
+def test_one_key_makes_one_job(jobs, dataset):
+    made = at_once(lambda _: jobs.add(LOCAL, "reconstruction", {"nodes": 16}, dataset, key="once"))
+    assert len({job["id"] for job in made}) == 1
+    assert len(jobs.newest(LOCAL, 2 * AT_ONCE)) == 1
+    assert states(jobs, made[0]["id"]) == ["queued"]
+
+
+def test_a_key_for_several_requests_is_the_firsts(jobs, dataset):
+    made = at_once(lambda n: jobs.add(LOCAL, "reconstruction", {"nodes": 16 + n % 2}, dataset, key="once"))
+    refused = [one for one in made if isinstance(one, KeyReused)]
+    assert len(refused) == AT_ONCE // 2
+    assert len(jobs.newest(LOCAL, 2 * AT_ONCE)) == 1
+
+
+def test_without_keys_each_makes_its_own(jobs, dataset):
+    made = at_once(lambda _: jobs.add(LOCAL, "reconstruction", {}, dataset))
+    assert len({job["id"] for job in made}) == AT_ONCE
+
+
+def test_a_scan_is_deleted_or_has_jobs(jobs, database, dataset, tmp_path):
+    files = Files(tmp_path / "data")
+    files.prepare()
+    deletion = Deletion(database, files)
+
+    def ask(number):
+        if number == AT_ONCE // 2:
+            return deletion.delete(Stored(LOCAL, "dataset", dataset))
+        return jobs.add(LOCAL, "reconstruction", {}, dataset)
+
+    told = at_once(ask)
+    deleted = told.pop(AT_ONCE // 2) is None
+    assert {type(one) for one in told} == ({UnknownId} if deleted else {dict})
+    assert len(jobs.newest(LOCAL, AT_ONCE)) == (0 if deleted else AT_ONCE - 1)
+
+
+def test_a_queued_job_is_cancelled_once(jobs, dataset):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)["id"]
+    told = Counter(type(one) for one in at_once(lambda _: jobs.request_cancel(LOCAL, job)))
+    assert told == {dict: 1, Finished: AT_ONCE - 1}
+    assert states(jobs, job) == ["queued", "cancelled"]
+
+
+def test_a_running_job_is_asked_to_stop_once(jobs, queue, dataset):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)["id"]
+    assert queue.claim()["id"] == job
+    told = at_once(lambda _: jobs.request_cancel(LOCAL, job)["state"])
+    assert told == ["cancelling"] * AT_ONCE
+    assert states(jobs, job) == ["queued", "running", "cancelling"]
+
+
+@pytest.mark.parametrize("end", ["succeed", "cancelled"])
+def test_a_job_that_ends_while_it_is_cancelled_has_one_end(jobs, queue, dataset, end):
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset)["id"]
+    queue.claim()
+
+    def ask(number):
+        if number:
+            return jobs.request_cancel(LOCAL, job)
+        return queue.succeed(job, None) if end == "succeed" else queue.cancelled(job)
+
+    at_once(ask)
+    if jobs.get(LOCAL, job)["state"] == "cancelling":
+        queue.cancelled(job)
+    told = states(jobs, job)
+    assert len([state for state in told if state in ("succeeded", "cancelled")]) == 1
+    assert len(told) == len(set(told))

@@ -1,0 +1,228 @@
+"""What tenants store and reserve, on every database: many at once never go beyond what is allowed."""
+
+import asyncio
+import time
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
+import pytest
+
+from bentray_service.access.quota import LEASE_S, Quota
+from bentray_service.files.data_folder import Files
+from bentray_service.files.deletion import Deletion, Stored
+from bentray_service.refusals import DatabaseAway, QuotaUsedUp, TooOften
+from bentray_service.rows import uploads as uploading
+from bentray_service.rows.database import open_database
+from bentray_service.rows.datasets import Datasets
+from bentray_service.rows.ids import new_id
+from bentray_service.rows.tenants import LOCAL, Tenant
+from bentray_service.rows.uploads import Uploads
+from bentray_service.rows.usage import Usage
+
+from .conftest import SUMMARY
+
+# Fewer than a slow database lets wait.
+AT_ONCE = 8
+OTHER = Tenant("other")
+
+
+def at_once(ask):
+    """Whether each of many simultaneous calls was allowed."""
+    begin = Barrier(AT_ONCE)
+
+    def call(number):
+        begin.wait()
+        try:
+            ask(number)
+        except (QuotaUsedUp, TooOften):
+            return False
+        return True
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        return list(pool.map(call, range(AT_ONCE)))
+
+
+def test_of_many_at_once_as_many_are_allowed_as_fit(database, address):
+    """Through two services, as far as the database is one that they can share."""
+    second = database if address.startswith("sqlite") else open_database(address)
+    quotas = Quota(database, 100), Quota(second, 100)
+    allowed = at_once(lambda n: quotas[n % 2].resize(LOCAL, f"ds-{n}", 15))
+    assert allowed.count(True) == 6
+    assert quotas[0].of(LOCAL) == quotas[1].of(LOCAL) == Usage(0, 90)
+    quotas[0].resize(OTHER, "ds-0", 100)
+    if second is not database:
+        second.close()
+
+
+def test_of_many_uploads_begun_at_once_as_many_are_allowed_as_fit(database):
+    uploads = Uploads(database)
+    allowed = at_once(lambda n: uploads.add(LOCAL, "dataset", 15, {}, "", 60.0, 100))
+    assert allowed.count(True) == 6
+    assert len(uploads.receiving()) == 6
+    assert Quota(database, 100).of(LOCAL) == Usage(0, 90)
+
+
+def test_of_many_uploads_begun_at_once_there_are_no_more_than_a_tenant_may_have(database, monkeypatch):
+    monkeypatch.setattr(uploading, "MOST_BEGUN", 5)
+    uploads = Uploads(database)
+    assert at_once(lambda n: uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)).count(True) == 5
+    with pytest.raises(TooOften, match="5 that are begun and not whole; accepted: fewer than 5") as refused:
+        uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)
+    assert refused.value.wait_s > 0.0
+    uploads.add(OTHER, "dataset", 1, {}, "", 60.0, 100)
+    uploads.remove(uploads.receiving()[0]["id"])
+    uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)
+
+
+def test_of_many_jobs_at_once_as_many_are_allowed_as_fit(database, jobs, dataset, queue):
+    Quota(database, 100).stored(LOCAL, dataset, 10)
+    allowed = at_once(lambda n: jobs.add(LOCAL, "reconstruction", {}, dataset, reserve=(15, 100)))
+    assert allowed.count(True) == 6
+    assert len(jobs.newest(LOCAL, 99)) == 6
+    assert Quota(database, 100).of(LOCAL) == Usage(10, 90)
+    jobs.request_cancel(LOCAL, jobs.newest(LOCAL, 1)[0]["id"])
+    assert Quota(database, 100).of(LOCAL) == Usage(10, 75)
+
+
+def test_the_refusal_says_what_is_stored_reserved_and_allowed(database):
+    quota = Quota(database, 100)
+    quota.stored(LOCAL, "vol-1.nii", 50)
+    quota.resize(LOCAL, "ds-1", 30)
+    found = "50 bytes stored, 30 reserved, 21 more asked for; accepted: at most 100 bytes for a tenant"
+    with pytest.raises(QuotaUsedUp, match=found):
+        quota.resize(LOCAL, "ds-2", 21)
+    quota.resize(LOCAL, "ds-2", 20)
+    # What is there already is no reason to refuse its change.
+    quota.resize(LOCAL, "ds-1", 29)
+    with pytest.raises(QuotaUsedUp):
+        quota.resize(LOCAL, "ds-1", 31)
+    assert quota.of(LOCAL) == Usage(50, 49)
+
+
+def test_what_fails_gives_its_room_back_and_what_is_stored_keeps_it(database):
+    quota, dataset = Quota(database, 100), new_id("dataset")
+
+    async def take_in(*, whole):
+        async with quota.reserved(LOCAL, dataset, 60):
+            quota.resize(LOCAL, dataset, 40)
+            if not whole:
+                raise ConnectionError
+            Datasets(database).add(LOCAL, dataset, size=60, sha256="0" * 64, summary=SUMMARY)
+
+    with pytest.raises(ConnectionError):
+        asyncio.run(take_in(whole=False))
+    assert quota.of(LOCAL) == Usage(0, 0)
+    asyncio.run(take_in(whole=True))
+    assert quota.of(LOCAL) == Usage(40, 0)
+
+
+def test_a_database_that_is_away_keeps_no_room_for_what_has_ended(database, monkeypatch):
+    quota = Quota(database, 100)
+
+    def away():
+        raise DatabaseAway("no answer")
+
+    quota.resize(LOCAL, "ds-1", 60)
+    monkeypatch.setattr(database, "write", away)
+    quota.release(LOCAL, "ds-1")
+    assert quota.of(LOCAL) == Usage(0, 60)
+    monkeypatch.undo()
+    quota.renew()
+    assert quota.of(LOCAL) == Usage(0, 0)
+
+
+def test_an_upload_has_its_room_until_it_is_forgotten_refused_or_stored(database):
+    quota, uploads = Quota(database, 100), Uploads(database)
+    forgotten, refused, stored = (uploads.add(LOCAL, "dataset", 20, {}, "", 60.0, 100) for _ in range(3))
+    assert quota.of(LOCAL) == Usage(0, 60)
+    uploads.remove(forgotten["id"])
+    uploads.refuse(refused["id"], {"detail": "no scan"}, 60.0)
+    quota.resize(LOCAL, stored["result_id"], 70)
+    Datasets(database).add(LOCAL, stored["result_id"], size=20, sha256="0" * 64, summary=SUMMARY)
+    uploads.done(stored["id"], 60.0)
+    # Its row goes, and what it has become stays.
+    for one in (refused, stored):
+        uploads.remove(one["id"])
+    assert quota.of(LOCAL) == Usage(70, 0)
+
+
+@pytest.mark.parametrize("end", ["succeed", "fail", "cancelled", "animation"])
+def test_a_job_has_its_room_until_its_end(database, jobs, queue, dataset, end):
+    quota = Quota(database, 100)
+    before = quota.of(LOCAL).stored
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset, reserve=(60, 100))["id"]
+    assert queue.claim()["id"] == job
+    queue.took(job, 50)
+    assert quota.of(LOCAL) == Usage(before, 60)
+    queue.took(job, 80)
+    assert quota.of(LOCAL) == Usage(before, 80)
+    queue.release(job, "the workers were away")
+    queue.claim()
+    assert quota.of(LOCAL).reserved == 80
+    volume = {
+        "id": "vol" + job[3:],
+        "bytes": 9,
+        "axes": "x,y",
+        "shape": [2, 2],
+        "spacing_m": [1, 1],
+        "origin_m": [0, 0],
+        "speed_range_mps": [1, 2],
+        "water_speed_mps": 1500.0,
+        "provenance": {},
+    }
+    {
+        "succeed": lambda: queue.succeed(job, volume),
+        "animation": lambda: queue.succeed(job, None, size=9),
+        "fail": lambda: queue.fail(job, {"detail": "odd"}),
+        "cancelled": lambda: queue.cancelled(job),
+    }[end]()
+    assert quota.of(LOCAL) == Usage(before + (9 if end in ("succeed", "animation") else 0), 0)
+
+
+def test_what_is_deleted_gives_its_room_back_with_all_that_was_made_of_it(database, jobs, queue, tmp_path):
+    quota, files, dataset = Quota(database, 1000), Files(tmp_path / "data"), new_id("dataset")
+    files.prepare()
+    Datasets(database).add(LOCAL, dataset, size=60, sha256="0" * 64, summary=SUMMARY)
+    job = jobs.add(LOCAL, "simulation", {}, dataset, reserve=(60, 1000))["id"]
+    queue.claim()
+    queue.succeed(job, None, size=9)
+    quota.stored(LOCAL, f"{dataset}.nii", 5)
+    quota.stored(LOCAL, "vol-of-another", 7)
+    assert quota.of(LOCAL) == Usage(60 + 9 + 5 + 7, 0)
+    Deletion(database, files).delete(Stored(LOCAL, "dataset", dataset))
+    assert quota.of(LOCAL) == Usage(7, 0)
+
+
+def test_reservations_of_a_process_that_died_expire_and_those_of_a_living_one_do_not(database, tmp_path):
+    files = Files(tmp_path / "data")
+    files.prepare()
+    now = time.time()
+    dead, living = (Quota(database, 100, clock=lambda: now - LEASE_S - 1.0) for _ in range(2))
+    dead.resize(LOCAL, "ds-dead", 60)
+    living.resize(LOCAL, "ds-living", 30)
+    uploads = Uploads(database)
+    uploads.add(LOCAL, "dataset", 5, {}, "", 60.0, 1000)
+    # It was slow, but lives.
+    living._clock = lambda: now
+    living.renew()
+    third = Quota(database, 100)
+    assert third.of(LOCAL) == Usage(0, 35)
+    third.resize(LOCAL, "ds-new", 65)
+    # An upload in pieces belongs to no process.
+    third.begin(files, alone=True)
+    assert third.of(LOCAL) == Usage(0, 5)
+
+
+def test_at_the_start_the_sizes_are_those_of_the_files(database, dataset, tmp_path):
+    """Of a version that did not count: the canonical file is not as large as what was uploaded."""
+    quota, files = Quota(database, 1000), Files(tmp_path / "data")
+    files.prepare()
+    mine, volume, job = files.of(LOCAL), new_id("volume"), new_id("job")
+    mine.dataset(dataset).write_bytes(bytes(70))
+    mine.export(volume, "nii").write_bytes(bytes(5))
+    mine.animation(job, "zip").write_bytes(bytes(3))
+    mine.field("field-" + "0" * 20).mkdir()
+    (mine.field("field-" + "0" * 20) / "outer.npy").write_bytes(bytes(200))
+    for _ in range(2):
+        quota.begin(files, alone=True)
+        assert quota.of(LOCAL) == Usage(278, 0)

@@ -1,0 +1,114 @@
+"""Attempts: a call that only waited on a dead worker is innocent, one that ran there is not for ever."""
+
+import distributed
+import pytest
+from distributed import KilledWorker
+
+from bentray_workers.cluster import attempts
+from bentray_workers.cluster.attempts import MOST_STRIKES, Attempts, ResultsLostError, watched
+
+
+class Future(distributed.Future):
+    """One that ends as the test says."""
+
+    status = "pending"
+    __hash__ = object.__hash__
+    __eq__ = object.__eq__
+
+    def __init__(self, work):
+        self.work = work
+        self.error = None
+
+    def __repr__(self):
+        return f"<{self.status} {self.work[1:]}>"
+
+    def __del__(self):
+        """Nothing of a real one is to be released."""
+
+    def result(self):
+        if self.error is not None:
+            raise self.error
+        return "given"
+
+    def ended(self, status, error=None):
+        self.status, self.error = status, error
+        return self
+
+    def killed(self, while_running):
+        if while_running:
+            self.work[0].touch()
+        return self.ended("error", KilledWorker("task", None, 2))
+
+
+class Client:
+    def submit(self, task, *work, resources, priority, pure):
+        assert task is watched
+        assert (resources, pure) == (attempts.RECONSTRUCTION, False)
+        return Future(work)
+
+
+@pytest.fixture
+def made(tmp_path):
+    return Attempts(Client(), tmp_path / "work")
+
+
+def test_who_only_waited_is_tried_again_for_ever(made):
+    future = made.submit(print, 1)
+    for _ in range(20):
+        future, _ = made.ended(future.killed(while_running=False))
+        assert future.work[1:] == (print, 1)
+
+
+def test_who_ran_is_given_up(made):
+    future = made.submit(print, 1)
+    for _ in range(MOST_STRIKES):
+        future, _ = made.ended(future.killed(while_running=True))
+        assert not future.work[0].exists()
+    with pytest.raises(KilledWorker):
+        made.ended(future.killed(while_running=True))
+
+
+def test_a_result_that_went_with_its_worker_is_made_again(made):
+    future = made.submit(print, 1)
+    future.killed(while_running=False).status = "finished"
+    again, _ = made.ended(future)
+    assert again.work[1:] == (print, 1)
+
+
+def test_what_is_kept_is_not_fetched(made):
+    future = made.submit(print)
+    future.error = AssertionError("it was fetched")
+    future.status = "finished"
+    assert made.ended(future, keep=True) == (None, future)
+
+
+def test_what_needs_a_lost_result_is_not_tried_for_ever(made):
+    needed = made.submit(print).ended("finished")
+    future = made.submit(print, [needed], 1)
+    future, _ = made.ended(future.killed(while_running=False))
+    needed.status = "error"
+    with pytest.raises(ResultsLostError):
+        made.ended(future.killed(while_running=False))
+
+
+def test_an_end_is_an_end(made):
+    assert made.ended(made.submit(print).ended("finished")) == (None, "given")
+    with pytest.raises(ZeroDivisionError):
+        made.ended(made.submit(print).ended("error", ZeroDivisionError()), keep=True)
+
+
+def test_the_file_is_there_as_long_as_the_call_runs(tmp_path):
+    marker = tmp_path / "call"
+    seen = []
+
+    def work(value):
+        seen.append(marker.exists())
+        if value < 0:
+            raise ValueError(value)
+        return value
+
+    assert watched(marker, work, 3) == 3
+    with pytest.raises(ValueError, match="-1"):
+        watched(marker, work, -1)
+    assert seen == [True, True]
+    assert not marker.exists()

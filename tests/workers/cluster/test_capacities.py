@@ -1,0 +1,69 @@
+"""What workers offer, and OpenCL only where a device passed."""
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography import reconstruct as reconstruct_here
+from bentray_workers.cluster import capacities
+from bentray_workers.cluster.connection import open_cluster
+from bentray_workers.cluster.resources import OPENCL
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.reconstruction import reconstruction_run
+
+WITH_DEVICE = Settings(nodes=16, sweeps=1, eikonal="fim-opencl")
+
+
+@pytest.fixture
+def fresh(tmp_path):
+    """Workers that no test has asked for a device before."""
+    with open_cluster(workers=1, local_directory=tmp_path, processes=False) as cluster:
+        yield cluster.client
+
+
+def lanes(client):
+    return {lane for offer in capacities.offers_of(client) for lane in offer.lanes}
+
+
+def test_memory_and_lanes_are_told(cluster):
+    found = capacities.offers_of(cluster.client)
+    assert len(found) == 2
+    assert {"recon", "render"} <= set(found[0].lanes)
+    assert found[0].memory_bytes >= 0
+
+
+def test_no_device_is_tried_unless_one_is_wanted(fresh, monkeypatch):
+    monkeypatch.setattr(capacities, "_has_device", lambda: pytest.fail("tried"))
+    assert capacities.resources_for(fresh, Settings()) == {"recon": 1}
+    assert lanes(fresh) == {"recon", "render"}
+
+
+def test_without_a_device_the_method_is_refused(fresh, monkeypatch):
+    monkeypatch.setattr(capacities, "_has_device", lambda: False)
+    with pytest.raises(InvalidInput, match="eikonal"):
+        capacities.resources_for(fresh, WITH_DEVICE)
+    assert "opencl" not in lanes(fresh)
+
+
+def test_a_device_is_offered_once_it_has_passed(fresh, monkeypatch):
+    asked = []
+    monkeypatch.setattr(capacities, "_has_device", lambda: not asked.append(None))
+    for _ in range(2):
+        assert capacities.resources_for(fresh, WITH_DEVICE) == {"recon": 1, "opencl": 1}
+    assert len(asked) == 1
+    assert "opencl" in lanes(fresh)
+    assert fresh.submit(sum, [1, 2], resources=OPENCL).result(10) == 3
+
+
+def test_a_joined_cluster_is_not_asked(fresh, monkeypatch):
+    monkeypatch.setattr(capacities, "_has_device", lambda: pytest.fail("tried"))
+    with open_cluster(fresh.scheduler.address) as joined, pytest.raises(InvalidInput, match="eikonal"):
+        capacities.resources_for(joined.client, WITH_DEVICE)
+
+
+@pytest.mark.opencl
+def test_a_reconstruction_runs_on_the_device_lane(fresh, scan, tmp_path):
+    path = tmp_path / "scan.h5"
+    write_dataset(path, scan)
+    found = reconstruction_run.reconstruct(fresh, path, WITH_DEVICE)
+    assert (found.speed == reconstruct_here(scan, WITH_DEVICE).speed).all()

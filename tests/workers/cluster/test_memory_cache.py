@@ -1,0 +1,40 @@
+"""What a worker keeps: never more than its memory allows, and little while it works for a job."""
+
+import pytest
+
+from bentray_workers.cluster import memory_cache
+from bentray_workers.cluster.attempts import watched
+from bentray_workers.cluster.capacities import USABLE, WARM_BYTES
+from bentray_workers.cluster.memory_cache import Kept, limit
+
+MIB = 2**20
+
+
+@pytest.fixture
+def worker(monkeypatch):
+    """A worker with room for 100 MiB."""
+    monkeypatch.setattr(memory_cache, "_ROOM", memory_cache._Room())
+    limit(round((WARM_BYTES + 100 * MIB) / USABLE))
+
+
+def test_what_is_made_makes_room_in_every_store(worker):
+    one, two = Kept(1000 * MIB), Kept(1000 * MIB)
+    one.get("a", 30 * MIB, str)
+    two.get("b", 30 * MIB, str)
+    one.get("a", 30 * MIB, str)
+    # 60 MiB are needed at once; what was used longest ago goes.
+    two.get("c", 10 * MIB, str, 60 * MIB)
+    assert (one.held(), two.held()) == (30 * MIB, 10 * MIB)
+
+
+def test_a_job_finds_little_kept(worker, tmp_path):
+    store = Kept(1000 * MIB)
+    store.get("a", 30 * MIB, str)
+    store.get("b", 10 * MIB, str)
+    assert watched(tmp_path / "marker", store.held) == 10 * MIB
+
+
+def test_without_a_limit_all_is_kept(tmp_path):
+    store = Kept(1000 * MIB)
+    store.get("a", 900 * MIB, str)
+    assert watched(tmp_path / "marker", store.held) == 900 * MIB

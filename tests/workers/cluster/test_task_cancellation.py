@@ -1,0 +1,68 @@
+"""Long kernels end when nobody waits for their task any more, and never outside of a worker."""
+
+import threading
+import time
+
+import pytest
+from distributed import Client, LocalCluster
+
+from bentray_kernels.phantoms import ONE_HOLE, sampled
+from bentray_kernels.refraction import Layers
+from bentray_workers.cluster.dask_settings import NO_DASHBOARD
+from bentray_workers.cluster.task_cancellation import Abandoned, look_out
+from bentray_workers.files.volume import Volume
+from bentray_workers.rendering import scene_cache
+
+BEGUN, ENDED = threading.Event(), []
+PATIENCE_S = 60.0
+
+
+def long_task():
+    check, until = look_out(), time.monotonic() + PATIENCE_S
+    BEGUN.set()
+    try:
+        while time.monotonic() < until:
+            check()
+            time.sleep(0.01)
+    except Abandoned:
+        ENDED.append("early")
+        raise
+    ENDED.append("late")
+
+
+def test_a_task_that_is_released_ends():
+    # Without our preload, which compiles every kernel first.
+    with (
+        LocalCluster(
+            n_workers=1,
+            processes=False,
+            dashboard_address=NO_DASHBOARD,
+            scheduler_kwargs={"dashboard": False},
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        future = client.submit(long_task, pure=False)
+        assert BEGUN.wait(PATIENCE_S)
+        assert not ENDED
+        future.release()
+        until = time.monotonic() + PATIENCE_S
+        while not ENDED and time.monotonic() < until:
+            time.sleep(0.01)
+    assert ENDED == ["early"]
+
+
+def test_outside_of_a_worker_nothing_is_abandoned():
+    look_out()()
+
+
+def test_a_scene_is_not_made_for_nobody(monkeypatch):
+    def nobody():
+        def check():
+            raise Abandoned("task")
+
+        return check
+
+    monkeypatch.setattr(scene_cache, "look_out", nobody)
+    filtered = scene_cache.filtered_of(Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3), "bspline3", 0.0)
+    with pytest.raises(Abandoned):
+        scene_cache.build(filtered, Layers((0.5,), (1.0, 1.5)))

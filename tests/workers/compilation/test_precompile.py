@@ -1,0 +1,76 @@
+"""What an image compiles ahead: jobs on other scans compile nothing more, and who compiles says so."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bentray_workers.compilation.precompile import WAVES, digitised
+from bentray_workers.simulation.waves import simulate_waves
+
+# Jobs of a process that finds the cache of another: the kernels that it compiles all the same.
+JOBS = """
+import sys, warnings
+from pathlib import Path
+from bentray_kernels.tomography import Settings
+from bentray_workers import compiling
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.compilation.precompile import digitised
+from bentray_workers.simulation.plane import SimulationSettings, simulate
+from bentray_workers.reconstruction.reconstruction_run import reconstruct
+from bentray_workers.simulation.waves import WaveSimulationSettings, simulate_waves
+
+warnings.simplefilter("ignore")
+compiling.announce()
+times, waves = Path(sys.argv[1], "times.h5"), Path(sys.argv[1], "waves.h5")
+with compiling.compiled_kernels() as kernels:
+    write_dataset(times, simulate(None, SimulationSettings(nodes=32, elements=32, coupling_mps=1425.0)))
+    scan = simulate_waves(None, WaveSimulationSettings(3e5, 0.04, 32, 16, 32, snr=30.0))
+    write_dataset(waves, digitised(scan))
+    for method in ("sart", "auto", "gauss-newton"):
+        reconstruct(None, times, Settings(nodes=32, method=method))
+    reconstruct(None, waves, Settings(nodes=32, method="waveform", wave_bands=1, wave_emitters=4))
+print(*kernels, sep="\\n")
+"""
+
+
+def test_a_digitised_scan_holds_the_same_traces() -> None:
+    scan = simulate_waves(None, WAVES)
+    assert scan.waveform is not None
+    found = digitised(scan).waveform
+    assert found is not None
+    assert found.object.dtype == "int16"
+    assert abs(found.scale * found.object - scan.waveform.object).max() <= 0.5001 * found.scale
+
+
+def test_a_kernel_that_is_compiled_is_noted_and_announced_once(caplog: pytest.LogCaptureFixture) -> None:
+    program = """
+import logging, numba
+from bentray_workers import compiling
+logging.basicConfig(format="%(message)s")
+compiling.announce()
+compiling.announce()
+with compiling.compiled_kernels() as kernels:
+    numba.njit(lambda x: x + 1)(1)
+    numba.njit(lambda x: x + 2)(1)
+print(len(kernels))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "2\n"
+    assert done.stderr.count("Compiling kernels for this processor") == 1
+
+
+@pytest.mark.nightly
+def test_jobs_find_every_kernel_compiled(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    ahead = [sys.executable, "-m", "bentray_workers.compilation.precompile"]
+    done = subprocess.run(ahead, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("kernels compiled\n")
+    later = [sys.executable, "-c", JOBS, str(tmp_path)]
+    done = subprocess.run(later, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""
+    assert done.stderr == ""

@@ -1,0 +1,35 @@
+"""A summary tells of a file what the whole dataset would."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography.pairs import of
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.files.dataset.summary import summary_of
+
+from ..datasets import small
+
+
+@pytest.mark.parametrize("reciprocity", [True, False])
+def test_it_counts_what_a_problem_has(tmp_path, reciprocity):
+    dataset, path = small(), tmp_path / "scan.h5"
+    write_dataset(path, dataset)
+    asked = Settings(reciprocity=reciprocity)
+    found, pairs = summary_of(path, asked), of(dataset, asked, 0)
+    assert (found.emitters, found.receivers) == pairs.delta_tof.shape
+    assert (found.pairs, found.slices, found.in_space, found.height_m) == (12 * 24, 1, False, 0.0)
+    assert found.width_m == pytest.approx(0.2, rel=1e-2)
+    assert (found.traces_bytes, found.amplitudes) == (0, False)
+
+
+def test_traces_that_must_be_picked_and_heights_count(tmp_path, scan):
+    dataset, path = replace(small(), delta_tof_s=None), tmp_path / "traces.h5"
+    write_dataset(path, dataset)
+    assert summary_of(path, Settings()).traces_bytes == 2 * 12 * 24 * 20 * 2
+    write_dataset(path, replace(scan, log_ratio_np=np.zeros_like(scan.delta_tof_s)))
+    found = summary_of(path, Settings())
+    assert (found.slices, found.pairs, found.height_m) == (3, 3 * 24 * 24, 0.006)
+    assert found.amplitudes

@@ -1,0 +1,184 @@
+"""Hostile HDF5: refused before its data are read."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.dataset import Limits, read_dataset, write_dataset
+from bentray_workers.files.hdf5_reading import opened
+
+from .datasets import small
+
+PLACE = "traveltime/delta_tof_s"
+
+
+def external_link(file, folder):
+    with h5py.File(folder / "other.h5", "w") as other:
+        other["secret"] = np.zeros((12, 24))
+    file[PLACE] = h5py.ExternalLink(str(folder / "other.h5"), "/secret")
+
+
+def external_group(file, folder):
+    with h5py.File(folder / "other.h5", "w") as other:
+        other["delta_tof_s"] = np.zeros((12, 24))
+    del file["traveltime"]
+    file["traveltime"] = h5py.ExternalLink(str(folder / "other.h5"), "/")
+
+
+def soft_link(file, folder):
+    file[PLACE] = h5py.SoftLink("/truth/sound_speed_mps")
+
+
+def loop(file, folder):
+    file[PLACE] = h5py.SoftLink("/" + PLACE)
+
+
+def virtual(file, folder):
+    layout = h5py.VirtualLayout((12, 24), np.float64)
+    layout[:] = h5py.VirtualSource(str(folder / "other.h5"), "secret", (12, 24))
+    file.create_virtual_dataset(PLACE, layout)
+
+
+def external_storage(file, folder):
+    (folder / "secret.bin").write_bytes(bytes(12 * 24 * 8))
+    file.create_dataset(PLACE, (12, 24), np.float64, external=[(str(folder / "secret.bin"), 0, 12 * 24 * 8)])
+
+
+def objects(file, folder):
+    file.create_dataset(PLACE, (12, 24), h5py.vlen_dtype(np.float64))
+
+
+def strings(file, folder):
+    file.create_dataset(PLACE, (12, 24), h5py.string_dtype())
+
+
+def references(file, folder):
+    file.create_dataset(PLACE, (12, 24), h5py.ref_dtype)
+
+
+def records(file, folder):
+    file.create_dataset(PLACE, (12, 24), np.dtype([("a", "f8")]))
+
+
+def named_type(file, folder):
+    file[PLACE] = np.dtype("f8")
+
+
+def nothing(file, folder):
+    file.create_dataset(PLACE, data=h5py.Empty("f8"))
+
+
+def scale_offset(file, folder):
+    file.create_dataset(PLACE, data=np.zeros((12, 24), np.int32), chunks=(12, 24), scaleoffset=4)
+
+
+def absurd_size(file, folder):
+    file.create_dataset(PLACE, (2**40, 2**10), np.float64, chunks=(64, 64), compression="gzip")
+
+
+def nothing_stored(file, folder):
+    file.create_dataset(PLACE, (2**12, 2**12), np.float64, chunks=(64, 64), compression="gzip")
+
+
+def giant_chunk(file, folder):
+    file.create_dataset(PLACE, (2**14, 2**13), np.float64, chunks=(2**14, 2**13), compression="gzip")
+
+
+@pytest.mark.parametrize(
+    "build",
+    [
+        external_link,
+        external_group,
+        soft_link,
+        loop,
+        virtual,
+        external_storage,
+        objects,
+        strings,
+        references,
+        records,
+        named_type,
+        nothing,
+        scale_offset,
+        absurd_size,
+        nothing_stored,
+        giant_chunk,
+    ],
+)
+def test_a_hostile_array_is_refused_by_name(tmp_path, build):
+    path = tmp_path / "d.h5"
+    write_dataset(path, small())
+    with h5py.File(path, "a") as file:
+        del file[PLACE]
+        build(file, tmp_path)
+    with pytest.raises(InvalidInput) as refused:
+        read_dataset(path)
+    assert refused.value.field in (PLACE, "traveltime")
+    assert "damaged" not in refused.value.value
+
+
+def test_what_the_format_does_not_know_is_never_opened(tmp_path):
+    path = tmp_path / "d.h5"
+    write_dataset(path, small())
+    with h5py.File(path, "a") as file:
+        file["more"] = h5py.ExternalLink("/dev/zero", "/x")
+        file.create_dataset("text", data=["a"] * 10)
+    assert read_dataset(path).title == "small"
+
+
+@pytest.mark.parametrize(
+    ("limits", "field"),
+    [
+        (Limits(total_bytes=1000), PLACE),
+        (Limits(chunk_bytes=100), "waveform/object"),
+        (Limits(text=10), "@format"),
+    ],
+)
+def test_the_limits_are_the_callers(tmp_path, limits, field):
+    path = tmp_path / "d.h5"
+    write_dataset(path, small())
+    with pytest.raises(InvalidInput) as refused:
+        read_dataset(path, limits=limits)
+    assert refused.value.field == field
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        np.zeros(1000),
+        np.array([(1.0,)], dtype=[("a", "f8")]),
+        h5py.Empty("f8"),
+        np.array(["a", "b"] * 20, dtype="S1"),
+    ],
+)
+def test_a_hostile_attribute_is_refused_by_name(tmp_path, value):
+    path = tmp_path / "d.h5"
+    write_dataset(path, small())
+    with h5py.File(path, "a") as file:
+        file["water"].attrs["sound_speed_mps"] = value
+    with pytest.raises(InvalidInput) as refused:
+        read_dataset(path)
+    assert refused.value.field == "water@sound_speed_mps"
+
+
+def test_text_is_made_printable(tmp_path):
+    path = tmp_path / "d.h5"
+    write_dataset(path, small())
+    with h5py.File(path, "a") as file:
+        file.attrs["title"] = np.bytes_(b"a\x00b\x1b[31mc\xff")
+    title = read_dataset(path).title
+    assert title.startswith("ab[31mc")
+    assert title.isprintable()
+
+
+def test_the_file_is_closed_again(tmp_path):
+    path = tmp_path / "d.h5"
+    write_dataset(path, small())
+    with opened(path, Limits()) as reader:
+        assert reader.has("geometry")
+        assert not reader.has("geometry/nothing")
+    with h5py.File(path, "a"):
+        pass

@@ -1,0 +1,210 @@
+"""Foreign meshes: every format is read, what is hostile or broken is refused in words."""
+
+import base64
+import io
+import json
+import struct
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.meshes.example_surfaces import torus
+from bentray_workers.files import mesh_formats
+from bentray_workers.files.mesh_formats import read_mesh
+
+FORMATS = ("ply", "obj", "off", "stl", "stl_ascii", "glb", "gltf")
+
+
+def exported(file_type, colours=None):
+    """A torus of 80 faces as a file."""
+    surface = torus(8, 5)
+    mesh = trimesh.Trimesh(surface.vertices, surface.faces, vertex_colors=colours, process=False)
+    if file_type == "gltf":
+        return gltf(mesh)
+    data = mesh.export(file_type=file_type)
+    return data.encode() if isinstance(data, str) else data
+
+
+def gltf(mesh):
+    """As one file: the buffers of trimesh's several files written into it."""
+    files = mesh.export(file_type="gltf")
+    scene = json.loads(files["model.gltf"])
+    for buffer in scene["buffers"]:
+        content = base64.b64encode(files[buffer["uri"]]).decode()
+        buffer["uri"] = "data:application/octet-stream;base64," + content
+    return json.dumps(scene).encode()
+
+
+@pytest.mark.parametrize("file_type", FORMATS)
+def test_every_format(file_type):
+    found = read_mesh(exported(file_type))
+    assert found.format == file_type.split("_")[0]
+    assert (found.surface.genus, found.surface.holes, found.surface.turned) == (1, 0, 0)
+    assert found.surface.merged == (200 if "stl" in file_type else 0)
+    surface = torus(8, 5)
+    corners = found.surface.mesh.corners
+
+    def told_apart(faces):
+        return np.array(sorted(np.round(np.sort(faces.reshape(-1, 9), axis=1), 3).tolist()))
+
+    np.testing.assert_allclose(told_apart(corners), told_apart(surface.corners), atol=2e-3)
+    assert found.colours is None
+
+
+@pytest.mark.parametrize("file_type", ["ply", "obj", "glb", "gltf"])
+def test_colours_stay_with_their_vertices(file_type):
+    surface = torus(8, 5)
+    shades = np.random.default_rng(0).integers(0, 256, (40, 4)).astype(np.uint8)
+    found = read_mesh(exported(file_type, shades))
+    order = [
+        np.linalg.norm(surface.vertices - place, axis=1).argmin() for place in found.surface.mesh.vertices
+    ]
+    np.testing.assert_allclose(found.colours, shades[order, :3] / 255.0, atol=0.003)
+
+
+def test_polygons_become_triangles():
+    cube = "OFF\n8 6 0\n" + "\n".join(f"{a} {b} {c}" for a in (0, 1) for b in (0, 1) for c in (0, 1))
+    cube += "\n4 0 1 3 2\n4 4 6 7 5\n4 0 4 5 1\n4 2 3 7 6\n4 0 2 6 4\n4 1 5 7 3\n"
+    found = read_mesh(cube.encode()).surface
+    assert (len(found.mesh.faces), found.holes, found.genus) == (12, 0, 0)
+
+
+def test_a_binary_stl_may_begin_like_a_text():
+    data = b"solid facet".ljust(80) + exported("stl")[80:]
+    assert read_mesh(data).format == "stl"
+
+
+@pytest.mark.parametrize("file_type", ["ply", "glb", "obj", "off", "stl", "stl_ascii", "gltf"])
+@pytest.mark.parametrize("part", [0.3, 0.9])
+def test_files_cut_short_are_refused(file_type, part):
+    data = exported(file_type)
+    with pytest.raises(InvalidInput):
+        read_mesh(data[: int(part * len(data))])
+
+
+NUMPY = ("array", "reshape", "broadcast", "literal", "axis", "index", "list", "dimension")
+
+
+@pytest.mark.parametrize("file_type", FORMATS)
+def test_refusals_of_cut_files_are_in_words_of_ours(file_type):
+    data = exported(file_type)
+    for part in np.linspace(0.01, 0.99, 23):
+        try:
+            read_mesh(data[: int(part * len(data))])
+        except InvalidInput as error:
+            words = f"{error.value} {error.accepted}"
+            assert not [word for word in NUMPY if word in words.split("begins with")[0]], words
+
+
+@pytest.mark.parametrize("file_type", ["ply", "off", "obj", "gltf", "stl_ascii"])
+def test_a_byte_order_mark_is_passed_over(file_type):
+    assert len(read_mesh(b"\xef\xbb\xbf" + exported(file_type)).surface.mesh.faces) == 80
+
+
+def test_a_long_comment_may_come_before_an_obj():
+    assert read_mesh(b"# by hand\n" * 10_000 + exported("obj")).format == "obj"
+
+
+@given(
+    st.sampled_from(FORMATS),
+    st.lists(st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=4),
+)
+@settings(max_examples=150, deadline=None)
+def test_flipped_bytes_give_a_refusal_or_a_sound_mesh(file_type, flips):
+    content = bytearray(exported(file_type))
+    for place, value in flips:
+        content[int(place * len(content))] = value
+    try:
+        found = read_mesh(bytes(content))
+    except InvalidInput:
+        return
+    assert np.isfinite(found.surface.mesh.vertices).all()
+    assert found.surface.mesh.faces.max() < len(found.surface.mesh.vertices)
+
+
+def lone(place, accepted="three"):
+    """An OBJ of one triangle, one of its corners as told."""
+    return f"v 0 0 0\nv 1 0 0\nv {place}\nf 1 2 {accepted}\n".encode()
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", "file: found an empty file"),
+        (b"\x00\x01\x02 something else", "a file of another kind .it begins with"),
+        (b"PK\x03\x04" + b"v 0 0 0" * 9, "a file of another kind"),
+        (lone("0 1 0", "9"), "file: found OBJ data that are cut short, damaged"),
+        (lone("nan 1 0", "3"), "not finite"),
+        (lone("inf 1 0", "3"), "not finite"),
+        (lone("2 0 0", "3"), "1 without area"),
+        (b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "vertices: found 'v 0 0' in line 1"),
+        (b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "an STL of words without its end"),
+        (exported("stl")[:-1], r"or a binary STL of \d+ bytes, where its header means \d+"),
+        (b"OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n", "faces: found none|damaged"),
+        (b"ply\nformat ascii 1.0\nelement vertex 2000000000\nproperty float x\nend_header\n", "damaged"),
+    ],
+)
+def test_what_is_no_mesh_is_refused(data, words):
+    with pytest.raises(InvalidInput, match=words):
+        read_mesh(data)
+
+
+def scene(buffers, **more):
+    return json.dumps({"asset": {"version": "2.0"}, "buffers": buffers, "meshes": [], **more}).encode()
+
+
+@pytest.mark.parametrize("uri", ["outside.bin", "file:///etc/passwd", "http://127.0.0.1/a.bin", "../a.bin"])
+def test_gltf_reads_no_other_file(uri):
+    with pytest.raises(InvalidInput, match=r"buffers/uri: found .*; accepted: data within the file"):
+        read_mesh(scene([{"uri": uri, "byteLength": 4}]))
+    text = scene([{"uri": uri, "byteLength": 4}]).ljust(400)
+    glb = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text), len(text), b"JSON") + text
+    with pytest.raises(InvalidInput, match="buffers/uri"):
+        read_mesh(glb)
+
+
+def test_images_of_gltf_are_not_looked_at(monkeypatch):
+    surface = torus(8, 5)
+    mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
+    whole = json.loads(gltf(mesh))
+    whole["images"] = [{"uri": "http://127.0.0.1/picture.png"}]
+    whole["textures"] = [{"source": 0}]
+    whole["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    for part in whole["meshes"]:
+        part["primitives"][0]["material"] = 0
+    assert read_mesh(json.dumps(whole).encode()).surface.genus == 1
+
+
+def test_obj_opens_no_material_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "secret.mtl").write_text("newmtl a\nmap_Kd picture.png\n")
+    opened = []
+    monkeypatch.setattr("builtins.open", lambda *words, **more: opened.append(words))
+    data = b"mtllib secret.mtl\nusemtl a\n" + exported("obj")
+    assert read_mesh(data).surface.genus == 1
+    assert opened == []
+
+
+def test_limits(monkeypatch):
+    data = exported("ply")
+    monkeypatch.setattr(mesh_formats, "MOST_FACES", 79)
+    with pytest.raises(InvalidInput, match="faces: found 80; accepted: at most 79"):
+        read_mesh(data)
+    monkeypatch.setattr(mesh_formats, "LARGEST_BYTES", len(data) - 1)
+    with pytest.raises(InvalidInput, match=f"file: found {len(data)} bytes"):
+        read_mesh(data)
+
+
+def test_the_parts_of_a_scene_become_one_mesh():
+    surface = torus(8, 5)
+    parts = trimesh.Scene()
+    halves = surface.corners.mean(axis=1)[:, 0] > 0.0
+    for half in (halves, ~halves):
+        parts.add_geometry(trimesh.Trimesh(surface.vertices, surface.faces[half], process=False))
+    buffer = io.BytesIO(parts.export(file_type="glb"))
+    found = read_mesh(buffer.getvalue()).surface
+    assert (len(found.mesh.faces), found.genus, found.holes) == (80, 1, 0)

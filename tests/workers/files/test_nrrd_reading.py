@@ -1,0 +1,181 @@
+"""NRRD: shapes, units and packed values come out as they went in; no file but this one is ever opened."""
+
+import bz2
+import gzip
+from contextlib import suppress
+
+import nrrd
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.volume_formats import import_volume
+
+from .volumes import ramp, refused
+
+PLAIN = "type: uint8\ndimension: 3\nsizes: 3 4 5\nencoding: raw\n"
+
+
+def write(path, fields=PLAIN, data=None, end="\n"):
+    path.write_bytes(f"NRRD0004\n{fields}{end}".encode() + (ramp().tobytes("F") if data is None else data))
+    return path
+
+
+@pytest.mark.parametrize("encoding", ["raw", "gzip"])
+@pytest.mark.parametrize("dtype", ["u1", "<u2", ">i2", "<f4", ">f8"])
+def test_a_file_of_pynrrd(tmp_path, encoding, dtype):
+    path = tmp_path / "v.nrrd"
+    own = {
+        "encoding": encoding,
+        "space directions": np.diag([0.5, 0.5, 2.0]),
+        "space origin": [1.0, 2.0, 3.0],
+    }
+    nrrd.write(str(path), ramp(dtype=dtype), {"space": "right-anterior-superior", "content": "a head", **own})
+    volume = import_volume(path)
+    np.testing.assert_array_equal(volume.values, ramp(dtype=dtype))
+    np.testing.assert_allclose(volume.spacing_m, (5e-4, 5e-4, 2e-3))
+    np.testing.assert_allclose(volume.origin_m, (1e-3, 2e-3, 3e-3))
+    assert volume.title == "a head"
+
+
+@pytest.mark.parametrize(
+    ("more", "spacing"),
+    [
+        ("", 1e-3),
+        ("spacings: 2 2 2\n", 2e-3),
+        ('spacings: 2 2 2\nunits: "cm" "cm" "cm"\n', 2e-2),
+        ('spacings: 2 2 2\nspace units: "um" "um" "um"\nspace dimension: 3\n', 2e-6),
+    ],
+)
+def test_units(tmp_path, more, spacing):
+    np.testing.assert_allclose(import_volume(write(tmp_path / "v", PLAIN + more)).spacing_m, (spacing,) * 3)
+
+
+def test_each_axis_has_its_own_unit(tmp_path):
+    fields = PLAIN + 'spacings: 1 2 3\nunits: "mm" "m" "cm"\n'
+    np.testing.assert_allclose(import_volume(write(tmp_path / "v", fields)).spacing_m, (1e-3, 2.0, 3e-2))
+    turned = "space dimension: 3\nspace directions: (0,2,0) (3,0,0) (0,0,4)\nspace origin: (1,1,1)\n"
+    volume = import_volume(write(tmp_path / "v", PLAIN + turned + 'space units: "mm" "m" "mm"\n'))
+    np.testing.assert_allclose(volume.spacing_m, (3e-3, 2.0, 4e-3))
+    np.testing.assert_allclose(volume.origin_m, (1e-3, 1.0, 1e-3))
+
+
+def test_lines_may_end_as_on_windows(tmp_path):
+    fields = PLAIN.replace("\n", "\r\n")
+    path = tmp_path / "v"
+    path.write_bytes(f"NRRD0004\r\n{fields}\r\n".encode() + ramp().tobytes("F"))
+    np.testing.assert_array_equal(import_volume(path).values, ramp())
+
+
+@pytest.mark.parametrize(
+    ("fields", "field"),
+    [
+        (PLAIN + "data file: /etc/passwd\n", "data file"),
+        (PLAIN + "datafile: LIST\n", "datafile"),
+        (PLAIN + "byte skip: -1\n", "byte skip"),
+        (PLAIN + "line skip: 9\n", "line skip"),
+        (PLAIN.replace("raw", "ascii"), "encoding"),
+        (PLAIN.replace("raw", "hex"), "encoding"),
+        (PLAIN.replace("uint8", "block"), "type"),
+        (PLAIN.replace("dimension: 3\nsizes: 3 4 5", "dimension: 2\nsizes: 12 5"), "sizes"),
+        (PLAIN.replace("dimension: 3\nsizes: 3 4 5", "dimension: 4\nsizes: 3 4 5 1"), "sizes"),
+        (PLAIN.replace("3 4 5", "0 4 5"), "sizes"),
+        (PLAIN.replace("3 4 5", "-3 -4 5"), "sizes"),
+        (PLAIN.replace("3 4 5", "65536 65536 65536"), "sizes"),
+        (PLAIN.replace("3 4 5", "3 4 6"), "file"),
+        (PLAIN.replace("3 4 5", "a b c"), "file"),
+        (PLAIN.replace("sizes: 3 4 5\n", ""), "file"),
+        (PLAIN + "kinds: RGB-color domain domain\n", "kinds"),
+        (PLAIN + 'units: "inch" "inch" "inch"\n', "units"),
+        (PLAIN + 'spacings: 1 1 1\nunits: "mm" "mm" "inch"\n', "units"),
+        (PLAIN + "spacings: 0 1 1\n", "spacings"),
+        (PLAIN + "spacings: nan nan nan\n", "spacings"),
+        ("nonsense\n", "file"),
+    ],
+)
+def test_what_is_refused(tmp_path, fields, field):
+    error = refused(write(tmp_path / "v", fields))
+    assert error.field == field, error
+
+
+def test_a_header_without_an_end(tmp_path):
+    assert "without an end" in refused(write(tmp_path / "v", PLAIN, b"", end="")).value
+
+
+@pytest.mark.parametrize("encoding", ["raw", "gzip"])
+def test_more_values_than_declared_are_refused_unread(tmp_path, encoding):
+    data = b"\0" * 200_000_000
+    data = gzip.compress(data, 9) if encoding == "gzip" else data[:61]
+    error = refused(write(tmp_path / "v", PLAIN.replace("raw", encoding), data))
+    assert "more data after the values" in error.value
+
+
+@pytest.mark.parametrize("byte", [-1, -4, -5, -8, -40])
+def test_a_flipped_bit_in_packed_values_their_check_sum_or_length_is_refused(tmp_path, byte):
+    packed = bytearray(gzip.compress(ramp().tobytes("F"), compresslevel=0))
+    packed[byte] ^= 1
+    error = refused(write(tmp_path / "v", PLAIN.replace("raw", "gzip"), bytes(packed)))
+    assert "damaged data" in error.value
+
+
+def test_packed_values_that_end_early_or_are_none(tmp_path):
+    fields = PLAIN.replace("raw", "gzip")
+    packed = gzip.compress(ramp().tobytes())
+    for data in (packed[:20], bz2.compress(b"x"), gzip.compress(b"few")):
+        assert refused(write(tmp_path / "v", fields, data)).field == "file"
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.text(st.characters(max_codepoint=126), max_size=60), st.integers(0, 60))
+def test_a_damaged_header_is_read_or_refused_and_nothing_else(tmp_path, text, place):
+    fields = PLAIN[:place] + text + PLAIN[place:]
+    with suppress(InvalidInput):
+        assert import_volume(write(tmp_path / "v", fields)).values.ndim == 3
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1), (1, 0, 2)])
+@pytest.mark.parametrize("sense", [(1, 1, 1), (-1, 1, 1), (-1, -1, 1), (1, -1, -1)])
+def test_axes_in_any_order_and_sense_are_the_same_volume(tmp_path, order, sense):
+    plain = ramp()
+    steps, origin = np.array([0.5, 1.0, 2.0]), np.array([1.0, 2.0, 3.0])
+    last = (np.array(plain.shape) - 1) * steps
+    directions = np.diag(np.array(sense) * steps)[list(order)]
+    start = origin + np.where(np.array(sense) < 0, last, 0.0)
+    stored = plain[tuple(slice(None, None, one) for one in sense)].transpose(order)
+    own = {"space directions": directions, "space origin": start, "space": "right-anterior-superior"}
+    path = tmp_path / "turned.nrrd"
+    nrrd.write(str(path), np.ascontiguousarray(stored), own)
+    volume = import_volume(path)
+    np.testing.assert_array_equal(volume.values, plain)
+    np.testing.assert_allclose(volume.spacing_m, 1e-3 * steps)
+    np.testing.assert_allclose(volume.origin_m, 1e-3 * origin)
+
+
+def test_sheared_axes_are_refused(tmp_path):
+    path = write(tmp_path / "v.nrrd", PLAIN + "space: RAS\nspace directions: (1,0,0) (0.3,1,0) (0,0,1)\n")
+    assert refused(path).field == "space directions"
+
+
+@pytest.mark.parametrize(
+    ("space", "signs"),
+    [
+        ("left-posterior-superior", (-1, -1, 1)),
+        ("LPS", (-1, -1, 1)),
+        ("left-anterior-superior", (-1, 1, 1)),
+        ("LAS", (-1, 1, 1)),
+        ("right-anterior-superior", (1, 1, 1)),
+        ("RAS", (1, 1, 1)),
+        ("3D-right-handed", (1, 1, 1)),
+    ],
+)
+def test_whichever_way_the_space_goes_it_is_the_same_body(tmp_path, space, signs):
+    """A node lies in the same place of the body whatever the file calls the way there."""
+    steps, start = np.array([0.5, 1.0, 2.0]), np.array([1.0, 2.0, 3.0])
+    own = {"space directions": np.diag(signs * steps), "space origin": signs * start, "space": space}
+    nrrd.write(str(tmp_path / "v.nrrd"), ramp(), own)
+    volume = import_volume(tmp_path / "v.nrrd")
+    np.testing.assert_array_equal(volume.values, ramp())
+    np.testing.assert_allclose(volume.spacing_m, 1e-3 * steps)
+    np.testing.assert_allclose(volume.origin_m, 1e-3 * start)

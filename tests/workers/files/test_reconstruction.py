@@ -1,0 +1,115 @@
+"""Reconstruction files: exact round trips, the promised names, and refusals."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Sweep
+from bentray_workers.files.reconstruction import read_reconstruction, write_reconstruction
+
+from .reconstructions import made
+from .test_dataset_files import assert_same
+
+
+@pytest.mark.parametrize("slices", [None, 3])
+@pytest.mark.parametrize("with_attenuation", [True, False])
+def test_what_is_written_comes_back_bit_by_bit(tmp_path, slices, with_attenuation):
+    result = made(slices=slices)
+    if not with_attenuation:
+        result = replace(result, attenuation=None)
+    write_reconstruction(tmp_path / "r.h5", result)
+    found = read_reconstruction(tmp_path / "r.h5")
+    # NaN, which says that slices are not evenly spaced, equals itself here.
+    np.testing.assert_array_equal(found.spacing_m, result.spacing_m)
+    assert_same(replace(found, spacing_m=()), replace(result, spacing_m=()))
+
+
+def test_bands_of_a_refinement_come_back(tmp_path):
+    waves = (
+        Sweep(0, 1, 3e-8, 36, 1, given=False, band_hz=(1e5, 2e5), misfit=0.3, held_out_misfit=0.4),
+        Sweep(0, 2, 2e-8, 36, 1, band_hz=(1e5, 2e5), misfit=0.1),
+        Sweep(0, 1, 2e-8, 24, 2, band_hz=(2e5, 3e5), misfit=0.2, of_attenuation=True),
+    )
+    whole = replace(made(), history=(*made().history, *waves))
+    write_reconstruction(tmp_path / "r.h5", whole)
+    assert read_reconstruction(tmp_path / "r.h5").history == whole.history
+    with h5py.File(tmp_path / "r.h5", "r+") as file:
+        del file["history/misfit"]
+    with pytest.raises(InvalidInput, match="history/misfit"):
+        read_reconstruction(tmp_path / "r.h5")
+
+
+def test_a_result_without_history_comes_back(tmp_path):
+    write_reconstruction(tmp_path / "r.h5", replace(made(), history=(), provenance={}))
+    assert read_reconstruction(tmp_path / "r.h5").history == ()
+
+
+def test_the_file_has_the_names_that_others_read(tmp_path):
+    result = made(slices=2)
+    write_reconstruction(tmp_path / "r.h5", result)
+    with h5py.File(tmp_path / "r.h5") as file:
+        np.testing.assert_array_equal(file["speed_mps"][()], result.speed)
+        np.testing.assert_array_equal(file["coverage_m"][()], result.coverage)
+        np.testing.assert_array_equal(file["attenuation_np_m"][()], result.attenuation)
+        assert file.attrs["axes"] == "x,y,z"
+        assert file.attrs["spacing_m"].shape == (3,)
+        assert file.attrs["origin_m"].tolist() == list(result.origin_m)
+        assert json.loads(file.attrs["settings"])["rays"] == "straight"
+        assert json.loads(file.attrs["provenance"])["bentray"] == "0.1.0"
+        assert file["history/residual_rms_s"].shape == (6,)
+
+
+def test_the_same_result_gives_the_same_bytes(tmp_path):
+    write_reconstruction(tmp_path / "a.h5", made())
+    write_reconstruction(tmp_path / "b.h5", made())
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+
+def drop(name):
+    return lambda file: file.pop(name)
+
+
+def attr(name, value):
+    return lambda file: file.attrs.__setitem__(name, value)
+
+
+@pytest.mark.parametrize(
+    ("field", "change"),
+    [
+        ("@format", attr("format", "uct-transmission")),
+        ("speed_mps", drop("speed_mps")),
+        ("coverage_m", lambda f: (f.pop("coverage_m"), f.create_dataset("coverage_m", data=np.ones((2, 2))))),
+        ("@spacing_m", attr("spacing_m", [1.0])),
+        ("@water_speed_mps", lambda f: f.attrs.pop("water_speed_mps")),
+        ("@settings", attr("settings", "not JSON")),
+        ("@settings", attr("settings", "[1]")),
+        ("@settings", attr("settings", '{"from": "the future"}')),
+        ("@settings", attr("settings", '{"sweeps": "many"}')),
+        ("rays", attr("settings", '{"rays": "wavy"}')),
+        ("@provenance", attr("provenance", "")),
+        ("history/sweep", lambda f: f["history"].pop("sweep")),
+        ("history", lambda f: (f["history"].pop("sweep"), f["history"].create_dataset("sweep", data=[1]))),
+    ],
+)
+def test_a_wrong_field_is_named(tmp_path, field, change):
+    write_reconstruction(tmp_path / "r.h5", made())
+    with h5py.File(tmp_path / "r.h5", "a") as file:
+        change(file)
+    with pytest.raises(InvalidInput) as refused:
+        read_reconstruction(tmp_path / "r.h5")
+    assert refused.value.field == field
+
+
+def test_a_file_cut_short_is_refused(tmp_path):
+    write_reconstruction(tmp_path / "r.h5", made())
+    whole = (tmp_path / "r.h5").read_bytes()
+    for length in range(0, len(whole), len(whole) // 40):
+        (tmp_path / "r.h5").write_bytes(whole[:length])
+        with pytest.raises(InvalidInput):
+            read_reconstruction(tmp_path / "r.h5")

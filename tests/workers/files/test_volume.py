@@ -1,0 +1,147 @@
+"""Volumes as files: what is written is read, what is no volume is refused."""
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.volume import Volume, read_volume, write_volume
+
+STEPS = (1e-3, 2e-3, 3e-3)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "kept"),
+    [
+        (np.uint8, np.uint8),
+        (np.uint16, np.uint16),
+        (">u2", np.uint16),
+        (np.float32, np.float32),
+        (np.float64, np.float32),
+        (np.int16, np.float32),
+        (np.float16, np.float32),
+        (bool, np.float32),
+    ],
+)
+def test_a_volume_survives_its_file(tmp_path, dtype, kept):
+    values = (np.arange(60).reshape(3, 4, 5) % 2).astype(dtype)
+    write_volume(tmp_path / "v.h5", Volume.of(values, STEPS, (0.1, -0.2, 0.3), "A  title"))
+    read = read_volume(tmp_path / "v.h5")
+    assert read.values.dtype == kept
+    np.testing.assert_array_equal(read.values, values.astype(kept))
+    assert (read.spacing_m, read.origin_m, read.title) == (STEPS, (0.1, -0.2, 0.3), "A  title")
+    assert read.range() == (0.0, 1.0)
+
+
+@given(arrays.arrays(np.float32, arrays.array_shapes(min_dims=3, max_dims=3, min_side=2, max_side=5)))
+def test_a_volume_is_finite_or_refused(values):
+    if np.isfinite(values).all():
+        np.testing.assert_array_equal(Volume.of(values, STEPS).values, values)
+    else:
+        with pytest.raises(InvalidInput, match="finite"):
+            Volume.of(values, STEPS)
+
+
+@pytest.mark.parametrize("shape", [(4, 4), (4, 4, 1), (0, 4, 4), (2, 2, 2, 2), ()])
+def test_another_shape_is_refused(shape):
+    with pytest.raises(InvalidInput, match="shape"):
+        Volume.of(np.zeros(shape), STEPS)
+
+
+@pytest.mark.parametrize("values", [np.zeros((2, 2, 2), complex), np.zeros((2, 2, 2), [("r", "u1")])])
+def test_what_is_not_real_is_refused(values):
+    with pytest.raises(InvalidInput, match="accepted: integers or floating-point"):
+        Volume.of(values, STEPS)
+
+
+def test_a_number_too_large_for_float32_is_named():
+    values = np.zeros((2, 2, 2))
+    values[1, 0, 1] = 1e300
+    with pytest.raises(InvalidInput, match=r"found 1e\+300, beyond float32"):
+        Volume.of(values, STEPS)
+    values[1, 0, 0] = np.inf
+    with pytest.raises(InvalidInput, match=r"found inf at node \(1, 0, 0\)"):
+        Volume.of(values, STEPS)
+
+
+@pytest.mark.parametrize(
+    ("values", "dtype"),
+    [
+        (1e9 + np.arange(8) / 7, "<f8"),
+        (16777216 + np.arange(8) % 4, "<i4"),
+        (16777216 + np.arange(8) % 4, ">u4"),
+        (-(2**62) + np.arange(8), "<i8"),
+        (1.0 + np.arange(8) * 1e-9, ">f8"),
+    ],
+)
+def test_values_that_float32_cannot_tell_apart_are_refused(values, dtype):
+    with pytest.raises(InvalidInput, match=r"cannot tell apart; accepted: .*subtract an offset first"):
+        Volume.of(values.astype(dtype).reshape(2, 2, 2), STEPS)
+
+
+@pytest.mark.parametrize(
+    ("values", "dtype"),
+    [
+        (16777216 + 2 * np.arange(8), "i4"),
+        (np.full(8, 0.1), "f8"),
+        (1e9 * np.arange(8) / 7, "f8"),
+        (1.0 + np.arange(8) * 1e-4, "f8"),
+        (np.arange(8) * 2**60 - 2**62, "i8"),
+    ],
+)
+def test_values_that_float32_can_tell_apart_are_taken(values, dtype):
+    volume = Volume.of(values.astype(dtype).reshape(2, 2, 2), STEPS)
+    assert len(np.unique(volume.values)) == len(np.unique(values))
+
+
+@pytest.mark.parametrize("steps", [(1.0, 1.0), (1.0, 0.0, 1.0), (1.0, float("nan"), 1.0), (1.0, 1.0, -1.0)])
+def test_a_spacing_must_be_three_distances(steps):
+    with pytest.raises(InvalidInput, match="spacing_m"):
+        Volume.of(np.zeros((2, 2, 2)), steps)
+
+
+@pytest.mark.parametrize("step", [1e-300, 0.99e-9, 1.01e3, 1e300, float("inf")])
+@pytest.mark.parametrize("axis", range(3))
+def test_a_spacing_that_nothing_has_is_refused(step, axis):
+    steps = [1e-3] * 3
+    steps[axis] = step
+    with pytest.raises(InvalidInput, match=r"spacing_m: .* three times a number from 1e-09 to 1000 m"):
+        Volume.of(np.zeros((2, 2, 2)), steps)
+
+
+def test_the_closest_and_the_farthest_spacing_are_kept():
+    assert Volume.of(np.zeros((2, 2, 2)), (1e-9, 1.0, 1e3)).spacing_m == (1e-9, 1.0, 1e3)
+
+
+def test_an_origin_must_be_finite():
+    with pytest.raises(InvalidInput, match="origin_m"):
+        Volume.of(np.zeros((2, 2, 2)), STEPS, (0.0, float("inf"), 0.0))
+
+
+@given(st.text())
+def test_a_title_from_a_stranger_can_be_stored(title):
+    kept = Volume.of(np.zeros((2, 2, 2)), STEPS, title=title).title
+    assert len(kept) <= 200
+    kept.encode()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "field"),
+    [
+        (lambda file: file.attrs.pop("spacing_m"), "spacing_m"),
+        (lambda file: file.pop("values"), "values"),
+        (lambda file: file.attrs.update(format="another"), "@format"),
+        (lambda file: file.attrs.update(format_version="9"), "@format_version"),
+        (lambda file: file.attrs.update(spacing_m="wide"), "@spacing_m"),
+    ],
+)
+def test_a_spoilt_file_is_named(tmp_path, spoil, field):
+    write_volume(tmp_path / "v.h5", Volume.of(np.zeros((2, 2, 2)), STEPS))
+    with h5py.File(tmp_path / "v.h5", "a") as file:
+        spoil(file)
+    with pytest.raises(InvalidInput) as caught:
+        read_volume(tmp_path / "v.h5")
+    assert caught.value.field == field

@@ -1,0 +1,204 @@
+"""Foreign volumes: NumPy, raw bytes and our own files are read; what is hostile is refused in words."""
+
+import io
+import pickle
+import zipfile
+from contextlib import suppress
+from dataclasses import replace
+
+import h5py
+import nibabel
+import nrrd
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.files import bounded_reading
+from bentray_workers.files.hdf5_reading import Reader
+from bentray_workers.files.reconstruction import write_reconstruction
+from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.files.volume_formats import RAW_TYPES, SPACING_M, Given, import_volume
+
+from .reconstructions import made
+from .volumes import ramp, refused
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("dtype", ["u1", "<u2", ">u2", "<f8", ">f4"])
+def test_numpy(tmp_path, dtype, order):
+    values = np.asarray(ramp(dtype=dtype), order=order)
+    np.save(tmp_path / "any.name", values)
+    volume = import_volume(tmp_path / "any.name.npy")
+    np.testing.assert_array_equal(volume.values, values)
+    assert volume.spacing_m == (SPACING_M,) * 3
+
+
+def test_what_is_given_is_used(tmp_path):
+    np.save(tmp_path / "v.npy", ramp())
+    one = import_volume(tmp_path / "v.npy", Given("A head", (2e-3,)))
+    assert (one.title, one.spacing_m) == ("A head", (2e-3,) * 3)
+    assert import_volume(tmp_path / "v.npy", Given(spacing_m=(1e-3, 2e-3, 3e-3))).spacing_m == (
+        1e-3,
+        2e-3,
+        3e-3,
+    )
+
+
+@pytest.mark.parametrize("dtype", RAW_TYPES)
+def test_raw_bytes_have_x_first(tmp_path, dtype):
+    values = ramp(dtype=RAW_TYPES[dtype])
+    (tmp_path / "v").write_bytes(values.tobytes(order="F"))
+    volume = import_volume(tmp_path / "v", Given(shape=(3, 4, 5), dtype=dtype, spacing_m=(1e-3,)))
+    np.testing.assert_array_equal(volume.values, values)
+
+
+def test_a_volume_of_ours(tmp_path):
+    volume = Volume.of(ramp(), (1e-3, 2e-3, 3e-3), (0.0, 1.0, 2.0), "ours")
+    write_volume(tmp_path / "v.h5", volume)
+    read = import_volume(tmp_path / "v.h5")
+    np.testing.assert_array_equal(read.values, volume.values)
+    assert replace(read, values=volume.values) == volume
+
+
+def test_a_reconstruction_gives_its_speed(tmp_path):
+    result = replace(made(8, 4), spacing_m=(2e-3, 2e-3, 3e-3))
+    write_reconstruction(tmp_path / "r.h5", result)
+    volume = import_volume(tmp_path / "r.h5")
+    np.testing.assert_allclose(volume.values, result.speed, rtol=1e-7)
+    assert (volume.spacing_m, volume.origin_m) == (result.spacing_m, result.origin_m)
+
+
+def test_uneven_slices_and_plain_images_are_refused(tmp_path):
+    write_reconstruction(tmp_path / "r.h5", made(8, 4))
+    assert refused(tmp_path / "r.h5").field == "spacing_m"
+    write_reconstruction(tmp_path / "r.h5", made(8))
+    assert "shape (8, 8)" in refused(tmp_path / "r.h5").value
+
+
+def saved(array: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, array, allow_pickle=True)
+    return buffer.getvalue()
+
+
+def header(text: str) -> bytes:
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text.encode()
+
+
+HUGE = header("{'descr': '|u1', 'fortran_order': False, 'shape': (65536, 65536, 65536), }\n") + b"\0" * 100
+SHORT = header("{'descr': '|u1', 'fortran_order': False, 'shape': (100, 100, 100), }\n") + b"\0" * 100
+MINUS = header("{'descr': '|u1', 'fortran_order': False, 'shape': (-2, -2, 2), }\n") + b"\0" * 100
+NAN = np.where(np.arange(8).reshape(2, 2, 2) == 5, np.nan, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("content", "field", "found"),
+    [
+        (b"", "file", "empty"),
+        (b"P5 3 3 255", "file", "another kind"),
+        (pickle.dumps([1, 2]), "file", "another kind"),
+        (saved(np.array([[[{}] * 2] * 2] * 2)), "values", "Python objects"),
+        (saved(np.zeros((2, 2, 2), complex)), "values", "complex"),
+        (saved(np.zeros((2, 2, 2), [("r", "u1"), ("g", "u1")])), "values", "RGB"),
+        (saved(np.array([[["a"] * 2] * 2] * 2)), "values", "no numbers"),
+        (saved(np.zeros((2, 2, 2, 2))), "values", "shape (2, 2, 2, 2)"),
+        (saved(np.zeros((0, 4, 4))), "values", "shape (0, 4, 4)"),
+        (saved(NAN), "values", "nan at node (1, 0, 1)"),
+        (saved(np.full((2, 2, 2), np.inf)), "values", "inf"),
+        (saved(ramp())[:-1], "file", "59 bytes of values"),
+        (saved(ramp())[:40], "file", "damaged"),
+        (b"\x93NUMPY\x07\x00", "file", "NumPy's format"),
+        (header("print('never')\n"), "file", "damaged"),
+        (header("{" * 900), "file", "damaged"),
+        (HUGE, "values", "281474976710656 bytes"),
+        (SHORT, "file", "100 bytes of values"),
+        (MINUS, "values", "shape (-2, -2, 2)"),
+    ],
+)
+def test_what_is_refused_and_why(tmp_path, content, field, found):
+    (tmp_path / "v.npy").write_bytes(content)
+    error = refused(tmp_path / "v.npy")
+    assert (error.field, found in error.value) == (field, True), error
+    assert error.accepted
+
+
+def test_an_archive_of_arrays_is_refused(tmp_path):
+    with zipfile.ZipFile(tmp_path / "v.npz", "w") as archive:
+        archive.writestr("a.npy", saved(ramp()))
+    assert "another kind" in refused(tmp_path / "v.npz").value
+
+
+def test_no_file(tmp_path):
+    assert "No such file" in refused(tmp_path / "none").value
+
+
+def test_more_than_the_limit_is_refused_before_it_is_read(tmp_path, monkeypatch):
+    np.save(tmp_path / "v.npy", ramp())
+    monkeypatch.setattr(bounded_reading, "LARGEST_BYTES", 59)
+    error = refused(tmp_path / "v.npy")
+    assert "60 bytes" in error.value
+    assert "59" in error.accepted
+
+
+def test_a_shape_without_use_is_refused_before_the_values_are_read(tmp_path, monkeypatch):
+    def nothing_else(shape):
+        raise InvalidInput("volume", f"shape {tuple(shape)}", "another")
+
+    def read(*given, **how):
+        raise AssertionError("values were read")
+
+    np.save(tmp_path / "v.npy", ramp())
+    (tmp_path / "v.raw").write_bytes(ramp().tobytes())
+    nrrd.write(str(tmp_path / "v.nrrd"), ramp())
+    (tmp_path / "v.nii").write_bytes(nibabel.Nifti1Image(ramp(), np.eye(4)).to_bytes())
+    write_volume(tmp_path / "v.h5", Volume.of(ramp(), (1e-3,) * 3))
+    write_reconstruction(tmp_path / "r.h5", replace(made(3, 5), spacing_m=(2e-3, 2e-3, 3e-3)))
+    monkeypatch.setattr(Volume, "of", read)
+    monkeypatch.setattr(Reader, "array", read)
+    for path in sorted(tmp_path.iterdir()):
+        given = Given(shape=(3, 4, 5), dtype="uint8") if path.suffix == ".raw" else None
+        with pytest.raises(InvalidInput, match=r"volume: found shape \(3, [34], 5\)"):
+            import_volume(path, given, nothing_else)
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        (Given(shape=(3, 4, 5)), "dtype"),
+        (Given(dtype="uint8"), "shape"),
+        (Given(shape=(3, 4, 5), dtype="object"), "dtype"),
+        (Given(shape=(3, 4, 4), dtype="uint8"), "file"),
+        (Given(shape=(60,), dtype="uint8"), "shape"),
+        (Given(shape=(-3, -4, 5), dtype="uint8"), "shape"),
+        (Given(shape=(2**40, 2**40, 2), dtype="uint8"), "shape"),
+        (Given(shape=(3, 4, 5), dtype="uint8", spacing_m=(0.0,)), "spacing_m"),
+        (Given(shape=(3, 4, 5), dtype="uint8", spacing_m=(1.0, 1.0)), "spacing_m"),
+    ],
+)
+def test_raw_bytes_need_the_truth(tmp_path, given, field):
+    (tmp_path / "v").write_bytes(ramp().tobytes())
+    assert refused(tmp_path / "v", given).field == field
+
+
+def test_a_spacing_is_for_files_that_have_none(tmp_path):
+    write_volume(tmp_path / "v.h5", Volume.of(ramp(), (1e-3,) * 3))
+    assert refused(tmp_path / "v.h5", Given(spacing_m=(1e-3,))).field == "spacing_m"
+
+
+def test_hdf5_of_another_kind(tmp_path):
+    with h5py.File(tmp_path / "v.h5", "w") as file:
+        file.attrs["format"] = "uct-transmission"
+    assert refused(tmp_path / "v.h5").field == "@format"
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_a_damaged_file_is_read_or_refused_and_nothing_else(tmp_path, data):
+    content = bytearray(saved(ramp()))
+    for _ in range(data.draw(st.integers(1, 5))):
+        content[data.draw(st.integers(0, 127))] = data.draw(st.integers(0, 255))
+    (tmp_path / "v").write_bytes(bytes(content[: data.draw(st.integers(0, len(content)))]))
+    with suppress(InvalidInput):
+        assert import_volume(tmp_path / "v").values.ndim == 3

@@ -1,0 +1,117 @@
+"""The errors against a truth, and the region they are read in."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bentray_kernels.acquisition import Truth
+from bentray_kernels.tomography import Reconstruction, Settings
+from bentray_workers.images.truth_comparison import NotComparable, compare
+
+WATER = 1500.0
+STEP = 1e-3
+
+
+def image(speed: np.ndarray, origin: tuple[float, ...] = (0.0, 0.0)) -> Reconstruction:
+    return Reconstruction(
+        speed=speed,
+        coverage=np.ones_like(speed),
+        spacing_m=(STEP,) * speed.ndim,
+        origin_m=origin,
+        water_speed_mps=WATER,
+        settings=Settings(nodes=16),
+    )
+
+
+def truth(speed: np.ndarray, spacing: float = STEP) -> Truth:
+    axes = ",".join("xyz"[: speed.ndim])
+    return Truth(speed, (spacing,) * speed.ndim, (0.0,) * speed.ndim, axes=axes)
+
+
+def disc(nodes: int = 17) -> np.ndarray:
+    """Water with a square of 1450 and 1550 m/s in it."""
+    speed = np.full((nodes, nodes), WATER)
+    speed[4:9, 4:13], speed[9:13, 4:13] = 1450.0, 1550.0
+    return speed
+
+
+@given(st.floats(-40.0, 40.0))
+def test_a_constant_error_is_read_as_it_is(offset: float) -> None:
+    found = compare(image(disc() + offset), truth(disc()))
+    assert found.rmse_mps == pytest.approx(abs(offset), abs=1e-9)
+    assert found.mean_absolute_error_of_range == pytest.approx(abs(offset) / 100.0, abs=1e-9)
+    assert found.true_range_mps == (1450.0, 1550.0)
+    assert found.region.sum() == 81
+
+
+def test_errors_in_the_water_do_not_count() -> None:
+    speed = disc()
+    speed[0, 0] += 500.0
+    assert compare(image(speed), truth(disc())).rmse_mps == 0.0
+
+
+def test_the_outline_holds_what_it_encloses_in_each_slice() -> None:
+    ring = disc()
+    ring[7:10, 7:10] = WATER
+    assert compare(image(disc()), truth(ring)).region.sum() == 81
+    # A tube: what it encloses in its slices is open at both ends of the volume.
+    solid = np.stack([ring, ring, np.full((17, 17), WATER)], axis=-1)
+    region = compare(image(solid, (0.0,) * 3), truth(solid)).region
+    assert region.sum(axis=(0, 1)).tolist() == [81, 81, 0]
+
+
+def test_the_region_of_the_file_is_used_and_named() -> None:
+    roi = np.zeros((17, 17), dtype=bool)
+    roi[0:2, 0:2] = True
+    found = compare(image(disc() + 3.0), truth(disc()), roi)
+    assert found.region_choice == "mask/roi of the file"
+    assert found.region.sum() == 4
+    assert found.mean_absolute_error_of_range is None, "water alone has no range to divide by"
+    assert found.rmse_mps == pytest.approx(3.0)
+    assert str(found) == "3.0 m/s rms"
+
+
+def test_a_region_wider_than_the_outline_brings_in_what_equals_the_water() -> None:
+    """Fat as fast as the water: the outline misses it, and with it the error that is made there."""
+    roi = np.zeros((17, 17), dtype=bool)
+    roi[2:15, 2:15] = True
+    speed = disc()
+    speed[2, 2:15] += 30.0
+    assert compare(image(speed), truth(disc())).rmse_mps == 0.0
+    wide = compare(image(speed), truth(disc()), roi)
+    assert wide.rmse_mps == pytest.approx(30.0 / math.sqrt(13.0))
+    assert str(wide) == f"{100 * 0.3 / 13:.1f} % of range, {30 / math.sqrt(13):.1f} m/s rms"
+
+
+@pytest.mark.parametrize("roi", [np.zeros((17, 17), bool), np.ones((3, 3), bool)])
+def test_a_region_that_marks_nothing_or_lies_on_another_grid_is_not_used(roi: np.ndarray) -> None:
+    found = compare(image(disc()), truth(disc()), roi)
+    assert found.region_choice == "the outline of what is not water in the truth"
+
+
+def test_a_truth_that_is_water_throughout_is_compared_everywhere() -> None:
+    found = compare(image(np.full((17, 17), WATER + 2.0)), truth(np.full((17, 17), WATER)))
+    assert found.region_choice == "every node that the truth covers"
+    assert found.region.all()
+
+
+def test_x_and_y_are_not_exchanged() -> None:
+    assert compare(image(disc().T), truth(disc())).rmse_mps > 10.0
+    assert compare(image(disc()), replace(truth(disc().T), axes="y,x")).rmse_mps == 0.0
+
+
+def test_several_slices_are_compared_with_a_solid_truth() -> None:
+    solid = np.stack([disc(), np.full((17, 17), WATER), disc()[::-1]], axis=-1)
+    assert compare(image(solid + 2.0, (0.0,) * 3), truth(solid)).rmse_mps == pytest.approx(2.0)
+    assert compare(image(solid[..., ::-1], (0.0,) * 3), truth(solid)).rmse_mps > 10.0
+
+
+def test_a_truth_beside_the_image_is_not_comparable() -> None:
+    with pytest.raises(NotComparable, match="no node of the image lies within the truth"):
+        compare(image(disc(), origin=(1.0, 1.0)), truth(disc()))

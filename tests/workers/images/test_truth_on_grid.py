@@ -1,0 +1,70 @@
+"""The truth on the nodes of an image: interpolation, axes, and what cannot be laid on it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Truth
+from bentray_kernels.tomography import Reconstruction
+from bentray_workers.images.truth_on_grid import NotComparable, on_grid
+
+from ..files.reconstructions import SPACING_M, made, truth
+
+
+def speed_on_grid(known: Truth, result: Reconstruction) -> np.ndarray:
+    return on_grid(known.sound_speed_mps, known, result)
+
+
+def test_on_the_same_grid_the_truth_is_itself():
+    np.testing.assert_allclose(speed_on_grid(truth(), made()), truth().sound_speed_mps)
+
+
+def test_a_ramp_is_read_between_its_nodes_and_missing_beyond_them():
+    x, y = np.meshgrid(np.linspace(-0.01, 0.01, 7), np.linspace(-0.02, 0.02, 9), indexing="ij")
+    ramp = Truth(1500.0 + 1e3 * x - 2e3 * y, (0.02 / 6, 0.005), (-0.01, -0.02))
+    result = made()
+    place = result.origin_m[0] + SPACING_M * np.arange(24)
+    expected = 1500.0 + 1e3 * place[:, None] - 2e3 * place[None, :]
+    inside = (np.abs(place) <= 0.01)[:, None] & (np.abs(place) <= 0.02)[None, :]
+    found = speed_on_grid(ramp, result)
+    np.testing.assert_allclose(found[inside], expected[inside])
+    assert np.isnan(found[~inside]).all()
+
+
+def test_axes_are_brought_to_x_and_y():
+    plain = truth()
+    turned = replace(plain, sound_speed_mps=plain.sound_speed_mps.T.copy(), axes="y,x")
+    np.testing.assert_array_equal(speed_on_grid(turned, made()), speed_on_grid(plain, made()))
+    assert not np.array_equal(turned.sound_speed_mps, plain.sound_speed_mps)
+
+
+def test_a_volume_is_read_at_each_slice():
+    volume = Truth(
+        np.full((3, 3, 3), 1500.0) + 10.0 * np.arange(3), (0.1, 0.1, 0.01), (-0.1, -0.1, 0.0), axes="x,y,z"
+    )
+    result = replace(made(slices=2), spacing_m=(SPACING_M, SPACING_M, 0.01), origin_m=(-0.02, -0.02, 0.005))
+    found = speed_on_grid(volume, result)
+    assert found.shape == result.speed.shape
+    np.testing.assert_allclose(found[..., 0], 1505.0)
+    np.testing.assert_allclose(found[..., 1], 1515.0)
+
+
+def solid() -> Truth:
+    return Truth(np.full((3, 3, 3), 1500.0), (0.1,) * 3, (0.0,) * 3, axes="x,y,z")
+
+
+@pytest.mark.parametrize(
+    ("known", "result", "why"),
+    [
+        (truth(axes="as displayed"), made(), "registered"),
+        (truth(axes="x,y,z"), made(), "axes x,y,z and 2 dimensions, the image 2"),
+        (truth(), made(slices=2), "the image 3"),
+        (solid(), made(slices=2), "not evenly spaced"),
+    ],
+)
+def test_what_cannot_be_laid_on_the_image_is_said(known, result, why):
+    with pytest.raises(NotComparable, match=why):
+        speed_on_grid(known, result)

@@ -1,0 +1,83 @@
+"""Peak memory of the calls of a reconstruction, in processes of their own: prints bytes by call as JSON.
+
+Called as ``call_memory.py SETTINGS ELEMENTS HEIGHTS``, the settings as JSON, with the repository on the
+path; 0 heights for one slice. As in ``benchmarks/shared/_peak_memory.py`` each call runs in a fork of a warm
+process, less a fork that does nothing; the bytes of what was there before are added: dataset, problem and
+arguments.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from benchmarks.shared._peak_memory import peak
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
+from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography.reconstruct import Here
+from bentray_kernels.tomography.task_chains import Call, Chain
+
+
+def scan(elements: int, heights: int) -> Dataset:
+    """Made-up smooth delays and losses of a ring, at several heights or without one."""
+    every = np.arange(elements)
+    angle = every * 2 * np.pi / elements
+    delta = -1e-6 * np.sin(0.5 * (angle[:, None] - angle[None, :])) ** 2
+    if heights:
+        delta = delta * np.ones(heights)[:, None, None]
+    return Dataset(
+        Ring(elements, 0.08).positions(),
+        every,
+        every,
+        1500.0,
+        delta_tof_s=delta,
+        log_ratio_np=-1e5 * delta,
+        water_attenuation_np_m=0.1,
+        slice_z_m=0.004 * np.arange(heights) if heights else None,
+    )
+
+
+def held(*things: Any) -> int:
+    """Bytes of the arrays in records, lists and tuples."""
+    found = 0
+    for thing in things:
+        if isinstance(thing, np.ndarray):
+            found += thing.nbytes
+        elif is_dataclass(thing):
+            found += held(*(getattr(thing, part.name) for part in fields(thing)))
+        elif isinstance(thing, list | tuple):
+            found += held(*thing)
+    return found
+
+
+def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
+    """The most that a call of each name takes, over one slice or the volume."""
+    here = Here(dataset, settings, "all")
+    chain, found = Chain(here, 0), {}
+    waiting = chain.first()
+    while waiting:
+        call: Call = waiting.pop(0)
+        name = call.function.__name__
+        if (name, chain.state.sweep) not in found:
+            taken = peak(lambda call=call: call.function(*call.arguments)) - peak(lambda: None)
+            found[name, chain.state.sweep] = taken + held(dataset, here.problem(0), call.arguments[1:])
+        waiting = chain.after(call, call.function(*call.arguments)) + waiting
+    return {name: max(most for (one, _), most in found.items() if one == name) for name, _ in found}
+
+
+def main(settings: dict[str, Any], elements: int, heights: int) -> None:
+    asked = Settings(**settings)
+    # Loading compiled code takes memory too, here and not in the forks.
+    small = Settings(**{**settings, "nodes": 16})
+    for _ in range(2):
+        bytes_of(scan(8, heights and 2), small)
+    sys.stdout.write(json.dumps(bytes_of(scan(elements, heights), asked)) + "\n")
+
+
+if __name__ == "__main__":
+    main(json.loads(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))

@@ -1,0 +1,71 @@
+"""Peak memory of the calls that examine and pick a scan, in processes of their own; see ``call_memory``.
+
+Called as ``arrival_call_memory.py FOLDER PICKER ELEMENTS SAMPLES``; prints bytes by call as JSON, and those
+of the traces. FOLDER is for the scan's file.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from benchmarks.shared._peak_memory import peak
+from call_memory import held
+
+from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.reconstruction.arrivals import Arrivals, Files, Source
+
+RATE_HZ, CENTRE_HZ, WATER_MPS, RADIUS_M = 8e6, 1e6, 1480.0, 0.05
+
+
+def scan(elements: int, samples: int) -> Dataset:
+    """Water through water with a little noise, one emission made at a time."""
+    ring = Ring(elements, RADIUS_M).positions()
+    every, time = np.arange(elements), np.arange(samples) / RATE_HZ - 4e-6
+    random = np.random.default_rng(0)
+    traces = np.empty((elements, elements, samples), np.int16)
+    for e in every:
+        late = CENTRE_HZ * (time - np.linalg.norm(ring - ring[e], axis=1)[:, None] / WATER_MPS)
+        pulse = np.exp(-(late**2)) * np.sin(2.0 * np.pi * late)
+        traces[e] = 1000.0 * pulse + 3.0 * random.standard_normal(pulse.shape)
+    return Dataset(
+        ring,
+        every,
+        every,
+        WATER_MPS,
+        waveform=Waveform(traces, traces),
+        center_frequency_hz=CENTRE_HZ,
+        sampling_rate_hz=RATE_HZ,
+        t0_s=-4e-6,
+    )
+
+
+def bytes_of(path: Path, picker: str) -> dict[str, int]:
+    """The first call of each name, with its arguments, less a fork that does nothing."""
+    chain = Arrivals(Source(path, path.stat().st_mtime_ns, path.parent, picker, True), Files.of(path.parent))
+    waiting, found = chain.first(), {}
+    while waiting:
+        call = waiting.pop(0)
+        name = call.function.__name__
+        if name not in found:
+            taken = peak(lambda call=call: call.function(*call.arguments)) - peak(lambda: None)
+            found[name] = taken + held(*call.arguments)
+        waiting = chain.after(call, call.function(*call.arguments)) + waiting
+    return found
+
+
+def main(folder: Path, picker: str, elements: int, samples: int) -> None:
+    # Loading compiled code takes memory too, here and not in the forks.
+    write_dataset(folder / "small.h5", scan(12, 700))
+    bytes_of(folder / "small.h5", picker)
+    write_dataset(folder / "scan.h5", scan(elements, samples))
+    found = bytes_of(folder / "scan.h5", picker)
+    sys.stdout.write(json.dumps({**found, "traces": 4 * elements**2 * samples}) + "\n")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), int(sys.argv[4]))

@@ -1,0 +1,51 @@
+"""What examination and picking take: as planned, and far less than the traces that they go through."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bentray_kernels.tomography import Settings
+from bentray_workers.files.dataset.summary import summary_of
+from bentray_workers.reconstruction.memory.arrival_memory import arrival_call_bytes, parts_of
+
+PROGRAM = Path(__file__).with_name("arrival_call_memory.py")
+ROOT = Path(__file__).parents[4]
+MIB = 2**20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("picker", "elements", "samples"), [("aic", 100, 2400), ("matched", 64, 1500)])
+def test_calls_take_what_the_plan_says_and_never_the_traces(tmp_path, picker, elements, samples):
+    # Freed arrays go back at once, so that a fork's peak is that of its own.
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join((str(ROOT), str(PROGRAM.parent))),
+        "MALLOC_MMAP_THRESHOLD_": "65536",
+        "MALLOC_TRIM_THRESHOLD_": "65536",
+    }
+    command = [sys.executable, str(PROGRAM), str(tmp_path), picker, str(elements), str(samples)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    measured = json.loads(done.stdout)
+    traces = measured.pop("traces")
+    settings = Settings(picker=picker)
+    scan = summary_of(tmp_path / "scan.h5", settings)
+    told = arrival_call_bytes(scan.traces, scan.pairs, settings)
+    assert set(told) == set(measured)
+    wrong = {
+        name: (told[name], taken)
+        for name, taken in measured.items()
+        if not taken <= told[name] <= 1.5 * taken + 8 * MIB
+    }
+    assert not wrong
+    if picker == "aic":
+        assert max(measured.values()) < 0.5 * traces
+
+
+@pytest.mark.parametrize(("emissions", "samples"), [(1, 1), (7, 4_000_000), (256, 10**9), (100, 0)])
+def test_parts_are_all_emissions_in_order(emissions, samples):
+    parts = parts_of(emissions, samples)
+    assert [e for part in parts for e in part] == list(range(emissions))

@@ -1,0 +1,102 @@
+"""What a plan counts for the calls of a refinement is what they really take; it grows with the scan."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bentray_kernels.tomography import Settings
+from bentray_workers.cluster.capacities import MIB
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.files.dataset.counts import Traces
+from bentray_workers.files.dataset.summary import summary_of
+from bentray_workers.reconstruction.memory.waveform_memory import wave_call_bytes, wave_tasks
+
+from ....kernels.tomography.waveform.scans import CENTRE_HZ, ELEMENTS, RATE_HZ, WATER, scan
+
+PROGRAM = Path(__file__).with_name("wave_call_memory.py")
+ROOT = Path(__file__).parents[4]
+SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("asked", "elements", "samples"),
+    # Each has its largest band last.
+    [
+        ({"wave_bands": 2, "wave_emitters": 16, "attenuation": False}, 64, 260),
+        ({"attenuation": False}, 128, 300),
+        ({"wave_bands": 1}, 96, 300),
+    ],
+)
+def test_calls_take_what_the_plan_says(asked, elements, samples):
+    # Freed arrays go back at once, so that a fork's peak is that of its own.
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(ROOT),
+        "MALLOC_MMAP_THRESHOLD_": "65536",
+        "MALLOC_TRIM_THRESHOLD_": "65536",
+    }
+    command = [sys.executable, str(PROGRAM), json.dumps(asked), str(elements), str(samples)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    measured = json.loads(done.stdout)
+    traces = replace(SCAN, emissions=elements, receivers=elements, samples=samples)
+    told = wave_call_bytes(traces, 0.1, Settings(method="waveform", **asked))
+    assert set(told) == set(measured)
+    wrong = {
+        name: (told[name], taken)
+        for name, taken in measured.items()
+        if not taken <= told[name] <= 1.5 * taken + 4 * MIB
+    }
+    assert not wrong
+
+
+@given(
+    bands=st.integers(1, 3),
+    emissions=st.integers(8, 512),
+    samples=st.integers(300, 3000),
+    width=st.floats(0.05, 0.3),
+)
+def test_more_of_anything_never_takes_less(bands, emissions, samples, width):
+    traces = replace(SCAN, emissions=emissions, samples=samples)
+    settings = Settings(method="waveform", wave_bands=bands)
+    found = wave_call_bytes(traces, width, settings)
+    # Beyond those that a band uses emissions do not count, but where they are read in blocks.
+    many = wave_call_bytes(replace(traces, emissions=emissions + 64), width, settings)
+    assert all(many[name] >= size for name, size in found.items())
+    assert emissions < 64 or many["look_at_waves"] == found["look_at_waves"]
+    for other in (
+        wave_call_bytes(replace(traces, receivers=traces.receivers + 64), width, settings),
+        wave_call_bytes(replace(traces, samples=samples + 300), width, settings),
+        wave_call_bytes(traces, width + 0.05, settings),
+    ):
+        assert all(other[name] > size for name, size in found.items())
+    more = wave_call_bytes(traces, width, replace(settings, wave_bands=bands + 1))
+    assert all(more[name] >= size for name, size in found.items())
+
+
+def test_what_auto_may_do_is_planned():
+    """It judges by waves where there are traces, and refines where it is given minutes."""
+    auto = Settings(method="auto")
+    judged = wave_call_bytes(SCAN, 0.1, auto)
+    assert list(judged) == ["judge_by_waves"]
+    assert wave_call_bytes(SCAN, 0.1, replace(auto, wave_minutes=1.0)) == wave_call_bytes(
+        SCAN, 0.1, replace(auto, method="waveform")
+    )
+    assert wave_tasks(SCAN, auto) == 0 < wave_tasks(SCAN, replace(auto, wave_minutes=1.0))
+    assert wave_call_bytes(None, 0.1, auto) == wave_call_bytes(SCAN, 0.1, Settings()) == {}
+
+
+def test_traces_are_summed_up_where_there_are_both(tmp_path):
+    write_dataset(tmp_path / "scan.h5", scan())
+    found = summary_of(tmp_path / "scan.h5", Settings()).traces
+    assert found == Traces(12, ELEMENTS, 120, 4, RATE_HZ, CENTRE_HZ, WATER)
+    alone = replace(scan().waveform, water=None)
+    write_dataset(tmp_path / "alone.h5", replace(scan(), waveform=alone))
+    assert summary_of(tmp_path / "alone.h5", Settings()).traces is None

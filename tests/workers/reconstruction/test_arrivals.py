@@ -1,0 +1,226 @@
+"""Examination and picking of jobs: what `examine` and `pick` give at once, from a file, a batch a call."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import PICKERS, Waveform, pick
+from bentray_kernels.acquisition.quality import examine
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography import reconstruct as reconstruct_here
+from bentray_workers.cluster.job_cancellation import Unwanted
+from bentray_workers.cluster.task_loop import run_here
+from bentray_workers.files.dataset import read_dataset, write_dataset
+from bentray_workers.files.findings import read_findings
+from bentray_workers.reconstruction import reconstruction_run
+from bentray_workers.reconstruction.arrivals import PICKED, Arrivals, Files, Source, measure, read
+from bentray_workers.reconstruction.memory import arrival_memory
+
+from ...kernels.acquisition.traces import RATE_HZ, blob_delay, scan
+from ...kernels.tomography.waveform.scans import SETTINGS
+from ...kernels.tomography.waveform.scans import scan as wave_scan
+
+ELEMENTS = 16
+PLAN = Settings(nodes=24, sweeps=1)
+
+
+@cache
+def clean():
+    return scan(blob_delay(ELEMENTS), elements=ELEMENTS, noise=0.01)
+
+
+def disordered(traces):
+    """Element 3 receives upside down, 5 and 9 are swapped."""
+    traces = traces.copy()
+    traces[:, 3] *= -1.0
+    traces[:, [5, 9]] = traces[:, [9, 5]]
+    return traces
+
+
+def damaged(traces):
+    """The same, 12 is dead, and one trace holds a NaN."""
+    traces = disordered(traces)
+    traces[:, 12] = 0.0
+    traces[12] = 0.0
+    traces[0, 8, 40] = np.nan
+    return traces
+
+
+def spoilt(dataset, by):
+    return replace(dataset, waveform=Waveform(by(dataset.waveform.object), by(dataset.waveform.water)))
+
+
+def stacked(*datasets):
+    both = [np.stack([getattr(one.waveform, name) for one in datasets]) for name in ("object", "water")]
+    heights = 0.01 * np.arange(len(datasets))
+    return replace(datasets[0], slice_z_m=heights, waveform=Waveform(*both))
+
+
+def arrived(dataset, folder, picker="aic", *, examined=True):
+    """What goes on of a dataset in a file, and what was found."""
+    path = folder / "scan.h5"
+    write_dataset(path, dataset)
+    files = Files.of(folder)
+    arrivals = Arrivals(Source(path, path.stat().st_mtime_ns, folder, picker, examined), files)
+    run_here(None)([("", call) for call in arrivals.first()], {"": arrivals}, lambda name: None)
+    found = read_findings(files.findings)
+    return read_dataset(files.picked if found.changed else path), found
+
+
+def assert_same(one, other):
+    np.testing.assert_array_equal(one.differential_tof(), other.differential_tof())
+    known = np.isfinite(one.differential_tof())
+    np.testing.assert_array_equal(one.sigma_s[known], other.sigma_s[known])
+    assert (one.picker, one.t0_s) == (other.picker, other.t0_s)
+    assert one.waveform is other.waveform is None
+
+
+@pytest.mark.parametrize("samples", [30_000, 10**9])
+@pytest.mark.parametrize("picker", PICKERS)
+def test_batches_give_what_the_whole_gives(tmp_path, monkeypatch, picker, samples):
+    monkeypatch.setattr(arrival_memory, "CALL_SAMPLES", samples)
+    assert_same(arrived(clean(), tmp_path, picker, examined=False)[0], pick(clean(), picker))
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_faults_are_found_and_corrected_as_in_one_piece(tmp_path, monkeypatch, whole):
+    monkeypatch.setattr(arrival_memory, "CALL_SAMPLES", 10**9 if whole else 30_000)
+    both = stacked(clean(), spoilt(clean(), damaged))
+    expected = examine(both)
+    picked, found = arrived(both, tmp_path)
+    assert_same(picked, expected.picked)
+    np.testing.assert_array_equal(picked.valid, expected.picked.valid)
+    assert [f.to_dict() for f in found.findings] == [f.to_dict() for f in expected.report.findings]
+    told = found.words(stacked=True)
+    for words in (
+        "slice 1: polarity: 1 inverted in reception (3), corrected",
+        "slice 1: swapped channels: elements 5 and 9 fit each other's places in reception (5, 9), corrected",
+        "slice 1: dead elements: 1 without a pulse in reception (12), left out",
+        "slice 1: values: water: 1 traces with samples that are not finite, left out",
+    ):
+        assert words in told
+    assert "slice 0" not in told
+
+
+def test_a_clean_scan_gives_the_image_that_it_gave_unexamined(cluster, tmp_path):
+    write_dataset(tmp_path / "scan.h5", clean())
+    expected = reconstruct_here(pick(clean()), PLAN)
+    for client in (cluster.client, None):
+        result = reconstruction_run.reconstruct(client, tmp_path / "scan.h5", PLAN)
+        np.testing.assert_array_equal(result.speed, expected.speed)
+        assert result.provenance == {**expected.provenance, "quality": "nothing found"}
+        plain = reconstruction_run.reconstruct(client, tmp_path / "scan.h5", replace(PLAN, examine=False))
+        np.testing.assert_array_equal(plain.speed, expected.speed)
+        assert plain.provenance == expected.provenance
+
+
+def test_it_tells_how_many_emissions_are_examined_and_picked(tmp_path, monkeypatch):
+    monkeypatch.setattr(arrival_memory, "CALL_SAMPLES", 50_000)
+    write_dataset(tmp_path / "scan.h5", clean())
+    told = []
+    reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN, told.append)
+    steps = {
+        phase: [p.done for p in told if p.phase == phase] for phase in dict.fromkeys(p.phase for p in told)
+    }
+    assert list(steps) == ["examining", "picking", "reconstructing"]
+    assert {p.total for p in told if p.phase != "reconstructing"} == {ELEMENTS}
+    assert steps["examining"][0] == steps["picking"][0] == 0
+    assert steps["picking"][-1] == ELEMENTS
+    assert all(len(set(steps[phase])) > 3 for phase in ("examining", "picking"))
+    assert all(done == sorted(done) for done in steps.values())
+
+
+def test_calls_end_with_their_emission_once_the_job_has(tmp_path):
+    path, folder = tmp_path / "scan.h5", tmp_path / "job"
+    write_dataset(path, clean())
+    folder.mkdir()
+    source = Source(path, path.stat().st_mtime_ns, folder, "aic", True)
+    with source.slice(0) as one:
+        assert one.waveform.object[0].any()
+        folder.rmdir()
+        with pytest.raises(Unwanted):
+            one.waveform.object[1]
+    for function, arguments in ((measure, (range(4),)), (read, ((), None, range(4)))):
+        with pytest.raises(Unwanted):
+            function(source, 0, *arguments)
+
+
+def test_channels_put_back_give_the_image_of_the_clean_scan(cluster, tmp_path):
+    path = tmp_path / "scan.h5"
+    write_dataset(path, spoilt(clean(), disordered))
+    right = reconstruct_here(pick(clean()), PLAN).speed
+    for client in (None, cluster.client):
+        result = reconstruction_run.reconstruct(client, path, PLAN)
+        np.testing.assert_array_equal(result.speed, right)
+        assert "swapped channels" in result.provenance["quality"]
+    taken = reconstruction_run.reconstruct(None, path, replace(PLAN, examine=False))
+    assert not np.array_equal(taken.speed, right)
+    assert "quality" not in taken.provenance
+
+
+@pytest.mark.parametrize("embedded", [True, False])
+def test_a_scan_that_must_not_be_used_is_refused(cluster, tmp_path, embedded):
+    write_dataset(tmp_path / "scan.h5", replace(clean(), sampling_rate_hz=1.2 * RATE_HZ))
+    client = cluster.client if embedded else None
+    with pytest.raises(InvalidInput, match=r"sampling rate: found arrivals in water at .* examine false"):
+        reconstruction_run.reconstruct(client, tmp_path / "scan.h5", PLAN)
+
+
+def test_times_that_came_with_a_scan_are_examined_where_half_a_period_is_known(tmp_path):
+    delta = blob_delay(ELEMENTS).copy()
+    delta[2, 9] += 3e-6
+    known = replace(clean(), waveform=None, delta_tof_s=delta, sigma_s=None)
+    picked, found = arrived(known, tmp_path)
+    assert np.isnan(picked.differential_tof()[2, 9])
+    assert "cycle jumps: 1 pairs" in found.words(stacked=False)
+    for other in (replace(known, center_frequency_hz=None), replace(known, delta_tof_s=blob_delay(ELEMENTS))):
+        (tmp_path / PICKED).unlink(missing_ok=True)
+        kept, found = arrived(other, tmp_path)
+        np.testing.assert_array_equal(kept.delta_tof_s, other.delta_tof_s)
+        assert not (tmp_path / PICKED).exists()
+        assert found.findings == ()
+    assert found.words(stacked=False) == "nothing found"
+
+
+def test_without_a_water_shot_nothing_is_begun(tmp_path):
+    with pytest.raises(InvalidInput, match="waveform/water"):
+        arrived(replace(clean(), waveform=Waveform(clean().waveform.object)), tmp_path)
+
+
+def test_what_was_picked_before_a_death_is_not_picked_again(cluster, tmp_path, monkeypatch):
+    write_dataset(tmp_path / "scan.h5", spoilt(clean(), damaged))
+    expected = reconstruction_run.reconstruct(
+        cluster.client, tmp_path / "scan.h5", PLAN, work_dir=tmp_path / "work"
+    )
+    monkeypatch.setattr(reconstruction_run, "Arrivals", None)
+    again = reconstruction_run.reconstruct(
+        cluster.client, tmp_path / "scan.h5", PLAN, work_dir=tmp_path / "work"
+    )
+    np.testing.assert_array_equal(again.speed, expected.speed)
+    assert again.provenance == expected.provenance
+
+
+def test_waves_are_refined_from_channels_put_back(tmp_path, monkeypatch):
+    """As far as the problem of the first band; from there on only that counts."""
+    problems = []
+
+    def begun(dataset, settings, scan_of, drive, waves_of, samples):
+        problems.append(waves_of(SETTINGS, 0).problem(0))
+        raise reconstruction_run.Cancelled
+
+    monkeypatch.setattr(reconstruction_run, "carried_out", begun)
+    for name, by in (("clean.h5", np.array), ("wrong.h5", disordered)):
+        write_dataset(tmp_path / name, spoilt(wave_scan(), by))
+        with pytest.raises(reconstruction_run.Cancelled):
+            reconstruction_run.reconstruct(None, tmp_path / name, replace(PLAN, method="waveform"))
+    clean_one, put_right = problems
+    np.testing.assert_array_equal(put_right.wavelet, clean_one.wavelet)
+    np.testing.assert_array_equal(put_right.weight, clean_one.weight)
+    assert set(put_right.traces) == set(clean_one.traces)
+    for emitter, traces in clean_one.traces.items():
+        np.testing.assert_array_equal(put_right.traces[emitter], traces)

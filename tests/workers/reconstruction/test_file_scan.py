@@ -1,0 +1,30 @@
+"""Scans as tasks know them: a look at waves ends when the folder of its job has gone."""
+
+from __future__ import annotations
+
+import pytest
+
+from bentray_kernels.tomography.waveform.band_inversion import Model
+from bentray_kernels.tomography.waveform.waveform_chain import look_at_waves
+from bentray_kernels.wave import time_blocks
+from bentray_workers.cluster.job_cancellation import Unwanted
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.files.findings import Found, write_findings
+from bentray_workers.reconstruction.file_scan import FileWaveScan
+
+from ...kernels.tomography.waveform.scans import SETTINGS, scan
+
+
+def test_a_look_at_waves_ends_with_its_job(tmp_path, monkeypatch):
+    path, folder = tmp_path / "scan.h5", tmp_path / "job"
+    write_dataset(path, scan())
+    folder.mkdir()
+    write_findings(folder / "findings.json", Found((), examined=True, changed=False))
+    waves = FileWaveScan(path, path.stat().st_mtime_ns, SETTINGS, 0, folder / "findings.json")
+    problem = waves.problem(0)
+    water = Model(problem.water.speed + 0.0 * problem.region)
+    assert look_at_waves(waves, 0, water, 0).misfit > 0.0
+    monkeypatch.setattr(time_blocks, "STRIP", 10**5)
+    folder.rename(tmp_path / "job.ended")
+    with pytest.raises(Unwanted):
+        look_at_waves(waves, 0, water, 0)

@@ -1,0 +1,96 @@
+"""Blocks on a cluster find what the whole grid finds, and say what they cannot take."""
+
+import time
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from bentray_kernels import eikonal
+from bentray_kernels.eikonal.problem import PointSource
+from bentray_kernels.eikonal.subdomains import solve_by_blocks
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.cluster.connection import open_cluster
+from bentray_workers.reconstruction import subdomains
+
+GRIDS = st.sampled_from([((20, 17), (3, 2)), ((5, 6), (5, 3)), ((30, 4), (1, 4)), ((8, 9, 7), (2, 3, 2))])
+
+
+@given(grid=GRIDS, seed=st.integers(0, 2**32 - 1), on_node=st.booleans())
+@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_it_equals_the_whole_domain(cluster, grid, seed, on_node):
+    shape, blocks = grid
+    rng = np.random.default_rng(seed)
+    speed, spacing = rng.uniform(300.0, 5000.0, shape), 1.5e-3
+    source = rng.uniform(0.0, 1.0, len(shape)) * (np.array(shape) - 1)
+    source = spacing * (np.round(source) if on_node else source)
+    found = subdomains.solve(cluster.client, speed, spacing, source, blocks)
+    assert np.allclose(found, eikonal.solve(speed, spacing, source, "fsm"), rtol=1e-12, atol=0.0)
+    same = solve_by_blocks(PointSource.checked(speed, spacing, source), blocks)
+    assert np.array_equal(found, same)
+
+
+def test_a_file_serves_and_blocks_can_be_had_one_by_one(cluster, tmp_path):
+    speed = np.random.default_rng(1).uniform(1.0, 2.0, (12, 10, 9))
+    np.save(tmp_path / "speed.npy", speed.astype(np.float32))
+    field = subdomains.settle(cluster.client, tmp_path / "speed.npy", 1.0, (5.5, 5.0, 2.2), (2, 2, 1))
+    expected = eikonal.solve(speed.astype(np.float32), 1.0, (5.5, 5.0, 2.2), "fsm")
+    assert np.allclose(field.whole(), expected, rtol=1e-12, atol=0.0)
+    assert np.array_equal(field.block((1, 0, 0)), field.whole()[6:, :5])
+    assert field.rounds > 1
+
+
+def test_a_source_at_the_corner_of_blocks_wakes_all_of_them(cluster):
+    """Seeds that no sweep can improve must still reach the neighbours."""
+    speed = np.ones((4, 4))
+    found = subdomains.solve(cluster.client, speed, 1.0, (1.5, 1.5), (2, 2))
+    assert np.isfinite(found).all()
+    assert np.allclose(found, found.T)
+    assert found[1, 1] == pytest.approx(0.5**0.5)
+
+
+def test_a_lost_workers_blocks_are_made_again(tmp_path):
+    """What is asked of a block afterwards goes back as far as it must, to the same bits."""
+    speed = np.random.default_rng(2).uniform(1.0, 2.0, (9, 8))
+    expected = solve_by_blocks(PointSource.checked(speed, 1.0, (2.0, 2.0)), (2, 2))
+    with open_cluster(workers=2, local_directory=tmp_path, processes=False) as cluster:
+        client = cluster.client
+        field = subdomains.settle(client, speed, 1.0, (2.0, 2.0), (2, 2))
+        worker = next(iter(client.cluster.workers.values()))
+        client.sync(worker.close, nanny=False, executor_wait=False)
+        assert np.array_equal(field.whole(), expected)
+
+
+def test_nothing_is_left_on_the_cluster(cluster):
+    before = set(cluster.client.futures)
+    subdomains.solve(cluster.client, np.ones((6, 6)), 1.0, (2.0, 2.0), (2, 2))
+    # Futures that are dropped are given back by the client's own thread.
+    end = time.monotonic() + 5.0
+    while not set(cluster.client.futures) <= before and time.monotonic() < end:
+        time.sleep(0.01)
+    assert set(cluster.client.futures) <= before
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [
+        ({"speed": np.ones(5)}, "speed"),
+        ({"speed": np.where(np.arange(36).reshape(6, 6) == 35, -1.0, 1.0)}, r"-1 at node \(5, 5\)"),
+        ({"speed": np.where(np.arange(36).reshape(6, 6) == 14, np.nan, 1.0)}, r"nan at node \(2, 2\)"),
+        ({"spacing": 0.0}, "spacing"),
+        ({"source": (9.0, 1.0)}, "source"),
+        ({"blocks": (2, 7)}, "blocks"),
+    ],
+)
+def test_what_does_not_fit_is_named(cluster, changes, field):
+    asked = {"speed": np.ones((6, 6)), "spacing": 1.0, "source": (2.0, 2.0), "blocks": (2, 2), **changes}
+    with pytest.raises(InvalidInput, match=field):
+        subdomains.solve(cluster.client, **asked)
+
+
+def test_a_file_that_is_none_is_named(cluster, tmp_path):
+    (tmp_path / "speed.npy").write_bytes(b"no array")
+    for name in ("speed.npy", "nothing.npy"):
+        with pytest.raises(InvalidInput, match=name):
+            subdomains.solve(cluster.client, tmp_path / name, 1.0, (2.0, 2.0), (2, 2))

@@ -1,0 +1,127 @@
+"""Refinement by waveforms on a cluster: the same bits as in one process, progress, stopping, going on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Waveform, pick
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography import reconstruct as reconstruct_here
+from bentray_kernels.tomography.waveform.inversion_state import Image
+from bentray_workers.cluster.task_loop import Cancelled
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.reconstruction import reconstruction_run
+
+from ...kernels.tomography.waveform.scans import error, scan, water
+from ..cluster.tearing import torn_runs
+
+PLAN = Settings(method="waveform", nodes=32, sweeps=2, wave_bands=3, wave_emitters=5)
+HEIGHTS = np.array([0.0, 0.002])
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    target = tmp_path_factory.mktemp("scans") / "scan.h5"
+    write_dataset(target, scan())
+    return target
+
+
+@pytest.fixture(scope="module")
+def expected():
+    return reconstruct_here(replace(pick(scan()), waveform=scan().waveform), PLAN)
+
+
+def same(result, expected):
+    for name in ("speed", "coverage", "attenuation"):
+        assert np.array_equal(getattr(result, name), getattr(expected, name)), name
+    for name in ("history", "spacing_m", "origin_m", "settings", "trials"):
+        assert getattr(result, name) == getattr(expected, name), name
+    assert {**expected.provenance, "quality": "nothing found"} == {**result.provenance}
+
+
+def test_waves_make_the_image_of_rays_better(expected):
+    heard = replace(pick(scan()), waveform=scan().waveform)
+    rays = reconstruct_here(heard, replace(PLAN, method="auto"))
+    by_rays, by_waves = (error(Image(one.speed, one.spacing_m[0], one.origin_m)) for one in (rays, expected))
+    assert by_waves < 0.75 * by_rays
+    assert expected.settings == PLAN
+    assert expected.trials == rays.trials
+    assert expected.residuals is None
+    assert expected.provenance["waveform"].startswith(f"begun from the image of {rays.settings.rays} rays")
+    assert expected.speed.shape == expected.coverage.shape != rays.speed.shape
+    assert expected.history[: len(rays.history)] == rays.history
+    waves = expected.history[len(rays.history) :]
+    of_speed = {sweep.band_hz for sweep in waves if not sweep.of_attenuation}
+    assert of_speed == {(62500.0, 187500.0), (62500.0, 281250.0)}
+    losses = [sweep for sweep in waves if sweep.of_attenuation]
+    assert {(sweep.stage, sweep.band_hz) for sweep in losses} == {(waves[-1].stage, (187500.0, 281250.0))}
+    assert {sweep.residual_rms_s for sweep in losses} == {expected.residual_rms_s}
+    assert "attenuation (experimental), 188 to 281 kHz: misfit" in expected.provenance["waveform"]
+    # There is none, nor do the wrong parts of the speed make much of it.
+    assert 0.0 <= expected.attenuation.min() <= expected.attenuation.mean() < 0.5
+    assert min(sweep.stage for sweep in waves) > max(sweep.stage for sweep in rays.history)
+
+
+def test_cluster_and_one_process_give_the_same_bits(cluster, path, expected):
+    for client in (cluster.client, None):
+        seen = []
+        same(reconstruction_run.reconstruct(client, path, PLAN, seen.append), expected)
+        seen = [progress for progress in seen if progress.phase == reconstruction_run.RECONSTRUCTING]
+        done = [progress.done for progress in seen]
+        assert done == sorted(done)
+        assert done[-1] == seen[-1].total
+        assert len({progress.total for progress in seen}) <= 2
+        assert seen[-1].history == expected.history
+
+
+def test_a_torn_run_is_gone_on_from_to_the_same_bits(cluster, path, tmp_path, expected):
+    def go_on(tear):
+        return reconstruction_run.reconstruct(cluster.client, path, PLAN, tear, work_dir=tmp_path / "work")
+
+    # While rays are tried, in the first band that is gone through, and in the last.
+    result, reached = torn_runs(go_on, (20, 120, 60, 90))
+    assert reached == sorted(reached)
+    assert reached[-1] > 0, "something was restored"
+    same(result, expected)
+
+
+@pytest.mark.parametrize("embedded", [True, False])
+def test_stop_ends_it_among_the_waves(cluster, path, embedded):
+    seen = []
+
+    def stop():
+        return bool(seen and seen[-1].history and seen[-1].history[-1].band_hz)
+
+    with pytest.raises(Cancelled):
+        reconstruction_run.reconstruct(cluster.client if embedded else None, path, PLAN, seen.append, stop)
+    assert seen[-1].done < seen[-1].total
+
+
+def test_slices_are_refined_by_themselves(cluster, tmp_path, expected):
+    one = scan()
+    other = scan(seed=1, noise=0.05)
+    both = [np.stack([getattr(part.waveform, name) for part in (one, other)]) for name in ("object", "water")]
+    stacked = replace(one, waveform=Waveform(*both), slice_z_m=HEIGHTS)
+    write_dataset(tmp_path / "stack.h5", stacked)
+    result = reconstruction_run.reconstruct(cluster.client, tmp_path / "stack.h5", PLAN)
+    assert result.speed.shape == (*expected.speed.shape, 2)
+    assert result.spacing_m == (*expected.spacing_m, pytest.approx(0.002))
+    for k in range(2):
+        image = Image(result.speed[..., k], result.spacing_m[0], result.origin_m[:2])
+        assert error(image) < 0.6 * error(water())
+    assert {sweep.slice for sweep in result.history if sweep.band_hz} == {0, 1}
+    same(reconstruction_run.reconstruct(None, tmp_path / "stack.h5", PLAN), result)
+
+
+@pytest.mark.parametrize("embedded", [True, False])
+def test_a_scan_without_traces_of_the_water_is_refused_before_any_work(cluster, tmp_path, embedded):
+    mute = replace(pick(scan()), waveform=Waveform(scan().waveform.object))
+    write_dataset(tmp_path / "mute.h5", mute)
+    seen = []
+    with pytest.raises(InvalidInput, match="traces of object and water"):
+        reconstruction_run.reconstruct(
+            cluster.client if embedded else None, tmp_path / "mute.h5", PLAN, seen.append
+        )
+    assert not seen

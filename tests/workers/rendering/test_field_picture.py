@@ -1,0 +1,134 @@
+"""Pictures of geometry fields: every scene, material and lookup; strips; what a process keeps."""
+
+import io
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.meshes.example_surfaces import bumpy_ball, torus
+from bentray_workers.files.geometry_image import GeometryMaps, read_geometry_image, write_geometry_image
+from bentray_workers.images.png import colours_of
+from bentray_workers.rendering import field_cache, tiles
+from bentray_workers.rendering.field_cache import world_at
+from bentray_workers.rendering.field_picture import map_png, picture_png, strip_image, tasks_of
+from bentray_workers.rendering.field_settings import FieldSettings
+from bentray_workers.rendering.field_view import CHOICES, LOOKUPS, FieldView
+
+from .field_folders import field_of
+
+SIZE = {"width": 48, "height": 40}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A ring that sees itself."""
+    settings = FieldSettings(samples=10, inner_samples=6, divisions=8, image_size=65)
+    return field_of(tmp_path_factory.mktemp("field"), torus(24, 16), settings)
+
+
+def drawn(folder, **how):
+    return colours_of(picture_png(folder, FieldView(**{**SIZE, **how}))).astype(int)
+
+
+@pytest.mark.parametrize(
+    "name", [*CHOICES, "index", "share", "azimuth_deg", "elevation_deg", "zoom", "depth"]
+)
+def test_every_field_changes_the_picture(folder, name):
+    plain = {"mode": "refract", "lookup": "nearest", "eye": "nearest"}
+    numbers = {"index": 1.1, "share": 0.3, "azimuth_deg": 10, "elevation_deg": 60, "zoom": 2, "depth": 1}
+    values = CHOICES.get(name, (getattr(FieldView(), name), numbers.get(name)))
+    pictures = [drawn(folder, **{**plain, name: value}) for value in values]
+    seen = {picture.tobytes() for picture in pictures}
+    # Rays that refract walk within the ring: of the lookups only those from outside differ there.
+    assert len(seen) >= (2 if name in ("lookup", "eye") else len(values))
+
+
+def test_the_picture_has_its_size(folder):
+    assert drawn(folder, rays=2).shape == (40, 48, 3)
+
+
+@pytest.mark.parametrize("mode", CHOICES["mode"])
+@pytest.mark.parametrize("scene", CHOICES["scene"])
+def test_the_accurate_lookup_is_nearly_exact(folder, scene, mode):
+    how = {"scene": scene, "mode": mode, "azimuth_deg": -90.0}
+    off = np.abs(drawn(folder, **how, eye="accurate") - drawn(folder, **how, lookup="exact")).max(axis=2)
+    assert (off > 16).mean() < 0.03
+
+
+def test_strips_are_parts_of_the_whole(folder, cluster, monkeypatch):
+    view = FieldView(**SIZE, rays=2)
+    whole = picture_png(folder, view)
+    parts = [strip_image(folder, view, first, first + 8) for first in range(0, 40, 8)]
+    off = np.abs(np.concatenate(parts).astype(int) - colours_of(whole)).max(axis=2)
+    assert (off > 2).mean() < 0.002
+    monkeypatch.setattr(tiles, "TASK_RAYS", 8 * 48 * 4)
+    assert len(tiles.strips_of(view)) == 5
+    assert Image.open(io.BytesIO(tiles.submit(cluster.client, tasks_of(folder, view), 0).result())).size == (
+        48,
+        40,
+    )
+
+
+def test_self_reflection_alone_is_dark_around(folder):
+    dark = drawn(folder, mode="self-only")
+    assert (dark[0] < 20).all()
+    assert drawn(folder, mode="self")[0].mean() > 60
+
+
+def test_colours_of_the_mesh_are_its_texture(folder, tmp_path):
+    coloured = tmp_path / "coloured"
+    coloured.mkdir()
+    for file in folder.iterdir():
+        (coloured / file.name).write_bytes(file.read_bytes())
+    maps = read_geometry_image(coloured / "geometry-image.h5")
+    pure = np.zeros((*maps.valid.shape, 3), np.float32)
+    pure[..., 1] = 1.0
+    write_geometry_image(
+        coloured / "geometry-image.h5", GeometryMaps(maps.positions, maps.normals, maps.valid, pure)
+    )
+    middle = drawn(coloured, mode="diffuse", zoom=2.0, elevation_deg=60)[8:12, 20:28]
+    assert (middle[..., 1] > 40).all()
+    assert (middle[..., [0, 2]] == 0).all()
+
+
+def test_maps(folder):
+    positions, normals = (map_png(folder, what) for what in ("positions", "normals"))
+    assert positions != normals
+    assert Image.open(io.BytesIO(normals)).size == (65, 65)
+    with pytest.raises(InvalidInput, match="colours"):
+        map_png(folder, "colours")
+
+
+def test_a_scene_is_made_once_and_tables_are_not_copied(folder, monkeypatch):
+    monkeypatch.setattr(field_cache, "_WORLDS", field_cache.Kept(2**30))
+    monkeypatch.setattr(field_cache, "_SHAPES", field_cache.Kept(2**30))
+    view = FieldView(scene="mirror-ball")
+    world = world_at(folder, view)
+    assert world_at(folder, FieldView(scene="mirror-ball", azimuth_deg=3.0)) is world
+    other = world_at(folder, FieldView(scene="two-mirrors"))
+    assert other is not world
+    assert np.shares_memory(other.faces, world.faces)
+    assert np.shares_memory(other.inner_faces, world.inner_faces)
+    assert field_cache._WORLDS.held() >= 2 * (6 * 100) ** 2
+
+
+def test_what_does_not_fit_is_not_kept(folder, monkeypatch):
+    monkeypatch.setattr(field_cache, "_WORLDS", field_cache.Kept(10))
+    view = FieldView(scene="two-mirrors")
+    assert world_at(folder, view) is not world_at(folder, view)
+    assert field_cache._WORLDS.held() == 0
+
+
+def test_tables_of_another_surface_are_refused(folder, tmp_path):
+    other = field_of(tmp_path, bumpy_ball(300))
+    (other / "chart.h5").write_bytes((folder / "chart.h5").read_bytes())
+    with pytest.raises(InvalidInput, match="faces"):
+        picture_png(other, FieldView(**SIZE))
+
+
+def test_every_field_has_a_meaning():
+    assert all(field.metadata["description"] for field in fields(FieldView))
+    assert set(LOOKUPS) == set(CHOICES["lookup"])

@@ -1,0 +1,44 @@
+"""Settings of geometry fields: bounded, and part of the name of what they make."""
+
+from dataclasses import replace
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.rendering.field_settings import MOST_FACES, FieldSettings, check_faces
+
+OTHER = {"samples": 12, "inner_samples": 8, "divisions": 4, "image_size": 129, "image_threshold": 1e-3}
+
+
+def test_every_setting_and_the_mesh_name_the_field():
+    plain = FieldSettings()
+    assert set(OTHER) == set(plain.plain())
+    names = {replace(plain, **{name: value}).content("a") for name, value in OTHER.items()}
+    names |= {plain.content("a"), plain.content("b")}
+    assert len(names) == len(OTHER) + 2
+    assert FieldSettings().content("a") == plain.content("a")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("samples", 3),
+        ("samples", 49),
+        ("inner_samples", 0),
+        ("divisions", 65),
+        ("image_size", 32),
+        ("image_size", 1026),
+        ("image_threshold", float("nan")),
+        ("image_threshold", -1.0),
+    ],
+)
+def test_what_is_refused(name, value):
+    with pytest.raises(InvalidInput) as caught:
+        FieldSettings(**{name: value})
+    assert caught.value.field == name
+
+
+def test_a_mesh_that_is_too_large():
+    check_faces(MOST_FACES)
+    with pytest.raises(InvalidInput, match="mesh"):
+        check_faces(MOST_FACES + 1)

@@ -1,0 +1,36 @@
+"""Views of geometry fields: bounded, each field checked."""
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.geometry_field.tracing.lookup_scene import WAYS
+from bentray_kernels.ranges import ranges_of
+from bentray_workers.rendering.field_view import CHOICES, LOOKUPS, FieldView
+
+WITHIN = {name: (within.least, within.most) for name, within in ranges_of(FieldView).items()}
+
+
+def test_every_field_is_checked():
+    assert set(CHOICES) | set(WITHIN) == set(FieldView().plain())
+    assert set(LOOKUPS.values()) <= set(WAYS)
+
+
+@pytest.mark.parametrize("name", CHOICES)
+def test_other_words_are_refused(name):
+    with pytest.raises(InvalidInput) as caught:
+        FieldView(**{name: "other"})
+    assert caught.value.field == name
+    assert all(choice in caught.value.accepted for choice in CHOICES[name])
+
+
+@pytest.mark.parametrize(("name", "bounds"), WITHIN.items())
+def test_numbers_out_of_range_are_refused(name, bounds):
+    for value in (bounds[0] - 1, bounds[1] + 1, float("nan")):
+        with pytest.raises(InvalidInput) as caught:
+            FieldView(**{name: value})
+        assert caught.value.field == name
+
+
+def test_too_many_rays():
+    with pytest.raises(InvalidInput, match="rays"):
+        FieldView(width=4096, height=4096, rays=2)

@@ -1,0 +1,164 @@
+"""Geometry fields by tasks: as the kernels make them, stopped, gone on from, and made once a content."""
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.geometry_field.tables.inner_field import build_inner_rows, inner_field, spread_points
+from bentray_kernels.geometry_field.tables.outer_field import build_rows, outer_field
+from bentray_kernels.meshes.example_surfaces import bumpy_ball, torus
+from bentray_kernels.meshes.surface import surface_of
+from bentray_workers.cluster.fair_shares import alone
+from bentray_workers.cluster.task_loop import Cancelled
+from bentray_workers.cluster.task_pool import ClusterTasks, ThreadTasks
+from bentray_workers.files.geometry_field_folder import FieldFiles, mapped, read_chart
+from bentray_workers.rendering import field_tasks, geometry_field
+from bentray_workers.rendering.field_settings import FieldSettings
+from bentray_workers.rendering.geometry_field import build, bytes_of
+
+from .field_folders import SMALL, stored
+
+
+def nothing():
+    """Told of something that does not matter here."""
+
+
+@pytest.fixture(params=["cluster", "threads"])
+def tasks(request, cluster):
+    if request.param == "threads":
+        return ThreadTasks()
+    return ClusterTasks(cluster.client, 0, alone(cluster.client, "render"))
+
+
+@pytest.fixture
+def path(tmp_path):
+    (tmp_path / "work").mkdir()
+    return stored(tmp_path, torus(16, 10))
+
+
+@pytest.fixture
+def small_batches(monkeypatch):
+    """Seven and more tasks for each table."""
+    monkeypatch.setattr(geometry_field, "TASK_RAYS", 32 * 6 * 6**2)
+
+
+def made(tasks, path, tmp_path, name="field", told=None, stop=lambda: False, settings=SMALL):
+    """Build into a folder of that name."""
+    report = (lambda progress: None) if told is None else told.append
+    return build(tasks, path, settings, tmp_path / name, tmp_path / "work", report, nothing, stop)
+
+
+def test_the_tables_are_those_of_the_kernels(tasks, path, tmp_path, small_batches):
+    told = []
+    figures = made(tasks, path, tmp_path, told=told)
+    files = FieldFiles(tmp_path / "field")
+    surface = surface_of(read_chart(files.chart))
+    outer = outer_field(6, [build_rows(surface, 6, 0, 216)])
+    points, starts = spread_points(surface, 4)
+    inner = inner_field(4, starts, [build_inner_rows(surface, 4, points)])
+    assert (outer.faces >= 0).mean() > 0.01
+    np.testing.assert_array_equal(mapped(files.outer[0]), outer.faces)
+    np.testing.assert_array_equal(mapped(files.outer[1]), outer.fractions)
+    np.testing.assert_array_equal(mapped(files.inner), inner.faces)
+    np.testing.assert_array_equal(mapped(files.starts), inner.starts)
+    assert figures["outer_tasks"] == 7
+    assert (figures["faces"], figures["points"]) == (320, len(points))
+    assert 0.0 < figures["image_rms"] < 0.05
+    assert figures["lookup_median"] < 1e-6
+    assert figures["lookup_wrong"] < 0.1
+    assert min(figures[f"{part}_seconds"] for part in ("outer", "inner", "image")) > 0.0
+    assert bytes_of(tmp_path / "field") > figures["outer_bytes"] + figures["inner_bytes"]
+    total = 2 + figures["outer_tasks"] + figures["inner_tasks"]
+    assert [(one.done, one.total) for one in told] == [(0, 0), *((k, total) for k in range(1, total + 1))]
+
+
+def test_a_torn_job_is_gone_on_from(tasks, path, tmp_path, small_batches):
+    told = []
+    with pytest.raises(Cancelled):
+        made(tasks, path, tmp_path, told=told, stop=lambda: len(told) > 4)
+    assert not (tmp_path / "field").exists()
+    done = {mark.name: mark.stat().st_mtime_ns for mark in (tmp_path / "work" / "done").glob("*.json")}
+    assert len(done) >= 2
+    # As a crash leaves it: rows that were begun and not told to be done.
+    torn = next(iter(done))
+    (tmp_path / "work" / "done" / torn).unlink()
+    table = FieldFiles(tmp_path / "work" / "field").outer[0 if torn.startswith("outer") else 1]
+    first = int(torn[6:11])
+    mapped(table, "r+")[first : first + 5] = 77
+    layout = FieldFiles(tmp_path / "work" / "field").layout.stat().st_mtime_ns
+    again = []
+    made(tasks, path, tmp_path, told=again)
+    # The layout in place of the torn batch; what was in flight at the stop may have ended since.
+    assert again[0].done >= len(done)
+    assert FieldFiles(tmp_path / "field").layout.stat().st_mtime_ns == layout
+    kept = {mark.name: mark.stat().st_mtime_ns for mark in (tmp_path / "work" / "done").glob("*.json")}
+    assert all(kept[name] == when for name, when in done.items() if name != torn)
+    (tmp_path / "other").mkdir()
+    build(
+        tasks, path, SMALL, tmp_path / "whole", tmp_path / "other", lambda told: None, nothing, lambda: False
+    )
+    for name in ("outer-faces.npy", "outer-fractions.npy", "inner-faces.npy"):
+        assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "field" / name).read_bytes()
+
+
+def test_a_death_after_the_borders_were_marked(path, tmp_path, monkeypatch):
+    tasks = ThreadTasks()
+    whole = made(tasks, path, tmp_path, "whole")
+    (tmp_path / "whole").rename(tmp_path / "work" / "field")
+    FieldFiles(tmp_path / "work" / "field").figures.unlink()
+    before = FieldFiles(tmp_path / "work" / "field").outer[0].read_bytes()
+    again = made(tasks, path, tmp_path, "again")
+    assert FieldFiles(tmp_path / "again").outer[0].read_bytes() == before
+    assert again["lookup_wrong"] == whole["lookup_wrong"]
+
+
+def test_what_is_there_is_taken(path, tmp_path):
+    first = made(ThreadTasks(), path, tmp_path)
+
+    class NoTasks:
+        window = 1
+
+        def submit(self, *given):
+            raise AssertionError("nothing is to be done")
+
+    told = []
+    assert made(NoTasks(), path, tmp_path, told=told) == first
+    assert told[-1].done == told[-1].total
+
+
+def test_two_at_once_make_one(path, tmp_path):
+    made(ThreadTasks(), path, tmp_path)
+    before = FieldFiles(tmp_path / "field").figures.read_bytes()
+    geometry_field._move(FieldFiles(tmp_path / "field").folder, tmp_path / "field")
+    (tmp_path / "late").mkdir()
+    (tmp_path / "late" / "figures.json").write_text("late")
+    geometry_field._move(tmp_path / "late", tmp_path / "field")
+    assert FieldFiles(tmp_path / "field").figures.read_bytes() == before
+
+
+def test_a_threshold_halves_the_image(path, tmp_path):
+    settings = FieldSettings(samples=4, inner_samples=4, divisions=2, image_size=129, image_threshold=1e-3)
+    assert made(ThreadTasks(), path, tmp_path, settings=settings)["image_rms"] < 1e-3
+    coarser = FieldSettings(samples=4, inner_samples=4, divisions=2, image_size=129, image_threshold=0.02)
+    figures = made(ThreadTasks(), path, tmp_path, "coarser", settings=coarser)
+    assert (figures["image_pixels"], figures["image_rms"] > 1e-3) == (33, True)
+
+
+def test_what_is_refused(path, tmp_path, monkeypatch):
+    settings = FieldSettings(samples=4, inner_samples=4, image_size=33, image_threshold=1e-9)
+    with pytest.raises(InvalidInput, match="threshold"):
+        made(ThreadTasks(), path, tmp_path, settings=settings)
+    monkeypatch.setattr(field_tasks, "MOST_INNER", 100)
+    with pytest.raises(InvalidInput, match="fewer divisions"):
+        made(ThreadTasks(), path, tmp_path)
+    assert not (tmp_path / "field").exists()
+
+
+def test_an_open_surface(tmp_path):
+    (tmp_path / "work").mkdir()
+    whole = bumpy_ball(500)
+    keep = whole.corners.mean(axis=1)[:, 2] < 0.5
+    path = stored(tmp_path, type(whole)(whole.vertices, whole.faces[keep]))
+    figures = made(ThreadTasks(), path, tmp_path)
+    assert figures["faces"] == keep.sum()
+    assert figures["lookup_median"] < 1e-6

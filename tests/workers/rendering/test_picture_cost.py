@@ -1,0 +1,161 @@
+"""What pictures are thought to take: never less memory than measured, and refusals that name what fits."""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.request_fields import MOST_PIXELS
+from bentray_workers.cluster.capacities import Offer
+from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.files.volume_export import export_volume
+from bentray_workers.images.drawing_tasks import volume_slice_png
+from bentray_workers.rendering import picture_cost
+from bentray_workers.rendering.field_view import FieldView
+from bentray_workers.rendering.picture_cost import (
+    Cost,
+    Stored,
+    check_memory,
+    field_cost,
+    placed,
+    refraction_cost,
+)
+from bentray_workers.rendering.refraction import strip_image
+from bentray_workers.rendering.refraction_view import RefractionView
+
+GIB = 2**30
+LANES = ("recon", "render")
+
+
+def test_a_large_picture_of_smooth_glass_is_taken_and_a_deep_one_refused():
+    stored = Stored((128, 128, 128), 6)
+    large = RefractionView(width=MOST_PIXELS, height=MOST_PIXELS)
+    assert refraction_cost(stored, large).seconds < picture_cost.MOST_SECONDS + 1.0
+    with pytest.raises(InvalidInput, match=r"width, height, depth: .* or submit a job of kind `refraction`"):
+        refraction_cost(stored, RefractionView(width=MOST_PIXELS, height=MOST_PIXELS, depth=256))
+    # What is named as the largest is taken.
+    with pytest.raises(InvalidInput) as refused:
+        refraction_cost(stored, RefractionView(width=4000, height=2000, depth=200))
+    width, height = (
+        int(part.split()[-1]) for part in refused.value.accepted.split(" pixels")[0].split(" x ")
+    )
+    assert width / height == pytest.approx(2.0, rel=0.01)
+    refraction_cost(stored, RefractionView(width=width, height=height, depth=200))
+
+
+def test_the_page_may_draw_a_field_and_the_largest_picture_of_few_surfaces():
+    page = field_cost({}, FieldView(width=512, height=512, rays=2))
+    assert page.seconds < 5.0
+    assert (
+        field_cost({}, FieldView(width=MOST_PIXELS, height=MOST_PIXELS)).seconds < picture_cost.MOST_SECONDS
+    )
+    with pytest.raises(InvalidInput, match=r"width, height, rays, depth: .* or a smaller depth"):
+        field_cost({}, FieldView(width=MOST_PIXELS, height=MOST_PIXELS, depth=64))
+
+
+def test_it_grows_with_whatever_takes_longer():
+    stored, view = Stored((64, 64, 64), 6), RefractionView
+    usual = refraction_cost(stored, view()).seconds
+    for more in (
+        view(width=1024),
+        view(depth=64),
+        view(supersampling="real", degree=2),
+        view(filter="bspline6"),
+    ):
+        assert refraction_cost(stored, more).seconds > usual
+    assert refraction_cost(stored, view(mode="shaded")).seconds < usual
+
+
+def test_what_no_worker_can_hold_is_refused_with_both_numbers():
+    offers = [Offer(GIB, LANES), Offer(2 * GIB, LANES)]
+    room = math.floor(offers[1].task_bytes)
+    check_memory("volume", "it", Cost(1.0, room), offers)
+    with pytest.raises(
+        InvalidInput, match=rf"volume: found it, which takes {room + 1} bytes .* {room} bytes"
+    ):
+        check_memory("volume", "it", Cost(1.0, room + 1), offers)
+    check_memory("volume", "it", Cost(1.0, 2**60), [])
+    check_memory("volume", "it", Cost(1.0, 2**60), [Offer(0, LANES)])
+
+
+def test_where_pictures_of_a_turntable_may_be_drawn():
+    workers = {"small": Offer(GIB, LANES), "large": Offer(8 * GIB, LANES)}
+    assert placed(2**20, workers) == {"resources": {"render": 1}}
+    assert placed(GIB, workers) == {"resources": {"render": 1, "recon": 1}, "workers": ["large"]}
+    assert placed(GIB, {"any": Offer(0, LANES)}) == {"resources": {"render": 1}}
+
+
+def taken(work, *given) -> int:
+    """Bytes that a call takes beyond those of a process that has made a small one, in a new process."""
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        return int(pool.apply(_peak, (work, given)))
+
+
+def _peak(work, given) -> int:
+    small, *rest = given
+    _call(work, *small)
+    Path("/proc/self/clear_refs").write_text("5")
+    before = _high_water()
+    _call(work, *rest)
+    return _high_water() - before
+
+
+def _call(work, *given) -> None:
+    positional = [one for one in given if not isinstance(one, dict)]
+    work(
+        *positional, **{name: value for one in given if isinstance(one, dict) for name, value in one.items()}
+    )
+
+
+def _high_water() -> int:
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM"))
+
+
+@pytest.fixture(scope="module")
+def volumes(tmp_path_factory):
+    """A small volume and a large one of 200³ float32."""
+    folder = tmp_path_factory.mktemp("volumes")
+    for name, n in (("small", 8), ("large", 200)):
+        x = np.linspace(-1.0, 1.0, n, dtype=np.float32)
+        ball = x[:, None, None] ** 2 + x[None, :, None] ** 2 + x[None, None, :] ** 2
+        write_volume(folder / f"{name}.h5", Volume.of(ball, (1e-3,) * 3))
+    return folder
+
+
+LARGE = Stored((200, 200, 200), 6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bspline3", "trilinear"])
+def test_a_strip_takes_no_more_memory_than_planned(volumes, name):
+    small = RefractionView(iso=(0.9,), filter=name, width=8, height=8)
+    view = RefractionView(iso=(0.9,), filter=name, width=4096, height=4096)
+    measured = taken(
+        strip_image, (volumes / "small.h5", small, 0, 8), volumes / "large.h5", view, 1024, 1024 + 128
+    )
+    planned = picture_cost.refraction_bytes((200, 200, 200), view)
+    assert planned / 2 < measured < planned
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "how", [{}, {"size": 4096, "frame": False}, {"size": 4096, "interpolation": "cubic"}]
+)
+def test_a_slice_takes_no_more_memory_than_planned(volumes, how):
+    measured = taken(volume_slice_png, (volumes / "small.h5",), volumes / "large.h5", how)
+    assert measured < picture_cost.slice_cost(LARGE, how.get("size")).bytes
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["npy", "nifti", "metaimage", "mat"])
+def test_an_export_takes_no_more_memory_than_planned(volumes, tmp_path, name):
+    small = {"target": tmp_path / "small", "name": name}
+    large = {"target": tmp_path / "large", "name": name}
+    measured = taken(export_volume, (volumes / "small.h5", small), volumes / "large.h5", large)
+    assert measured < picture_cost.export_cost(LARGE).bytes

@@ -1,0 +1,165 @@
+"""Pictures through volumes: straight where nothing refracts, the same in strips and on a cluster."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.phantoms import ONE_HOLE, FringeSphere, sampled
+from bentray_workers.cluster.resources import RECONSTRUCTION
+from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.images.png import colours_of
+from bentray_workers.rendering import refraction, tiles
+from bentray_workers.rendering.refraction import frame_of, picture_png, strip, strip_image
+from bentray_workers.rendering.refraction_view import RefractionView
+from bentray_workers.rendering.scene_cache import scene_at
+from bentray_workers.rendering.tiles import joined_png, strips_of
+
+SMALL = RefractionView(iso=(0.5,), width=48, height=32)
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    path = tmp_path_factory.mktemp("ball") / "v.h5"
+    write_volume(path, Volume.of(sampled(ONE_HOLE, 24), (1e-3,) * 3))
+    return path
+
+
+def whole(path, view, card=None):
+    return strip(scene_at(path, view), view, 0, view.height, card)
+
+
+@pytest.mark.parametrize("camera", ["orthographic", "perspective"])
+@pytest.mark.parametrize(("azimuth", "elevation"), [(0, 0), (200, -35), (10, 90), (10, -90)])
+def test_without_refraction_the_backdrop_is_seen_straight(path, camera, azimuth, elevation):
+    view = replace(SMALL, index=(1.0,), camera=camera, azimuth_deg=azimuth, elevation_deg=elevation)
+    found = whole(path, replace(view, supersampling="none")).position_m
+    # The shorter side shows 1.25 times the longest side of the volume; a perspective shows more farther away.
+    side = 1.25 * 0.023
+    if camera == "perspective":
+        side *= 1.0 + view.backdrop_distance / refraction.EYE_DISTANCE
+    pixel = side / 32
+    np.testing.assert_allclose(found[..., 0], np.tile((np.arange(48) - 23.5) * pixel, (32, 1)), atol=1e-9)
+    np.testing.assert_allclose(found[..., 1], np.tile((np.arange(32) - 15.5) * pixel, (48, 1)).T, atol=1e-9)
+
+
+def test_a_ball_of_glass_bends_as_snell_says(tmp_path):
+    """Rays parallel to its axis, 0.5 of its radius and less from it: in closed form."""
+    ball, index, edge = FringeSphere(0.4, 0.3), 1.5, 0.5 * 0.031
+    write_volume(tmp_path / "v.h5", Volume.of(sampled(ball, 32), (1e-3,) * 3))
+    view = replace(SMALL, height=48, index=(index,), supersampling="none", backdrop_distance=0.7)
+    found = whole(tmp_path / "v.h5", view).position_m[23, :, 0]
+    radius, screen = ball.iso_radius(0.5) * edge, 0.7 * 2.0 * edge * np.sqrt(3.0)
+    offset = (np.arange(48) - 23.5) / 48 * 1.25 * 2.0 * edge
+    # The row lies half a pixel beside the axis.
+    apart = np.hypot(offset, offset[24])
+    near = apart < 0.5 * radius
+    incidence, within = np.arcsin(apart[near] / radius), np.arcsin(apart[near] / radius / index)
+    leaves = incidence + np.pi - 2.0 * within
+    behind = screen + radius * np.cos(leaves)
+    expected = radius * np.sin(leaves) - behind * np.tan(2.0 * (incidence - within))
+    np.testing.assert_allclose(found[near], expected * offset[near] / apart[near], atol=0.005 * edge)
+    assert near.sum() > 8
+    assert np.sign(found[near]).tolist() == (-np.sign(offset[near])).tolist()
+
+
+def test_rays_that_meet_more_surfaces_than_allowed_show_dark_grey(path):
+    """As the description of ``depth`` says."""
+    image = whole(path, replace(SMALL, depth=1)).image
+    assert (image[14:18, 22:26] == refraction.BEYOND).all()
+    assert (whole(path, SMALL).image[14:18, 22:26] != refraction.BEYOND).any()
+
+
+def test_the_frame_is_right_handed_with_z_up():
+    ahead, right, down = frame_of(RefractionView(azimuth_deg=0.0, elevation_deg=0.0))
+    np.testing.assert_allclose(ahead, [-1.0, 0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(right, [0.0, 1.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(down, [0.0, 0.0, -1.0], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"supersampling": "none"},
+        {"supersampling": "prss"},
+        {"supersampling": "prss", "degree": 3, "backdrop": "picture", "camera": "perspective"},
+        {"mode": "shaded"},
+    ],
+    ids=str,
+)
+def test_strips_make_the_whole(path, how):
+    view = replace(SMALL, **how)
+    image = whole(path, view).image
+    parts = [strip_image(path, view, first, min(first + 7, 32)) for first in range(0, 32, 7)]
+    joined = colours_of(joined_png(parts))
+    assert joined.shape == (32, 48, 3)
+    # The same rays but for the last digit, which may move a pixel over the border of a square.
+    assert (joined != image).any(axis=-1).mean() < 0.005
+    np.testing.assert_array_equal(colours_of(picture_png(path, view)), image)
+
+
+def test_real_supersampling_smooths(path):
+    view = replace(SMALL, supersampling="real", degree=4)
+    levels = len(np.unique(whole(path, view).image))
+    assert levels > 8 > len(np.unique(whole(path, replace(view, supersampling="none")).image))
+    lit = replace(view, mode="shaded")
+    edges = len(np.unique(whole(path, lit).image.reshape(-1, 3), axis=0))
+    assert edges > len(
+        np.unique(whole(path, replace(lit, supersampling="none")).image.reshape(-1, 3), axis=0)
+    )
+
+
+def test_a_picture_of_ones_own(path):
+    card = np.zeros((4, 8, 3), dtype=np.uint8)
+    card[:, :4] = (200, 0, 0)
+    view = replace(SMALL, index=(1.0,), backdrop="picture", supersampling="none")
+    image = whole(path, view, card).image
+    assert image[16, 12].tolist() == [200, 0, 0]
+    assert image[16, 36].tolist() == [0, 0, 0]
+    assert (whole(path, view).image[:, :, 2] > 0).mean() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("view", "rows"),
+    [
+        (RefractionView(), [512]),
+        (RefractionView(width=4096, height=4096), [128] * 32),
+        (RefractionView(width=1000, height=1000, supersampling="real", degree=4), [32] * 31 + [8]),
+        (RefractionView(width=4096, height=10, supersampling="real", degree=8), [2] * 5),
+    ],
+)
+def test_a_task_has_about_a_second_of_work(view, rows):
+    assert [last - first for first, last in strips_of(view)] == rows
+    assert strips_of(view)[-1][1] == view.height
+
+
+@pytest.mark.parametrize("rays", [2**19, 200])
+def test_on_a_cluster(cluster, path, rays, monkeypatch):
+    monkeypatch.setattr(tiles, "TASK_RAYS", rays)
+    png = tiles.submit(cluster.client, refraction.tasks_of(path, SMALL), 0).result(timeout=60)
+    image = whole(path, SMALL).image
+    assert (colours_of(png) != image).any(axis=-1).mean() < 0.005
+
+
+def test_a_picture_does_not_wait_for_reconstructions(cluster, path):
+    picture_png(path, SMALL)
+    busy = [
+        cluster.client.submit(time.sleep, 2.0, pure=False, resources=RECONSTRUCTION, priority=0)
+        for _ in range(8)
+    ]
+    started = time.monotonic()
+    tiles.submit(cluster.client, refraction.tasks_of(path, SMALL), 10).result(timeout=60)
+    waited, left = time.monotonic() - started, [future.done() for future in busy]
+    for future in busy:
+        future.cancel()
+    assert waited < 2.0
+    assert not any(left)
+
+
+def test_what_the_worker_refuses_arrives_in_words(cluster, path):
+    with pytest.raises(InvalidInput, match="the range of the volume"):
+        tiles.submit(cluster.client, refraction.tasks_of(path, replace(SMALL, iso=(9.0,))), 0).result(
+            timeout=60
+        )

@@ -1,0 +1,141 @@
+"""Kept scenes: made once, made anew when file or filter change, never more than there is room for."""
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.phantoms import ONE_HOLE, sampled
+from bentray_kernels.splines import Spline
+from bentray_workers.cluster.memory_cache import Kept
+from bentray_workers.files.reconstruction import write_reconstruction
+from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.rendering import scene_cache
+from bentray_workers.rendering.refraction_view import RefractionView
+from bentray_workers.rendering.scene_cache import check_size, scene_at, stored_shape
+
+from ..files.reconstructions import made
+
+BALL = sampled(ONE_HOLE, 12)
+
+
+@pytest.fixture
+def path(tmp_path):
+    write_volume(tmp_path / "v.h5", Volume.of(BALL, (1e-3, 1e-3, 2e-3)))
+    return tmp_path / "v.h5"
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 60)), max_size=60))
+def test_there_is_never_more_than_fits(asked):
+    kept, made_of = Kept(100), {}
+    for key, size in asked:
+        size = made_of.setdefault(key, size)
+        assert kept.get(key, size, lambda key=key: key) == key
+        assert kept.held() <= 100
+
+
+def test_the_least_lately_used_goes_first():
+    kept, made_now = Kept(100), []
+
+    def get(key, size):
+        return kept.get(key, size, lambda: made_now.append(key) or key)
+
+    for key in ("a", "b", "a", "c", "a", "b"):
+        get(key, 40)
+    assert made_now == ["a", "b", "c", "b"]
+    get("huge", 101)
+    get("huge", 101)
+    assert made_now[-2:] == ["huge", "huge"]
+
+
+def test_what_fails_is_not_kept():
+    kept = Kept(10)
+    with pytest.raises(ZeroDivisionError):
+        kept.get("a", 1, lambda: 1 / 0)
+    assert kept.get("a", 1, lambda: 5) == 5
+
+
+def test_a_scene_has_the_middle_of_its_volume_at_0(path):
+    scene = scene_at(path, RefractionView())
+    np.testing.assert_allclose(scene.origin, -0.5 * 11 * np.array([1e-3, 1e-3, 2e-3]))
+    assert scene.layers.isos[0] == pytest.approx(0.5 * (BALL.min() + BALL.max()))
+
+
+def test_the_default_surface_of_a_smoothed_volume_lies_within_it(tmp_path):
+    """A small cube loses more than half of its height, and the middle of the stored range is above all."""
+    cube = np.zeros((32, 32, 32), np.uint8)
+    cube[12:20, 12:20, 12:20] = 255
+    write_volume(tmp_path / "cube.h5", Volume.of(cube, (1e-3,) * 3))
+    scene = scene_at(tmp_path / "cube.h5", RefractionView(smoothing=100.0))
+    nodes = Spline(cube, smoothing=100.0).value(np.argwhere(np.ones(cube.shape)))
+    assert nodes.max() < 127.5
+    assert scene.layers.isos[0] == pytest.approx(0.5 * (nodes.min() + nodes.max()))
+    with pytest.raises(InvalidInput, match=r"iso: found 127\.5; .*, the range of the volume after smoothing"):
+        scene_at(tmp_path / "cube.h5", RefractionView(iso=(127.5,), smoothing=100.0))
+
+
+def test_another_glass_shares_the_octree(path):
+    one, two = (scene_at(path, RefractionView(iso=(0.4,), index=(n,))) for n in (1.3, 1.5))
+    assert one.octree is two.octree
+    assert (one.layers.indices, two.layers.indices) == ((1.0, 1.3), (1.0, 1.5))
+    other = scene_at(path, RefractionView(iso=(0.6,)))
+    assert other.octree is not one.octree
+    assert other.field.coefficients is one.field.coefficients
+    assert scene_at(path, RefractionView(iso=(0.4,), filter="trilinear")).field is not one.field
+
+
+def test_other_surroundings_are_another_scene(path):
+    air, glass = (scene_at(path, RefractionView(iso=(0.4,), surroundings=n)) for n in (0, 1))
+    assert (air.layers.surroundings, glass.layers.surroundings) == (0, 1)
+    assert glass.open
+    assert not air.open
+
+
+def test_a_new_file_is_read_anew(path):
+    before = scene_at(path, RefractionView(iso=(0.4,)))
+    write_volume(path, Volume.of(0.9 * BALL, (1e-3,) * 3))
+    os.utime(path, ns=(1, 1))
+    after = scene_at(path, RefractionView(iso=(0.4,)))
+    np.testing.assert_allclose(
+        after.field.coefficients, 0.9 * before.field.coefficients, rtol=1e-5, atol=1e-6
+    )
+
+
+def test_a_reconstruction_is_a_volume(tmp_path):
+    write_reconstruction(tmp_path / "r.h5", replace(made(8, 4), spacing_m=(2e-3, 2e-3, 3e-3)))
+    assert stored_shape(tmp_path / "r.h5") == (8, 8, 4)
+    assert scene_at(tmp_path / "r.h5", RefractionView()).spacing.tolist() == [2e-3, 2e-3, 3e-3]
+
+
+def test_a_volume_that_no_worker_can_hold_is_refused_before_it_is_read(path, monkeypatch):
+    check_size((512, 512, 512))
+    with pytest.raises(InvalidInput, match=r"shape \(1024, 1024, 1024\)"):
+        check_size((1024, 1024, 1024))
+    monkeypatch.setattr(scene_cache, "MOST_BUILDING_BYTES", 1000)
+    monkeypatch.setattr(scene_cache, "import_volume", None)
+    with pytest.raises(InvalidInput, match="1000 bytes"):
+        scene_at(path, RefractionView())
+
+
+def test_the_figures_for_memory_are_no_less_than_what_is_used():
+    """Of numpy's own arrays, which are nearly all there is."""
+    import tracemalloc
+
+    volume = Volume.of(sampled(ONE_HOLE, 64), (1e-3,) * 3)
+    filtered = scene_cache.filtered_of(volume, "bspline3", 0.0)
+    scene_cache.build(filtered, RefractionView(iso=(0.5,)).layers())
+    tracemalloc.start()
+    filtered = scene_cache.filtered_of(volume, "bspline3", 0.0)
+    spline = tracemalloc.get_traced_memory()[0]
+    scene = scene_cache.build(filtered, RefractionView(iso=(0.5,)).layers())
+    kept, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert scene.layers.isos == (0.5,)
+    shape = volume.values.shape
+    assert spline <= scene_cache.needed_bytes(shape, scene_cache.SPLINE_BYTES)
+    assert kept <= scene_cache.needed_bytes(shape, scene_cache.SCENE_BYTES)
+    assert peak <= scene_cache.needed_bytes(shape, scene_cache.BUILDING_BYTES)

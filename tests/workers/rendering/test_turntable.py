@@ -1,0 +1,120 @@
+"""Turntables: every picture once, from all sides, in one file; stopped in between."""
+
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.phantoms import TWO_HOLES, sampled
+from bentray_workers.cluster.task_loop import Cancelled
+from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.images.png import colours_of
+from bentray_workers.rendering.refraction import picture_png
+from bentray_workers.rendering.refraction_view import RefractionView
+from bentray_workers.rendering.turntable import Turntable, turn
+
+SMALL = {"iso": (0.5,), "width": 32, "height": 24}
+
+
+def nothing():
+    """Told of something that does not matter here."""
+
+
+@pytest.fixture
+def path(tmp_path):
+    write_volume(tmp_path / "v.h5", Volume.of(sampled(TWO_HOLES, 12), (1e-3,) * 3))
+    return tmp_path / "v.h5"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "work").mkdir()
+    return tmp_path / "work"
+
+
+def test_frames_go_round():
+    table = Turntable(azimuth_deg=350.0, frames=4, zoom=2.0)
+    views = [table.frame(k) for k in range(4)]
+    assert [view.azimuth_deg for view in views] == [350.0, 80.0, 170.0, 260.0]
+    assert type(views[0]) is RefractionView
+    assert {view.zoom for view in views} == {2.0}
+    assert Turntable(azimuth_deg=10.0, turn_deg=-40.0, frames=2).frame(1).azimuth_deg == 350.0
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"frames": 0}, "frames"),
+        ({"frames": 721}, "frames"),
+        ({"frames": 720, "width": 1024}, "frames"),
+        ({"turn_deg": float("nan")}, "turn_deg"),
+        ({"turn_deg": 1e9}, "turn_deg"),
+        ({"format": "gif"}, "format"),
+        ({"zoom": 0.0}, "zoom"),
+    ],
+)
+def test_what_is_refused(given, field):
+    with pytest.raises(InvalidInput) as caught:
+        Turntable(**given)
+    assert caught.value.field == field
+
+
+def test_a_zip_holds_each_picture(cluster, path, folder, tmp_path):
+    table, told = Turntable(**SMALL, frames=3, turn_deg=90.0), []
+    turn(cluster.client, path, table, tmp_path / "t.zip", folder, told.append, nothing, lambda: False)
+    with zipfile.ZipFile(tmp_path / "t.zip") as archive:
+        assert archive.namelist() == ["0000.png", "0001.png", "0002.png"]
+        pictures = [archive.read(name) for name in archive.namelist()]
+    assert pictures == [picture_png(path, table.frame(k)) for k in range(3)]
+    assert len(set(pictures)) == 3
+    assert [(one.done, one.total) for one in told] == [(0, 3), (1, 3), (2, 3), (3, 3)]
+    # As a service that died half-way leaves it: one picture missing, the others not drawn again.
+    (folder / "0000.png").unlink()
+    before = {frame.name: frame.stat().st_mtime_ns for frame in folder.iterdir()}
+    turn(cluster.client, path, table, tmp_path / "u.zip", folder, told.append, nothing, lambda: False)
+    assert [(one.done, one.total) for one in told[4:]] == [(2, 3), (3, 3)]
+    assert before.items() <= {frame.name: frame.stat().st_mtime_ns for frame in folder.iterdir()}.items()
+    assert (tmp_path / "u.zip").read_bytes() == (tmp_path / "t.zip").read_bytes()
+
+
+def test_an_apng_shows_each_picture(cluster, path, folder, tmp_path):
+    table = Turntable(**SMALL, frames=3, turn_deg=90.0, format="apng")
+    turn(cluster.client, path, table, tmp_path / "t.apng", folder, lambda told: None, nothing, lambda: False)
+    control = (tmp_path / "t.apng").read_bytes().partition(b"acTL")[2]
+    assert struct.unpack(">II", control[:8]) == (3, 0), "three pictures, without end"
+    with Image.open(tmp_path / "t.apng") as found:
+        assert (found.format, found.n_frames) == ("PNG", 3)
+        for k in range(3):
+            found.seek(k)
+            expected = colours_of(picture_png(path, table.frame(k)))
+            np.testing.assert_array_equal(np.asarray(found.convert("RGB")), expected)
+            assert found.info["duration"] == 80
+
+
+def test_it_stops_between_pictures(cluster, path, folder, tmp_path):
+    told = []
+    with pytest.raises(Cancelled):
+        turn(
+            cluster.client,
+            path,
+            Turntable(**SMALL, frames=200),
+            tmp_path / "t.zip",
+            folder,
+            told.append,
+            nothing,
+            lambda: len(told) > 2,
+        )
+    assert told[-1].done < 200
+    assert not list(tmp_path.glob("t.zip*"))
+
+
+def test_what_a_worker_refuses_ends_it(cluster, path, folder, tmp_path):
+    table = Turntable(**{**SMALL, "iso": (9.0,)}, frames=3)
+    with pytest.raises(InvalidInput, match="the range of the volume"):
+        turn(
+            cluster.client, path, table, tmp_path / "t.zip", folder, lambda told: None, nothing, lambda: False
+        )
+    assert not list(tmp_path.glob("t.zip*"))

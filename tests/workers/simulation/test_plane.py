@@ -1,0 +1,81 @@
+"""Simulated datasets: the same on a cluster and here, noise as asked, refusals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.dataset import read_dataset, write_dataset
+from bentray_workers.simulation.plane import SimulationSettings, simulate
+
+SMALL = SimulationSettings(nodes=32, elements=20, coupling_mps=1400.0)
+
+
+def test_cluster_and_this_machine_agree(cluster):
+    seen = []
+    here, there = simulate(None, SMALL, seen.append), simulate(cluster.client, SMALL)
+    assert np.array_equal(here.delta_tof_s, there.delta_tof_s)
+    assert [p.done for p in seen] == [7, 14, 20]
+    assert here.truth.sound_speed_mps.shape == here.roi.shape == (32, 32)
+    assert here.water_speed_mps == 1400.0
+
+
+def test_noise_has_the_size_asked_for():
+    quiet, loud = simulate(None, SMALL), simulate(None, replace(SMALL, noise_s=1e-7, seed=4))
+    noise = (loud.delta_tof_s - quiet.delta_tof_s)[~np.eye(20, dtype=bool)]
+    assert noise.std() == pytest.approx(1e-7, rel=0.15)
+    assert (loud.sigma_s == 1e-7).all()
+    assert np.array_equal(simulate(None, replace(SMALL, noise_s=1e-7, seed=4)).delta_tof_s, loud.delta_tof_s)
+
+
+def test_amplitudes_come_when_asked_for_and_leave_the_times_alone(tmp_path):
+    plain, full = simulate(None, SMALL), simulate(None, replace(SMALL, attenuation=True))
+    assert plain.log_ratio_np is None
+    assert np.array_equal(full.delta_tof_s, plain.delta_tof_s)
+    write_dataset(tmp_path / "full.h5", full)
+    found = read_dataset(tmp_path / "full.h5")
+    assert np.array_equal(found.log_ratio_np, full.log_ratio_np)
+    assert found.water_attenuation_np_m == 0.0
+    # Across the whole breast: about 4 cm of fat at 15 Np/m and 12 cm of tissue at 50.
+    assert 4.0 < found.log_ratio_np.max() < 8.0
+    assert (np.diag(found.log_ratio_np) == 0.0).all()
+
+
+def test_noise_by_its_ratio_to_the_signal():
+    settings = replace(SMALL, attenuation=True)
+    quiet, loud = simulate(None, settings), simulate(None, replace(settings, snr=10.0, seed=4))
+    pairs = ~np.eye(20, dtype=bool)
+    for name in ("delta_tof_s", "log_ratio_np"):
+        clean, noisy = getattr(quiet, name)[pairs], getattr(loud, name)[pairs]
+        assert np.sqrt((clean**2).mean()) / (noisy - clean).std() == pytest.approx(10.0, rel=0.15)
+    assert (loud.sigma_s > 0.0).all()
+
+
+def test_default_reconstruction_grid_is_the_grid_of_the_truth():
+    from bentray_kernels.tomography import Problem, Settings
+
+    dataset = simulate(None, SMALL)
+    problem = Problem.of(dataset, Settings(nodes=32))
+    assert problem.origin == pytest.approx(dataset.truth.origin_m)
+    assert problem.spacing == pytest.approx(dataset.truth.spacing_m[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"nodes": 8}, "nodes"),
+        ({"elements": 2}, "elements"),
+        ({"refinement": 10**6}, "refinement"),
+        ({"seed": -1}, "seed"),
+        ({"refinement": 1}, "refinement"),
+        ({"coupling_mps": 0.0}, "coupling_mps"),
+        ({"noise_s": -1.0}, "noise_s"),
+        ({"snr": -1.0}, "snr"),
+        ({"snr": 10.0, "noise_s": 1e-8}, "snr"),
+    ],
+)
+def test_bad_settings_are_named(change, field):
+    with pytest.raises(InvalidInput) as refusal:
+        replace(SMALL, **change)
+    assert refusal.value.field == field

@@ -1,0 +1,69 @@
+"""Simulations as they are asked for: the right scan, the same again from what is stored, and refusals."""
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.simulation.plane import SimulationSettings
+from bentray_workers.simulation.request import OWN, AskedSimulation
+from bentray_workers.simulation.volume import VolumeSimulationSettings
+from bentray_workers.simulation.volume_waves import VolumeWaveSettings
+from bentray_workers.simulation.waves import WaveSimulationSettings
+
+SIZES = {"nodes": st.integers(16, 1024), "elements": st.integers(8, 4096), "seed": st.integers(0, 2**40)}
+NOISE = {"snr": st.none() | st.floats(0.1, 1e6), "coupling_mps": st.floats(1300.0, 1700.0)}
+TIMES = {"refinement": st.none() | st.integers(4, 64), "attenuation": st.none() | st.booleans()}
+
+
+@given(
+    st.fixed_dictionaries(SIZES | NOISE | TIMES)
+    | st.fixed_dictionaries(
+        SIZES
+        | NOISE
+        | TIMES
+        | {"phantom": st.just("table7"), "slices": st.none() | st.integers(2, 9), "three_d": st.booleans()}
+    )
+    | st.fixed_dictionaries(
+        SIZES
+        | NOISE
+        | {"waveform": st.just(True), "frequency_hz": st.floats(1e4, 1e6), "emissions": st.just(8)}
+    )
+)
+def test_what_is_stored_gives_the_same_scan(given):
+    asked = AskedSimulation(**given)
+    stored = json.loads(json.dumps(asked.plain()))
+    assert AskedSimulation(**stored).chosen() == asked.chosen()
+    for name, value in given.items():
+        if name not in ("phantom", "waveform") and value is not None:
+            assert getattr(asked.chosen(), name) == value
+
+
+def test_which_scan_is_meant():
+    assert AskedSimulation().chosen() == SimulationSettings()
+    assert AskedSimulation(phantom="table7").chosen() == VolumeSimulationSettings()
+    waves = AskedSimulation(waveform=True, nodes=256, elements=128).chosen()
+    assert waves == WaveSimulationSettings()
+    in_space = AskedSimulation(phantom="table7", waveform=True, nodes=256, elements=128).chosen()
+    assert in_space == VolumeWaveSettings()
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"phantom": "table8"}, "phantom"),
+        ({"phantom": "table7", "waveform": True, "slices": 4}, "slices"),
+        ({"elements": 2}, "elements"),
+        ({"side_m": float("nan"), "waveform": True}, "side_m"),
+        ({"phantom": "table7", "array": "rings"}, "array"),
+        ({"phantom": "table7", "noise_s": 1e-8}, "noise_s"),
+        ({"waveform": True, "attenuation": False}, "attenuation"),
+        *(({name: 4}, name) for name in OWN if name not in ("refinement", "noise_s", "attenuation")),
+    ],
+)
+def test_what_is_refused(given, field):
+    with pytest.raises(InvalidInput) as caught:
+        AskedSimulation(**given)
+    assert caught.value.field == field

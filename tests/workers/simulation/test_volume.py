@@ -1,0 +1,101 @@
+"""Simulated volume scans: their shapes, their file, the same on a cluster and here."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.dataset import read_dataset, write_dataset
+from bentray_workers.simulation.volume import VolumeSimulationSettings, simulate_volume
+
+SMALL = VolumeSimulationSettings(nodes=24, slices=3, elements=10, coupling_mps=1475.0, attenuation=True)
+IN_SPACE = replace(SMALL, three_d=True, refinement=2)
+
+
+@pytest.fixture(scope="module")
+def moved():
+    return simulate_volume(None, SMALL)
+
+
+def test_slices_come_back_from_a_file(moved, tmp_path):
+    write_dataset(tmp_path / "moved.h5", moved)
+    found = read_dataset(tmp_path / "moved.h5")
+    assert found.slices == 3
+    for name in ("delta_tof_s", "log_ratio_np", "slice_z_m", "roi"):
+        assert np.array_equal(getattr(found, name), getattr(moved, name)), name
+    assert found.delta_tof_s.shape == found.log_ratio_np.shape == (3, 10, 10)
+    assert found.truth.axes == "x,y,z"
+    assert found.truth.sound_speed_mps.shape == found.truth.attenuation_np_m.shape == found.roi.shape
+    assert found.truth.origin_m[2] == found.slice_z_m[0]
+    assert found.truth.spacing_m[2] == pytest.approx(np.diff(found.slice_z_m)[0])
+    assert found.amplitude_frequency_hz == 7.5e6
+    assert found.water_attenuation_np_m == 0.0
+
+
+def test_each_slice_is_the_scan_of_its_plane(moved):
+    plane = SMALL.scan().slice(2)
+    times, amplitudes = plane.medium(attenuation=True).arrivals(plane.elements(), np.array([0, 7]))
+    assert np.array_equal(moved.delta_tof_s[2, [0, 7]], times)
+    assert np.array_equal(moved.log_ratio_np[2, [0, 7]], amplitudes)
+    assert not np.allclose(moved.delta_tof_s[0], moved.delta_tof_s[2], atol=1e-8)
+
+
+def test_cluster_and_this_machine_agree(cluster, moved):
+    seen = []
+    there = simulate_volume(cluster.client, SMALL, seen.append)
+    assert np.array_equal(moved.delta_tof_s, there.delta_tof_s)
+    assert np.array_equal(moved.log_ratio_np, there.log_ratio_np)
+    assert [p.done for p in seen] == [5, 10, 15, 20, 25, 30]
+    assert {p.total for p in seen} == {30}
+
+
+def test_moved_ring_in_space_is_the_diagonal_of_all_rings_at_once(tmp_path):
+    one, all_at_once = (simulate_volume(None, replace(IN_SPACE, array=array)) for array in ("moved", "rings"))
+    assert all_at_once.element_position_m.shape == (30, 3)
+    assert all_at_once.slice_z_m is None
+    for k in range(3):
+        own = slice(10 * k, 10 * k + 10)
+        assert np.array_equal(all_at_once.delta_tof_s[own, own], one.delta_tof_s[k])
+        assert np.array_equal(all_at_once.log_ratio_np[own, own], one.log_ratio_np[k])
+    assert np.isfinite(all_at_once.delta_tof_s).all()
+    write_dataset(tmp_path / "rings.h5", all_at_once)
+    found = read_dataset(tmp_path / "rings.h5")
+    assert found.array_type == "rings"
+    assert np.array_equal(found.element_position_m, all_at_once.element_position_m)
+    assert np.array_equal(found.delta_tof_s, all_at_once.delta_tof_s)
+
+
+def test_noise_has_the_ratio_asked_for(moved):
+    loud = simulate_volume(None, replace(SMALL, snr=10.0, seed=5))
+    pairs = np.broadcast_to(~np.eye(10, dtype=bool), (3, 10, 10))
+    for name in ("delta_tof_s", "log_ratio_np"):
+        clean, noisy = getattr(moved, name)[pairs], getattr(loud, name)[pairs]
+        assert np.sqrt((clean**2).mean()) / (noisy - clean).std() == pytest.approx(10.0, rel=0.15)
+    assert loud.sigma_s[0, 0, 0] == pytest.approx(np.sqrt((moved.delta_tof_s[pairs] ** 2).mean()) / 10.0)
+    assert moved.sigma_s is None
+
+
+def test_amplitudes_are_left_out_unless_asked_for():
+    assert simulate_volume(None, replace(SMALL, attenuation=False, slices=2)).log_ratio_np is None
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"nodes": 8}, "nodes"),
+        ({"slices": 1}, "slices"),
+        ({"elements": 2}, "elements"),
+        ({"refinement": 10**6}, "refinement"),
+        ({"seed": -1}, "seed"),
+        ({"refinement": 2}, "refinement"),
+        ({"array": "rings"}, "array"),
+        ({"array": "spiral"}, "array"),
+        ({"snr": 0.0}, "snr"),
+        ({"coupling_mps": -1.0}, "coupling_mps"),
+    ],
+)
+def test_bad_settings_are_named(change, field):
+    with pytest.raises(InvalidInput) as refusal:
+        replace(SMALL, **change)
+    assert refusal.value.field == field

@@ -1,0 +1,92 @@
+"""Scans by waves: what arrives when, noise as asked for, the same everywhere, settings that are refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import pick
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.dataset import read_dataset, write_dataset
+from bentray_workers.simulation.waves import HIGHEST, Noise, WaveSimulationSettings, simulate_waves
+
+SMALL = WaveSimulationSettings(frequency_hz=3e5, side_m=0.05, elements=24, emissions=6, nodes=32)
+
+
+@pytest.fixture(scope="module")
+def scan():
+    return simulate_waves(None, SMALL)
+
+
+def test_the_pulse_in_water_comes_when_it_should(scan):
+    """In a plane a pulse is turned by an eighth of a period and dragged out; so times are held against it."""
+    water = scan.waveform.water
+    far = scan.distance_m()[0] > 0.02
+    at = scan.t0_s + np.abs(water[0]).argmax(axis=-1)[far] / scan.sampling_rate_hz
+    late = at - scan.distance_m()[0][far] / scan.water_speed_mps
+    # Alike for all distances, to a sample and what the phase speed is wrong by.
+    assert np.ptp(late) <= 1.5 / scan.sampling_rate_hz
+    assert abs(late.mean()) < 1.0 / SMALL.frequency_hz
+
+
+def test_emitter_and_receiver_may_change_places(scan):
+    for name in ("object", "water"):
+        traces = getattr(scan.waveform, name)
+        there, back = traces[0, scan.tx[2]], traces[2, scan.tx[0]]
+        assert np.abs(there - back).max() < 2e-3 * np.abs(there).max()
+
+
+def test_the_object_is_picked_slower_than_water_through_fat(scan):
+    """Two thirds of the way are fat or tissue, which both are slower than the water."""
+    delta = pick(scan).delta_tof_s
+    across = delta[0, np.argsort(scan.distance_m()[0])[-5:]]
+    assert (across[np.isfinite(across)] > 1e-7).all()
+    assert np.isfinite(across).any()
+
+
+def test_a_cluster_gives_the_same_bits(cluster, scan, tmp_path):
+    other = simulate_waves(cluster.client, SMALL)
+    assert np.array_equal(other.waveform.object, scan.waveform.object)
+    assert np.array_equal(other.waveform.water, scan.waveform.water)
+    write_dataset(tmp_path / "scan.h5", other)
+    again = read_dataset(tmp_path / "scan.h5")
+    assert np.array_equal(again.waveform.object, scan.waveform.object)
+    assert np.array_equal(again.truth.sound_speed_mps, scan.truth.sound_speed_mps)
+
+
+def test_noise_has_the_size_that_was_asked_for(scan):
+    noisy = simulate_waves(None, replace(SMALL, snr=20.0))
+    added = noisy.waveform.water - scan.waveform.water
+    expected = np.median(np.abs(scan.waveform.water).max(axis=-1)) / 20.0
+    assert added.std() == pytest.approx(expected, rel=0.02)
+    assert not np.array_equal(added, noisy.waveform.object - scan.waveform.object)
+    again = Noise(replace(SMALL, snr=20.0), np.abs(scan.waveform.water).max(axis=-1))
+    assert np.array_equal(scan.waveform.object[0] + again.drawn(), noisy.waveform.object[0])
+
+
+def test_the_dispersion_is_within_its_budget():
+    for frequency in (1e5, 5e5, 2e6):
+        settings = WaveSimulationSettings(frequency_hz=frequency)
+        centre, highest = settings.dispersion
+        assert abs(centre) < 1e-3
+        assert abs(highest) < 3e-3
+        assert settings.speeds[0] / (HIGHEST * frequency) > 6.5 * settings.spacing_m
+
+
+@pytest.mark.parametrize(
+    ("words", "field"),
+    [
+        ({"frequency_hz": 0.0}, "frequency_hz"),
+        ({"frequency_hz": 9e6, "side_m": 1.0}, "frequency_hz"),
+        ({"side_m": 5.0}, "side_m"),
+        ({"elements": 4}, "elements"),
+        ({"emissions": 200}, "emissions"),
+        ({"nodes": 4}, "nodes"),
+        ({"snr": 0.0}, "snr"),
+        ({"seed": -1}, "seed"),
+    ],
+)
+def test_bad_settings_are_refused(words, field):
+    with pytest.raises(InvalidInput) as caught:
+        WaveSimulationSettings(**words)
+    assert caught.value.field == field

@@ -1,0 +1,1 @@
+"""The Dask cluster: providers, workers, resources, and calls that survive the death of a worker."""

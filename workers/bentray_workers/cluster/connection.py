@@ -1,0 +1,154 @@
+"""A client of a cluster: of one that is already running, or of one that a provider starts."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import dask
+from distributed import Client
+from distributed.core import rpc
+from distributed.security import Security
+
+from bentray_kernels.errors import InvalidInput
+
+from .connected import connected_workers
+from .dask_settings import OF_CLIENTS
+from .providers import Deployed, Wanted, deploy
+from .tls import security_of
+
+# What tells that nothing, or something else, is at an address; other protocols look like huge messages.
+NO_SCHEDULER = (OSError, TimeoutError, ValueError, MemoryError)
+
+
+class Cluster:
+    """A client of a running scheduler, and the scheduler itself where it is ours."""
+
+    def __init__(self, connect: Callable[[], Client], deployed: Deployed | None = None) -> None:
+        # For the whole process: a client looks them up whenever something is submitted.
+        dask.config.set(OF_CLIENTS)
+        self._connect = connect
+        self._deployed = deployed
+        self._client = connect()
+        self._changing = threading.Lock()
+
+    @property
+    def client(self) -> Client:
+        """A ``distributed.Client``; tasks name their lane by ``resources=``.
+
+        A client gives up when its scheduler stays away for longer than the time to connect. The next call
+        then makes a new one, so that a scheduler that was started again is found again.
+
+        Raises:
+            ConnectionError: while there is no scheduler.
+        """
+        with self._changing:
+            if self._client.status == "closed":
+                try:
+                    self._client = self._connect()
+                except InvalidInput as error:
+                    raise ConnectionError(str(error)) from error
+            return self._client
+
+    def describe(self) -> dict[str, Any]:
+        """What there is now: scheduler address, workers, threads and the lanes offered."""
+        client = self.client
+        workers = connected_workers(client).values()
+        lanes: dict[str, float] = {}
+        for worker in workers:
+            for lane, amount in worker.get("resources", {}).items():
+                lanes[lane] = lanes.get(lane, 0) + amount
+        return {
+            "scheduler": client.scheduler.address,
+            "embedded": self._deployed is not None,
+            "workers": len(workers),
+            "threads": sum(worker["nthreads"] for worker in workers),
+            "lanes": lanes,
+        }
+
+    def close(self) -> None:
+        """Leave; a cluster that was started for us ends with it."""
+        self._client.close()
+        if self._deployed is not None:
+            self._deployed.close()
+
+    def __enter__(self) -> Cluster:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def open_cluster(
+    scheduler_address: str | None = None,
+    workers: int | None = None,
+    local_directory: Path | None = None,
+    *,
+    kind: str = "embedded",
+    template: Path | None = None,
+    tls: Path | None = None,
+    processes: bool = True,
+    connect_timeout_s: float = 10.0,
+) -> Cluster:
+    """A cluster by its scheduler's address, or one that is started for us.
+
+    Args:
+        scheduler_address: as ``tcp://host:port``; None starts a cluster.
+        workers: worker processes of a cluster that is started; None: what its kind thinks right.
+        local_directory: where embedded workers keep their scratch files.
+        kind: of the cluster that is started, a key of ``cluster.providers.PROVIDERS``.
+        template: what that kind must be told about this site.
+        tls: a folder of certificates, see ``security_of``.
+        processes: False keeps embedded workers in this process (for tests).
+        connect_timeout_s: how long to try an address, s.
+
+    Raises:
+        InvalidInput: when no scheduler answers at the address, or from the provider.
+    """
+    if scheduler_address is None:
+        deployed = deploy(kind, Wanted(workers, local_directory, template, tls, processes))
+        return Cluster(lambda: Client(deployed, set_as_default=False), deployed)
+    security = security_of(tls)
+
+    def connect() -> Client:
+        # A scheduler that accepts and stays silent would hold a client for ever, so it is asked first.
+        identity_of(scheduler_address, security, connect_timeout_s)
+        return Client(scheduler_address, timeout=connect_timeout_s, security=security, set_as_default=False)
+
+    return Cluster(connect)
+
+
+def identity_of(address: str, security: Security, timeout_s: float, workers: int = 0) -> dict[str, Any]:
+    """What the scheduler at an address says of itself, with so many of its workers, -1 for all.
+
+    Raises:
+        InvalidInput: when there is none, with the reason.
+    """
+    encrypted = address.startswith("tls://")
+    if (encrypted and security.tls_ca_file is None) or (security.require_encryption and not encrypted):
+        found = f"{address} with{'out' if encrypted else ''} certificates"
+        raise InvalidInput(
+            "scheduler_address", found, "tls://host:port with certificates, else tcp://host:port"
+        )
+    try:
+        return asyncio.run(identity(address, security, timeout_s, workers))
+    except NO_SCHEDULER as error:
+        reason = f"no answer in {timeout_s:g} s" if isinstance(error, TimeoutError) else error
+        raise InvalidInput(
+            "scheduler_address", f"{address} ({reason})", "the address of a running Dask scheduler"
+        ) from error
+
+
+async def identity(address: str, security: Security, timeout_s: float, workers: int) -> dict[str, Any]:
+    """As ``identity_of``, awaited; raises one of ``NO_SCHEDULER``."""
+    async with asyncio.timeout(timeout_s):
+        secrets = security.get_connection_args("client")
+        async with rpc(address, connection_args=secrets, timeout=timeout_s) as scheduler:
+            found: dict[str, Any] = await scheduler.identity(n_workers=workers)
+            return found

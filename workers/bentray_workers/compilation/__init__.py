@@ -1,0 +1,1 @@
+"""Compiled kernels: made ready for an image, and loaded before a worker's first task."""

@@ -1,0 +1,1 @@
+"""File formats: datasets, volumes, meshes, reconstructions and geometry fields."""

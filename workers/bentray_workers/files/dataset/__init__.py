@@ -1,0 +1,8 @@
+"""Datasets as files in the upload format ``uct-transmission`` 1.0."""
+
+from ..hdf5_reading import Limits
+from .copy import copy_dataset
+from .read import read_dataset
+from .write import write_dataset
+
+__all__ = ["Limits", "copy_dataset", "read_dataset", "write_dataset"]

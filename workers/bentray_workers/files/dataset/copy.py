@@ -1,0 +1,76 @@
+"""Copying a dataset file into canonical form, its traces in pieces: they may be larger than the memory."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import h5py
+
+from bentray_kernels.acquisition import Dataset
+
+from ..hdf5_reading import Limits, opened, refusing
+from .read import NUMERIC, TRACES, dataset_of, stand_ins, trace_type
+from .write import Piece, bytes_of, write_dataset
+
+# Of one piece. It takes about three times as much while it is read, converted and packed.
+PIECE_BYTES = 16 * 2**20
+
+
+def copy_dataset(
+    source: Path,
+    target: Path,
+    limits: Limits | None = None,
+    on_size: Callable[[int], None] = lambda size: None,
+) -> Dataset:
+    """Check a dataset file and write it anew, with no more than a piece of its traces in memory.
+
+    Args:
+        source: of the HDF5 file.
+        target: replaced whole or not touched.
+        limits: what the file may ask for; None: the defaults of ``Limits``.
+        on_size: told before ``target`` is written how many bytes it will have at most, but for its headers.
+
+    Returns:
+        What it holds. In place of traces there are arrays of their shape and type that take no memory.
+
+    Raises:
+        InvalidInput: as ``read_dataset`` does, and for traces that are damaged.
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    with opened(source, limits or Limits()) as reader:
+        dataset = dataset_of(reader, stand_ins)
+        on_size(bytes_of(dataset))
+
+        def pieces(name: str, chunk: tuple[int, ...]) -> Iterator[Piece]:
+            path = f"waveform/{name}"
+            found = reader.checked(path, NUMERIC, TRACES)
+            assert found is not None
+            for where in blocks(found, chunk):
+                with refusing(path, TRACES):
+                    values = found[where]
+                yield where, trace_type(path, values)
+
+        write_dataset(target, dataset, pieces)
+    return dataset
+
+
+def blocks(found: h5py.Dataset, chunk: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
+    """Cut an array into boxes of about ``PIECE_BYTES`` that follow its chunks.
+
+    Args:
+        found: the array.
+        chunk: that of the file to be written, which is followed too as long as the boxes stay small.
+    """
+    shape, size = found.shape, found.dtype.itemsize
+    own = found.chunks or (1,) * len(shape)
+    both = [math.lcm(a, b) for a, b in zip(own, chunk, strict=True)]
+    unit = both if math.prod(both) * size <= PIECE_BYTES else own
+    box = [min(side, n) for side, n in zip(unit, shape, strict=True)]
+    for axis in reversed(range(len(shape))):
+        box[axis] = min(shape[axis], box[axis] * max(1, PIECE_BYTES // (math.prod(box) * size)))
+    starts = (range(0, n, side) for n, side in zip(shape, box, strict=True))
+    for corner in itertools.product(*starts):
+        yield tuple(slice(at, min(at + side, n)) for at, side, n in zip(corner, box, shape, strict=True))

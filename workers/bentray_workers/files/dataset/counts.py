@@ -1,0 +1,192 @@
+"""What a plan needs to know of a dataset: counts and sizes in plain values, kept when it is taken in."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentray_kernels.arrays import Floats, Ints
+
+# What plans are made with loads compiled kernels, which take seconds: the reader of an upload starts without.
+if TYPE_CHECKING:
+    from bentray_kernels.acquisition import Dataset
+    from bentray_kernels.tomography.settings import Settings
+
+# Of emissions that lie in the same chunks, at most.
+BLOCK_BYTES = 32 * 2**20
+
+
+@dataclass(frozen=True)
+class Traces:
+    """The traces of a dataset as a plan sees them.
+
+    Attributes:
+        emissions, receivers: of one slice.
+        samples: of each trace.
+        sample_bytes: of one.
+        rate_hz: of the samples.
+        frequency_hz: of the middle of the pulse.
+        water_mps: speed of the water.
+    """
+
+    emissions: int
+    receivers: int
+    samples: int
+    sample_bytes: int
+    rate_hz: float
+    frequency_hz: float
+    water_mps: float
+
+    def bytes_of(self, emissions: int) -> int:
+        """Of the object's traces of some emissions of one slice, all at most."""
+        return min(emissions, self.emissions) * self.receivers * self.samples * self.sample_bytes
+
+    @property
+    def read_bytes(self) -> int:
+        """Of what is read at once of object or water: an emission, or those that share chunks with it."""
+        return max(self.bytes_of(1), min(self.bytes_of(self.emissions), BLOCK_BYTES))
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A dataset as the plan sees it.
+
+    Attributes:
+        emitters, receivers: of one slice, or of the array, once reverses are filled in.
+        pairs: in all slices.
+        slices: heights of the ring; 1 for a plain scan, and for an array in space.
+        in_space: whether the elements have heights of their own.
+        height_m: from the lowest height to the highest, m.
+        width_m: of the array, m.
+        traces_bytes: of the waveforms, 0 where there are travel times.
+        amplitudes: whether there are any.
+        traces: of object and water, which waves may refine from; None where one of them is not there.
+        period: whether a centre frequency is known, so that times are examined.
+    """
+
+    emitters: int
+    receivers: int
+    pairs: int
+    slices: int
+    in_space: bool
+    height_m: float
+    width_m: float
+    traces_bytes: int
+    amplitudes: bool
+    traces: Traces | None = None
+    period: bool = False
+
+
+@dataclass(frozen=True)
+class DatasetCounts:
+    """A dataset in so many numbers, however many elements it has.
+
+    Attributes:
+        emissions, receivers: of one slice.
+        elements: that send, receive or do both.
+        slices: heights of the ring; 1 for a plain scan, and for an array in space.
+        in_space: whether the elements have heights of their own.
+        height_m, width_m: of the array with all of its heights, m.
+        times: whether there are travel times.
+        amplitudes: whether there are recorded ones.
+        traces_bytes: of the traces of object and water.
+        samples, sample_bytes: of each trace, where there are both of object and water; else 0 samples.
+        rate_hz, frequency_hz: of the samples and of the middle of the pulse; None where they are not known.
+        water_mps: speed of the water.
+    """
+
+    emissions: int
+    receivers: int
+    elements: int
+    slices: int
+    in_space: bool
+    height_m: float
+    width_m: float
+    times: bool
+    amplitudes: bool
+    traces_bytes: int
+    samples: int
+    sample_bytes: int
+    rate_hz: float | None
+    frequency_hz: float | None
+    water_mps: float
+
+    @classmethod
+    def of(cls, dataset: Dataset) -> DatasetCounts:
+        """Of a dataset whose traces may be stand-ins that take no memory."""
+        traces = dataset.waveform
+        both = [] if traces is None else [one for one in (traces.object, traces.water) if one is not None]
+        return cls(
+            **array_counts(dataset.element_position_m, dataset.tx, dataset.rx, dataset.slice_z_m),
+            times=dataset.picked,
+            amplitudes=dataset.log_ratio_np is not None,
+            traces_bytes=sum(one.size * one.dtype.itemsize for one in both),
+            samples=int(both[0].shape[-1]) if len(both) == 2 else 0,
+            sample_bytes=both[0].dtype.itemsize if both else 0,
+            rate_hz=dataset.sampling_rate_hz,
+            frequency_hz=dataset.center_frequency_hz,
+            water_mps=float(dataset.water_speed_mps),
+        )
+
+    def summary(self, settings: Settings) -> Summary:
+        """The dataset as the plan of a reconstruction sees it.
+
+        Args:
+            settings: with ``reciprocity``, elements that only send or only receive do both; and whether
+                amplitudes are read from traces.
+        """
+        both = (self.elements, self.elements)
+        emitters, receivers = both if settings.reciprocity else (self.emissions, self.receivers)
+        return Summary(
+            emitters=emitters,
+            receivers=receivers,
+            pairs=self.slices * self.emissions * self.receivers,
+            slices=self.slices,
+            in_space=self.in_space,
+            height_m=self.height_m,
+            width_m=self.width_m,
+            traces_bytes=0 if self.times and not settings.listens else self.traces_bytes,
+            amplitudes=self.amplitudes or settings.listens,
+            traces=self._traces(),
+            period=self.frequency_hz is not None,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON; ``DatasetCounts(**plain)`` gives the same."""
+        return asdict(self)
+
+    def _traces(self) -> Traces | None:
+        if not self.samples or self.rate_hz is None or self.frequency_hz is None:
+            return None
+        return Traces(
+            self.emissions,
+            self.receivers,
+            self.samples,
+            self.sample_bytes,
+            self.rate_hz,
+            self.frequency_hz,
+            self.water_mps,
+        )
+
+
+def array_counts(position: Floats, tx: Ints, rx: Ints, heights: Floats | None) -> dict[str, Any]:
+    """Those of ``DatasetCounts`` that geometry and acquisition tell.
+
+    Args:
+        position: (elements, 2 or 3), m.
+        tx, rx: (ntx,), (nrx,).
+        heights: (nz,) of the slices, m; None for a plain scan.
+    """
+    in_space = position.shape[1] == 3
+    z = position[:, 2] if in_space else np.zeros(1) if heights is None else heights
+    return {
+        "emissions": len(tx),
+        "receivers": len(rx),
+        "elements": len(np.union1d(tx, rx)),
+        "slices": 1 if heights is None else len(heights),
+        "in_space": in_space,
+        "height_m": float(np.ptp(z)),
+        "width_m": float(np.ptp(position[:, :2], axis=0).max()),
+    }

@@ -1,0 +1,229 @@
+"""Reading a dataset file: every field by name, each refused with what was found and what is accepted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.acquisition import (
+    Dataset,
+    Truth,
+    Waveform,
+    speed_from_temperature,
+    temperature_from_speed,
+)
+from bentray_kernels.acquisition.plausibility import check_plausible
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import COUNTED, OVER_NODES, OVER_PAIRS, check_size
+
+from ..hdf5_reading import Limits, Reader, opened
+from .format import FORMAT, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
+
+NUMERIC = "iuf"
+# Arrays whose number of rows, pairs or nodes is held against its limit before anything is read.
+SIZED = (*(place for place in COUNTED if place not in OVER_PAIRS), *OVER_PAIRS, *OVER_NODES)
+TRACES = "int16 or float32 traces over (ntx, nrx, nt)"
+
+
+def read_dataset(path: Path, *, traces: bool = True, limits: Limits | None = None) -> Dataset:
+    """Read and check a dataset file.
+
+    Args:
+        path: of the HDF5 file.
+        traces: false leaves the traces in the file: they may be large, and what was picked is enough to
+            reconstruct. They are checked all the same.
+        limits: what the file may ask for; None: the defaults of ``Limits``.
+
+    Raises:
+        InvalidInput: naming the first field that is missing or wrong by its path in the file (``file``
+            for the file as a whole), what was found and what is accepted; and as ``check_plausible``.
+    """
+    with opened(Path(path), limits or Limits()) as reader:
+        return dataset_of(reader, _waveform if traces else None)
+
+
+def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) -> Dataset:
+    """What an open file holds; ``waveform`` reads its traces, if there are any. See ``read_dataset``."""
+    _check_format(reader)
+    for place in SIZED:
+        check_size(place, _shape(reader, place))
+    speed, temperature = _water(reader)
+    position = _floats(reader, "geometry/element_position_m", "(elements, 2 or 3) numbers in m")
+    if position is None:
+        raise InvalidInput("geometry/element_position_m", "nothing", "(elements, 2 or 3) numbers in m")
+    dimension = reader.number("", "dimension", "2 or 3")
+    if dimension is not None and position.ndim == 2 and dimension != position.shape[1]:
+        raise InvalidInput("@dimension", f"{dimension:g}", f"{position.shape[1]}, as element_position_m has")
+    tx, rx = _indices(reader, "acquisition/tx"), _indices(reader, "acquisition/rx")
+    slices = _floats(reader, "slice/z_m", "(nz,) numbers in m")
+    pairs = (*(() if slices is None else slices.shape[:1]), *tx.shape[:1], *rx.shape[:1])
+    # Lists that are none are refused below.
+    for place in (*PAIR_ARRAYS, "mask/valid") if tx.ndim == rx.ndim == 1 else ():
+        # Before they are read: they are by far the largest.
+        shape = _shape(reader, place)
+        if 0 < math.prod(pairs) < math.prod(shape):
+            raise InvalidInput(place, f"shape {shape}", f"shape {pairs}")
+    fields: dict[str, Any] = {
+        name: _floats(reader, place, "numbers over (ntx, nrx)") for place, name in PAIR_ARRAYS.items()
+    }
+    fields |= {name: reader.number(group, attribute, unit) for group, attribute, unit, name in NUMBERS}
+    fields |= {name: reader.text("", name) or "" for name in TEXTS}
+    if not traces_in(reader) and fields["tof_s"] is None and fields["delta_tof_s"] is None:
+        raise InvalidInput(
+            "traveltime",
+            "neither travel times nor traces",
+            "traveltime/delta_tof_s, traveltime/tof_s or waveform/object",
+        )
+    dataset = Dataset(
+        element_position_m=position,
+        tx=tx,
+        rx=rx,
+        water_speed_mps=speed,
+        water_temperature_c=temperature,
+        element_normal=_floats(reader, "geometry/element_normal", "numbers, one row an element"),
+        array_type=reader.text("geometry", "array_type") or "ring",
+        t0_s=reader.number("acquisition", "t0_s", "s") or 0.0,
+        wavelet=_floats(reader, "acquisition/wavelet", "(nt,) numbers"),
+        valid=_flags(reader, "mask/valid", "booleans over (ntx, nrx)"),
+        roi=_flags(reader, "mask/roi", "an image of booleans"),
+        slice_z_m=slices,
+        picker=reader.text("traveltime", "picker") or "",
+        waveform=waveform(reader) if waveform is not None and traces_in(reader) else None,
+        truth=_truth(reader),
+        **fields,
+    )
+    check_plausible(dataset)
+    return dataset
+
+
+def _shape(reader: Reader, place: str) -> tuple[int, ...]:
+    """Of an array as the file declares it; () where it is absent, or one number."""
+    found = reader.checked(place, "iufb", "an array of numbers")
+    return () if found is None else tuple(found.shape)
+
+
+def _check_format(reader: Reader) -> None:
+    for name, expected in (("format", FORMAT), ("format_version", VERSION)):
+        found = reader.attribute("", name)
+        if not isinstance(found, str) or found != expected:
+            shown = "nothing" if found is None else repr(found if isinstance(found, str) else found.tolist())
+            raise InvalidInput(f"@{name}", shown[:60], f'"{expected}"')
+
+
+def _water(reader: Reader) -> tuple[float, float | None]:
+    """Speed and temperature of the water; where one is absent it follows from the other."""
+    speed = reader.number("water", "sound_speed_mps", "m/s")
+    temperature = reader.number("water", "temperature_c", "°C")
+    if speed is None and temperature is None:
+        raise InvalidInput(
+            "water@sound_speed_mps", "nothing", "@sound_speed_mps in m/s or @temperature_c in °C"
+        )
+    if speed is None:
+        assert temperature is not None
+        return speed_from_temperature(temperature), temperature
+    if temperature is None:
+        try:
+            temperature = temperature_from_speed(speed)
+        except InvalidInput:
+            # Coupled by something else than pure water; its speed is all that is needed.
+            return speed, None
+    return speed, temperature
+
+
+def traces_in(reader: Reader) -> bool:
+    """Whether there are traces; what they are is checked."""
+    return reader.checked("waveform/object", "iuf", "traces over (ntx, nrx, nt)") is not None
+
+
+def stand_ins(reader: Reader) -> Waveform:
+    """The traces of a file as arrays of their shape and type that take no memory; they are all 0."""
+
+    def stand_in(path: str) -> NDArray[Any] | None:
+        found = reader.checked(path, NUMERIC, TRACES)
+        if found is None:
+            return None
+        zero = trace_type(path, np.zeros((), dtype=found.dtype))
+        return np.broadcast_to(zero, found.shape)
+
+    return _waveform(reader, stand_in)
+
+
+def trace_type(path: str, array: NDArray[Any]) -> NDArray[Any]:
+    """Traces as int16 or float32, whichever holds them.
+
+    Raises:
+        InvalidInput: naming ``path``, for integers that are wider.
+    """
+    if array.dtype.kind == "f":
+        # A damaged NaN may signal, which is no reason to warn.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.ascontiguousarray(array, dtype=np.float32).reshape(array.shape)
+    if not np.can_cast(array.dtype, np.int16):
+        raise InvalidInput(path, f"{array.dtype}", TRACES)
+    return np.ascontiguousarray(array, dtype=np.int16).reshape(array.shape)
+
+
+def _waveform(reader: Reader, traces: Callable[[str], NDArray[Any] | None] | None = None) -> Waveform:
+    """The traces with their scales; ``traces`` reads one array of them in its own way."""
+    scale = reader.number("waveform", "scale", "the unit of the traces a count")
+    read = traces or (lambda path: _traces(reader, path))
+    received = read("waveform/object")
+    assert received is not None
+    return Waveform(
+        received,
+        read("waveform/water"),
+        1.0 if scale is None else scale,
+        _floats(reader, "waveform/object_scale", "numbers over (ntx, nrx)"),
+        _floats(reader, "waveform/water_scale", "numbers over (ntx, nrx)"),
+    )
+
+
+def _traces(reader: Reader, path: str) -> NDArray[Any] | None:
+    array = reader.array(path, NUMERIC, TRACES)
+    return None if array is None else trace_type(path, array)
+
+
+def _truth(reader: Reader) -> Truth | None:
+    speed = _floats(reader, "truth/sound_speed_mps", "(nx, ny) or (nx, ny, nz) numbers in m/s")
+    if speed is None:
+        return None
+    spacing = reader.numbers("truth", "spacing_m", "m")
+    origin = reader.numbers("truth", "origin_m", "m")
+    for name, value in (("spacing_m", spacing), ("origin_m", origin)):
+        if value is None:
+            raise InvalidInput(f"truth@{name}", "nothing", "a number in m for each axis")
+    assert spacing is not None
+    assert origin is not None
+    return Truth(
+        speed,
+        spacing * speed.ndim if len(spacing) == 1 else spacing,
+        origin,
+        _floats(reader, "truth/attenuation_np_m", "numbers in Np/m, as many as in sound_speed_mps"),
+        reader.text("truth", "axes") or ("x,y" if speed.ndim == 2 else "x,y,z"),
+    )
+
+
+def _floats(reader: Reader, path: str, accepted: str) -> NDArray[np.float64] | None:
+    array = reader.array(path, NUMERIC, accepted)
+    return None if array is None else np.ascontiguousarray(array, dtype=np.float64)
+
+
+def _flags(reader: Reader, path: str, accepted: str) -> NDArray[np.bool_] | None:
+    # MATLAB writes logical arrays as uint8.
+    array = reader.array(path, "biu", accepted)
+    return None if array is None else np.ascontiguousarray(array != 0)
+
+
+def _indices(reader: Reader, path: str) -> NDArray[np.int64]:
+    accepted = "(n,) integers that count elements from 0"
+    array = reader.array(path, "iu", accepted)
+    if array is None:
+        raise InvalidInput(path, "nothing", accepted)
+    if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
+        raise InvalidInput(path, array.max(), accepted)
+    return np.ascontiguousarray(array, dtype=np.int64)

@@ -1,0 +1,36 @@
+"""What a service remembers of a dataset, in plain values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from .counts import DatasetCounts
+
+if TYPE_CHECKING:
+    from bentray_kernels.acquisition.dataset import Dataset
+
+LONGEST_TEXT = 200
+
+
+def record_of(dataset: Dataset) -> dict[str, Any]:
+    """By the names that the service keeps it under; ``counts`` is what plans are made of."""
+    return {
+        "title": text(dataset.title),
+        "source": text(dataset.source),
+        "license": text(dataset.license),
+        "dimension": int(dataset.element_position_m.shape[1]),
+        "elements": len(dataset.element_position_m),
+        "ntx": len(dataset.tx),
+        "nrx": len(dataset.rx),
+        "slices": dataset.slices,
+        "has_traces": dataset.waveform is not None,
+        "has_travel_times": dataset.picked,
+        "has_truth": dataset.truth is not None,
+        "water_speed_mps": float(dataset.water_speed_mps),
+        "counts": DatasetCounts.of(dataset).to_dict(),
+    }
+
+
+def text(value: str) -> str:
+    """A string from a file, printable and short."""
+    return "".join(c for c in value if c.isprintable())[:LONGEST_TEXT]

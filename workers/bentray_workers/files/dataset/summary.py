@@ -1,0 +1,73 @@
+"""The counts of a dataset file, read without the arrays over its pairs."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import check_size
+from bentray_kernels.tomography.settings import Settings
+
+from ..hdf5_reading import Limits, Reader, opened
+from .counts import DatasetCounts, Summary, array_counts
+from .read import NUMERIC
+from .traces import samples_in
+
+
+def counts_in(path: Path) -> DatasetCounts:
+    """The counts of a dataset that has been read before.
+
+    Args:
+        path: of the HDF5 file.
+
+    Raises:
+        InvalidInput: for a file without positions, emitters or receivers, or with more than any scan has.
+    """
+    with opened(path, Limits()) as reader:
+        position, tx, rx = (
+            _wanted(reader, place)
+            for place in ("geometry/element_position_m", "acquisition/tx", "acquisition/rx")
+        )
+        received = reader.checked("waveform/object", NUMERIC, "traces")
+        water = reader.number("water", "sound_speed_mps", "m/s")
+        return DatasetCounts(
+            **array_counts(position, tx, rx, _sized(reader, "slice/z_m")),
+            times=any(_bytes(reader, f"traveltime/{name}") for name in ("delta_tof_s", "tof_s")),
+            amplitudes=_bytes(reader, "amplitude/log_ratio_np") > 0,
+            traces_bytes=sum(_bytes(reader, f"waveform/{name}") for name in ("object", "water")),
+            samples=samples_in(reader),
+            sample_bytes=0 if received is None else 2 if received.dtype.kind != "f" else 4,
+            rate_hz=reader.number("acquisition", "sampling_rate_hz", "Hz"),
+            frequency_hz=reader.number("acquisition", "center_frequency_hz", "Hz"),
+            # As far as sizes go all waters are alike.
+            water_mps=1500.0 if water is None else water,
+        )
+
+
+def summary_of(path: Path, settings: Settings) -> Summary:
+    """As ``counts_in``, for the plan of a reconstruction."""
+    return counts_in(path).summary(settings)
+
+
+def _wanted(reader: Reader, place: str) -> NDArray[Any]:
+    found = _sized(reader, place)
+    if found is None:
+        raise InvalidInput(place, "nothing", "numbers")
+    return found
+
+
+def _sized(reader: Reader, place: str) -> NDArray[Any] | None:
+    found = reader.checked(place, NUMERIC, "numbers")
+    if found is None:
+        return None
+    check_size(place, found.shape)
+    return reader.array(place, NUMERIC, "numbers")
+
+
+def _bytes(reader: Reader, path: str) -> int:
+    found = reader.checked(path, NUMERIC, "numbers")
+    return 0 if found is None else math.prod(found.shape) * found.dtype.itemsize

@@ -1,0 +1,99 @@
+"""The traces of one slice of a dataset file, an emission at a time; how many samples they have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.acquisition.emissions import Emissions
+
+from ..hdf5_reading import Limits, Reader, opened, refusing
+from .counts import BLOCK_BYTES
+from .read import NUMERIC, TRACES, trace_type
+
+
+def trace_samples(path: Path) -> int:
+    """Samples of each trace of a dataset file; 0 where there are none of the object or none of the water."""
+    with opened(path, Limits()) as reader:
+        return samples_in(reader)
+
+
+def samples_in(reader: Reader) -> int:
+    """As ``trace_samples`` of an open file."""
+    found = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
+    return 0 if None in found or found[0] is None else int(found[0].shape[-1])
+
+
+@contextmanager
+def slice_opened(
+    path: Path, whole: Dataset, index: int, poll: Callable[[], None] = lambda: None
+) -> Iterator[Dataset]:
+    """One slice with its traces as ``Emissions``: what is asked for is read, as long as the context lasts.
+
+    Args:
+        path: of the HDF5 file.
+        whole: the dataset as it was read without its traces.
+        index: of the slice, from 0.
+        poll: called whenever an emission is asked for; may raise.
+
+    Raises:
+        InvalidInput: as ``read_dataset``; while traces are read for those that are damaged.
+    """
+    with opened(path, Limits()) as reader:
+        stacked = whole.slice_z_m is not None
+        kept = partial(_emissions, reader, poll=poll, index=index if stacked else None)
+        waveform = _waveform(reader, whole, index, kept)
+        yield replace(whole.slice(index), waveform=waveform)
+
+
+def _waveform(reader: Reader, whole: Dataset, index: int, read: Callable[[str], Any]) -> Waveform | None:
+    """The traces of a slice; ``read`` gives those of a path."""
+    received, water = (read(f"waveform/{name}") for name in ("object", "water"))
+    if received is None:
+        return None
+    factors = [
+        reader.array(f"waveform/{name}", NUMERIC, "numbers over (ntx, nrx)")
+        for name in ("object_scale", "water_scale")
+    ]
+    scale = reader.number("waveform", "scale", "the unit of the traces a count")
+    of_slice = [
+        None
+        if factor is None
+        else np.asarray(factor if whole.slice_z_m is None else factor[index], np.float64)
+        for factor in factors
+    ]
+    return Waveform(received, water, 1.0 if scale is None else scale, *of_slice)
+
+
+def _emissions(reader: Reader, path: str, *, poll: Callable[[], None], index: int | None) -> Emissions | None:
+    """The traces of a path, of one slice unless ``index`` is None."""
+    stored = reader.checked(path, NUMERIC, TRACES)
+    if stored is None:
+        return None
+    chunks = stored.chunks or (1,) * stored.ndim
+    block = max(1, min(chunks[-3], BLOCK_BYTES // (math.prod(stored.shape[-2:]) * stored.dtype.itemsize)))
+
+    # Emissions that share chunks are unpacked together, for they are asked for one after the other.
+    @lru_cache(maxsize=1)
+    def rows(number: int) -> NDArray[Any]:
+        some = slice(number * block, (number + 1) * block)
+        with refusing(path, TRACES):
+            found = stored[some] if index is None else stored[index, some]
+        return trace_type(path, found)
+
+    def emission(e: int) -> NDArray[Any]:
+        poll()
+        found: NDArray[Any] = rows(e // block)[e % block]
+        return found
+
+    dtype = trace_type(path, np.zeros(1, dtype=stored.dtype)).dtype
+    return Emissions.of(emission, stored.shape[-3:], dtype)

@@ -1,0 +1,134 @@
+"""Writing a dataset file, atomically; the same dataset gives the same bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.acquisition import Dataset, Truth, Waveform
+from bentray_kernels.errors import InvalidInput
+
+from ..hdf5_reading import printable
+from ..hdf5_writing import creating
+from .format import FORMAT, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
+
+# Below this many bytes a chunk's bookkeeping outweighs what packing saves.
+PACK_FROM_BYTES = 4096
+
+
+# Part of an array, and where it belongs.
+Piece = tuple[tuple[slice, ...], NDArray[Any]]
+# The traces of a name, piece by piece; also told the shape of the chunks that they are stored in.
+Pieces = Callable[[str, tuple[int, ...]], Iterable[Piece]]
+
+
+def write_dataset(path: Path, dataset: Dataset, pieces: Pieces | None = None) -> None:
+    """Write a dataset in the upload format; ``path`` is replaced whole or not touched.
+
+    Args:
+        path: of the file.
+        dataset: what to write.
+        pieces: gives the values of the traces in place of ``dataset.waveform``, which tells shape and type.
+
+    Raises:
+        InvalidInput: for a dataset without travel times and traces.
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    if not dataset.picked and dataset.waveform is None:
+        raise InvalidInput("traveltime", "neither travel times nor traces", "at least one of the two")
+    with creating(Path(path)) as file:
+        _write(file, dataset, pieces)
+
+
+def bytes_of(dataset: Dataset) -> int:
+    """Of all arrays of a dataset; its file packs them, and is larger by its headers at most."""
+    parts = [part for part in (dataset, dataset.waveform, dataset.truth) if part is not None]
+    arrays = (getattr(part, one.name) for part in parts for one in fields(part))
+    return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
+
+
+def write_array(group: h5py.Group, name: str, array: Any) -> None:
+    """An array, packed with gzip unless it is small."""
+    array = np.asarray(array)
+    group.create_dataset(name, data=array, track_times=False, **_packing(array, True))
+
+
+def _packing(array: NDArray[Any], chunks: tuple[int, ...] | bool) -> dict[str, Any]:
+    if array.size * array.dtype.itemsize < PACK_FROM_BYTES:
+        return {}
+    # Level 1: on traces higher levels take several times as long for a few per cent.
+    return {"chunks": chunks, "compression": "gzip", "compression_opts": 1, "shuffle": True}
+
+
+def _write(file: h5py.File, dataset: Dataset, pieces: Pieces | None) -> None:
+    file.attrs["format"] = FORMAT
+    file.attrs["format_version"] = VERSION
+    file.attrs["dimension"] = dataset.element_position_m.shape[1]
+    for name in TEXTS:
+        file.attrs[name] = printable(getattr(dataset, name))
+    geometry = file.create_group("geometry")
+    geometry.attrs["array_type"] = dataset.array_type
+    write_array(geometry, "element_position_m", dataset.element_position_m)
+    if dataset.element_normal is not None:
+        write_array(geometry, "element_normal", dataset.element_normal)
+    acquisition = file.create_group("acquisition")
+    acquisition.attrs["t0_s"] = dataset.t0_s
+    write_array(acquisition, "tx", dataset.tx)
+    write_array(acquisition, "rx", dataset.rx)
+    if dataset.wavelet is not None:
+        write_array(acquisition, "wavelet", dataset.wavelet)
+    water = file.create_group("water")
+    water.attrs["sound_speed_mps"] = dataset.water_speed_mps
+    if dataset.water_temperature_c is not None:
+        water.attrs["temperature_c"] = dataset.water_temperature_c
+    for place, name in PAIR_ARRAYS.items():
+        if getattr(dataset, name) is not None:
+            group, leaf = place.split("/")
+            write_array(file.require_group(group), leaf, getattr(dataset, name))
+    if dataset.picker:
+        file.require_group("traveltime").attrs["picker"] = printable(dataset.picker)
+    for leaf, array in (("valid", dataset.valid), ("roi", dataset.roi)):
+        if array is not None:
+            write_array(file.require_group("mask"), leaf, array)
+    if dataset.slice_z_m is not None:
+        write_array(file.create_group("slice"), "z_m", dataset.slice_z_m)
+    if dataset.waveform is not None:
+        _write_waveform(file.create_group("waveform"), dataset.waveform, pieces)
+    if dataset.truth is not None:
+        _write_truth(file.create_group("truth"), dataset.truth)
+    for group, attribute, _, name in NUMBERS:
+        if getattr(dataset, name) is not None:
+            file.require_group(group).attrs[attribute] = getattr(dataset, name)
+
+
+def _write_waveform(group: h5py.Group, waveform: Waveform, pieces: Pieces | None) -> None:
+    group.attrs["scale"] = waveform.scale
+    # An emission a chunk, which is what the picker reads at a time.
+    chunks = tuple(
+        np.minimum(waveform.object.shape, (1,) * (waveform.object.ndim - 2) + (256, 4096)).tolist()
+    )
+    for name, array in (("object", waveform.object), ("water", waveform.water)):
+        if array is not None:
+            how = _packing(array, chunks)
+            made = group.create_dataset(name, array.shape, array.dtype, track_times=False, **how)
+            whole = ((slice(None),) * array.ndim, array)
+            for where, values in pieces(name, chunks) if pieces is not None else (whole,):
+                made[where] = values
+    for name, scale in (("object_scale", waveform.object_scale), ("water_scale", waveform.water_scale)):
+        if scale is not None:
+            write_array(group, name, scale)
+
+
+def _write_truth(group: h5py.Group, truth: Truth) -> None:
+    group.attrs["axes"] = printable(truth.axes)
+    group.attrs["spacing_m"] = truth.spacing_m
+    group.attrs["origin_m"] = truth.origin_m
+    write_array(group, "sound_speed_mps", truth.sound_speed_mps)
+    if truth.attenuation_np_m is not None:
+        write_array(group, "attenuation_np_m", truth.attenuation_np_m)

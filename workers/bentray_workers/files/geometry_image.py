@@ -1,0 +1,132 @@
+"""Geometry images as files: ``bentray-geometry-image`` in HDF5, and PNG of positions, normals and colours."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from bentray_kernels.arrays import Flags, Floats
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.geometry_field.image.geometry_image import GeometryImage
+
+from .hdf5_reading import Limits, Reader, opened
+from .hdf5_writing import creating
+
+FORMAT = "bentray-geometry-image"
+VERSION = "1.0"
+
+Pixels = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class GeometryMaps:
+    """What a geometry image holds; pixel (i, j) of n² lies at (u, v) = (i, j)/(n − 1).
+
+    Attributes:
+        positions: (n, n, 3) in the unit cube.
+        normals: (n, n, 3) unit vectors.
+        valid: (n, n) whether a pixel stands for a point of the surface; the others are 0.
+        colours: (n, n, 3) in [0, 1], or None.
+    """
+
+    positions: Pixels
+    normals: Pixels
+    valid: Flags
+    colours: Pixels | None = None
+
+    @classmethod
+    def of(cls, image: GeometryImage, colours: Floats | None = None) -> GeometryMaps:
+        """Of an image, with the colours, (vertices, 3), of its mesh where it has them."""
+        return cls(
+            image.positions.astype(np.float32),
+            image.normals.astype(np.float32),
+            image.valid,
+            None if colours is None else image.sampled(colours).astype(np.float32),
+        )
+
+
+def write_geometry_image(path: Path, maps: GeometryMaps) -> None:
+    """Write the maps, float32 and bytes; ``path`` is replaced whole or not touched.
+
+    Raises:
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    with creating(path) as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["format_version"] = VERSION
+        for name, values in _named(maps).items():
+            file.create_dataset(name, data=values, compression="gzip", shuffle=True, track_times=False)
+
+
+def read_geometry_image(path: Path, limits: Limits | None = None) -> GeometryMaps:
+    """Read what ``write_geometry_image`` wrote.
+
+    Raises:
+        InvalidInput: naming the first field that is missing or wrong.
+    """
+    with opened(path, limits or Limits()) as reader:
+        for name, wanted in (("format", FORMAT), ("format_version", VERSION)):
+            if (found := reader.text("", name)) != wanted:
+                raise InvalidInput(f"@{name}", repr(found), f'"{wanted}"')
+        positions = _map(reader, "positions")
+        normals = _map(reader, "normals")
+        valid = reader.array("valid", "u", "(n, n) bytes, 0 or 1")
+        colours = _map(reader, "colours") if reader.has("colours") else None
+    if valid is None or valid.ndim != 2 or valid.shape[0] != valid.shape[1]:
+        raise InvalidInput("valid", "nothing" if valid is None else f"shape {valid.shape}", "(n, n)")
+    for name, values in (("positions", positions), ("normals", normals), ("colours", colours)):
+        if values is not None and values.shape != (*valid.shape, 3):
+            raise InvalidInput(name, f"shape {values.shape}", f"{(*valid.shape, 3)}, as valid has it")
+    return GeometryMaps(positions, normals, valid > 0, colours)
+
+
+def _named(maps: GeometryMaps) -> dict[str, NDArray[np.generic]]:
+    named: dict[str, NDArray[np.generic]] = {
+        "positions": maps.positions,
+        "normals": maps.normals,
+        "valid": maps.valid.astype(np.uint8),
+    }
+    return named if maps.colours is None else named | {"colours": maps.colours}
+
+
+def _map(reader: Reader, name: str) -> Pixels:
+    values = reader.array(name, "f", "(n, n, 3) numbers")
+    if values is None or not np.isfinite(values).all():
+        raise InvalidInput(name, "nothing" if values is None else "not finite", "(n, n, 3) finite numbers")
+    return values.astype(np.float32)
+
+
+def position_png(maps: GeometryMaps) -> bytes:
+    """The positions as red, green and blue, u to the right and v up; clear where not valid."""
+    return _png(maps.positions, maps.valid)
+
+
+def normal_png(maps: GeometryMaps) -> bytes:
+    """The normals likewise, −1 to 1 from dark to bright."""
+    return _png(0.5 * (maps.normals + 1.0), maps.valid)
+
+
+def colour_png(maps: GeometryMaps) -> bytes:
+    """The colours likewise.
+
+    Raises:
+        InvalidInput: for an image without.
+    """
+    if maps.colours is None:
+        raise InvalidInput("colours", "none", "the image of a mesh with colours")
+    return _png(maps.colours, maps.valid)
+
+
+def _png(values: Pixels, valid: Flags) -> bytes:
+    shades = np.rint(np.clip(np.where(valid[..., np.newaxis], values, 0.0), 0.0, 1.0) * 255.0)
+    pixels = np.dstack((shades, 255.0 * valid)).astype(np.uint8)
+    # An image has its rows from the top down.
+    upright = np.ascontiguousarray(pixels.transpose(1, 0, 2)[::-1])
+    buffer = io.BytesIO()
+    Image.fromarray(upright).save(buffer, "png", optimize=True)
+    return buffer.getvalue()

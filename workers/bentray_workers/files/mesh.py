@@ -1,0 +1,111 @@
+"""Meshes as files: ``bentray-mesh`` in HDF5, and what a service remembers of one."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bentray_kernels.arrays import Floats
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.meshes.defects import SoundMesh
+from bentray_kernels.meshes.mesh import TriangleMesh
+
+from .hdf5_reading import Limits, opened
+from .hdf5_writing import creating
+
+FORMAT = "bentray-mesh"
+VERSION = "1.0"
+
+
+@dataclass(frozen=True)
+class StoredMesh:
+    """A sound mesh, as ``defects.sound`` leaves it.
+
+    Attributes:
+        mesh: vertices in any unit.
+        colours: (vertices, 3) in [0, 1], or None.
+    """
+
+    mesh: TriangleMesh
+    colours: Floats | None = None
+
+    @property
+    def nbytes(self) -> int:
+        """Of its arrays; a file packs them."""
+        parts = (self.mesh.vertices, self.mesh.faces, self.colours)
+        return sum(part.nbytes for part in parts if part is not None)
+
+    def content(self) -> str:
+        """SHA-256 of vertices, faces and colours, in hexadecimal."""
+        digest = hashlib.sha256()
+        parts = (self.mesh.vertices, self.mesh.faces, self.colours)
+        for part, kind in zip(parts, ("<f8", "<i4", "<f8"), strict=True):
+            values = np.zeros(0) if part is None else part
+            digest.update(repr(values.shape).encode())
+            digest.update(np.ascontiguousarray(values, dtype=kind).tobytes())
+        return digest.hexdigest()
+
+
+def summary_of(stored: StoredMesh, surface: SoundMesh, kind: str, pieces: int = 1) -> dict[str, Any]:
+    """What a service remembers of a mesh, in plain values.
+
+    Args:
+        stored: the mesh.
+        surface: what was done to make it sound.
+        kind: the format of the file that it came in, or "isosurface".
+        pieces: of which it is one.
+    """
+    repairs = {
+        "merged_vertices": surface.merged,
+        "unused_vertices": surface.unused,
+        "turned_faces": surface.turned,
+        "parted_vertices": surface.parted,
+        "dropped_pieces": pieces - 1,
+    }
+    return {
+        "format": kind,
+        "vertices": len(stored.mesh.vertices),
+        "faces": len(stored.mesh.faces),
+        "genus": surface.genus,
+        "holes": surface.holes,
+        "coloured": stored.colours is not None,
+        "repairs": repairs,
+        "content": stored.content(),
+    }
+
+
+def write_mesh(path: Path, stored: StoredMesh) -> None:
+    """Write a mesh; ``path`` is replaced whole or not touched.
+
+    Raises:
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    with creating(path) as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["format_version"] = VERSION
+        arrays = {"vertices": stored.mesh.vertices, "faces": stored.mesh.faces, "colours": stored.colours}
+        for name, values in arrays.items():
+            if values is not None:
+                file.create_dataset(name, data=values, compression="gzip", shuffle=True, track_times=False)
+
+
+def load_mesh(path: Path) -> StoredMesh:
+    """Read what ``write_mesh`` wrote.
+
+    Raises:
+        InvalidInput: naming the first field that is missing or wrong.
+    """
+    with opened(path, Limits()) as reader:
+        for name, wanted in (("format", FORMAT), ("format_version", VERSION)):
+            if (found := reader.text("", name)) != wanted:
+                raise InvalidInput(f"@{name}", repr(found), f'"{wanted}"')
+        vertices = reader.array("vertices", "f", "(vertices, 3) numbers")
+        faces = reader.array("faces", "i", "(faces, 3) rows of the vertices")
+        colours = reader.array("colours", "f", "(vertices, 3) numbers") if reader.has("colours") else None
+    if vertices is None or faces is None:
+        raise InvalidInput("vertices" if vertices is None else "faces", "nothing", "an array")
+    return StoredMesh(TriangleMesh(vertices.astype(np.float64), faces.astype(np.int32)), colours)

@@ -1,0 +1,174 @@
+"""Meshes that a stranger wrote, in any of the formats, told apart by content and not by name."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import trimesh
+from trimesh.visual import ColorVisuals
+
+from bentray_kernels.arrays import Floats
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.meshes.defects import SoundMesh, sound
+
+from .bounded_reading import refusing
+from .gltf_checks import check_gltf
+from .obj_checks import check_obj
+from .off_checks import HEADERS, check_off
+
+ACCEPTED = "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB"
+
+LARGEST_BYTES = 256 * 2**20
+MOST_FACES = 2_000_000
+
+# Some editors put it before text.
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+# Chunks of GLB: JSON, "JSON" in little-endian.
+GLB_HEADER = struct.Struct("<4sII")
+GLB_CHUNK = struct.Struct("<I4s")
+
+# What glTF says of looks; images would have to be decoded, and nothing here asks for them.
+LOOKS = ("images", "textures", "samplers", "materials", "animations", "skins", "cameras")
+
+
+@dataclass(frozen=True)
+class ReadMesh:
+    """A mesh from a file.
+
+    Attributes:
+        format: as ``trimesh`` names it.
+        surface: the mesh, and what was done to make it sound.
+        colours: (vertices, 3) in [0, 1], or None where the file gives none for vertices.
+    """
+
+    format: str
+    surface: SoundMesh
+    colours: Floats | None
+
+
+def read_mesh(data: bytes) -> ReadMesh:
+    """Read a mesh in any of the formats; nothing outside of the bytes is looked at.
+
+    Faces of more corners become triangles, the parts of a glTF scene one mesh. Vertices in one place are
+    merged (STL has each of them once a face), and faces that run against the others are turned.
+
+    Args:
+        data: the whole file.
+
+    Raises:
+        InvalidInput: for anything else, for more than ``LARGEST_BYTES`` or ``MOST_FACES``, for damage, for
+            glTF that refers to other files, and as ``rendering.geometry_field.defects.sound``.
+    """
+    if len(data) > LARGEST_BYTES:
+        raise InvalidInput("file", f"{len(data)} bytes", f"at most {LARGEST_BYTES} bytes")
+    data = data.removeprefix(BYTE_ORDER_MARK)
+    kind = _kind(data)
+    if kind in ("gltf", "glb"):
+        data = _without_looks(data, kind)
+    if kind == "off":
+        check_off(data)
+    if kind == "obj":
+        check_obj(data)
+    with _whole(kind):
+        loaded = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False)
+        mesh = loaded.to_mesh()
+        faces, vertices = np.asarray(mesh.faces), np.asarray(mesh.vertices)
+    if len(faces) > MOST_FACES:
+        raise InvalidInput("faces", len(faces), f"at most {MOST_FACES}")
+    surface = sound(vertices, faces)
+    return ReadMesh(kind, surface, _colours(mesh, surface))
+
+
+def _kind(data: bytes) -> str:
+    start = data[:512].lstrip()
+    if data.startswith(b"glTF"):
+        return "glb"
+    if start.startswith(b"{"):
+        return "gltf"
+    if data.startswith(b"ply"):
+        return "ply"
+    if start.split(maxsplit=1)[:1] and start.split(maxsplit=1)[0] in HEADERS:
+        return "off"
+    # Binary STL begins with any 80 bytes, even with "solid"; its length tells.
+    as_stl = 84 + 50 * struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else 0
+    if as_stl and as_stl == len(data):
+        return "stl"
+    if start.startswith(b"solid") and b"facet" in data[:4096]:
+        if b"endsolid" not in data:
+            raise InvalidInput("file", "an STL of words without its end (endsolid)", "a whole STL file")
+        return "stl"
+    text = b"\0" not in data[: 2**16]
+    if text and re.search(rb"^v[ \t]", data, re.MULTILINE):
+        return "obj"
+    found = f"a file of another kind (it begins with {data[:8]!r})"
+    if not data:
+        found = "an empty file"
+    elif as_stl and not text:
+        found += f"; or a binary STL of {len(data)} bytes, where its header means {as_stl}"
+    raise InvalidInput("file", found, ACCEPTED)
+
+
+@contextmanager
+def _whole(kind: str) -> Iterator[None]:
+    """What trimesh raises on damage in words of ours: its own are those of the arrays that it makes."""
+    try:
+        with refusing("file", f"a whole {kind.upper()} file"):
+            yield
+    except InvalidInput as error:
+        if not error.value.startswith("damaged data"):
+            raise
+        found = f"{kind.upper()} data that are cut short, damaged, or not what the file itself says of them"
+        raise InvalidInput("file", found, error.accepted) from None
+
+
+def _without_looks(data: bytes, kind: str) -> bytes:
+    """The same glTF without images and materials, once it is sure that it refers to no other file."""
+    with _whole(kind):
+        rest = b""
+        text = data
+        if kind == "glb":
+            length, name = GLB_CHUNK.unpack_from(data, GLB_HEADER.size)
+            begin = GLB_HEADER.size + GLB_CHUNK.size
+            text, rest = data[begin : begin + length], data[begin + length :]
+            if name != b"JSON" or len(text) < length:
+                raise InvalidInput("file", f"a first chunk {name!r}", "JSON, as a whole")
+        scene = json.loads(text)
+        outside = [buffer["uri"] for buffer in scene.get("buffers", []) if not _inside(buffer)]
+        if outside:
+            # Its name could be that of any file of this machine; it is not repeated.
+            raise InvalidInput("buffers/uri", "data in another file", "data within the file")
+        check_gltf(scene, len(data), MOST_FACES)
+        kept = json.dumps(_stripped(scene)).encode()
+    if kind == "gltf":
+        return kept
+    kept += b" " * (-len(kept) % 4)
+    total = GLB_HEADER.size + GLB_CHUNK.size + len(kept) + len(rest)
+    return GLB_HEADER.pack(b"glTF", 2, total) + GLB_CHUNK.pack(len(kept), b"JSON") + kept + rest
+
+
+def _inside(buffer: dict[str, Any]) -> bool:
+    return "uri" not in buffer or buffer["uri"].startswith("data:")
+
+
+def _stripped(scene: dict[str, Any]) -> dict[str, Any]:
+    for mesh in scene.get("meshes", []):
+        for primitive in mesh["primitives"]:
+            primitive.pop("material", None)
+    return {name: value for name, value in scene.items() if name not in LOOKS}
+
+
+def _colours(mesh: trimesh.Trimesh, surface: SoundMesh) -> Floats | None:
+    visual = mesh.visual
+    if not isinstance(visual, ColorVisuals) or visual.kind != "vertex":
+        return None
+    colours = np.asarray(visual.vertex_colors)[surface.origin, :3]
+    return colours.astype(np.float64) / 255.0

@@ -1,0 +1,104 @@
+"""NIfTI-1 and -2 of one part: nibabel reads the header, the values are read here, within bounds."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.arrays import Floats
+from bentray_kernels.errors import InvalidInput
+
+from .bounded_reading import (
+    LONGEST_HEADER,
+    LONGEST_TAIL,
+    UNITS_M,
+    ShapeCheck,
+    any_shape,
+    at_end,
+    declared,
+    refusing,
+    whole,
+)
+from .volume import Volume
+from .volume_axes import turned
+
+# Takes what nibabel says of a header while it checks it: the refusal says the same in one line.
+_unheard = logging.Logger("nibabel's checks, unheard", logging.CRITICAL + 1)
+
+
+def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
+    """The volume in an open file, unpacked, its axes turned to the right, front and up of the body.
+
+    Axes change places and sense so that they come nearest to these; values are never resampled, so what is
+    left of a tilt is not kept. A file that says nothing of directions (both codes 0) stays as it is stored.
+
+    Args:
+        file: at its beginning. It is read to its end, so that one that was packed verifies its check sum.
+        check: called with the shape in the file before the values are read.
+
+    Raises:
+        InvalidInput: for anything else, and for axes that are not at right angles.
+    """
+    from nibabel.nifti1 import Nifti1Header
+    from nibabel.nifti2 import Nifti2Header
+    from nibabel.spatialimages import HeaderDataError
+
+    with refusing("file", "a whole NIfTI file of one part"):
+        start = file.read(540)
+        kind, size = (Nifti2Header, 540) if start[4:8] == b"n+2\0" else (Nifti1Header, 348)
+        if b"n+" not in (start[344:346], start[4:6]):
+            raise InvalidInput("file", f"packed content of another kind ({start[:8]!r})", "NIfTI")
+        try:
+            header: Any = kind(start[:size], check=False)
+            _check_numbers(header)
+            header.check_fix(_unheard)
+            dtype, shape = header.get_data_dtype(), tuple(int(n) for n in header.get_data_shape())
+            slope, intercept = header.get_slope_inter()
+            affine, unit = _affine(header), header.get_xyzt_units()[0]
+        except HeaderDataError as error:
+            raise InvalidInput("file", f"a damaged NIfTI header ({error})", "a whole NIfTI file") from None
+        # A volume of one moment often has a fourth axis of length 1.
+        while len(shape) > 3 and shape[-1] == 1:
+            shape = shape[:-1]
+        count = declared("dim", shape, dtype, check)
+        offset = int(header["vox_offset"])
+        if not size <= offset <= LONGEST_HEADER:
+            raise InvalidInput("vox_offset", offset, f"{size} to {LONGEST_HEADER} bytes")
+        file.seek(offset)
+        values = np.frombuffer(whole(file, count), dtype).reshape(shape, order="F")
+        at_end(file, LONGEST_TAIL)
+        if (slope or 1.0, intercept or 0.0) != (1.0, 0.0):
+            with np.errstate(over="ignore", invalid="ignore"):
+                values = values * np.float32(slope) + np.float32(intercept)
+        values, affine = turned(values, affine, "affine")
+        scale = UNITS_M["mm" if unit == "unknown" else unit]
+        with np.errstate(over="ignore"):
+            spacing = scale * np.linalg.norm(affine[:3, :3], axis=0)
+        return Volume.of(values, spacing.tolist(), (scale * affine[:3, 3]).tolist(), _text(header["descrip"]))
+
+
+def _check_numbers(header: Any) -> None:
+    """Refuse numbers that nibabel would put right by guesses of its own."""
+    for name in ("scl_slope", "scl_inter"):
+        # NaN is how nibabel itself writes that there is none.
+        if np.isinf(header[name]):
+            raise InvalidInput(name, float(header[name]), "a finite number")
+    steps = header["pixdim"][1:4]
+    placed = header["sform_code"] != 0 or header["qform_code"] != 0
+    if not placed and (steps == 0.0).any():
+        raise InvalidInput("pixdim", [float(step) for step in steps], "distances other than 0")
+
+
+def _affine(header: Any) -> Floats:
+    """(4, 4) from nodes to places, unit of the file, x to the right, y to the front, z up."""
+    if header["sform_code"] == 0 and header["qform_code"] == 0:
+        # Nibabel would mirror x, as another format has it.
+        return np.diag([*np.asarray(header["pixdim"][1:4], dtype=np.float64), 1.0])
+    return np.asarray(header.get_best_affine(), dtype=np.float64)
+
+
+def _text(field: NDArray[Any]) -> str:
+    return bytes(field.item()).decode("utf-8", "replace")

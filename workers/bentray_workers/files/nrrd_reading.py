@@ -1,0 +1,137 @@
+"""NRRD: pynrrd reads the header, the values are read here, since pynrrd unpacks without bound."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Sequence
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.arrays import Floats
+from bentray_kernels.errors import InvalidInput
+
+from .bounded_reading import (
+    LONGEST_HEADER,
+    UNITS_M,
+    ShapeCheck,
+    any_shape,
+    at_end,
+    declared,
+    refusing,
+    whole,
+)
+from .volume import Volume
+from .volume_axes import turned
+
+NRRD_TYPES = {
+    "i1": ("signed char", "int8", "int8_t"),
+    "u1": ("uchar", "unsigned char", "uint8", "uint8_t"),
+    "i2": ("short", "short int", "signed short", "signed short int", "int16", "int16_t"),
+    "u2": ("ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"),
+    "i4": ("int", "signed int", "int32", "int32_t"),
+    "u4": ("uint", "unsigned int", "uint32", "uint32_t"),
+    "i8": ("longlong", "long long", "signed long long", "int64", "int64_t"),
+    "u8": ("ulonglong", "unsigned long long", "uint64", "uint64_t"),
+    "f4": ("float",),
+    "f8": ("double",),
+}
+
+
+# What a header says of values that do not follow it.
+ELSEWHERE = ("data file", "datafile", "byte skip", "byteskip", "line skip", "lineskip")
+
+
+def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
+    """The volume in an NRRD file with its values after the header; raises InvalidInput for anything else.
+
+    Its axes go to the right, the front and the head where the file's space tells of them, as ``LPS`` does;
+    else they come in the order and the sense of that space.
+
+    ``check`` is called with the shape before the values are read.
+    """
+    import nrrd
+
+    start = file.read(LONGEST_HEADER)
+    # The header ends with an empty line.
+    ends = [start.find(mark) + len(mark) for mark in (b"\n\n", b"\r\n\r\n") if mark in start]
+    if not ends:
+        raise InvalidInput("file", "an NRRD header without an end", f"one of at most {LONGEST_HEADER} bytes")
+    accepted = "a whole NRRD file in three dimensions"
+    with refusing("file", accepted):
+        header: Any = nrrd.read_header(start[: min(ends)].splitlines(keepends=True))
+        # A data file beside the header could be any file of this machine; its name is not repeated.
+        for field in ELSEWHERE:
+            if field in header:
+                raise InvalidInput(field, "values elsewhere", "values in the same file, after the header")
+        kinds = set(header.get("kinds", ())) - {"domain", "space", "none", "???"}
+        if kinds:
+            raise InvalidInput("kinds", ", ".join(sorted(kinds)), "domain or space along each axis")
+        dtype = next((np.dtype(code) for code, names in NRRD_TYPES.items() if header["type"] in names), None)
+        if dtype is None:
+            raise InvalidInput("type", repr(header["type"]), "a type of numbers")
+        dtype = dtype.newbyteorder(">" if header.get("endian") == "big" else "<")
+        shape = tuple(int(n) for n in header["sizes"])
+        count = declared("sizes", shape, dtype, check)
+        if header["dimension"] != len(shape):
+            raise InvalidInput("dimension", header["dimension"], f"{len(shape)}, as many as there are sizes")
+        file.seek(min(ends))
+        encoding = header["encoding"]
+        if encoding == "raw":
+            data = whole(file, count)
+            at_end(file)
+        elif encoding in ("gzip", "gz"):
+            with gzip.open(file) as unpacked:
+                data = whole(unpacked, count)
+                at_end(unpacked)
+        else:
+            raise InvalidInput("encoding", repr(encoding), "raw or gzip")
+        values = np.frombuffer(data, dtype).reshape(shape, order="F")
+        values, affine = turned(values, _affine(header), "space directions")
+        with np.errstate(over="ignore"):
+            steps = np.linalg.norm(affine[:3, :3], axis=0)
+        return Volume.of(values, steps.tolist(), affine[:3, 3].tolist(), str(header.get("content", "")))
+
+
+def _affine(header: Any) -> Floats:
+    """(4, 4) from nodes to places in the space of the file, m."""
+    # Spacings are told in the units of the array's axes, directions and origin in those of space.
+    own, space = header.get("units"), header.get("space units")
+    around = _metres(space or own)
+    affine = np.eye(4)
+    directions = header.get("space directions")
+    if directions is None:
+        spacings = header.get("spacings", [1.0] * 3)
+        if len(spacings) != 3 or not all(0.0 < step < np.inf for step in spacings):
+            raise InvalidInput(
+                "spacings", [float(step) for step in spacings], "three finite distances above 0"
+            )
+        affine[:3, :3] = np.diag(np.multiply(spacings, _metres(own or space)))
+    else:
+        affine[:3, :3] = (directions * around).T
+    affine[:3, 3] = np.multiply(header.get("space origin", [0.0] * 3), around)
+    return np.diag([*_to_right_front_up(header.get("space")), 1.0]) @ affine
+
+
+def _to_right_front_up(space: Any) -> tuple[float, float, float]:
+    """What the axes of a space are times those to the right, the front and the head, as NIfTI's are.
+
+    One that names no patient, as ``3D-right-handed`` or none, stays as it is.
+    """
+    words = str(space or "").lower().removesuffix("-time")
+    words = {"ras": "right-anterior-superior", "las": "left-anterior-superior"}.get(words, words)
+    words = {"lps": "left-posterior-superior"}.get(words, words)
+    left, back = words.startswith("left-"), "-posterior-" in words
+    return -1.0 if left else 1.0, -1.0 if back else 1.0, 1.0
+
+
+def _metres(names: Sequence[str] | None) -> NDArray[np.float64]:
+    """What each of three axes is measured in, m; mm where the header does not tell."""
+    units = [str(name).strip('" ') or "mm" for name in names or ["mm"] * 3]
+    for unit in units:
+        if unit not in UNITS_M:
+            raise InvalidInput("units", repr(unit), "one of " + ", ".join(UNITS_M))
+    if len(units) != 3:
+        raise InvalidInput("units", ", ".join(units), "three, one for each axis")
+    return np.array([UNITS_M[unit] for unit in units])

@@ -1,0 +1,224 @@
+"""Reconstructions as files: ``reconstruction.h5``, written atomically and read back exactly."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import RESIDUAL_EDGES_S, Reconstruction, Settings, Sweep, Trial
+
+from .dataset.write import write_array
+from .hdf5_reading import Limits, Reader, opened
+from .hdf5_writing import creating
+from .reconstruction_format import FORMAT, VERSION
+
+HISTORY = {
+    "slice": np.int64,
+    "sweep": np.int64,
+    "residual_rms_s": np.float64,
+    "emitters": np.int64,
+    "stage": np.int64,
+    "given": np.bool_,
+}
+
+# Columns of refinements by waveforms; NaN where there is none. Files of before them have none of these.
+WAVES = ("band_low_hz", "band_high_hz", "misfit", "held_out_misfit", "of_attenuation")
+IMAGES = {
+    "speed": "speed_mps",
+    "coverage": "coverage_m",
+    "attenuation": "attenuation_np_m",
+    "recovery": "recovery",
+}
+
+
+def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
+    """Write a reconstruction; ``path`` is replaced whole or not touched.
+
+    The file holds ``speed_mps``, ``coverage_m`` and, where there are such, ``attenuation_np_m`` and
+    ``recovery``, each (nx, ny) or (nx, ny, nz); ``history`` with a column a field of ``Sweep``; ``residuals``
+    with ``count`` and the ``edge_s`` of its bins; and root attributes ``spacing_m``, ``origin_m``, ``axes``,
+    ``water_speed_mps``, ``settings``, ``trials`` and ``provenance``, the last three JSON.
+
+    Raises:
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    with creating(Path(path)) as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["format_version"] = VERSION
+        file.attrs["axes"] = "x,y" if reconstruction.speed.ndim == 2 else "x,y,z"
+        file.attrs["spacing_m"] = reconstruction.spacing_m
+        file.attrs["origin_m"] = reconstruction.origin_m
+        file.attrs["water_speed_mps"] = reconstruction.water_speed_mps
+        file.attrs["settings"] = json.dumps(reconstruction.settings.to_dict())
+        file.attrs["trials"] = json.dumps([asdict(trial) for trial in reconstruction.trials])
+        file.attrs["provenance"] = json.dumps(reconstruction.provenance)
+        for name, place in IMAGES.items():
+            if getattr(reconstruction, name) is not None:
+                write_array(file, place, getattr(reconstruction, name))
+        history = file.create_group("history")
+        for column, dtype in HISTORY.items():
+            rows: NDArray[Any] = np.array([getattr(sweep, column) for sweep in reconstruction.history], dtype)
+            write_array(history, column, rows)
+        if any(sweep.band_hz is not None for sweep in reconstruction.history):
+            for column, values in zip(
+                WAVES, zip(*map(_waves, reconstruction.history), strict=True), strict=True
+            ):
+                write_array(history, column, np.array(values, dtype=np.float64))
+        if reconstruction.residuals is not None:
+            residuals = file.create_group("residuals")
+            write_array(residuals, "count", reconstruction.residuals)
+            write_array(residuals, "edge_s", RESIDUAL_EDGES_S)
+
+
+def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstruction:
+    """Read what ``write_reconstruction`` wrote.
+
+    Raises:
+        InvalidInput: naming the first field that is missing or wrong, as ``read_dataset`` does.
+    """
+    with opened(Path(path), limits or Limits()) as reader:
+        for name, expected in (("format", FORMAT), ("format_version", VERSION)):
+            if (found := reader.text("", name)) != expected:
+                raise InvalidInput(f"@{name}", repr(found), f'"{expected}"')
+        speed = _image(reader, "speed_mps", None)
+        coverage = _image(reader, "coverage_m", speed.shape)
+        extra = {
+            name: _image(reader, IMAGES[name], speed.shape) if reader.has(IMAGES[name]) else None
+            for name in ("attenuation", "recovery")
+        }
+        water = reader.number("", "water_speed_mps", "m/s")
+        if water is None:
+            raise InvalidInput("@water_speed_mps", "nothing", "a speed in m/s")
+        return Reconstruction(
+            speed=speed,
+            coverage=coverage,
+            **extra,
+            spacing_m=_per_axis(reader, "spacing_m", speed.ndim),
+            origin_m=_per_axis(reader, "origin_m", speed.ndim),
+            water_speed_mps=water,
+            settings=_settings(_json(reader, "settings")),
+            history=_history(reader),
+            residuals=_residuals(reader),
+            trials=_trials(reader),
+            provenance={str(k): str(v) for k, v in _json(reader, "provenance").items()},
+        )
+
+
+def _image(reader: Reader, place: str, shape: tuple[int, ...] | None) -> NDArray[np.float64]:
+    accepted = "(nx, ny) or (nx, ny, nz) numbers" if shape is None else f"numbers of shape {shape}"
+    image = reader.array(place, "f", accepted)
+    if image is None:
+        raise InvalidInput(place, "nothing", accepted)
+    if image.ndim not in (2, 3) or 0 in image.shape or (shape is not None and image.shape != shape):
+        raise InvalidInput(place, f"shape {image.shape}", accepted)
+    return np.asarray(image, dtype=np.float64)
+
+
+def _per_axis(reader: Reader, name: str, ndim: int) -> tuple[float, ...]:
+    values = reader.numbers("", name, "m")
+    if values is None or len(values) != ndim:
+        raise InvalidInput(f"@{name}", "nothing" if values is None else values, f"{ndim} numbers in m")
+    return values
+
+
+def _history(reader: Reader) -> tuple[Sweep, ...]:
+    columns = {}
+    for column, dtype in HISTORY.items():
+        found = reader.array(f"history/{column}", np.dtype(dtype).kind, "a column of numbers")
+        if found is None or found.ndim != 1:
+            raise InvalidInput(
+                f"history/{column}", "nothing" if found is None else f"shape {found.shape}", "a column"
+            )
+        columns[column] = found.tolist()
+    rows = [dict(zip(columns, row, strict=False)) for row in zip(*columns.values(), strict=False)]
+    waves = [[None if math.isnan(value) else value for value in column] for column in _wave_columns(reader)]
+    if len({len(column) for column in (*columns.values(), *waves)}) != 1:
+        raise InvalidInput("history", "columns of different lengths", "columns of one length")
+    if not waves:
+        return tuple(Sweep(**row) for row in rows)
+    return tuple(
+        Sweep(
+            **row,
+            band_hz=(low, high) if low and high else None,
+            misfit=misfit,
+            held_out_misfit=held,
+            of_attenuation=bool(loss),
+        )
+        for row, low, high, misfit, held, loss in zip(rows, *waves, strict=True)
+    )
+
+
+def _waves(sweep: Sweep) -> tuple[float, ...]:
+    """What is in ``WAVES`` of one sweep."""
+    found = (*(sweep.band_hz or (None, None)), sweep.misfit, sweep.held_out_misfit, sweep.of_attenuation)
+    return tuple(math.nan if value is None else value for value in found)
+
+
+def _wave_columns(reader: Reader) -> list[list[float]]:
+    """None in a file without them."""
+    if not reader.has(f"history/{WAVES[0]}"):
+        return []
+    found = [reader.array(f"history/{column}", "f", "a column of numbers") for column in WAVES]
+    for column, values in zip(WAVES, found, strict=True):
+        if values is None or values.ndim != 1:
+            raise InvalidInput(
+                f"history/{column}", "nothing" if values is None else f"shape {values.shape}", "a column"
+            )
+    return [values.tolist() for values in found if values is not None]
+
+
+def _residuals(reader: Reader) -> NDArray[np.int64] | None:
+    if not reader.has("residuals/count"):
+        return None
+    accepted = f"{len(RESIDUAL_EDGES_S) - 1} counts"
+    found = reader.array("residuals/count", "i", accepted)
+    if found is None or found.shape != (len(RESIDUAL_EDGES_S) - 1,):
+        raise InvalidInput(
+            "residuals/count", "nothing" if found is None else f"shape {found.shape}", accepted
+        )
+    return np.asarray(found, dtype=np.int64)
+
+
+def _trials(reader: Reader) -> tuple[Trial, ...]:
+    try:
+        found = json.loads(reader.text("", "trials") or "[]")
+        return tuple(
+            Trial(
+                dict(one["settings"]),
+                float(one["held_out_rms_s"]),
+                float(one["shown_rms_s"]),
+                None if one.get("held_out_mean_s") is None else float(one["held_out_mean_s"]),
+            )
+            for one in found
+        )
+    except (ValueError, TypeError, KeyError, RecursionError):
+        accepted = "a JSON list of trials by this version"
+        raise InvalidInput("@trials", repr((reader.text("", "trials") or "")[:60]), accepted) from None
+
+
+def _json(reader: Reader, name: str) -> dict[str, Any]:
+    text = reader.text("", name)
+    try:
+        found = json.loads(text or "")
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        raise InvalidInput(f"@{name}", repr((text or "")[:60]), "a JSON object")
+    return found
+
+
+def _settings(values: dict[str, Any]) -> Settings:
+    # JSON has lists where Settings has tuples.
+    given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
+    try:
+        return Settings(**given)
+    except TypeError as error:
+        accepted = "the settings of a reconstruction by this version"
+        raise InvalidInput("@settings", str(error), accepted) from None

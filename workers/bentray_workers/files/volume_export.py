@@ -1,0 +1,116 @@
+"""A volume in other file formats: what each holds, and the task that writes one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .atomic import replacing
+from .hdf5_reading import Limits, opened
+from .mat_writing import write_mat
+from .metaimage_writing import write_metaimage
+from .nifti_writing import write_nifti
+from .reconstruction import IMAGES, read_reconstruction
+from .volume import FORMAT, read_volume
+
+
+@dataclass(frozen=True)
+class Content:
+    """What is in the file of a volume.
+
+    Attributes:
+        values: (nx, ny[, nz]): the speed of a reconstruction, m/s, or the values of an upload.
+        spacing_m, origin_m: one an axis, m; NaN where heights are uneven.
+        title: what it is.
+        images: every array of it by its name, these values among them.
+    """
+
+    values: NDArray[Any]
+    spacing_m: Sequence[float]
+    origin_m: Sequence[float]
+    title: str
+    images: Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format: the end of its files' names, their media type, and what writes one."""
+
+    extension: str
+    media_type: str
+    write: Callable[[Path, Content], None]
+
+
+# Of the numbers of a volume, and of what a file says beside them.
+NUMBER_BYTES, HEADER_BYTES = 8, 64 * 2**10
+
+
+def largest_bytes(shape: Sequence[int], *, uploaded: bool) -> int:
+    """Bytes that a volume of this shape takes in any of the formats, at most."""
+    images = 1 if uploaded else len(IMAGES)
+    return images * NUMBER_BYTES * math.prod(shape) + HEADER_BYTES
+
+
+def export_volume(volume: Path, *, target: Path, name: str) -> None:
+    """Task: write a volume or reconstruction file in another format.
+
+    Args:
+        volume: its file.
+        target: the file to make, replaced whole.
+        name: a key of ``FORMATS``.
+
+    Raises:
+        InvalidInput: naming ``volume``, for what the format cannot tell.
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    with opened(volume, Limits()) as reader:
+        uploaded = reader.text("", "format") == FORMAT
+    FORMATS[name].write(target, _uploaded(volume) if uploaded else _reconstructed(volume))
+
+
+def _uploaded(volume: Path) -> Content:
+    own = read_volume(volume)
+    return Content(own.values, own.spacing_m, own.origin_m, own.title, {"values": own.values})
+
+
+def _reconstructed(volume: Path) -> Content:
+    own = read_reconstruction(volume)
+    held = {place: getattr(own, name) for name, place in IMAGES.items()}
+    images = {place: image for place, image in held.items() if image is not None}
+    return Content(own.speed, own.spacing_m, own.origin_m, "Speed of sound, m/s", images)
+
+
+def _npy(target: Path, content: Content) -> None:
+    with replacing(target) as partial, partial.open("wb") as file:
+        np.save(file, np.ascontiguousarray(content.values), allow_pickle=False)
+
+
+def _nifti(target: Path, content: Content) -> None:
+    write_nifti(target, content.values, content.spacing_m, content.origin_m, content.title)
+
+
+def _metaimage(target: Path, content: Content) -> None:
+    write_metaimage(target, content.values, content.spacing_m, content.origin_m, content.title)
+
+
+def _mat(target: Path, content: Content) -> None:
+    grid = {"spacing_m": np.array(content.spacing_m), "origin_m": np.array(content.origin_m)}
+    axes = ",".join("xyz"[: content.values.ndim])
+    write_mat(target, {**content.images, **grid, "axes": axes, "title": content.title})
+
+
+FORMATS: Mapping[str, Format] = MappingProxyType(
+    {
+        "npy": Format("npy", "application/octet-stream", _npy),
+        "nifti": Format("nii", "application/octet-stream", _nifti),
+        "metaimage": Format("mha", "application/octet-stream", _metaimage),
+        "mat": Format("mat", "application/x-matlab-data", _mat),
+    }
+)

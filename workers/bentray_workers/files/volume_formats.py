@@ -1,0 +1,157 @@
+"""Volumes that a stranger wrote, in any of the formats, told apart by content and not by name."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+
+from bentray_kernels.errors import InvalidInput
+
+from .bounded_reading import LARGEST_BYTES, ShapeCheck, any_shape, declared, refusing
+from .hdf5_reading import SIGNATURE, Limits, opened, printable
+from .nifti_reading import read_nifti
+from .npy_headers import PARSING
+from .nrrd_reading import read_nrrd
+from .reconstruction_format import FORMAT as RECONSTRUCTION
+from .volume import FORMAT, Volume, volume_in
+
+ACCEPTED = "a volume as NumPy (.npy), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype"
+
+# Where neither the file nor the user tells, m.
+SPACING_M = 1e-3
+
+# Little-endian, and with "-be" big-endian.
+RAW_TYPES = {"uint8": np.dtype("u1"), "int8": np.dtype("i1")} | {
+    name + suffix: np.dtype(order + code)
+    for name, code in {"uint16": "u2", "int16": "i2", "int32": "i4", "float32": "f4", "float64": "f8"}.items()
+    for suffix, order in (("", "<"), ("-be", ">"))
+}
+
+
+@dataclass(frozen=True)
+class Given:
+    """What the user says of a file that does not say it itself.
+
+    Attributes:
+        title: in place of the file's own.
+        spacing_m: one distance or three, m; for NumPy and raw files only.
+        shape: (nx, ny, nz) of raw bytes, in which x runs fastest.
+        dtype: of raw bytes, a key of ``RAW_TYPES``.
+    """
+
+    title: str = ""
+    spacing_m: Sequence[float] | None = None
+    shape: Sequence[int] | None = None
+    dtype: str | None = None
+
+
+def import_volume(path: Path, given: Given | None = None, check: ShapeCheck = any_shape) -> Volume:
+    """Read a volume in any of the formats.
+
+    Axes stay in the order of the file, x first; how an NRRD is turned in space is not kept. Those of a NIfTI
+    are put in the order right, front, up (``read_nifti``). What both give in mm becomes m. A reconstruction
+    of ours becomes its speed, m/s.
+
+    Args:
+        path: of the file.
+        given: what it does not say.
+        check: of the shape, called before the values are read.
+
+    Raises:
+        InvalidInput: from ``check``, for anything else, for more than ``LARGEST_BYTES``, for values that are
+            not real and finite or that float32 cannot tell apart, and for uneven slices.
+    """
+    given = given or Given()
+    try:
+        with path.open("rb") as file:
+            start = file.read(540)
+            file.seek(0)
+            volume = _read(path, file, start, given, check)
+    except OSError as error:
+        raise InvalidInput("file", f"{path.name}: {error.strerror or error}", ACCEPTED) from None
+    return replace(volume, title=printable(given.title)[:200]) if given.title else volume
+
+
+def _read(path: Path, file: IO[bytes], start: bytes, given: Given, check: ShapeCheck) -> Volume:
+    if given.shape is not None or given.dtype is not None:
+        return _raw(path, given, check)
+    if start.startswith(b"\x93NUMPY"):
+        return _numpy(path, file, given, check)
+    if given.spacing_m is not None:
+        raise InvalidInput(
+            "spacing_m", given.spacing_m, "nothing: this file tells it, or is of no known format"
+        )
+    if start.startswith(SIGNATURE):
+        return _hdf5(path, check)
+    if start.startswith(b"NRRD000"):
+        return read_nrrd(file, check)
+    if start.startswith(b"\x1f\x8b"):
+        with refusing("file", "a whole NIfTI file packed with gzip"), gzip.open(file) as unpacked:
+            return read_nifti(unpacked, check)
+    if start[344:348] == b"n+1\0" or start[4:8] == b"n+2\0":
+        return read_nifti(file, check)
+    found = "an empty file" if not start else f"a file of another kind (it begins with {start[:8]!r})"
+    raise InvalidInput("file", found, ACCEPTED)
+
+
+def _raw(path: Path, given: Given, check: ShapeCheck) -> Volume:
+    if given.shape is None or given.dtype is None:
+        missing = "shape" if given.shape is None else "dtype"
+        raise InvalidInput(missing, "nothing", "both shape and dtype for raw bytes")
+    if given.dtype not in RAW_TYPES:
+        raise InvalidInput("dtype", repr(given.dtype), "one of " + ", ".join(RAW_TYPES))
+    dtype, size = RAW_TYPES[given.dtype], path.stat().st_size
+    count = declared("shape", given.shape, dtype, check)
+    if size != count:
+        raise InvalidInput("file", f"{size} bytes", f"{count} bytes, as shape and dtype say")
+    values = np.memmap(path, dtype, "r", shape=tuple(given.shape), order="F")
+    return Volume.of(values, _spacing(given))
+
+
+def _numpy(path: Path, file: IO[bytes], given: Given, check: ShapeCheck) -> Volume:
+    with refusing("file", "a whole NumPy file of numbers"):
+        version = np.lib.format.read_magic(file)
+        if version not in {(1, 0), (2, 0)}:
+            raise InvalidInput(
+                "file", f"NumPy's format {version}", "1.0 or 2.0, as numpy.save writes numbers"
+            )
+        with PARSING:
+            if version == (1, 0):
+                shape, columns_first, dtype = np.lib.format.read_array_header_1_0(file)
+            else:
+                shape, columns_first, dtype = np.lib.format.read_array_header_2_0(file)
+        count = declared("values", shape, dtype, check)
+        left = path.stat().st_size - file.tell()
+        if left < count:
+            raise InvalidInput("file", f"{left} bytes of values", f"{count}, as its header says")
+        values = np.memmap(path, dtype, "r", file.tell(), shape, "F" if columns_first else "C")
+        return Volume.of(values, _spacing(given))
+
+
+def _hdf5(path: Path, check: ShapeCheck) -> Volume:
+    limits = Limits(total_bytes=LARGEST_BYTES)
+    with opened(path, limits) as reader:
+        kind = reader.text("", "format")
+        place = "values" if kind == FORMAT else "speed_mps"
+        values = reader.checked(place, "buif", "(nx, ny, nz) numbers")
+        if values is not None:
+            check(values.shape)
+        if kind == FORMAT:
+            return volume_in(reader)
+    if kind != RECONSTRUCTION:
+        raise InvalidInput("@format", repr(kind), f'"{FORMAT}" or "{RECONSTRUCTION}"')
+    # It loads compiled code, and each upload starts a process.
+    from .reconstruction import read_reconstruction
+
+    result = read_reconstruction(path, limits=limits)
+    return Volume.of(result.speed, result.spacing_m, result.origin_m, "Speed of sound, m/s")
+
+
+def _spacing(given: Given) -> tuple[float, ...]:
+    steps = tuple(given.spacing_m or (SPACING_M,))
+    return steps * 3 if len(steps) == 1 else steps

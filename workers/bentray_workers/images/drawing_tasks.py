@@ -1,0 +1,20 @@
+"""Tasks that draw: who hands them out need not hold Matplotlib, which takes 30 MB."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+
+def slice_png(path: Path, **how: Any) -> bytes:
+    """As ``bentray_workers.images.slice.slice_png``."""
+    from .slice import slice_png as draw
+
+    return draw(path, **how)
+
+
+def volume_slice_png(path: Path, **how: Any) -> bytes:
+    """As ``bentray_workers.images.volume_slice.volume_slice_png``."""
+    from .volume_slice import volume_slice_png as draw
+
+    return draw(path, **how)

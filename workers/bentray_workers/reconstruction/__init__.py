@@ -1,0 +1,1 @@
+"""Reconstruction on a cluster: planned, run in tasks, checkpointed."""

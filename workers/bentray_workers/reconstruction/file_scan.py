@@ -1,0 +1,84 @@
+"""A scan as tasks know it: a file and settings; every process reads what it needs once."""
+
+from __future__ import annotations
+
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import NamedTuple
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.quality.correction import apply
+from bentray_kernels.tomography import Problem, Settings
+from bentray_kernels.tomography.grid_schedule import stages
+from bentray_kernels.tomography.model_selection.held_out import Part, part_of
+from bentray_kernels.tomography.reconstruct import problem_of
+from bentray_kernels.tomography.waveform.preparation import prepare
+from bentray_kernels.tomography.waveform.waveform_problem import WaveProblem
+from bentray_kernels.tomography.waveform.waveform_settings import WaveSettings
+
+from ..cluster.job_cancellation import check_wanted
+from ..files.dataset import read_dataset
+from ..files.dataset.traces import slice_opened
+from ..files.findings import read_findings
+
+
+class FileScan(NamedTuple):
+    """See ``tomography.task_chains.Scan``; ``stamp`` tells a rewritten file from the old one."""
+
+    path: Path
+    stamp: int
+    settings: Settings
+    part: Part
+
+    def stages(self) -> tuple[Settings, ...]:
+        return _stages(self)
+
+    def problem(self, index: int, stage: int = -1) -> Problem:
+        return _problem(self, index, stage % len(self.stages()))
+
+
+class FileWaveScan(NamedTuple):
+    """See ``tomography.waveform.waveform_chain.WaveScan``; ``path`` is that of a file with traces.
+
+    Attributes:
+        findings: the file of what was found in the scan; faults of its traces are corrected or left out. Once
+            its folder, the job's, has gone, calls end within a second.
+    """
+
+    path: Path
+    stamp: int
+    plan: WaveSettings
+    slice: int
+    findings: Path
+
+    def settings(self) -> WaveSettings:
+        return self.plan
+
+    def problem(self, number: int) -> WaveProblem:
+        return _wave_problem(self, number)
+
+
+@lru_cache(maxsize=16)
+def _stages(scan: FileScan) -> tuple[Settings, ...]:
+    return stages(read_once(scan.path, scan.stamp), scan.settings)
+
+
+@lru_cache(maxsize=8)
+def _problem(scan: FileScan, index: int, stage: int) -> Problem:
+    dataset = part_of(read_once(scan.path, scan.stamp), scan.part)
+    return problem_of(dataset, scan.stages()[stage], index)
+
+
+@lru_cache(maxsize=2)
+def read_once(path: Path, stamp: int) -> Dataset:
+    """A dataset without its traces; ``stamp`` tells a rewritten file from the old one."""
+    return read_dataset(path, traces=False)
+
+
+# Two jobs may take turns; more would cost memory, for a problem holds the traces of the object.
+@lru_cache(maxsize=2)
+def _wave_problem(scan: FileWaveScan, number: int) -> WaveProblem:
+    faults = read_findings(scan.findings).of_traces(scan.slice)
+    poll = partial(check_wanted, scan.findings.parent)
+    with slice_opened(scan.path, read_once(scan.path, scan.stamp), scan.slice, poll) as one:
+        return prepare(apply(one, faults), scan.plan, number, poll=poll)

@@ -1,0 +1,256 @@
+"""One travel-time field in blocks that stay on the workers and trade their faces until they agree.
+
+For fields larger than a worker's memory: a block's slowness and times never leave the workers; from block to
+block go faces, and to this process only whether they have changed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from distributed import Client, Future
+from numpy.typing import ArrayLike
+
+from bentray_kernels.arrays import Floats
+from bentray_kernels.eikonal.problem import Node, cell_of, placed, straight_times
+from bentray_kernels.eikonal.subdomains import (
+    BlockSweep,
+    Box,
+    Place,
+    cut,
+    neighbours,
+    opposite,
+    sweep_block,
+)
+from bentray_kernels.errors import InvalidInput
+
+from ..cluster.connected import connected_workers
+from ..cluster.resources import RECONSTRUCTION
+from ..files.npy_headers import PARSING
+
+# A file that every worker reads its blocks of, or the speed itself.
+Speed = Path | Floats
+
+
+class Edges(NamedTuple):
+    """What a block tells its neighbours, in the order of ``reconstruction.subdomains.Faces``."""
+
+    faces: tuple[Floats, ...]
+    changed: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class BlockField:
+    """A settled travel time whose blocks are still on the workers; they go with the last reference to it.
+
+    Attributes:
+        shape: (nx, ny[, nz]).
+        boxes: the nodes of each block, by its place among the blocks.
+        rounds: how often blocks swept and then traded faces.
+    """
+
+    shape: tuple[int, ...]
+    boxes: Mapping[Place, Box]
+    rounds: int
+    swept: Mapping[Place, Future]
+
+    def block(self, place: Place) -> Floats:
+        """The times of one block, s, in its own shape."""
+        future = self.swept[place]
+        found: Floats = future.client.submit(_times, future, resources=RECONSTRUCTION, pure=False).result()
+        return found
+
+    def whole(self) -> Floats:
+        """(nx, ny[, nz]), s; fetched block by block."""
+        time = np.empty(self.shape)
+        for place, box in self.boxes.items():
+            time[box] = self.block(place)
+        return time
+
+
+def solve(
+    client: Client,
+    speed: Path | ArrayLike,
+    spacing: float,
+    source: ArrayLike,
+    blocks: Sequence[int],
+    *,
+    tolerance: float = 1e-12,
+) -> Floats:
+    """Travel time from a point source by fast sweeping in blocks (Zhao 2007; chapter 7.2.2).
+
+    Args:
+        client: of the cluster.
+        speed: (nx, ny[, nz]), m/s, or a ``.npy`` file of it that every worker can read. Of an array each
+            block travels with its task, so that a lost worker's blocks are made again elsewhere.
+        spacing: node spacing, m.
+        source: (ndim,), m, in the grid; node 0 lies at 0.
+        blocks: along each axis, from 1 to the nodes there; see ``planning.blocks_of`` for a number that fits.
+        tolerance: as for ``eikonal.fast_sweeping``, for every block.
+
+    Returns:
+        (nx, ny[, nz]), s. Equal to ``eikonal.solve(..., "fsm")`` to 1e-12 of each time, and to the bit to
+        ``solve_by_blocks``, which does the same in one process.
+
+    Raises:
+        InvalidInput: for a speed, source or number of blocks that does not fit.
+    """
+    return settle(client, speed, spacing, source, blocks, tolerance=tolerance).whole()
+
+
+def settle(
+    client: Client,
+    speed: Path | ArrayLike,
+    spacing: float,
+    source: ArrayLike,
+    blocks: Sequence[int],
+    *,
+    tolerance: float = 1e-12,
+) -> BlockField:
+    """As ``solve``, but the field stays in its blocks, for grids that no process can hold."""
+    given: Speed = speed if isinstance(speed, Path) else np.asarray(speed, dtype=np.float64)
+    array = opened(given)
+    if array.ndim not in (2, 3) or array.size == 0:
+        raise InvalidInput("speed", f"shape {array.shape}", "a non-empty 2-D or 3-D array")
+    if not (math.isfinite(spacing) and spacing > 0.0):
+        raise InvalidInput("spacing", spacing, "a finite node spacing > 0 m")
+    seeds = _seeds(array, spacing, placed(source, array.shape, spacing))
+    boxes = cut(array.shape, blocks)
+    homes = _homes(client, list(boxes))
+
+    def run(place: Place, function: object, *arguments: object) -> Future:
+        return client.submit(
+            function,
+            *arguments,
+            resources=RECONSTRUCTION,
+            pure=False,
+            workers=homes[place],
+            allow_other_workers=True,
+        )
+
+    slowness = {
+        place: run(place, slowness_of, given if isinstance(given, Path) else array[box], box)
+        for place, box in boxes.items()
+    }
+    # A block with seeds begins with them; every other one knows nothing before a face comes in.
+    own = {place: _within(seeds, box) for place, box in boxes.items()}
+    swept: dict[Place, Future] = {}
+    held: dict[Place, list[Future | None]] = {place: [None] * (2 * array.ndim) for place in boxes}
+    waiting, rounds = {place for place, found in own.items() if found}, 0
+    while waiting:
+        rounds += 1
+        edges = {}
+        for place in sorted(waiting):
+            before = swept.get(place, own[place])
+            swept[place] = run(place, sweep, slowness[place], before, list(held[place]), spacing, tolerance)
+            edges[place] = run(place, _edges, swept[place])
+        changed = {place: run(place, _changed, edge) for place, edge in edges.items()}
+        told: dict[Place, tuple[bool, ...]] = client.gather(changed)
+        waiting = set()
+        for place, sides in told.items():
+            for side, beyond in neighbours(place, boxes):
+                if sides[side]:
+                    held[beyond][opposite(side)] = run(beyond, _face, edges[place], side)
+                    waiting.add(beyond)
+    return BlockField(array.shape, boxes, rounds, swept)
+
+
+def opened(speed: Speed) -> Floats:
+    """The speed itself, or what maps its file without reading it.
+
+    Raises:
+        InvalidInput: for a file that is none of one array of numbers.
+    """
+    if not isinstance(speed, Path):
+        return speed
+    try:
+        with PARSING:
+            found: Floats = np.load(speed, mmap_mode="r", allow_pickle=False)
+    except (OSError, ValueError) as error:
+        raise InvalidInput("speed", f"{speed} ({error})", "a .npy file of numbers") from error
+    return found
+
+
+def slowness_of(speed: Speed, box: Box) -> Floats:
+    """Task: the slowness of one block, s/m, from the file of the whole or from the block's own speed.
+
+    Raises:
+        InvalidInput: for speeds that are not finite and positive, with the node in the whole grid.
+    """
+    part = np.asarray(opened(speed)[box] if isinstance(speed, Path) else speed, dtype=np.float64)
+    # NaN fails the first comparison.
+    if not (part.min() > 0.0 and part.max() < math.inf):
+        inside = tuple(int(i) for i in np.argwhere(~(np.isfinite(part) & (part > 0.0)))[0])
+        node = tuple(b.start + i for b, i in zip(box, inside, strict=True))
+        raise InvalidInput("speed", f"{part[inside]:g} at node {node}", "finite speeds > 0 m/s")
+    return np.ascontiguousarray(1.0 / part)
+
+
+def sweep(
+    slowness: Floats,
+    before: BlockSweep | Mapping[Node, float],
+    faces: list[Floats | None],
+    spacing: float,
+    tolerance: float,
+) -> BlockSweep:
+    """Task: settle one block, from what it was or, at first, from the seeds in it, by their nodes in it."""
+    if isinstance(before, BlockSweep):
+        return sweep_block(slowness, before.times, faces, spacing, tolerance)
+    times = np.full(slowness.shape, math.inf)
+    for node, time in before.items():
+        times[node] = time
+    found = sweep_block(slowness, times, faces, spacing, tolerance)
+    # To the neighbours the seeds are news as well.
+    return BlockSweep(found.times, found.faces, tuple(bool(np.isfinite(face).any()) for face in found.faces))
+
+
+def _edges(swept: BlockSweep) -> Edges:
+    return Edges(swept.faces, swept.changed)
+
+
+def _changed(edges: Edges) -> tuple[bool, ...]:
+    return edges.changed
+
+
+def _face(edges: Edges, side: int) -> Floats:
+    return edges.faces[side]
+
+
+def _times(swept: BlockSweep) -> Floats:
+    return swept.times
+
+
+def _seeds(speed: Floats, spacing: float, source: Floats) -> dict[Node, float]:
+    """Times of the nodes around the source, s; of the speed only those nodes are read."""
+    cell = cell_of(source, speed.shape, spacing)
+    at_nodes = [float(speed[node]) for node, _ in cell]
+    for (node, _), value in zip(cell, at_nodes, strict=True):
+        if not 0.0 < value < math.inf:
+            raise InvalidInput("speed", f"{value:g} at node {node}", "finite speeds > 0 m/s")
+    return straight_times(cell, [1.0 / value for value in at_nodes], spacing, source)
+
+
+def _within(seeds: Mapping[Node, float], box: Box) -> dict[Node, float]:
+    """The seeds in a block, by their nodes in it."""
+    found = {}
+    for node, time in seeds.items():
+        if all(b.start <= i < b.stop for i, b in zip(node, box, strict=True)):
+            found[tuple(i - b.start for i, b in zip(node, box, strict=True))] = time
+    return found
+
+
+def _homes(client: Client, places: Sequence[Place]) -> dict[Place, str]:
+    """A worker for each block, neighbours in turn: data stay with it while it lives.
+
+    Raises:
+        ConnectionError: without workers.
+    """
+    workers = sorted(connected_workers(client))
+    if not workers:
+        raise ConnectionError("the cluster has no workers")
+    return {place: workers[k % len(workers)] for k, place in enumerate(places)}

@@ -1,0 +1,1 @@
+"""Refractive volume rendering, turntables and geometry fields as tasks."""

@@ -1,0 +1,90 @@
+"""Geometry fields that are kept: surfaces and scenes made once a process, tables mapped from their files."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from bentray_kernels.arrays import Floats
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.geometry_field.tables.inner_field import InnerField
+from bentray_kernels.geometry_field.tables.outer_field import OuterField
+from bentray_kernels.geometry_field.tracing.packed_scene import World, world_of
+from bentray_kernels.geometry_field.tracing.scene import Shape
+from bentray_kernels.meshes.surface import surface_of
+
+from ..cluster.memory_cache import Kept
+from ..files.geometry_field_folder import FieldFiles, mapped, read_chart, read_json
+from ..files.geometry_image import read_geometry_image
+from .field_scenes import scene_of
+from .field_tasks import FACE_BYTES
+from .field_view import FieldView
+
+# What a process keeps; tables are maps of files and count as none.
+KEPT_BYTES = 2 * 2**30
+# Of the landscape and of the ball, in each scene.
+SCENE_BYTES = 32 * 2**20
+
+# One of each for the process, as ``functools.lru_cache`` would have.
+_SHAPES = Kept(KEPT_BYTES // 2)
+_WORLDS = Kept(KEPT_BYTES // 2)
+
+
+class Textured(NamedTuple):
+    """A shape, and its colours over (u, v) as ``Material.texture``, or None."""
+
+    shape: Shape
+    texture: Floats | None
+
+
+def world_at(folder: Path, view: FieldView) -> World:
+    """The scene of a field's folder as kernels read it, from what is kept or made now.
+
+    Raises:
+        InvalidInput: from the files.
+    """
+    files = FieldFiles(folder)
+    stamp = folder, files.figures.stat().st_mtime_ns
+    figures = read_json(files.figures)
+    surface_bytes = FACE_BYTES * figures["faces"]
+    image_bytes = 24 * figures["image_pixels"] ** 2
+    made: Textured = _SHAPES.get(stamp, surface_bytes + image_bytes, lambda: shape_of(files))
+    # Where entries agree is worked out for each scene, a byte each; surfaces are copied where there are two.
+    entries = len(made.shape.outer.faces) ** 2 if made.shape.outer else 0
+    looks = view.scene, view.mode, view.index, view.share, view.up
+    world: World = _WORLDS.get(
+        (stamp, looks),
+        entries + surface_bytes + SCENE_BYTES,
+        lambda: world_of(scene_of(made.shape, made.texture, view)),
+    )
+    return world
+
+
+def shape_of(files: FieldFiles) -> Textured:
+    """The surface of a field with its tables, mapped.
+
+    Raises:
+        InvalidInput: from the files, and where the tables are not those of the surface.
+    """
+    surface = surface_of(read_chart(files.chart))
+    faces, fractions = (mapped(path) for path in files.outer)
+    starts, inner = mapped(files.starts), mapped(files.inner)
+    if len(starts) != len(surface.triangles):
+        raise InvalidInput(
+            "inner-starts", f"{len(starts)} faces", f"{len(surface.triangles)}, as the chart has"
+        )
+    shape = Shape(
+        surface,
+        OuterField(_samples(faces.shape[1]), faces, fractions),
+        InnerField(_samples(inner.shape[1]), starts, inner),
+    )
+    colours = read_geometry_image(files.image).colours
+    texture = None if colours is None else np.clip(colours.transpose(1, 0, 2), 0.0, 1.0).astype(np.float64)
+    return Textured(shape, texture)
+
+
+def _samples(columns: int) -> int:
+    return math.isqrt(columns // 6)

@@ -1,0 +1,163 @@
+"""The tasks that make a geometry field in a folder: layout, rows of its tables, and the end."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.geometry_field.image.geometry_image import GeometryImage, geometry_image
+from bentray_kernels.geometry_field.image.subsampling import COARSEST, fitted_image
+from bentray_kernels.geometry_field.layout.parameterisation import parameterise
+from bentray_kernels.geometry_field.tables.inner_field import build_inner_rows, spread_points
+from bentray_kernels.geometry_field.tables.outer_field import OuterField, build_rows, mark_borders
+from bentray_kernels.meshes.geometric_error import GeometricError, geometric_error
+from bentray_kernels.meshes.mesh import Chart
+from bentray_kernels.meshes.surface import Surface, surface_of
+
+from ..cluster.memory_cache import Kept
+from ..files.geometry_field_folder import (
+    FieldFiles,
+    fill_rows,
+    make_table,
+    mapped,
+    read_chart,
+    read_json,
+    write_array,
+    write_chart,
+    write_json,
+)
+from ..files.geometry_image import GeometryMaps, write_geometry_image
+from ..files.mesh import load_mesh
+from .field_accuracy import accuracy
+from .field_settings import FieldSettings, check_faces
+
+# Entries of the inner table, 4 bytes each.
+MOST_INNER = 2**28
+# Rays of one task: a second or two.
+TASK_RAYS = 2**21
+
+# What a process keeps of surfaces while it makes fields, and about how much one is, bytes a face.
+KEPT_BYTES = 2**29
+FACE_BYTES = 320
+_SURFACES = Kept(KEPT_BYTES)
+
+
+def lay_out(mesh_path: Path, settings: FieldSettings, folder: Path) -> None:
+    """Task: chart, geometry image and empty tables; ``FieldFiles.layout`` last.
+
+    Raises:
+        InvalidInput: for a mesh that is too large, a threshold that no image reaches, or an inner table that
+            would be too large.
+    """
+    files, started = FieldFiles(folder), time.perf_counter()
+    stored = load_mesh(mesh_path)
+    check_faces(len(stored.mesh.faces))
+    found = parameterise(stored.mesh)
+    laid_out = time.perf_counter()
+    image, error = _image(found.chart, settings)
+    maps = GeometryMaps.of(image, stored.colours)
+    sampled = time.perf_counter()
+    if error is None:
+        error = geometric_error(found.chart.mesh, image.mesh())
+    surface = surface_of(found.chart)
+    points, starts = spread_points(surface, settings.divisions)
+    columns = 6 * settings.inner_samples**2
+    if len(points) * columns > MOST_INNER:
+        taken = f"{settings.divisions}, {len(points)} points by {columns} directions"
+        accepted = f"at most {MOST_INNER} entries: fewer divisions or inner_samples"
+        raise InvalidInput("divisions", taken, accepted)
+    write_chart(files.chart, found.chart)
+    write_geometry_image(files.image, maps)
+    write_array(files.points, points)
+    write_array(files.starts, starts)
+    for path, kind in zip(files.outer, (np.int32, np.float32), strict=True):
+        make_table(path, (6 * settings.samples**2,) * 2, kind)
+    make_table(files.inner, (len(points), columns), np.int32)
+    figures = {
+        "faces": len(stored.mesh.faces),
+        "vertices": len(stored.mesh.vertices),
+        "points": len(points),
+        "conformal": found.conformal,
+        "area_stretch": found.area_stretch,
+        "median_quasi_conformal": float(np.median(found.quasi_conformal)),
+        "image_pixels": image.size,
+        "image_rms": error.rms,
+        "image_greatest": error.greatest,
+        "parameterisation_seconds": laid_out - started,
+        "image_seconds": sampled - laid_out,
+        "error_seconds": time.perf_counter() - sampled,
+    }
+    write_json(files.layout, figures)
+
+
+def _image(chart: Chart, settings: FieldSettings) -> tuple[GeometryImage, GeometricError | None]:
+    """The geometry image, and its error where that has chosen it."""
+    if settings.image_threshold > 0.0:
+        fitted = fitted_image(chart, settings.image_threshold, settings.image_size, COARSEST)
+        return fitted.image, fitted.error
+    return geometry_image(chart, settings.image_size), None
+
+
+def outer_rows(folder: Path, n: int, first: int, last: int, done: Path) -> None:
+    """Task: rows of the outer table, and a file that says so."""
+    files, started = FieldFiles(folder), time.perf_counter()
+    for path, rows in zip(files.outer, build_rows(_surface(files), n, first, last), strict=True):
+        fill_rows(path, first, rows)
+    write_json(done, {"seconds": time.perf_counter() - started})
+
+
+def inner_rows(folder: Path, n: int, first: int, last: int, done: Path) -> None:
+    """Task: rows of the inner table, and a file that says so."""
+    files, started = FieldFiles(folder), time.perf_counter()
+    points = mapped(files.points)[first:last]
+    fill_rows(files.inner, first, build_inner_rows(_surface(files), n, points))
+    write_json(done, {"seconds": time.perf_counter() - started})
+
+
+def finish(folder: Path, settings: FieldSettings, done: Path) -> dict[str, Any]:
+    """Task: mark borders in the outer table, measure it, and tell all figures.
+
+    Args:
+        folder: of the field.
+        settings: of it.
+        done: the folder with what the other tasks left there.
+    """
+    files, started = FieldFiles(folder), time.perf_counter()
+    faces, fractions = (mapped(path, "r+") for path in files.outer)
+    mark_borders(settings.samples, faces)
+    _synchronised(files.outer[0], faces)
+    marked = time.perf_counter()
+    field = OuterField(settings.samples, faces, fractions)
+    figures = read_json(files.layout) | accuracy(_surface(files), field)
+    for part in ("outer", "inner"):
+        spent = [read_json(path)["seconds"] for path in done.glob(f"{part}-*.json")]
+        figures[f"{part}_seconds"] = float(sum(spent))
+        figures[f"{part}_tasks"] = len(spent)
+    figures["border_seconds"] = marked - started
+    figures["outer_bytes"] = sum(path.stat().st_size for path in files.outer)
+    figures["inner_bytes"] = files.inner.stat().st_size
+    for torn in folder.glob("*.partial"):
+        torn.unlink()
+    write_json(files.figures, figures)
+    return figures
+
+
+def _synchronised(path: Path, faces: Any) -> None:
+    """Let what was changed in a map reach the disk."""
+    base = faces.base
+    while not isinstance(base, np.memmap):
+        base = base.base
+    base.flush()
+
+
+def _surface(files: FieldFiles) -> Surface:
+    """The surface of a chart, made once a process."""
+    status = files.chart.stat()
+    key = files.chart, status.st_mtime_ns, status.st_size
+    faces = read_json(files.layout)["faces"]
+    made: Surface = _SURFACES.get(key, FACE_BYTES * faces, lambda: surface_of(read_chart(files.chart)))
+    return made

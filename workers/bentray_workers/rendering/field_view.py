@@ -1,0 +1,80 @@
+"""How a geometry field is looked at, checked once for every door."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.ranges import Range
+from bentray_kernels.request_fields import MOST_PIXELS, MOST_RAYS, asked, check
+
+# The names that people know, and those of the kernels.
+LOOKUPS = {"nearest": "nearest", "linear": "linear", "accurate": "walk", "exact": "exact"}
+CHOICES = {
+    "scene": ("object", "mirror-ball", "two-mirrors"),
+    "mode": ("reflect", "refract", "refract-single", "self", "self-only", "diffuse"),
+    "lookup": tuple(LOOKUPS),
+    "eye": tuple(LOOKUPS),
+    "camera": ("perspective", "orthographic"),
+    "up": ("z", "y"),
+}
+
+
+@dataclass(frozen=True)
+class FieldView:
+    """A picture of a mesh through its geometry field.
+
+    What each field means is its metadata ``description``; query parameters and options are made of them.
+
+    Raises:
+        InvalidInput: naming the first field that is wrong.
+    """
+
+    scene: Literal["object", "mirror-ball", "two-mirrors"] = asked(
+        "object",
+        "object: the mesh before a landscape; mirror-ball: two of it before a mirroring ball; "
+        "two-mirrors: two of it beside each other.",
+    )
+    mode: Literal["reflect", "refract", "refract-single", "self", "self-only", "diffuse"] = asked(
+        "reflect",
+        "What the mesh is made of. reflect: a mirror; self: one that sees itself too; self-only: that, in "
+        "the dark; refract: glass; refract-single: glass that bends light once; diffuse: clay, or its own "
+        "colours.",
+    )
+    lookup: Literal["nearest", "linear", "accurate", "exact"] = asked(
+        "accurate", "How mirrored and refracted rays ask the field; exact intersects the mesh itself."
+    )
+    eye: Literal["nearest", "linear", "accurate", "exact"] = asked("exact", "The same for rays of the eye.")
+    index: float = asked(1.5, "Refractive index of glass.", Range(0.1, 10.0))
+    share: float = asked(
+        0.85,
+        "Of the light, what is mirrored or refracted; the rest is the mesh's own colour.",
+        Range(0.0, 1.0),
+    )
+    camera: Literal["perspective", "orthographic"] = asked("perspective", "Kind of camera.")
+    azimuth_deg: float = asked(
+        -60.0, "Where the camera stands: angle about the vertical, degrees.", Range(-36000.0, 36000.0)
+    )
+    elevation_deg: float = asked(15.0, "Its height above the horizon, degrees.", Range(-89.0, 89.0))
+    zoom: float = asked(1.0, "1 shows the whole scene, 2 half of it.", Range(0.05, 50.0))
+    up: Literal["z", "y"] = asked("z", "Which axis of the mesh is up.")
+    width: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
+    height: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
+    rays: int = asked(1, "Along each side of a pixel.", Range(1, 8))
+    depth: int = asked(4, "Most surfaces at which a ray goes on.", Range(0, 64))
+
+    def __post_init__(self) -> None:
+        check(self, CHOICES)
+        count = self.width * self.height * self.rays**2
+        if count > MOST_RAYS:
+            raise InvalidInput("width, height, rays", f"{count} rays", f"at most {MOST_RAYS}")
+
+    @property
+    def times(self) -> int:
+        """Rays along each side of a pixel."""
+        return self.rays
+
+    def plain(self) -> dict[str, Any]:
+        """Its fields as JSON has them."""
+        return asdict(self)

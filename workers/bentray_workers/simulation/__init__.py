@@ -1,0 +1,1 @@
+"""Simulated scans on a cluster: planned, run in tasks, written as datasets."""

@@ -1,0 +1,78 @@
+"""The last task of a simulated scan: its parts into one dataset file, as the command line writes it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.acquisition import Dataset, Waveform
+
+from ..files.dataset.record import record_of
+from ..files.dataset.write import Piece, write_dataset
+from . import plane, volume, waves
+from .cost import Timed
+from .request import Simulated
+from .tasks import parts_of, read_part
+from .waves import Noise, WaveSimulationSettings
+
+
+def finish(settings: Simulated, folder: Path, target: Path) -> dict[str, Any]:
+    """Task: write the dataset of all parts.
+
+    Args:
+        settings: of the scan.
+        folder: with a file of each part.
+        target: replaced whole or not touched.
+
+    Returns:
+        What a service remembers of it: ``dataset.record.record_of``, bytes and SHA-256 of the file.
+    """
+    if isinstance(settings, WaveSimulationSettings):
+        dataset = _write_waves(settings, folder, target)
+    else:
+        dataset = _timed(settings, folder)
+        write_dataset(target, dataset)
+    with target.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    return {**record_of(dataset), "bytes": target.stat().st_size, "sha256": digest}
+
+
+def _timed(settings: Timed, folder: Path) -> Dataset:
+    shape = settings.scans, settings.emitters, settings.emitters
+    delta = np.empty(shape)
+    ratio = np.empty(shape) if settings.attenuation else None
+    for part in parts_of(settings):
+        found = read_part(part, folder)
+        delta[part.scan, part.first : part.last] = found[0]
+        if ratio is not None:
+            ratio[part.scan, part.first : part.last] = found[1]
+    if isinstance(settings, volume.VolumeSimulationSettings):
+        return volume.scan_of(settings, delta, ratio)
+    return plane.scan_of(settings, delta[0], None if ratio is None else ratio[0])
+
+
+def _write_waves(settings: WaveSimulationSettings, folder: Path, target: Path) -> Dataset:
+    """One emission after the other: all traces may be more than the memory."""
+    parts = parts_of(settings)
+    shape = len(parts), settings.elements, settings.samples
+    absent = np.broadcast_to(np.zeros((), np.float32), shape)
+    dataset = waves.scan_of(settings, Waveform(absent, absent))
+    noise = None
+    if settings.snr is not None:
+        heights = [np.abs(read_part(part, folder)[1]).max(axis=-1) for part in parts]
+        noise = Noise(settings, np.stack(heights))
+
+    def pieces(name: str, chunk: tuple[int, ...]) -> Iterator[Piece]:
+        for k, part in enumerate(parts):
+            traces: NDArray[Any] = read_part(part, folder)[("object", "water").index(name)]
+            if noise is not None:
+                traces = traces + noise.drawn()
+            yield (slice(k, k + 1), slice(None), slice(None)), traces[None]
+
+    write_dataset(target, dataset, pieces)
+    return dataset

@@ -1,0 +1,166 @@
+"""A scan of the Table 6 phantom as a dataset, its emitters shared out over workers or cores."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from distributed import Client
+
+from bentray_kernels.acquisition import Dataset, Truth
+from bentray_kernels.acquisition.noise import with_noise
+from bentray_kernels.acquisition.simulation.fine_medium import FineMedium
+from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.arrays import Floats
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import SPEED_MPS
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
+from bentray_kernels.tomography import Progress
+from bentray_kernels.tomography.problem import MARGIN_NODES
+
+from .emitter_batches import arrivals
+
+# More costs memory, which grows with its square, and gains nothing that noise would not hide.
+MOST_REFINEMENT = 64
+
+# Of every simulated scan.
+NODES = Range(16, 1024)
+SNR = Range(1e-6, 1e12)
+
+
+@dataclass(frozen=True)
+class SimulationSettings:
+    """A scan of the Table 6 phantom.
+
+    Attributes:
+        nodes: nodes along a side of the truth image, and of the reconstruction it is meant for.
+        elements: of the ring, each emitter and receiver.
+        coupling_mps: speed of the medium around the breast, m/s.
+        refinement: how many times finer the data are made; at least 4.
+        noise_s: standard deviation of Gaussian noise on the travel times, s.
+        seed: of the noise.
+        attenuation: whether to record amplitudes beside the travel times.
+        snr: root mean square of the data over the standard deviation of Gaussian noise on them, travel
+            times and amplitudes alike; None: no such noise.
+    """
+
+    nodes: int = ranged(128, NODES)
+    elements: int = ranged(256, Range(3, 4096))
+    coupling_mps: float = ranged(1500.0, SPEED_MPS)
+    refinement: int = ranged(4, Range(4, MOST_REFINEMENT))
+    noise_s: float = ranged(0.0, Range(0.0, 1.0, below=True, unit="s"))
+    seed: int = ranged(0, SEED)
+    attenuation: bool = False
+    snr: float | None = ranged(None, SNR)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+        if self.snr is not None and self.noise_s > 0.0:
+            raise InvalidInput("snr", self.snr, "nothing where noise_s is given")
+        self.scan()
+
+    def scan(self) -> TravelTimeScan:
+        """The scan; the ring leaves the margin that a reconstruction of as many nodes leaves."""
+        ring = Ring(self.elements, ring_radius(TABLE6_SIDE_M, self.nodes))
+        return TravelTimeScan(table6(self.coupling_mps), ring, TABLE6_SIDE_M, self.nodes, self.refinement)
+
+    @property
+    def scans(self) -> int:
+        """How many are simulated one by one."""
+        return 1
+
+    @property
+    def emitters(self) -> int:
+        """Of each of them."""
+        return self.elements
+
+    def medium_number(self, scan: int) -> int:
+        """As ``Scans``: there is one scan and one medium."""
+        return scan
+
+    def medium(self, number: int) -> FineMedium:
+        """As ``Scans``."""
+        return self.scan().medium(attenuation=self.attenuation)
+
+    def elements_in_medium(self, scan: int) -> Floats:
+        """As ``Scans``."""
+        return self.scan().elements()
+
+
+def ring_radius(side_m: float, nodes: int) -> float:
+    """Radius, m, of a ring in a square of ``nodes`` with the margin that a reconstruction leaves."""
+    return 0.5 * side_m * (1.0 - 2.0 * MARGIN_NODES / (nodes - 1))
+
+
+def simulate(
+    client: Client | None, settings: SimulationSettings, on_progress: Callable[[Progress], None] | None = None
+) -> Dataset:
+    """Simulate a scan.
+
+    Args:
+        client: of a cluster; None uses the cores of this machine.
+        settings: see ``SimulationSettings``.
+        on_progress: called after each batch, with emitters done of all.
+
+    Returns:
+        A dataset with ``delta_tof_s``, ``truth`` and the object's outline as ``roi``; with ``log_ratio_np``
+        where ``settings.attenuation`` asks for it.
+    """
+    delta = np.empty((settings.elements, settings.elements))
+    ratio = np.empty_like(delta) if settings.attenuation else None
+    done = 0
+    for (_, batch), (times, amplitudes) in arrivals(client, settings, 1, settings.elements):
+        delta[batch] = times
+        if ratio is not None:
+            ratio[batch] = amplitudes
+        done += len(batch)
+        if on_progress is not None:
+            on_progress(Progress(done, settings.elements))
+    return scan_of(settings, delta, ratio)
+
+
+def scan_of(settings: SimulationSettings, delta: Floats, ratio: Floats | None) -> Dataset:
+    """The dataset of what every element received, with its noise.
+
+    Args:
+        settings: of the scan.
+        delta: (elements, elements), s; taken over.
+        ratio: as ``delta``, Np, or None without attenuation.
+    """
+    scan = settings.scan()
+    random = np.random.default_rng(settings.seed)
+    sigma_s = settings.noise_s
+    pairs = ~np.eye(settings.elements, dtype=bool)
+    if settings.noise_s > 0.0:
+        delta += random.normal(0.0, settings.noise_s, delta.shape)
+        np.fill_diagonal(delta, 0.0)
+    elif settings.snr is not None:
+        delta, sigma_s = with_noise(delta, settings.snr, random, pairs)
+        if ratio is not None:
+            ratio, _ = with_noise(ratio, settings.snr, random, pairs)
+    spacing = scan.side_m / (scan.nodes - 1)
+    phantom = scan.phantom
+    return Dataset(
+        element_position_m=scan.ring.positions(),
+        tx=np.arange(settings.elements),
+        rx=np.arange(settings.elements),
+        water_speed_mps=settings.coupling_mps,
+        water_attenuation_np_m=phantom.coupling_np_m if settings.attenuation else None,
+        delta_tof_s=delta,
+        sigma_s=np.full(delta.shape, sigma_s) if sigma_s > 0.0 else None,
+        log_ratio_np=ratio,
+        roi=phantom.inside(scan.nodes, scan.side_m),
+        truth=Truth(
+            sound_speed_mps=phantom.speed(scan.nodes, scan.side_m),
+            spacing_m=(spacing, spacing),
+            origin_m=(-0.5 * scan.side_m, -0.5 * scan.side_m),
+            attenuation_np_m=phantom.attenuation(scan.nodes, scan.side_m),
+        ),
+        radius_m=scan.ring.radius_m,
+        picker=f"none: simulated travel times, factored fast marching, {scan.fine_nodes}² nodes",
+        title=f"Table 6 phantom, coupling {settings.coupling_mps:g} m/s",
+        source="made by bentray simulate",
+        license="CC0-1.0",
+    )

@@ -1,0 +1,122 @@
+"""A simulated scan as it is asked for by name: which phantom, by travel times or by waves, how finely."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Literal
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.ranges import Range, ranges_of
+from bentray_kernels.request_fields import asked, check
+
+from .plane import SimulationSettings
+from .volume import VolumeSimulationSettings
+from .volume_waves import VolumeWaveSettings
+from .waves import WaveSimulationSettings
+
+Simulated = SimulationSettings | VolumeSimulationSettings | WaveSimulationSettings
+
+KINDS = (SimulationSettings, VolumeSimulationSettings, WaveSimulationSettings, VolumeWaveSettings)
+
+CHOICES = {"phantom": ("table6", "table7")}
+
+
+def among(name: str) -> Range:
+    """What a number may be in any of the scans; each of them checks its own range."""
+    found = [known[name] for known in map(ranges_of, KINDS) if name in known]
+    return Range(
+        min(one.least for one in found),
+        max(one.most for one in found),
+        all(one.above for one in found),
+        all(one.below for one in found),
+        found[0].unit,
+    )
+
+
+# What only some scans have, and when.
+OWN = {
+    "refinement": "waveform is false",
+    "noise_s": "phantom is table6 and waveform is false",
+    "slices": "phantom is table7 and waveform is false",
+    "array": "phantom is table7 and waveform is false",
+    "three_d": "phantom is table7 and waveform is false",
+    "attenuation": "waveform is false",
+    "frequency_hz": "waveform is true",
+    "emissions": "waveform is true",
+    "side_m": "waveform is true",
+}
+
+
+@dataclass(frozen=True)
+class AskedSimulation:
+    """What each setting means is its metadata ``description``; left out, those of other scans stay None.
+
+    Raises:
+        InvalidInput: naming the first field that is wrong, or that another scan has.
+    """
+
+    phantom: Literal["table6", "table7"] = asked(
+        "table6", "The breast of Table 6, in a plane, or that of Table 7, in space."
+    )
+    waveform: bool = asked(
+        False, "Simulate waves and record traces of object and water, not travel times; of table7 in space."
+    )
+    nodes: int = asked(
+        128, "Nodes along a side of the truth, and of the image it is meant for.", among("nodes")
+    )
+    elements: int = asked(256, "Transducers of a ring; each sends and receives.", among("elements"))
+    coupling_mps: float = asked(1500.0, "Speed of the water, m/s.", among("coupling_mps"))
+    snr: float | None = asked(None, "Signal over noise, as 10; none without it.", among("snr"))
+    seed: int = asked(0, "Of the noise.", among("seed"))
+    refinement: int | None = asked(
+        None,
+        "Travel times: how many times finer their grid is, 4 by default; at least 2 in space, else 4.",
+        among("refinement"),
+    )
+    attenuation: bool | None = asked(None, "Travel times: record amplitudes too.")
+    noise_s: float | None = asked(
+        None,
+        "Travel times of table6: standard deviation of the noise on them, s; 0 by default.",
+        among("noise_s"),
+    )
+    slices: int | None = asked(
+        None, "table7: heights of the ring, one node apart; 40 by default.", among("slices")
+    )
+    array: Literal["moved", "rings"] | None = asked(
+        None, "table7: one ring moved (the default), or rings at all heights that receive each other."
+    )
+    three_d: bool | None = asked(None, "table7: wave fronts in space, not in each slice by itself.")
+    frequency_hz: float | None = asked(
+        None, "Waves: middle of the pulse, Hz; 500000 by default, of table7 100000.", among("frequency_hz")
+    )
+    emissions: int | None = asked(None, "Waves: elements that send; 64 by default.", among("emissions"))
+    side_m: float | None = asked(
+        None, "Waves: side of the square with phantom and ring, m; 0.12 by default.", among("side_m")
+    )
+
+    def __post_init__(self) -> None:
+        check(self, CHOICES)
+        self.chosen()
+
+    def chosen(self) -> Simulated:
+        """The settings of the scan that is meant, with the defaults of what is left out."""
+        kind: type[Simulated] = SimulationSettings
+        if self.waveform:
+            kind = VolumeWaveSettings if self.phantom == "table7" else WaveSimulationSettings
+        elif self.phantom == "table7":
+            kind = VolumeSimulationSettings
+        known = {one.name for one in fields(kind)}
+        given = {
+            one.name: getattr(self, one.name)
+            for one in fields(self)
+            if one.name not in ("phantom", "waveform") and getattr(self, one.name) is not None
+        }
+        for name, value in given.items():
+            if name not in known:
+                raise InvalidInput(name, value, f"nothing, unless {OWN[name]}")
+        return kind(**given)
+
+    def plain(self) -> dict[str, Any]:
+        """All that holds for this scan, as JSON has it; gives the same scan again."""
+        given = {name: value for name, value in asdict(self.chosen()).items() if value is not None}
+        return {"phantom": self.phantom, "waveform": self.waveform, **given}

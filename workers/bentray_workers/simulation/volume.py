@@ -1,0 +1,191 @@
+"""A scan of the Table 7 phantom as a dataset: slices of a ring that moves along z, or rings at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from distributed import Client
+
+from bentray_kernels.acquisition import Dataset, Truth
+from bentray_kernels.acquisition.noise import with_noise
+from bentray_kernels.acquisition.simulation.fine_medium import FineMedium
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
+from bentray_kernels.acquisition.simulation.volume_scan import VolumeScan
+from bentray_kernels.arrays import Floats
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import SPEED_MPS
+from bentray_kernels.phantoms import TABLE7_FREQUENCY_HZ, TABLE7_GRIDS, TABLE7_SIDE_M, table7, table7_slices
+from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
+from bentray_kernels.tomography import Progress
+
+from .emitter_batches import arrivals
+from .plane import MOST_REFINEMENT, NODES, SNR, ring_radius
+
+# The coarsest voxels that the phantom's lesions are measured in; wider ones would join them.
+LEAST_NODES = min(nodes for nodes, _ in TABLE7_GRIDS)
+
+
+@dataclass(frozen=True)
+class VolumeSimulationSettings:
+    """A scan of the Table 7 phantom.
+
+    Attributes:
+        nodes: nodes along x and y of the truth, and of the reconstruction it is meant for.
+        slices: heights of the ring, one node apart, the phantom's middle in their middle.
+        elements: of the ring, each emitter and receiver.
+        coupling_mps: speed of the medium around the breast, m/s.
+        refinement: how many times finer the data are made; at least 4, or 2 with ``three_d``.
+        three_d: wave fronts in space; else each slice is a world of its own.
+        array: ``moved``, one ring at each height in turn, whose elements receive their own ring alone;
+            ``rings``, all rings at once, each element receiving every other, with ``three_d`` only.
+        attenuation: whether to record amplitudes beside the travel times.
+        snr: root mean square of the data over the standard deviation of Gaussian noise on them; None: none.
+        seed: of the noise.
+    """
+
+    nodes: int = ranged(128, NODES)
+    slices: int = ranged(40, Range(2, 1024))
+    elements: int = ranged(256, Range(3, 4096))
+    coupling_mps: float = ranged(1500.0, SPEED_MPS)
+    refinement: int = ranged(4, Range(2, MOST_REFINEMENT))
+    three_d: bool = False
+    array: Literal["moved", "rings"] = "moved"
+    attenuation: bool = False
+    snr: float | None = ranged(None, SNR)
+    seed: int = ranged(0, SEED)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+        if self.array not in ("moved", "rings"):
+            raise InvalidInput("array", repr(self.array), "moved or rings")
+        if self.array == "rings" and not self.three_d:
+            raise InvalidInput("array", repr(self.array), "moved, unless three_d is true")
+        self.scan()
+
+    def scan(self) -> VolumeScan:
+        """The scan; the ring leaves the margin that a reconstruction of as many nodes leaves."""
+        return VolumeScan(
+            table7(self.coupling_mps, max(self.nodes, LEAST_NODES)),
+            Ring(self.elements, ring_radius(TABLE7_SIDE_M, self.nodes)),
+            tuple(table7_slices(self.nodes, self.slices).tolist()),
+            TABLE7_SIDE_M,
+            self.nodes,
+            self.refinement,
+            self.three_d,
+        )
+
+    @property
+    def scans(self) -> int:
+        """How many are simulated one by one."""
+        return 1 if self.array == "rings" else self.slices
+
+    @property
+    def emitters(self) -> int:
+        """Of each of them."""
+        return self.slices * self.elements if self.array == "rings" else self.elements
+
+    def medium_number(self, scan: int) -> int:
+        """As ``Scans``: a slice in two dimensions is a medium of its own."""
+        return 0 if self.three_d else scan
+
+    def medium(self, number: int) -> FineMedium:
+        """As ``Scans``."""
+        scan = self.scan()
+        part = scan if self.three_d else scan.slice(number)
+        return part.medium(attenuation=self.attenuation)
+
+    def elements_in_medium(self, scan: int) -> Floats:
+        """As ``Scans``."""
+        whole = self.scan()
+        if not self.three_d:
+            return whole.slice(scan).elements()
+        elements = whole.elements()
+        if self.array == "rings":
+            return elements
+        return elements[scan * self.elements : (scan + 1) * self.elements]
+
+
+def simulate_volume(
+    client: Client | None,
+    settings: VolumeSimulationSettings,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> Dataset:
+    """Simulate a scan.
+
+    Args:
+        client: of a cluster; None uses the cores of this machine.
+        settings: see ``VolumeSimulationSettings``.
+        on_progress: called after each batch, with emitters done of all.
+
+    Returns:
+        For ``moved`` a dataset with ``slice_z_m`` and arrays (slices, elements, elements); for ``rings`` one
+        with positions (slices · elements, 3), ring by ring, and arrays over all pairs of them. Both have
+        ``truth`` and ``roi`` of shape (nodes, nodes, slices).
+    """
+    scans, count = settings.scans, settings.emitters
+    delta = np.empty((scans, count, count))
+    ratio = np.empty_like(delta) if settings.attenuation else None
+    done = 0
+    for (k, batch), (times, amplitudes) in arrivals(client, settings, scans, count):
+        delta[k, batch] = times
+        if ratio is not None:
+            ratio[k, batch] = amplitudes
+        done += len(batch)
+        if on_progress is not None:
+            on_progress(Progress(done, scans * count))
+    return scan_of(settings, delta, ratio)
+
+
+def scan_of(settings: VolumeSimulationSettings, delta: Floats, ratio: Floats | None) -> Dataset:
+    """The dataset of what every element received, with its noise.
+
+    Args:
+        settings: of the scan.
+        delta: (scans, emitters, emitters), s.
+        ratio: as ``delta``, Np, or None without attenuation.
+    """
+    scan, count = settings.scan(), settings.emitters
+    rings = settings.array == "rings"
+    sigma_s = 0.0
+    if settings.snr is not None:
+        random = np.random.default_rng(settings.seed)
+        pairs = np.broadcast_to(~np.eye(count, dtype=bool), delta.shape)
+        delta, sigma_s = with_noise(delta, settings.snr, random, pairs)
+        if ratio is not None:
+            ratio, _ = with_noise(ratio, settings.snr, random, pairs)
+    if rings:
+        delta, ratio = delta[0], None if ratio is None else ratio[0]
+    return Dataset(
+        element_position_m=scan.positions() if rings else scan.ring.positions(),
+        tx=np.arange(count),
+        rx=np.arange(count),
+        water_speed_mps=settings.coupling_mps,
+        water_attenuation_np_m=scan.phantom.coupling_np_m if settings.attenuation else None,
+        delta_tof_s=delta,
+        sigma_s=np.full(delta.shape, sigma_s) if sigma_s > 0.0 else None,
+        log_ratio_np=ratio,
+        amplitude_frequency_hz=TABLE7_FREQUENCY_HZ if settings.attenuation else None,
+        roi=scan.phantom.inside(scan.nodes, scan.side_m, scan.z_m),
+        truth=_truth(scan),
+        slice_z_m=None if rings else np.array(scan.z_m),
+        array_type="rings" if rings else "ring",
+        radius_m=scan.ring.radius_m,
+        picker=f"none: simulated travel times, factored fast marching in {2 + scan.three_d} dimensions",
+        title=f"Table 7 phantom, coupling {settings.coupling_mps:g} m/s",
+        source="made by bentray simulate",
+        license="CC0-1.0",
+    )
+
+
+def _truth(scan: VolumeScan) -> Truth:
+    spacing = scan.side_m / (scan.nodes - 1)
+    return Truth(
+        sound_speed_mps=scan.phantom.speed(scan.nodes, scan.side_m, scan.z_m),
+        spacing_m=(spacing, spacing, spacing),
+        origin_m=(-0.5 * scan.side_m, -0.5 * scan.side_m, scan.z_m[0]),
+        attenuation_np_m=scan.phantom.attenuation(scan.nodes, scan.side_m, scan.z_m),
+        axes="x,y,z",
+    )

@@ -1,0 +1,298 @@
+"""A ring scan of a phantom by simulated waves, its emissions shared out over workers or cores."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar
+
+import numpy as np
+from distributed import Client, as_completed
+from distributed.system import MEMORY_LIMIT
+from numpy.typing import NDArray
+
+from bentray_kernels.acquisition import Dataset, Truth, Waveform
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
+from bentray_kernels.arrays import Floats
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import SPEED_MPS
+from bentray_kernels.phantoms import TABLE6_SIDE_M, EllipsePhantom, table6
+from bentray_kernels.phantoms.volume import PhantomSlice
+from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
+from bentray_kernels.tomography import Progress
+from bentray_kernels.wave.medium import Medium
+from bentray_kernels.wave.points import REACH
+from bentray_kernels.wave.simulation import simulate
+from bentray_kernels.wave.stencil import longest_step, phase_error
+from bentray_kernels.wave.time_blocks import Poll, unheeded
+
+from ..cluster.resources import RECONSTRUCTION
+from .plane import NODES, SNR, ring_radius
+
+# The pulse is a sine under a Gaussian; at this many times its centre frequency it has 3 % of its height.
+HIGHEST = 1.54
+
+# The simulation has another order in space than a refinement's 8, more nodes in its shortest wave than that
+# one's 4.5, and steps of this part of the longest stable one.
+ORDER, NODES_A_WAVE, STEP = 6, 7.0, 0.5
+
+FREQUENCY_HZ = Range(1e4, 1e7, unit="Hz")
+
+# Wider than those of a refinement.
+EDGE_NODES = 40
+
+# More nodes than these nobody waits for.
+MOST_NODES = 8192**2
+
+# Recorded samples in a period of the centre frequency.
+SAMPLES_A_PERIOD = 8
+
+# Periods of the pulse before its middle, and of the record after the slowest arrival.
+BEFORE, AFTER = 2.5, 12.0
+
+
+@dataclass(frozen=True)
+class WaveSimulationSettings:
+    """A ring scan by waves.
+
+    Attributes:
+        frequency_hz: of the middle of the pulse, Hz.
+        side_m: of the square that holds phantom and ring, m; the phantom is as large a part of it as in
+            the dissertation's 0.2 m.
+        elements: of the ring, each a receiver.
+        emissions: of them that send, evenly spread.
+        nodes: along a side of the truth image.
+        coupling_mps: speed of the water, m/s.
+        snr: highest sample of a water trace, in the median over all, over the standard deviation of Gaussian
+            noise on every trace; None: no noise.
+        seed: of the noise.
+    """
+
+    frequency_hz: float = ranged(5e5, FREQUENCY_HZ)
+    side_m: float = ranged(0.12, Range(1e-3, 1.0, unit="m"))
+    elements: int = ranged(128, Range(8, 4096))
+    emissions: int = ranged(64, Range(1, 4096))
+    nodes: int = ranged(256, NODES)
+    coupling_mps: float = ranged(1500.0, SPEED_MPS)
+    snr: float | None = ranged(None, SNR)
+    seed: int = ranged(0, SEED)
+
+    # Of the waves, what a scan in space has otherwise.
+    dimensions: ClassVar[int] = 2
+    edge_nodes: ClassVar[int] = EDGE_NODES
+    phantom_side_m: ClassVar[float] = TABLE6_SIDE_M
+    phantom_name: ClassVar[str] = "Table 6"
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+        if not 1 <= self.emissions <= self.elements:
+            raise InvalidInput("emissions", self.emissions, f"1 to {self.elements}")
+        size = math.prod(self.grid)
+        if size > MOST_NODES:
+            most = self.frequency_hz * (MOST_NODES / size) ** (1.0 / self.dimensions)
+            raise InvalidInput("frequency_hz", self.frequency_hz, f"at most {most:.3g} for this side")
+
+    @property
+    def phantom(self) -> EllipsePhantom | PhantomSlice:
+        """In the plane of the ring."""
+        return table6(self.coupling_mps)
+
+    @property
+    def grid(self) -> tuple[int, ...]:
+        """Nodes of the simulation along each axis."""
+        return self.fine_nodes, self.fine_nodes
+
+    def places_m(self) -> Floats:
+        """Elements in the medium, (elements, dimensions), m, node 0 at 0."""
+        return self.elements_m() + 0.5 * self.side_m
+
+    def speed(self) -> Floats:
+        """Of the object on the grid, m/s."""
+        return self.phantom.speed(self.fine_nodes, self.phantom_side_m)
+
+    @property
+    def speeds(self) -> tuple[float, float]:
+        """Lowest and highest in the medium, m/s."""
+        low, high = self.phantom.speed_range()
+        return min(low, self.coupling_mps), max(high, self.coupling_mps)
+
+    @property
+    def fine_nodes(self) -> int:
+        """Along a side of the simulation's grid."""
+        wave = self.speeds[0] / (HIGHEST * self.frequency_hz)
+        return int(np.ceil(self.side_m * NODES_A_WAVE / wave)) + 2 * REACH
+
+    @property
+    def told_grid(self) -> str:
+        """As people read it."""
+        return " by ".join(str(nodes) for nodes in self.grid)
+
+    @property
+    def spacing_m(self) -> float:
+        """Of that grid, m."""
+        return self.side_m / (self.fine_nodes - 1)
+
+    @property
+    def skip(self) -> int:
+        """Time steps from one recorded sample to the next."""
+        longest = STEP * longest_step(self.speeds[1], self.spacing_m, dimensions=self.dimensions)
+        return int(np.ceil(1.0 / (SAMPLES_A_PERIOD * self.frequency_hz) / longest))
+
+    @property
+    def step_s(self) -> float:
+        """Of time, s."""
+        return 1.0 / (SAMPLES_A_PERIOD * self.frequency_hz * self.skip)
+
+    @property
+    def samples(self) -> int:
+        """Of each trace."""
+        longest = 2.0 * ring_radius(self.side_m, self.nodes) / self.speeds[0]
+        return int(SAMPLES_A_PERIOD * (longest * self.frequency_hz + BEFORE + AFTER))
+
+    @property
+    def dispersion(self) -> tuple[float, float]:
+        """Error of the phase speed at the centre frequency and at the highest one of the pulse, relative."""
+        courant = self.coupling_mps * self.step_s / self.spacing_m
+        waves = (self.coupling_mps / (times * self.frequency_hz) for times in (1.0, HIGHEST))
+        centre, highest = (phase_error(wave / self.spacing_m, courant, order=ORDER) for wave in waves)
+        return centre, highest
+
+    def elements_m(self) -> Floats:
+        """Positions, (elements, 2), m, origin at the centre."""
+        return Ring(self.elements, ring_radius(self.side_m, self.nodes)).positions()
+
+    def senders(self) -> NDArray[np.int64]:
+        """Elements that send, (emissions,)."""
+        return np.arange(self.emissions) * self.elements // self.emissions
+
+
+def simulate_waves(
+    client: Client | None,
+    settings: WaveSimulationSettings,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> Dataset:
+    """Simulate a scan: traces of object and water, without travel times.
+
+    Args:
+        client: of a cluster; None uses the cores of this machine.
+        settings: see ``WaveSimulationSettings``.
+        on_progress: called after each emission.
+    """
+    shape = (settings.emissions, settings.elements, settings.samples)
+    received, water = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    for done, (k, both) in enumerate(_emissions(client, settings), 1):
+        received[k], water[k] = both
+        if on_progress is not None:
+            on_progress(Progress(done, settings.emissions))
+    if settings.snr is not None:
+        noise = Noise(settings, np.abs(water).max(axis=-1))
+        for traces in (received, water):
+            for emission in traces:
+                emission += noise.drawn()
+    return scan_of(settings, Waveform(received, water))
+
+
+class Noise:
+    """Noise on traces, drawn an emission at a time: of the object all, then of the water.
+
+    Args:
+        settings: with an ``snr``.
+        heights: highest sample of each water trace, (emissions, elements).
+    """
+
+    def __init__(self, settings: WaveSimulationSettings, heights: NDArray[np.float32]) -> None:
+        assert settings.snr is not None
+        self._random = np.random.default_rng(settings.seed)
+        self._sigma = float(np.median(heights)) / settings.snr
+        self._shape = settings.elements, settings.samples
+
+    def drawn(self) -> NDArray[np.float32]:
+        """Of the next emission, (elements, samples)."""
+        return (self._sigma * self._random.standard_normal(self._shape)).astype(np.float32)
+
+
+def scan_of(settings: WaveSimulationSettings, waveform: Waveform) -> Dataset:
+    """The dataset of traces, or of stand-ins for them."""
+    phantom = settings.phantom
+    spacing = settings.side_m / (settings.nodes - 1)
+    low, high = settings.dispersion
+    return Dataset(
+        element_position_m=settings.elements_m(),
+        tx=settings.senders(),
+        rx=np.arange(settings.elements),
+        water_speed_mps=settings.coupling_mps,
+        waveform=waveform,
+        roi=phantom.inside(settings.nodes, settings.phantom_side_m),
+        truth=Truth(
+            sound_speed_mps=phantom.speed(settings.nodes, settings.phantom_side_m),
+            spacing_m=(spacing, spacing),
+            origin_m=(-0.5 * settings.side_m, -0.5 * settings.side_m),
+        ),
+        radius_m=ring_radius(settings.side_m, settings.nodes),
+        center_frequency_hz=settings.frequency_hz,
+        sampling_rate_hz=SAMPLES_A_PERIOD * settings.frequency_hz,
+        t0_s=-BEFORE / settings.frequency_hz,
+        title=(
+            f"{settings.phantom_name} phantom, {1e3 * settings.side_m:g} mm, "
+            f"waves of {1e-3 * settings.frequency_hz:g} kHz"
+        ),
+        source=(
+            f"made by bentray simulate: order {ORDER} in space, {settings.told_grid} nodes of "
+            f"{1e3 * settings.spacing_m:.3g} mm, phase speed wrong by {low:.1e} in the middle of the pulse "
+            f"and {high:.1e} at its highest frequency"
+        ),
+        license="CC0-1.0",
+    )
+
+
+def _emissions(
+    client: Client | None, settings: WaveSimulationSettings
+) -> Iterator[tuple[int, tuple[NDArray[np.float32], NDArray[np.float32]]]]:
+    """Each emission's number with its traces of object and water, in no order that holds."""
+    every = range(settings.emissions)
+    if client is None:
+        # Made once, before the threads would each do it.
+        _media(settings)
+        with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+            yield from enumerate(pool.map(lambda k: simulate_emission(settings, k), every))
+        return
+    futures = {
+        client.submit(simulate_emission, settings, k, resources=RECONSTRUCTION, pure=False): k for k in every
+    }
+    for future, both in as_completed(futures, loop=client.loop, with_results=True):
+        yield futures[future], both
+
+
+def simulate_emission(
+    settings: WaveSimulationSettings, emission: int, poll: Poll = unheeded
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Task: traces of object and water of one emission, (elements, samples) each; ``poll`` as ``time_blocks``."""
+    places = settings.places_m()
+    at = places[settings.senders()[emission]]
+    time = settings.step_s * np.arange(settings.samples * settings.skip) - BEFORE / settings.frequency_hz
+    late = time * settings.frequency_hz
+    pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
+    received, water = (
+        simulate(medium, at, places, pulse, ORDER, poll)[:, :: settings.skip] for medium in _media(settings)
+    )
+    return received.astype(np.float32), water.astype(np.float32)
+
+
+@lru_cache(maxsize=1)
+def _media(settings: WaveSimulationSettings) -> tuple[Medium, Medium]:
+    """Of object and water."""
+    received, water = (
+        Medium.of(
+            speed,
+            settings.spacing_m,
+            settings.step_s,
+            edge_nodes=settings.edge_nodes,
+            room_bytes=MEMORY_LIMIT or math.inf,
+        )
+        for speed in (settings.speed(), np.full(settings.grid, settings.coupling_mps))
+    )
+    return received, water
