@@ -37,8 +37,8 @@ class Settings:
     Attributes:
         method: ``sart`` uses one emitter after the other (chapter 6); ``gauss-newton`` all at once, with bent
             rays and a penalty; ``auto`` tries several on part of the pairs and takes the one that predicts
-            the others best, see ``model_selection``; ``waveform`` does so too, and then refines that image until the
-            traces that waves through it would make agree with those recorded, see ``wave``. It needs slices
+            the others best, see ``model_selection``; ``waveform`` does so too, and then refines that image
+            until the traces that waves through it would make agree with those recorded. It needs slices
             with traces of object and water; its image has the finest grid that its waves ask for, ``nodes``
             is that of the rays.
         rays: ``curved`` traces down the travel time of the current image; ``straight`` ignores refraction;

@@ -21,7 +21,7 @@ class Cancelled(Exception):  # noqa: N818 - the word that users and states have 
 
 
 class Follows(Protocol):
-    """What says which calls follow one that has finished, see ``tomography.chains.Calls``."""
+    """What says which calls follow one that has finished, see ``tomography.task_chains.Calls``."""
 
     def after(self, call: Call, given: Any) -> list[Call]: ...
 

@@ -174,7 +174,7 @@ class Arrivals:
         ]
 
     def after(self, call: Call, given: Any) -> list[Call]:
-        """Calls that may follow one that has finished; see ``chains.Calls``."""
+        """Calls that may follow one that has finished; see ``task_chains.Calls``."""
         if call.function is join:
             return []
         index = call.arguments[1]

@@ -48,8 +48,8 @@ class Plan:
         lane: which workers take the tasks.
         tasks: about how many there will be.
         workers: how many are connected and can hold each of them.
-        call_bytes: of one call, by its name in ``tomography.task_chains``; working arrays, arguments and what a
-            process keeps of the dataset.
+        call_bytes: of one call, by its name in ``tomography.task_chains``; working arrays, arguments and what
+            a process keeps of the dataset.
         field_bytes, rows_bytes, state_bytes: of a travel time while it is made; of all rows of an image; of
             what comes back between two calls.
         stored_bytes: on disk while it runs, at most: the result, and the checkpoints beside it.

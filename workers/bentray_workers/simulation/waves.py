@@ -270,7 +270,7 @@ def _emissions(
 def simulate_emission(
     settings: WaveSimulationSettings, emission: int, poll: Poll = unheeded
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Task: traces of object and water of one emission, (elements, samples) each; ``poll`` as ``time_blocks``."""
+    """Task: object and water traces of an emission, (elements, samples); on ``poll`` see ``time_blocks``."""
     places = settings.places_m()
     at = places[settings.senders()[emission]]
     time = settings.step_s * np.arange(settings.samples * settings.skip) - BEFORE / settings.frequency_hz

@@ -1,4 +1,4 @@
-"""A refinement through all its bands, as calls that may run anywhere; see ``tomography.chains``."""
+"""A refinement through all its bands, as calls that may run anywhere; see ``tomography.task_chains``."""
 
 from __future__ import annotations
 
