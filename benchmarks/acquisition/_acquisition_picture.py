@@ -13,7 +13,7 @@ from bentray_kernels.acquisition import PICKERS, Dataset, Waveform, pick
 from bentray_workers.images.canvas import drawing, new_figure, to_png
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
-from ..shared._palette import with_a_palette
+from ..shared._small_png import small_png
 
 SHOWN = ("straight", "bent, wide", "waveform")
 
@@ -59,7 +59,7 @@ def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Any]]], seconds: str
                 grid = (one.result.spacing_m, one.result.origin_m)
                 maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=title))
             draw_bar(maps, "speed (m/s)")
-        return with_a_palette(to_png(figure))
+        return small_png(to_png(figure))
 
 
 def gather(axes: Axes, name: str, dataset: Dataset) -> None:

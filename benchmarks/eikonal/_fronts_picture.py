@@ -15,7 +15,7 @@ from bentray_kernels import eikonal
 from bentray_workers.images.canvas import drawing, new_figure, to_png
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map
 
-from ..shared._palette import with_a_palette
+from ..shared._small_png import small_png
 from .eikonal import Problem
 
 ERROR = "magma"
@@ -77,7 +77,7 @@ def picture(cases: Sequence[Case]) -> bytes:
         for axes in panels[::2].flat:
             axes.set_xlabel("")
             axes.tick_params(labelbottom=False)
-        return with_a_palette(to_png(figure))
+        return small_png(to_png(figure))
 
 
 def draw_fronts(row: Sequence[Axes], case: Case, names: Sequence[str]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from bentray_workers.images.canvas import drawing, new_figure, to_png
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
-from ..shared._palette import with_a_palette
+from ..shared._small_png import small_png
 
 
 @dataclass(frozen=True)
@@ -39,4 +39,4 @@ def picture(title: str, panels: Sequence[Panel], columns: int) -> bytes:
         for axes in list(places.flat)[len(panels) :]:
             axes.set_visible(False)
         draw_bar(maps, "speed (m/s)")
-        return with_a_palette(to_png(figure))
+        return small_png(to_png(figure))
