@@ -36,7 +36,7 @@ export function upload(address, mediaType, file, onProgress) {
     for (const [name, value] of Object.entries(authorization())) sender.setRequestHeader(name, value);
     sender.responseType = "json";
     sender.upload.onprogress = (event) => event.lengthComputable && onProgress(event.loaded / event.total);
-    sender.onerror = () => reject(new Error("The upload broke off: the service did not take it or does not answer."));
+    sender.onerror = () => reject(new Error("The upload failed: the service did not accept it or does not answer."));
     sender.onload = () => {
       if (sender.status === 201) resolve(sender.response);
       else reject(new Error(sender.response ? inWords(sender.response) : `The service answered ${sender.status}.`));

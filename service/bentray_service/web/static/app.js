@@ -25,7 +25,7 @@ function titleOf(dataset) {
 
 function titleOfJob(job) {
   if (job.mesh) return meshTitle(job.mesh);
-  if (job.kind === "simulation" && !job.dataset) return "Becomes a scan to reconstruct";
+  if (job.kind === "simulation" && !job.dataset) return "Will be a scan to reconstruct";
   return datasets.has(job.dataset) ? titleOf(datasets.get(job.dataset)) : volumeTitle(job.volume);
 }
 

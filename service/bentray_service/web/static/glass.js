@@ -40,7 +40,7 @@ function show() {
   shown = address;
   say(null);
   const image = new Image();
-  image.alt = `${volumeTitle(volume.id)} in glass`;
+  image.alt = `Volume rendering of ${volumeTitle(volume.id)}`;
   at("glass").className = "picture drawing";
   image.onload = () => {
     if (address === shown) at("glass").replaceChildren(image);
@@ -50,7 +50,7 @@ function show() {
     if (address !== shown) return;
     shown = "";
     at("glass").className = "picture";
-    at("glass").replaceChildren("No picture");
+    at("glass").replaceChildren("No image");
     // The service says why in the body, which an image does not tell.
     request(address).catch(say);
   };
@@ -72,7 +72,7 @@ export async function loadVolumes(chosen) {
 
 // Of a new volume other values are asked for.
 async function stored({ id, links }) {
-  if (!links.refraction) throw new Error("The volume is stored, but it cannot be shown: its spacing is not even.");
+  if (!links.refraction) throw new Error("The volume is stored, but it cannot be rendered: its spacing is not uniform.");
   form().reset();
   await loadVolumes(id);
 }

@@ -4,8 +4,8 @@ import { showOnceNear, withKey } from "./key.js";
 import { glassOf, queryOf } from "./views.js";
 
 const SVG = "http://www.w3.org/2000/svg";
-const RAYS = { curved: "Bent rays", straight: "Straight rays", adjoint: "Without rays" };
-const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton", auto: "auto", waveform: "waveforms" };
+const RAYS = { curved: "Bent rays", straight: "Straight rays", adjoint: "Adjoint, no rays" };
+const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton", auto: "automatic", waveform: "full waveform" };
 const cards = new Map();
 
 function make(tag, className, text) {
@@ -51,7 +51,7 @@ function sparkline({ values, begins }) {
   picture.setAttribute("preserveAspectRatio", "none");
   picture.setAttribute("role", "img");
   const stages = begins.length ? ` in ${begins.length + 1} stages` : "";
-  picture.setAttribute("aria-label", `Residual of ${values.length} sweeps${stages}`);
+  picture.setAttribute("aria-label", `Residual of ${values.length} iterations${stages}`);
   const top = Math.max(...values);
   const base = document.createElementNS(SVG, "line");
   for (const [name, value] of [["x1", 0], ["x2", 100], ["y1", 39], ["y2", 39]]) base.setAttribute(name, value);
@@ -74,7 +74,7 @@ function drawn(address, words, larger = address) {
   const frame = make("div", "picture");
   const image = make("img");
   image.alt = words;
-  image.onerror = () => frame.replaceChildren("The picture could not be drawn.");
+  image.onerror = () => frame.replaceChildren("The image could not be drawn.");
   showOnceNear(image, address);
   const anchor = link("", larger);
   anchor.append(image);
@@ -90,10 +90,10 @@ async function showVolume(column, job, title) {
   const range = low < high ? { low, high } : {};
   const small = `${job.links.image}?${queryOf({ frame: false, size: 320, ...range })}`;
   const words = `Sound speed, ${Math.round(low)} (dark) to ${Math.round(high)} m/s (bright)`;
-  column.replaceChildren(drawn(small, `Speed of sound, ${title}`, job.links.image), make("p", "caption", words));
+  column.replaceChildren(drawn(small, `Sound speed, ${title}`, job.links.image), make("p", "caption", words));
   if (!volume.links.refraction) return;
   const address = `${volume.links.refraction}?${queryOf(glassOf(volume))}`;
-  column.append(drawn(address, `As glass, ${title}`), make("p", "caption", "As glass"));
+  column.append(drawn(address, `Volume rendering, ${title}`), make("p", "caption", "Volume rendering"));
 }
 
 // The first picture of a turntable.
@@ -105,16 +105,16 @@ function firstFrame(job) {
 function pictures(job, title) {
   const column = make("div", "pictures");
   if (job.links.field) {
-    column.append(drawn(`${job.links.image}?${queryOf({ width: 320, height: 320, rays: 2 })}`, `As a mirror, ${title}`));
+    column.append(drawn(`${job.links.image}?${queryOf({ width: 320, height: 320, rays: 2 })}`, `Surface rendering, ${title}`));
   } else if (job.links.image) {
     column.append(make("div", "picture"));
     showVolume(column, job, title).catch(() => {});
   } else if (job.links.animation) {
     const moving = job.settings.format === "apng";
-    column.append(drawn(moving ? job.links.animation : firstFrame(job), `As glass, ${title}`));
+    column.append(drawn(moving ? job.links.animation : firstFrame(job), `Volume rendering, ${title}`));
   } else {
     const ended = job.state === "failed" || job.state === "cancelled";
-    const words = job.kind === "simulation" ? "A scan, which has no image yet" : "Image to come";
+    const words = job.kind === "simulation" ? "A scan; it has no image yet" : "The image follows";
     const none = ended || job.kind === "simulation";
     column.append(make("div", none ? "picture none" : "picture", ended ? "No image" : words));
   }
@@ -124,17 +124,17 @@ function pictures(job, title) {
 // What was asked for, in a heading and a line.
 function asked({ kind, settings }) {
   if (kind === "geometry-field") {
-    return ["Geometry field", `${settings.samples} samples along an edge, image of ${settings.image_size} pixels`];
+    return ["Geometry field", `${settings.samples} samples per edge, image of ${settings.image_size} pixels`];
   }
   if (kind === "refraction") {
-    return ["Turntable", `${settings.frames} pictures of ${settings.width} × ${settings.height}, index ${settings.index.join(", ")}`];
+    return ["Turntable", `${settings.frames} frames of ${settings.width} × ${settings.height}, index ${settings.index.join(", ")}`];
   }
   if (kind === "simulation") {
-    const of = settings.phantom === "table7" ? "Table 7, in space" : "Table 6";
-    return ["Simulated scan", `${of}, ${settings.waveform ? "by waves" : "travel times"}, ${settings.elements} elements`];
+    const of = settings.phantom === "table7" ? "3-D breast phantom" : "2-D breast phantom";
+    return ["Simulated scan", `${of}, ${settings.waveform ? "traces" : "travel times"}, ${settings.elements} elements`];
   }
   const { method, rays, nodes, sweeps } = settings;
-  return [method === "auto" ? "Chosen by trial" : RAYS[rays], `${METHODS[method]}, ${nodes} × ${nodes} nodes, ${sweeps} sweeps`];
+  return [method === "auto" ? "Automatic" : RAYS[rays], `${METHODS[method]}, ${nodes} × ${nodes} nodes, ${sweeps} iterations`];
 }
 
 // In a few words, and in full when asked for.
@@ -179,7 +179,7 @@ function facts(job, title, onCancel) {
   if (job.links.field) {
     row.append(link("Geometry image", job.links.geometry_image), link("Normal map", job.links.normal_map), link("Figures", job.links.field));
   }
-  if (job.links.animation) row.append(link("Pictures", job.links.animation, true));
+  if (job.links.animation) row.append(link("Frames", job.links.animation, true));
   if (job.links.data) {
     row.append(link("HDF5", `${job.links.data}?format=hdf5`, true), link("NumPy", `${job.links.data}?format=npy`, true));
   }

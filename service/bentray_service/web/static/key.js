@@ -100,7 +100,7 @@ export async function admitted(request) {
   try {
     const { tenant, how, scopes } = await request("/v1/access");
     at("access").textContent =
-      how === "open" ? "Open to this machine: no key is asked for" : `Tenant ${tenant} (${scopes.join(", ")})`;
+      how === "open" ? "Open to this machine; no key needed" : `Tenant ${tenant} (${scopes.join(", ")})`;
     return true;
   } catch (error) {
     // Where no key helps, the reason stands here.

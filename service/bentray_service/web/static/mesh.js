@@ -34,7 +34,7 @@ function show() {
   const links = fields.get(mesh.id);
   if (!links) {
     shown = "";
-    at("field-picture").replaceChildren("The picture appears here once the field is made");
+    at("field-picture").replaceChildren("The image appears here once the field is built");
     return;
   }
   const { samples, ...view } = Object.fromEntries(new FormData(form()));
@@ -53,7 +53,7 @@ function show() {
     if (address !== shown) return;
     shown = "";
     at("field-picture").className = "picture";
-    at("field-picture").replaceChildren("No picture");
+    at("field-picture").replaceChildren("No image");
     // The service says why in the body, which an image does not tell.
     request(address).catch(say);
   };
