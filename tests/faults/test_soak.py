@@ -43,7 +43,7 @@ SETTLE_S = 60.0
 LIVE_S = 10.0
 LIVE_EVERY_S = 0.5
 # A line fitted to the samples at rest after the warm-up may rise by so much from the first to the last.
-# Memory: what the allocator keeps differs by ten MiB between spells. In 24 minutes with 29,000 answers it went
+# Memory: what the allocator keeps differs by ten MiB between spells. In 24 minutes, 29,000 answers, it went
 # from 251 MiB before the traffic to 294 after three spells, and was between 291 and 311 from there on: the
 # line rose by 10. A leak of 2 kB a request would be 38 on top.
 MOST_SERVICE_MIB = 32.0
