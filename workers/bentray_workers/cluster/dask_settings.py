@@ -16,7 +16,7 @@ LOGS = {
 SETTINGS = {
     **LOGS,
     # What a scheduler would keep for ever, and no setting bounds.
-    "distributed.scheduler.preload": ["bentray_workers.scheduler_history"],
+    "distributed.scheduler.preload": ["bentray_workers.cluster.scheduler_history"],
     # A queue without workers fails its tasks after this long instead of waiting for ever.
     "distributed.scheduler.no-workers-timeout": "60s",
     # Workers that a task may kill besides the one that gives it up: each takes seconds to come back.

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bentray_kernels.errors import InvalidInput
+
 from .atomic import replacing
 from .hdf5_reading import Limits, opened
 from .mat_writing import write_mat
@@ -67,12 +69,18 @@ def export_volume(volume: Path, *, target: Path, name: str) -> None:
         name: a key of ``FORMATS``.
 
     Raises:
-        InvalidInput: naming ``volume``, for what the format cannot tell.
+        InvalidInput: naming ``volume``, for what the format cannot tell, or one that is deleted meanwhile.
         OSError: where the folder cannot be written to or the disk is full.
     """
     with opened(volume, Limits()) as reader:
         uploaded = reader.text("", "format") == FORMAT
-    FORMATS[name].write(target, _uploaded(volume) if uploaded else _reconstructed(volume))
+    try:
+        FORMATS[name].write(target, _uploaded(volume) if uploaded else _reconstructed(volume))
+    except FileNotFoundError:
+        # Deleting a volume takes its exports along, unfinished ones too.
+        if not target.parent.is_dir():
+            raise
+        raise InvalidInput("volume", "one that was deleted during its export", "one that stays") from None
 
 
 def _uploaded(volume: Path) -> Content:

@@ -8,7 +8,7 @@ from typing import Any
 
 import dask
 
-from .cluster.dask_settings import LOGS
+from .dask_settings import LOGS
 
 
 class NoSpans:

@@ -1,0 +1,43 @@
+"""A volume that is deleted while it is exported is a refusal in words, not a failure of the service."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.files import volume_export
+from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.files.volume_export import FORMATS, Format, export_volume
+
+
+@pytest.fixture
+def stored(tmp_path: Path) -> Path:
+    write_volume(tmp_path / "volume.h5", Volume(np.zeros((3, 4, 5), np.float32), (1e-3,) * 3, (0.0,) * 3, ""))
+    return tmp_path / "volume.h5"
+
+
+def test_an_export_is_written(stored: Path, tmp_path: Path) -> None:
+    export_volume(stored, target=tmp_path / "volume.npy", name="npy")
+    assert np.load(tmp_path / "volume.npy").shape == (3, 4, 5)
+
+
+def test_a_volume_deleted_during_its_export_is_named(
+    stored: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = FORMATS["npy"]
+
+    def write(target: Path, content: volume_export.Content) -> None:
+        with volume_export.replacing(target) as partial:
+            partial.write_bytes(b"begun")
+            for path in tmp_path.iterdir():
+                path.unlink()
+
+    monkeypatch.setattr(volume_export, "FORMATS", {"npy": Format(whole.extension, whole.media_type, write)})
+    with pytest.raises(InvalidInput, match="volume: found one that was deleted during its export"):
+        export_volume(stored, target=tmp_path / "volume.npy", name="npy")
+    assert list(tmp_path.iterdir()) == []
+    missing = tmp_path / "absent" / "volume.npy"
+    write_volume(stored, Volume(np.zeros((3, 4, 5), np.float32), (1e-3,) * 3, (0.0,) * 3, ""))
+    with pytest.raises(FileNotFoundError):
+        export_volume(stored, target=missing, name="npy")
