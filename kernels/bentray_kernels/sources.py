@@ -1,9 +1,15 @@
-"""What a module's results hang on: a digest of its source and of every module that it imports, in turn."""
+"""What a compiled kernel depends on: a digest of its module's code and of all modules that it imports."""
 
 from __future__ import annotations
 
+import ast
 import hashlib
+import json
+import os
 import re
+import sys
+import tempfile
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -12,19 +18,74 @@ ROOT = Path(__file__).parent
 # ``from ..rays.descent import STEP, walk``, also over several lines in brackets.
 _IMPORT = re.compile(r"^[ \t]*from (\.+)([\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
+# Digests of syntax trees by digests of their text: to parse the whole package takes a second.
+MEMORY = f"syntax-{sys.version_info.major}.{sys.version_info.minor}.json"
+# Files that it remembers, from all checkouts and versions.
+MOST_REMEMBERED = 10_000
+
 
 @cache
 def digest(module: str) -> str:
     """Hex digest for a module of this package, as ``bentray_kernels.rays.descent``.
 
-    An edit elsewhere in the package leaves it as it is. A module of somebody else may use all of the package.
+    An edit elsewhere in the package leaves it as it is, and so does one of comments and docstrings. A module
+    of somebody else may use all of the package.
     """
     package, *parts = module.split(".")
     reached = _reached(*_located(ROOT, parts)) if package == ROOT.name else set(ROOT.rglob("*.py"))
-    found = hashlib.sha256()
+    found, memory = hashlib.sha256(), _memory()
+    known = len(memory)
     for path in sorted(reached):
-        found.update(path.read_bytes())
+        found.update(_syntax(path, memory).encode())
+    if len(memory) > known:
+        _keep(memory)
     return found.hexdigest()
+
+
+def _syntax(path: Path, memory: dict[str, str]) -> str:
+    """Hex digest of what a file says to Python: without comments, docstrings and layout."""
+    text = path.read_bytes()
+    key = hashlib.sha256(text).hexdigest()
+    if key not in memory:
+        memory[key] = hashlib.sha256(_without_docstrings(text).encode()).hexdigest()
+    return memory[key]
+
+
+def _without_docstrings(text: bytes) -> str:
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            first = node.body[0] if node.body else None
+            if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
+                node.body = node.body[1:]
+    return ast.dump(tree)
+
+
+def _memory_file() -> Path:
+    """Beside numba's own files where these have a folder, as in an image; else in the user's cache."""
+    folder = os.environ.get("NUMBA_CACHE_DIR")
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return (Path(folder) if folder else home / "bentray") / MEMORY
+
+
+@cache
+def _memory() -> dict[str, str]:
+    with suppress(OSError, RuntimeError, ValueError):
+        found = json.loads(_memory_file().read_text(encoding="ascii"))
+        if isinstance(found, dict):
+            return {str(key): str(value) for key, value in found.items()}
+    return {}
+
+
+def _keep(memory: dict[str, str]) -> None:
+    """Write it down whole or not at all; what another process adds meanwhile is only parsed again."""
+    with suppress(OSError, RuntimeError):
+        file = _memory_file()
+        file.parent.mkdir(parents=True, exist_ok=True)
+        newest = dict(list(memory.items())[-MOST_REMEMBERED:])
+        with tempfile.NamedTemporaryFile("w", dir=file.parent, delete=False, encoding="ascii") as partial:
+            json.dump(newest, partial)
+        Path(partial.name).replace(file)
 
 
 def _reached(*start: Path) -> set[Path]:

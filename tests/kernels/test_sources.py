@@ -1,4 +1,4 @@
-"""Digests change with what a module imports, at any distance, and with nothing else."""
+"""Digests change with the code that a module imports, at any distance, and with nothing else."""
 
 import shutil
 from pathlib import Path
@@ -10,6 +10,8 @@ from bentray_kernels import sources
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    sources._memory.cache_clear()
     root = tmp_path / "bentray_kernels"
     for path in sources.ROOT.rglob("*.py"):
         target = root / path.relative_to(sources.ROOT)
@@ -25,14 +27,15 @@ def package(tmp_path, monkeypatch):
     yield root, digest
     sources.digest.cache_clear()
     sources._imported.cache_clear()
+    sources._memory.cache_clear()
 
 
 def edited(root: Path, module: str):
     path = root / f"{module.replace('.', '/')}.py"
-    path.write_text(path.read_text() + "\n# edited\n")
+    path.write_text(path.read_text() + "\nedited = True\n")
 
 
-@pytest.mark.parametrize("module", ["rays.descent", "eikonal.heap", "eikonal.updates", "tomography.huber"])
+@pytest.mark.parametrize("module", ["rays.descent", "eikonal.heap", "eikonal.updates", "tomography.gauss_newton.huber"])
 def test_an_edit_below_is_noticed(package, module):
     root, digest = package
     before = digest("tomography"), digest("splines.lanes")
@@ -63,3 +66,27 @@ def test_a_kernel_from_elsewhere_may_use_all(package):
     edited(root, "splines.lanes")
     sources.digest.cache_clear()
     assert sources.digest("somewhere.else") != before
+
+
+def test_comments_docstrings_and_layout_do_not_matter(package):
+    root, digest = package
+    path = root / "splines" / "prefilter.py"
+    before = digest("splines.prefilter")
+    text = path.read_text()
+    path.write_text(text.replace('"""', '"""Now in other words. ', 1) + "\n\n# A remark.\n")
+    assert digest("splines.prefilter") == before
+    path.write_text(text.replace("def ", "def other_", 1))
+    assert digest("splines.prefilter") != before
+
+
+def test_what_is_remembered_is_the_same_as_what_is_parsed(package, tmp_path):
+    _, digest = package
+    parsed = digest("eikonal.updates")
+    memory = tmp_path / "cache" / sources.MEMORY
+    assert memory.exists()
+    sources._memory.cache_clear()
+    assert digest("eikonal.updates") == parsed
+    memory.write_text("no JSON")
+    sources._memory.cache_clear()
+    assert digest("eikonal.updates") == parsed
+    assert list(memory.parent.iterdir()) == [memory]
