@@ -35,7 +35,9 @@ def edited(root: Path, module: str):
     path.write_text(path.read_text() + "\nedited = True\n")
 
 
-@pytest.mark.parametrize("module", ["rays.descent", "eikonal.heap", "eikonal.updates", "tomography.gauss_newton.huber"])
+@pytest.mark.parametrize(
+    "module", ["rays.descent", "eikonal.heap", "eikonal.updates", "tomography.gauss_newton.huber"]
+)
 def test_an_edit_below_is_noticed(package, module):
     root, digest = package
     before = digest("tomography"), digest("splines.lanes")

@@ -9,10 +9,10 @@ from typing import Any, Literal
 
 from distributed import Client, LocalCluster
 
-from bentray_kernels.eikonal.registry import METHODS
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl import choose
-from bentray_kernels.tomography.settings import DEVIATION, Settings
+from bentray_kernels.tomography.settings import Settings
+from bentray_kernels.tomography.solver_choice import needs_device
 
 from .connected import connected_workers
 from .resources import OPENCL, RECONSTRUCTION
@@ -49,9 +49,7 @@ class Offer:
 
 def lane_of(settings: Settings) -> Lane:
     """Where the calls of a reconstruction run: wave fronts on a device need a worker that has one."""
-    if settings.rays == "straight" or settings.eikonal == DEVIATION:
-        return "recon"
-    return "opencl" if METHODS.get(settings.eikonal).on_device else "recon"
+    return "opencl" if needs_device(settings) else "recon"
 
 
 def offers_of(client: Client) -> tuple[Offer, ...]:

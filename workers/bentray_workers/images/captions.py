@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 from bentray_kernels.tomography import Reconstruction, Settings
+from bentray_kernels.tomography.solver_choice import solver_of
 
 LABELS = {
     "speed": "sound speed (m/s)",
@@ -75,9 +76,7 @@ def stage_names(result: Reconstruction) -> tuple[str, ...]:
 def _rays(settings: Settings) -> str:
     if settings.rays == "straight":
         return "straight rays"
-    # Where ``deviation`` does not serve, another method stands in for it.
-    serves = settings.rays == "curved" and settings.method == "sart" and settings.decomposition == "slices"
-    front = settings.eikonal if serves else settings.front
+    front = solver_of(settings, 3 if settings.decomposition == "volume" else 2).eikonal
     return f"{'curved rays' if settings.rays == 'curved' else 'adjoint, no rays'} ({front})"
 
 

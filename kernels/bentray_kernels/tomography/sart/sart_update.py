@@ -14,7 +14,8 @@ from ...eikonal import adjoint, solve
 from ...rays.descent import PARTS, STEP, curved_ray, straight_ray, walk
 from ...rays.fan import Fan
 from ..problem import Problem
-from ..settings import DEVIATION, Settings
+from ..settings import Settings
+from ..solver_choice import solver_of
 from .emitter_pass import EmitterPass
 
 # One update in place: problem, settings, slowness, coverage, emitters and sweep in, residuals out.
@@ -23,8 +24,7 @@ Use = Callable[[Problem, Settings, Floats, Floats, Ints, int], Floats]
 
 def update_of(problem: Problem, settings: Settings) -> Use:
     """How images of the problem are updated: compiled where the settings allow it."""
-    known = settings.rays == "straight" or (settings.rays == "curved" and settings.eikonal == DEVIATION)
-    return _compiled(problem) if problem.region.ndim == 2 and known else _traced
+    return _compiled(problem) if solver_of(settings, problem.region.ndim).compiled else _traced
 
 
 def propagation_speed(slowness: Floats, region: Flags, settings: Settings, *, warm: bool) -> Floats:

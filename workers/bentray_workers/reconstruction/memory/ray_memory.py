@@ -11,7 +11,8 @@ import math
 from bentray_kernels.eikonal.diagonals import Diagonals
 from bentray_kernels.rays.in_step import LONGEST
 from bentray_kernels.tomography.problem import MARGIN_NODES
-from bentray_kernels.tomography.settings import DEVIATION, Settings
+from bentray_kernels.tomography.settings import Settings
+from bentray_kernels.tomography.solver_choice import solver_of
 from bentray_kernels.tomography.task_chains import BATCH
 
 from ...cluster.capacities import MIB, REAL
@@ -130,7 +131,7 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     if settings.method == "gauss-newton":
         found["look"] = look(rays)
         found["step"] = step(rays)
-    elif settings.decomposition == "slices" and settings.eikonal == DEVIATION and settings.rays != "adjoint":
+    elif solver_of(settings, len(shape)).compiled:
         found["advance"] = base + _pass_bytes(shape, scan.receivers)
     else:
         found["advance"] = base + field + 8 * image

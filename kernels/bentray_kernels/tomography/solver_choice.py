@@ -1,0 +1,42 @@
+"""Which solver a reconstruction runs: decided here for those that run it, plan it and report it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ..eikonal import METHODS
+from .settings import DEVIATION, Settings
+
+
+class Solver(NamedTuple):
+    """What tracks the wave front of an emitter and its rays.
+
+    Attributes:
+        compiled: whether one compiled call does front, rays and back-projection; see ``sart.emitter_pass``.
+        eikonal: the method of the wave front, ``deviation`` or one of ``eikonal.methods()``; None for
+            straight rays, which need no travel time.
+    """
+
+    compiled: bool
+    eikonal: str | None
+
+
+def solver_of(settings: Settings, dimensions: int) -> Solver:
+    """The solver of one method.
+
+    Args:
+        settings: whose ``method`` is that of an image, never ``auto`` or ``waveform``.
+        dimensions: of an image, 2 or 3.
+    """
+    straight = settings.rays == "straight"
+    known = straight or (settings.rays == "curved" and settings.eikonal == DEVIATION)
+    if settings.method == "sart" and dimensions == 2 and known:
+        return Solver(True, None if straight else DEVIATION)
+    return Solver(False, None if straight else settings.front)
+
+
+def needs_device(settings: Settings) -> bool:
+    """Whether a call of the reconstruction tracks wave fronts on an OpenCL device."""
+    # Methods that are tried bend rays whatever was asked for.
+    straight = settings.rays == "straight" and not settings.tries
+    return not straight and METHODS.get(settings.front).on_device

@@ -1,0 +1,87 @@
+"""What runs is what was planned, for every combination of rays, decomposition and Eikonal solver."""
+
+from itertools import product
+
+import pytest
+
+from bentray_kernels.eikonal import methods
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Problem, Settings
+from bentray_kernels.tomography.grid_schedule import start
+from bentray_kernels.tomography.sart import sart_update
+from bentray_kernels.tomography.sart.sart_step import advance, begin
+from bentray_kernels.tomography.settings import DEVIATION
+from bentray_kernels.tomography.solver_choice import needs_device, solver_of
+from bentray_workers.cluster.capacities import MIB, lane_of
+from bentray_workers.files.dataset.counts import Summary
+from bentray_workers.reconstruction.memory.ray_memory import call_bytes
+from bentray_workers.simulation.plane import SimulationSettings, simulate
+from bentray_workers.simulation.volume import VolumeSimulationSettings, simulate_volume
+
+RAYS, CUTS = ("curved", "straight", "adjoint"), ("slices", "volume")
+SOLVERS = (DEVIATION, *methods())
+# A device is not to be had everywhere, and stands in for itself.
+ON_DEVICE = ("fim-opencl",)
+
+
+@pytest.fixture(scope="module")
+def scans():
+    plane = simulate(None, SimulationSettings(nodes=16, elements=8), lambda _: None)
+    small = VolumeSimulationSettings(nodes=16, slices=2, elements=8, refinement=2, three_d=True)
+    return {"slices": plane, "volume": simulate_volume(None, small, lambda _: None)}
+
+
+@pytest.mark.parametrize(("rays", "cut", "eikonal"), list(product(RAYS, CUTS, SOLVERS)))
+def test_what_runs_is_what_was_chosen(scans, monkeypatch, rays, cut, eikonal):
+    if eikonal in ON_DEVICE:
+        pytest.skip("its fallback on the CPU is tested with the device")
+    settings = Settings(nodes=16, sweeps=1, rays=rays, decomposition=cut, eikonal=eikonal)
+    problem = Problem.of(scans[cut], settings, 0)
+    chosen = solver_of(settings, problem.region.ndim)
+    solved, passed = [], []
+    solve, look = sart_update.solve, sart_update.EmitterPass.look
+
+    def watched(speed, spacing, source, method):
+        solved.append(method)
+        return solve(speed, spacing, source, method)
+
+    def counted(self, slowness, front, *given):
+        passed.append(front is not None)
+        return look(self, slowness, front, *given)
+
+    monkeypatch.setattr(sart_update, "solve", watched)
+    monkeypatch.setattr(sart_update.EmitterPass, "look", counted)
+    advance(problem, settings, begin(start(problem)), 1)
+    assert bool(passed) is chosen.compiled
+    if chosen.compiled:
+        assert solved == []
+        assert set(passed) == {chosen.eikonal is not None}
+    else:
+        assert set(solved) == ({chosen.eikonal} - {None})
+
+
+@pytest.mark.parametrize(("rays", "eikonal"), list(product(RAYS, SOLVERS)))
+def test_the_plan_counts_the_arrays_of_what_runs(rays, eikonal):
+    scan = Summary(1024, 1024, 1024**2, 1, False, 0.0, 0.2, 0, False)
+    size = {
+        name: call_bytes(scan, Settings(nodes=1024, rays=rays, eikonal=name))["advance"]
+        for name in (eikonal, DEVIATION)
+    }
+    settings = Settings(nodes=1024, rays=rays, eikonal=eikonal)
+    if solver_of(settings, 2).compiled:
+        # Whatever the wave front would be tracked by: it is the same compiled call.
+        assert size[eikonal] == size[DEVIATION]
+    elif rays == "curved":
+        assert abs(size[eikonal] - size[DEVIATION]) > MIB
+
+
+@pytest.mark.parametrize("method", ["sart", "gauss-newton", "auto"])
+@pytest.mark.parametrize(("rays", "eikonal"), list(product(("curved", "straight"), SOLVERS)))
+def test_a_device_is_asked_for_where_one_is_used(method, rays, eikonal):
+    try:
+        settings = Settings(method=method, rays=rays, eikonal=eikonal)
+    except InvalidInput:
+        pytest.skip("refused")
+    used = eikonal in ON_DEVICE and (rays == "curved" or method == "auto")
+    assert needs_device(settings) is used
+    assert lane_of(settings) == ("opencl" if used else "recon")
