@@ -36,7 +36,7 @@ app = typer.Typer(
     cls=Commands,
     add_completion=False,
     pretty_exceptions_enable=False,
-    help="Refraction-corrected ultrasound computed tomography: a scan in, an image of sound speed out.",
+    help="Refraction-corrected ultrasound computed tomography: sound-speed and attenuation images.",
     epilog="Begin with: bentray demo. Exit codes: 0 done, 1 the work failed, 2 the input was bad.",
 )
 

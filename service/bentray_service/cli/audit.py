@@ -18,21 +18,22 @@ COLUMNS = ("time", "tenant", "how", "who", "method", "route", "ids", "status", "
 
 
 def audit(
-    tenant: Annotated[str | None, typer.Option(help="Only of this tenant.", show_default="all")] = None,
+    tenant: Annotated[str | None, typer.Option(help="Only this tenant.", show_default="all")] = None,
     who: Annotated[
-        str | None, typer.Option(help="Only of this key (its id) or user of a proxy.", show_default="all")
+        str | None, typer.Option(help="Only this key (its id) or proxy user.", show_default="all")
     ] = None,
     touched: Annotated[
-        str | None, typer.Option("--id", help="Only what named or made this id.", show_default="all")
+        str | None,
+        typer.Option("--id", help="Only requests that named or created this id.", show_default="all"),
     ] = None,
     since: Annotated[
-        str | None, typer.Option(help="Only from this day on, as 2026-11-22.", show_default="the first")
+        str | None, typer.Option(help="Only from this date on, e.g. 2026-11-22.", show_default="the first")
     ] = None,
-    last: Annotated[int, typer.Option(min=1, max=1_000_000, help="At most so many, the newest.")] = 1000,
+    last: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of newest records.")] = 1000,
     data: Data = None,
     as_json: AsJson = False,
 ) -> None:
-    """Show who read and changed what, oldest first.
+    """Show the audit log: who read and changed what, oldest first.
 
     Each request of a caller who was let in is there, but for asking how jobs stand. The files, one a day in
     DATA/audit, are only ever appended to; move old ones away as you like.

@@ -22,11 +22,11 @@ Rows = Callable[[bool, Step], Iterable[Row]]
 
 
 def bench(
-    name: Annotated[str, typer.Argument(help="Name of a file in a folder of benchmarks/, without .py.")],
+    name: Annotated[str, typer.Argument(help="Benchmark: a file name in benchmarks/*/, without .py.")],
     json_file: Annotated[Path, typer.Option("--json", help="File to write the rows to.")],
-    quick: Annotated[bool, typer.Option("--quick", help="Smaller problems, for trying it out.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Smaller problems, as a quick check.")] = False,
 ) -> None:
-    """Measure the rows of one table of targets, in this run and on this machine.
+    """Run a benchmark against its targets and peers, in one run on this machine.
 
     A row that misses its goal is a result, not an error: the exit code is 0 once every row is measured.
 

@@ -14,12 +14,12 @@ ACCEPTED = "the path of a scan in MATLAB 5 or 7.3, .npz, a zip of k-Wave outputs
 
 
 def convert(
-    file: Annotated[Path, typer.Argument(help="Scan; its content tells the format, not its name.")],
+    file: Annotated[Path, typer.Argument(help="Scan file; the format is detected from its content.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset file to write (.h5).")],
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Convert a scan of another program into a dataset file, with one emission in memory.
+    """Convert a scan from another format (MATLAB, k-Wave, NumPy) into a dataset file.
 
     Taken are MATLAB files with delta_tof and element_positions, or with time, transducerPositionsXY and
     full_dataset; .npz of plain arrays under the names of the dataset format; and zips of k-Wave outputs with

@@ -27,15 +27,15 @@ JOBS: dict[str, dict[str, Any]] = {"straight": {"rays": "straight"}, "bent": {"r
 
 
 def demo(
-    output: Annotated[
-        Path, typer.Option("--output", "-o", help="Folder for the scan and the picture.")
-    ] = Path("demo-output"),
-    nodes: Annotated[int, typer.Option(help="Nodes along a side of the image.")] = 128,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for scan and image.")] = Path(
+        "demo-output"
+    ),
+    nodes: Annotated[int, typer.Option(help="Nodes per side of the image.")] = 128,
     elements: Annotated[int, typer.Option(help="Transducers of the ring.")] = 256,
     coupling: Annotated[float, typer.Option(help="Speed of the water, m/s.")] = 1375.0,
     as_json: AsJson = False,
 ) -> None:
-    """Start a service, send it a simulated scan and compare what straight and bent rays make of it.
+    """Start a service, simulate a scan, reconstruct it and compare straight with bent rays.
 
     Needs no data and leaves nothing running. Fails if bent rays do not beat straight ones.
 

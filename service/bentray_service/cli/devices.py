@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def devices(as_json: AsJson = False) -> None:
-    """Try every OpenCL device of this machine and say which one the method fim-opencl uses.
+    """List and test the OpenCL devices, and show which one the method fim-opencl uses.
 
     A device that computes wrongly, aborts or hangs is refused with the reason; where none is left, the
     same is computed without OpenCL. GPUs are tried before processors. The variable BENTRAY_OPENCL_DEVICE

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def download(
-    stored: Annotated[str, typer.Argument(metavar="ID", help="Of a scan (ds-…) or of a volume (vol-…).")],
+    stored: Annotated[str, typer.Argument(metavar="ID", help="Id of a scan (ds-…) or volume (vol-…).")],
     output: Annotated[Path, typer.Option("--output", "-o", help="File to write.")],
     form: Annotated[
         str | None,
@@ -30,7 +30,7 @@ def download(
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Fetch a scan, as it was read or as a simulation made it, or a volume, in the format of OUTPUT's name.
+    """Download a scan or a volume; the extension of OUTPUT selects the format.
 
     Scans are HDF5 files (.h5), as bentray reconstruct takes them; volumes .h5, .nii, .mha, .mat or .npy.
 

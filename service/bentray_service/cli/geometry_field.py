@@ -25,11 +25,11 @@ ACCEPTED = "a triangle mesh: PLY, OBJ, OFF, STL, glTF or GLB"
 @with_field_options
 def geometry_field(
     mesh: Annotated[Path, typer.Argument(help="Triangle mesh: PLY, OBJ, OFF, STL, glTF or GLB.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; made if absent.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
     asked: AskedField,
     as_json: AsJson = False,
 ) -> None:
-    """Make the geometry field of a mesh, and pictures of it, in OUTPUT.
+    """Build the geometry field of a mesh and render it into OUTPUT.
 
     Writes image.png, geometry-image.png, normal-map.png, geometry-field.json and the field itself. A field
     that is there already is used again; one that was broken off is gone on from.

@@ -45,7 +45,7 @@ def create(
     data: Data = None,
     as_json: AsJson = False,
 ) -> None:
-    """Make a key and show it, this once: only a digest of it is kept.
+    """Create a key and show it once; only its digest is stored.
 
     Example:  bentray keys create --tenant clinic --name scanner --expires 90d
     """
@@ -74,7 +74,7 @@ def list_keys(
     data: Data = None,
     as_json: AsJson = False,
 ) -> None:
-    """List the keys, without what is secret of them.
+    """List the keys, without their secrets.
 
     Example:  bentray keys list --tenant clinic
     """
@@ -97,7 +97,7 @@ def revoke(
     data: Data = None,
     as_json: AsJson = False,
 ) -> None:
-    """End a key for good; a service that runs refuses it from the next request on.
+    """Revoke a key; a running service rejects it from the next request on.
 
     Example:  bentray keys revoke 0f3a5c7e9b1d
     """

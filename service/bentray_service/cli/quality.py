@@ -23,19 +23,19 @@ class Water(StrEnum):
 
 def quality(
     file: Annotated[Path, typer.Argument(help="Dataset file (HDF5, format uct-transmission).")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the report; made if absent.")],
-    picker: Annotated[str, typer.Option(help="How times are read from raw traces.")] = "aic",
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
+    picker: Annotated[str, typer.Option(help="Picker of first arrivals in raw traces.")] = "aic",
     calibrate: Annotated[
         Water | None,
         typer.Option(
-            help="Fit positions and delays to the water shot: with the water's speed as stated, or fitted, "
+            help="Calibrate positions and delays from the water shot, with stated or fitted water speed, "
             "the size of the array as drawn.",
             show_default="no calibration",
         ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Examine a scan: OUTPUT/quality.json and .png say what was found, picked.h5 is what goes on.
+    """Check the data quality of a scan: report in OUTPUT/quality.json and .png, corrected scan in picked.h5.
 
     Dead elements, swapped and inverted channels, wrong time zeros, cycle jumps, outliers and the like are
     named, and left out or corrected in picked.h5. A scan that must not be used ends with exit code 1.

@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 @with_settings_options
 def reconstruct(
     file: Annotated[Path, typer.Argument(help="Dataset file (HDF5, format uct-transmission).")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; made if absent.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
     asked: Asked,
     workers: Annotated[
         int | None,
         typer.Option(
             min=1,
             show_default="what works side by side, at most one a core",
-            help="Worker processes; 1 uses none.",
+            help="Worker processes; 1 runs in this process.",
         ),
     ] = None,
     as_json: AsJson = False,

@@ -43,23 +43,27 @@ class Phantom(StrEnum):
 
 @with_view_options
 def render(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Picture to write (PNG).")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Image file to write (PNG).")],
     asked: AskedView,
-    file: Annotated[Path | None, typer.Argument(help="Volume; its content tells the format.")] = None,
-    phantom: Annotated[Phantom | None, typer.Option(help="In place of a file.")] = None,
-    nodes: Annotated[int, typer.Option(min=8, max=512, help="Along a side of the phantom.")] = 64,
+    file: Annotated[
+        Path | None, typer.Argument(help="Volume file; the format is detected from its content.")
+    ] = None,
+    phantom: Annotated[Phantom | None, typer.Option(help="Phantom to render instead of a file.")] = None,
+    nodes: Annotated[int, typer.Option(min=8, max=512, help="Nodes per side of the phantom.")] = 64,
     position_map: Annotated[
         Path | None,
-        typer.Option("--map", help="Also write where on the backdrop each pixel looks (NumPy, m)."),
+        typer.Option("--map", help="Also write the backdrop coordinates seen by each pixel (NumPy, m)."),
     ] = None,
     shape: Annotated[
-        tuple[int, int, int] | None, typer.Option(help="Of raw bytes, x fastest.", metavar="NX NY NZ")
+        tuple[int, int, int] | None, typer.Option(help="Shape of a raw file, x fastest.", metavar="NX NY NZ")
     ] = None,
-    dtype: Annotated[str | None, typer.Option(help="Of raw bytes, as uint8, int16-be, float32.")] = None,
+    dtype: Annotated[
+        str | None, typer.Option(help="Data type of a raw file, e.g. uint8, int16-be, float32.")
+    ] = None,
     spacing: Annotated[
         list[float] | None,
         typer.Option(
-            help="Between nodes of raw and NumPy files, m: for all axes, or for each.",
+            help="Node spacing of raw and NumPy files, m: one value, or one per axis.",
             show_default="0.001",
             metavar="DX [DY DZ]",
         ),

@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 
 
 def reproduce(
-    result: Annotated[Path, typer.Argument(help="A reconstruction.h5, of this machine or another.")],
-    scan: Annotated[Path, typer.Argument(help="The dataset file that it was made of.")],
+    result: Annotated[Path, typer.Argument(help="A reconstruction.h5, made here or on another machine.")],
+    scan: Annotated[Path, typer.Argument(help="The dataset file it was made from.")],
     workers: Annotated[
         int | None,
         typer.Option(
             min=1,
             show_default="what works side by side, at most one a core",
-            help="Worker processes; 1 uses none. The bits do not depend on it.",
+            help="Worker processes; 1 runs in this process. The result does not depend on it.",
         ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Make a result again with the settings and the seed that it holds, and compare every array of it.
+    """Repeat a reconstruction from its own settings and seed, and compare every array.
 
     It ends with 0 where all are the same to the bit, and with 1 where they are not; other versions of
     Python, NumPy or Numba, or another processor, may round differently.

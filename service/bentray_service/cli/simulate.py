@@ -38,47 +38,50 @@ class Array(StrEnum):
 def simulate(
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset file to write (HDF5).")],
     phantom: Annotated[
-        Phantom, typer.Option(help="The breast of Table 6, in a plane, or that of Table 7, in space.")
+        Phantom, typer.Option(help="2-D breast phantom (Li 2008, Table 6) or 3-D breast phantom (Table 7).")
     ] = Phantom.TABLE6,
-    nodes: Annotated[int, typer.Option(help="Nodes along a side of the image it is meant for.")] = 128,
+    nodes: Annotated[int, typer.Option(help="Nodes per side of the image that the scan is made for.")] = 128,
     elements: Annotated[int, typer.Option(help="Transducers of a ring; each sends and receives.")] = 256,
     coupling: Annotated[float, typer.Option(help="Speed of the water, m/s.")] = 1500.0,
-    refinement: Annotated[int, typer.Option(help="How many times finer the grid of the times is.")] = 4,
+    refinement: Annotated[
+        int, typer.Option(help="Refinement of the simulation grid over the image grid.")
+    ] = 4,
     slices: Annotated[
-        int | None, typer.Option(show_default="40", help="table7: heights of the ring, one node apart.")
+        int | None, typer.Option(show_default="40", help="table7: number of ring heights, one node apart.")
     ] = None,
     array: Annotated[
         Array | None,
         typer.Option(
             show_default="moved",
-            help="table7: one ring moved, or rings at all heights that receive each other.",
+            help="table7: one moving ring, or rings at all heights that receive each other.",
         ),
     ] = None,
     three_d: Annotated[
-        bool, typer.Option("--three-d", help="table7: wave fronts in space, not in each slice by itself.")
+        bool, typer.Option("--three-d", help="table7: 3-D wave fronts instead of one slice at a time.")
     ] = False,
     noise_ns: Annotated[
         float | None,
-        typer.Option(show_default="0", help="table6: standard deviation of the noise on the times, ns."),
+        typer.Option(show_default="0", help="table6: standard deviation of the travel-time noise, ns."),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
     attenuation: Annotated[bool, typer.Option("--attenuation", help="Record amplitudes too.")] = False,
     snr: Annotated[
-        float | None, typer.Option(help="Signal over noise of times and amplitudes, as 10; none without it.")
+        float | None,
+        typer.Option(help="Signal-to-noise ratio of times and amplitudes, e.g. 10; default: no noise."),
     ] = None,
     waveform: Annotated[
         bool,
         typer.Option(
             "--waveform",
-            help="Simulate waves and record traces of object and water, not times; of table7 in space.",
+            help="Simulate waves and record traces of object and water, not travel times; table7: in 3-D.",
         ),
     ] = False,
     frequency: Annotated[
         float | None,
-        typer.Option(show_default="500000, table7 100000", help="--waveform: middle of the pulse, Hz."),
+        typer.Option(show_default="500000, table7 100000", help="--waveform: centre frequency, Hz."),
     ] = None,
     emissions: Annotated[
-        int | None, typer.Option(show_default="64", help="--waveform: elements that send.")
+        int | None, typer.Option(show_default="64", help="--waveform: number of emitting elements.")
     ] = None,
     side: Annotated[
         float | None, typer.Option(show_default="0.12", help="--waveform: side of the square, m.")

@@ -42,32 +42,33 @@ def submit(
         ),
     ] = None,
     wait: Annotated[
-        bool, typer.Option("--wait/--no-wait", help="Wait for the end, or return at once.")
+        bool, typer.Option("--wait/--no-wait", help="Wait for the job, or return at once.")
     ] = True,
     batch: Annotated[
         Path | None,
         typer.Option(
             metavar="DIR",
             show_default=False,
-            help="Reconstruct every *.h5 in DIR on --scheduler, in place of FILE.",
+            help="Reconstruct every *.h5 in DIR on --scheduler, instead of FILE.",
         ),
     ] = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
-            show_default=False, help="Cluster of a batch, as tcp://head:8786; its workers must see DIR too."
+            show_default=False,
+            help="Dask cluster for a batch, e.g. tcp://head:8786; its workers must see DIR.",
         ),
     ] = None,
     at_once: Annotated[
         int | None,
         typer.Option(
-            min=1, show_default="workers + 1", help="Datasets of a batch under way at the same time."
+            min=1, show_default="workers + 1", help="Datasets of a batch processed at the same time."
         ),
     ] = None,
     tls: Tls = None,
     as_json: AsJson = False,
 ) -> None:
-    """Upload a scan, reconstruct it on the service and download the result.
+    """Upload a scan, reconstruct it on a service and download the result.
 
     When the service or its database is started again meanwhile, it says so, waits up to five minutes, and
     goes on; the job is started once.

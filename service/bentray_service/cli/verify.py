@@ -19,14 +19,12 @@ TOLD = ("damaged", "orphan")
 def verify(
     remove_orphans: Annotated[
         bool,
-        typer.Option(
-            "--remove-orphans", help="Remove files that no row of the database knows; the service is stopped."
-        ),
+        typer.Option("--remove-orphans", help="Remove files without a database row; stop the service first."),
     ] = False,
     data: Data = None,
     as_json: AsJson = False,
 ) -> None:
-    """Read every stored file and compare it with its checksum; the service may be running.
+    """Verify the checksum of every stored file; the service may be running.
 
     What is damaged is named, and not served until it is restored; the exit code is 1 then. Files from before
     there were checksums get one. With a bucket, what lies there is fetched and compared.

@@ -28,7 +28,7 @@ def worker(
         str,
         typer.Option(
             envvar="DASK_SCHEDULER_ADDRESS",
-            help="Address of the scheduler, as tcp://head:8786 or tls://head:8786.",
+            help="Address of the Dask scheduler, e.g. tcp://head:8786 or tls://head:8786.",
         ),
     ],
     workers: Annotated[
@@ -39,7 +39,7 @@ def worker(
         typer.Option(
             envvar="BENTRAY_WORKER_MEMORY",
             show_default="its share of this machine's",
-            help="Memory of each process, as 4GiB; one that takes more is ended and its tasks go elsewhere.",
+            help="Memory limit per process, e.g. 4GiB; a process above it is restarted, its tasks run elsewhere.",
         ),
     ] = None,
     local_directory: Annotated[
@@ -49,7 +49,7 @@ def worker(
         str | None,
         typer.Option(
             show_default="the one that leads to the scheduler",
-            help="Address of this machine that scheduler and workers reach it by.",
+            help="Address under which scheduler and workers reach this machine.",
         ),
     ] = None,
     name: Annotated[
@@ -57,14 +57,14 @@ def worker(
     ] = None,
     opencl: Annotated[
         bool,
-        typer.Option("--opencl/--no-opencl", help="Try the OpenCL devices and offer the one that passes."),
+        typer.Option("--opencl/--no-opencl", help="Test the OpenCL devices and offer the one that passes."),
     ] = True,
     tls: Tls = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print {scheduler, workers, lanes, pid} as one JSON object.")
     ] = False,
 ) -> None:
-    """Work for the scheduler until Ctrl-C or SIGTERM; running tasks are handed to other workers then.
+    """Join a Dask scheduler as worker until Ctrl-C or SIGTERM; running tasks then move to other workers.
 
     Each process runs one reconstruction and one rendering task at a time. It must see the data folder of the
     service under the same path. Kernels are compiled before the first task comes. When the scheduler goes,

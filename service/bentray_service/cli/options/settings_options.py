@@ -42,21 +42,24 @@ OPTIONS = {
         "--method",
         str,
         "sart",
-        "sart: one emitter after the other; gauss-newton: all at once, with a penalty; auto tries both; "
-        "waveform refines what auto gives by simulated waves.",
+        "sart: one emitter after another; gauss-newton: all at once, regularised; auto: chosen by held-out "
+        "validation; waveform: full-waveform inversion from the image of auto.",
     ),
     "rays": Option(
-        "--rays", str, "curved", "curved follows refraction, straight does not, adjoint traces none."
+        "--rays",
+        str,
+        "curved",
+        "curved: corrected for refraction; straight; adjoint: sensitivities without rays.",
     ),
-    "eikonal": Option("--eikonal", str, "deviation", "Wave-front method for curved rays, as fmm or fsm."),
-    "nodes": Option("--nodes", int, "128", "Nodes along a side of the image."),
+    "eikonal": Option("--eikonal", str, "deviation", "Eikonal solver for curved rays, e.g. fmm or fsm."),
+    "nodes": Option("--nodes", int, "128", "Nodes per side of the image."),
     "side_m": Option("--side", float, "the array and a margin", "Side of the image, m."),
-    "sweeps": Option("--sweeps", int, "5", "How often every emitter is used."),
+    "sweeps": Option("--sweeps", int, "5", "Iterations over all emitters."),
     "speed_update": Option(
         "--speed-update",
         str,
         "fixed",
-        "fixed, or data-driven: stretch the image to --speed-range before the wave front is tracked.",
+        "fixed, or data-driven: stretch the image to --speed-range before solving the Eikonal equation.",
     ),
     "speed_range_mps": Option(
         "--speed-range", Range, "", "Lowest and highest speed in the object, m/s.", "LOW HIGH"
@@ -77,7 +80,7 @@ OPTIONS = {
     ),
 }
 SET = typer.Option(
-    "--set", metavar="NAME=VALUE", help="Any setting by its name, as coarser_grids=2; may be repeated."
+    "--set", metavar="NAME=VALUE", help="Any setting by name, e.g. coarser_grids=2; repeatable."
 )
 
 
@@ -125,7 +128,7 @@ def settings_from(asked: Asked) -> Settings:
     for text in asked.texts:
         name, equals, value = text.partition("=")
         if not equals or not name:
-            raise InvalidInput("--set", repr(text), "NAME=VALUE, as coarser_grids=2")
+            raise InvalidInput("--set", repr(text), "NAME=VALUE, e.g. coarser_grids=2")
         if name in asked.options:
             raise InvalidInput(name, f"{OPTIONS[name].name} and --set {text}", "one of the two")
         if name in given:

@@ -128,7 +128,7 @@ def test_any_text_gives_settings_or_names_the_setting(name: str, text: str) -> N
         (["--set", "penalty=lp"], "penalty: found 'lp'; accepted: 'total-variation', 'laplacian' or"),
         (["--set", "speed_bounds_mps=[1]"], "speed_bounds_mps.1: found nothing; accepted: a value"),
         (["--set", "edge_cost=0.3"], "edge_cost: found 0.3; accepted: a known setting: method, rays, "),
-        (["--set", "subset"], "--set: found 'subset'; accepted: NAME=VALUE, as coarser_grids=2"),
+        (["--set", "subset"], "--set: found 'subset'; accepted: NAME=VALUE, e.g. coarser_grids=2"),
         (["--set", "=3"], "--set: found '=3'; accepted: NAME=VALUE"),
         (
             ["--set", "subset=2", "--set", "subset=3"],
