@@ -39,7 +39,7 @@ def worker(
         typer.Option(
             envvar="BENTRAY_WORKER_MEMORY",
             show_default="its share of this machine's",
-            help="Memory limit per process, e.g. 4GiB; a process above it is restarted, its tasks run elsewhere.",
+            help="Memory limit per process, e.g. 4GiB; above it a process is restarted; tasks run elsewhere.",
         ),
     ] = None,
     local_directory: Annotated[
