@@ -104,7 +104,7 @@ def test_every_address_of_curl_is_served(tmp_path: Path) -> None:
         for path, methods_of_path in create_app(ServiceSettings(data_dir=tmp_path)).openapi()["paths"].items()
         for method in methods_of_path
     }
-    assert len(lines_of("curl")) == 12
+    assert len(lines_of("curl")) == 11
     for words in lines_of("curl"):
         method = "POST" if {"-d", "--data-binary", "POST"} & set(words) else "GET"
         url = next(word for word in words if word.startswith("http://"))
