@@ -21,5 +21,5 @@ def test_what_is_not_there_is_told():
 
 
 def test_to_read_a_mesh_takes_no_libigl():
-    program = "import sys; from bentray_kernels.geometry_field import sound; sys.exit('igl' in sys.modules)"
+    program = "import sys; from bentray_kernels.meshes.defects import sound; sys.exit('igl' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

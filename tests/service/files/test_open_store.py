@@ -49,7 +49,7 @@ def test_one_that_does_not_answer_or_is_not_there_is_refused(databases, tmp_path
 
 def test_what_has_to_be_installed_is_named(databases, tmp_path, monkeypatch):
     for name in ("bucket", "bucket_store"):
-        monkeypatch.delitem(sys.modules, f"bentray_service.storage.{name}", raising=False)
+        monkeypatch.delitem(sys.modules, f"bentray_service.files.{name}", raising=False)
     monkeypatch.setitem(sys.modules, "s3fs", None)
     with pytest.raises(InvalidInput, match=r"without the module s3fs.*bentray\[s3\]"):
         open_store("s3://somewhere", tmp_path, databases[0], 0)

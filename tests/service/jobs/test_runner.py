@@ -179,7 +179,11 @@ def test_what_is_left_of_jobs_goes_with_their_end(start, uploaded, submitted, un
     folder = http.app.state.parts.files.of(LOCAL).root / "work"
     work.hold.clear()
     job = submitted(http, uploaded(http))
-    until(http, job["id"], "running")
+    deadline = time.monotonic() + 10
+    # It is running a moment before its folder is there.
+    while not work.calls:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
     assert [left.name for left in folder.iterdir()] == [job["id"]]
     work.hold.set()
     until(http, job["id"])

@@ -49,7 +49,7 @@ def torn(monkeypatch):
 
     def keep(self, name, standing):
         real_keep(self, name, standing)
-        if not gone and type(standing).__module__.startswith("bentray_kernels.wave"):
+        if not gone and type(standing).__module__.startswith("bentray_kernels.tomography.waveform"):
             gone.append(name)
             raise CommClosedError("gone")
 

@@ -17,7 +17,7 @@ JOBS = """
 import sys, warnings
 from pathlib import Path
 from bentray_kernels.tomography import Settings
-from bentray_workers import compiling
+from bentray_workers.compilation import cache_misses
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.compilation.precompile import digitised
 from bentray_workers.simulation.plane import SimulationSettings, simulate
@@ -25,9 +25,9 @@ from bentray_workers.reconstruction.reconstruction_run import reconstruct
 from bentray_workers.simulation.waves import WaveSimulationSettings, simulate_waves
 
 warnings.simplefilter("ignore")
-compiling.announce()
+cache_misses.announce()
 times, waves = Path(sys.argv[1], "times.h5"), Path(sys.argv[1], "waves.h5")
-with compiling.compiled_kernels() as kernels:
+with cache_misses.compiled_kernels() as kernels:
     write_dataset(times, simulate(None, SimulationSettings(nodes=32, elements=32, coupling_mps=1425.0)))
     scan = simulate_waves(None, WaveSimulationSettings(3e5, 0.04, 32, 16, 32, snr=30.0))
     write_dataset(waves, digitised(scan))
@@ -50,11 +50,11 @@ def test_a_digitised_scan_holds_the_same_traces() -> None:
 def test_a_kernel_that_is_compiled_is_noted_and_announced_once(caplog: pytest.LogCaptureFixture) -> None:
     program = """
 import logging, numba
-from bentray_workers import compiling
+from bentray_workers.compilation import cache_misses
 logging.basicConfig(format="%(message)s")
-compiling.announce()
-compiling.announce()
-with compiling.compiled_kernels() as kernels:
+cache_misses.announce()
+cache_misses.announce()
+with cache_misses.compiled_kernels() as kernels:
     numba.njit(lambda x: x + 1)(1)
     numba.njit(lambda x: x + 2)(1)
 print(len(kernels))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from benchmarks.shared._peak_memory import peak
-from call_memory import held
+from tests.workers.reconstruction.call_memory import held
 
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.simulation.ring_scan import Ring

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 from benchmarks.shared._peak_memory import peak
-from call_memory import held
 from numpy.typing import NDArray
+from tests.workers.reconstruction.call_memory import held
 
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.emissions import Emissions
