@@ -78,7 +78,9 @@ def test_no_page_of_dask_is_shown(installation: Installation, part: str) -> None
         assert pages(sockets) == []
 
 
-@pytest.mark.parametrize("part", ["worker", "scheduler", "service", "database"])
+@pytest.mark.parametrize(
+    "part", ["worker", "scheduler", pytest.param("service", marks=pytest.mark.nightly), "database"]
+)
 def test_it_works_again_after_a_part_was_killed(installation: Installation, scan: Path, part: str) -> None:
     with Client(installation.url, key=installation.key) as client:
         job = client.submit(client.upload(scan)["id"], LONG.to_dict())

@@ -13,7 +13,7 @@ from bentray_workers.files.reconstruction import read_reconstruction
 
 from .machine import Machine, wait_until
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 PLAN = {"nodes": 64, "attenuation": False, "method": "sart", "sweeps": 150}
 CUT_S = 20.0

@@ -11,7 +11,7 @@ from bentray_workers.files.reconstruction import read_reconstruction
 from ..small_disk import MIB, fill
 from .machine import Machine, wait_until
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 PLAN = {"nodes": 64, "attenuation": False, "method": "sart", "sweeps": 300}
 

@@ -16,7 +16,7 @@ from bentray_workers.files.reconstruction import read_reconstruction
 
 from .machine import PATIENCE_S, Machine, wait_until
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 
 def test_it_outlives_its_service(machine: Machine, scan: Dataset, scan_file: Path, tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from bentray_kernels.refraction.caster import LOST, REFRACTED, Traced, cast, med
 from bentray_kernels.refraction.caster_opencl import OpenCLCaster, on_the_device
 from bentray_kernels.splines import Spline
 
+from ...effort import effort
 from . import test_caster
 from .solids import distance, squared, through_ball
 from .test_caster import *  # noqa: F403 - every case of the compiled caster, cast by the fixture below
@@ -109,7 +110,11 @@ def strays(found: Traced, expected: Traced, far: float) -> int:
 
 @pytest.mark.parametrize(
     ("name", "roots", "structure"),
-    [("bspline2", "certain", "octree"), ("bspline4", "brent", "dda"), ("bspline6", "brent", "steps")],
+    [
+        ("bspline2", "certain", "octree"),
+        pytest.param("bspline4", "brent", "dda", marks=pytest.mark.nightly),
+        pytest.param("bspline6", "brent", "steps", marks=pytest.mark.nightly),
+    ],
 )
 def test_every_filter_and_root_finder_sees_the_ball(name, roots, structure):
     """In place of the case above: each filter with each root finder takes seconds to build.
@@ -130,10 +135,13 @@ def test_rays_through_nested_surfaces_are_those_of_the_compiled_caster(roots):
     np.testing.assert_allclose(found.vertices, expected.vertices, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["central", "trilinear", "catmull-rom", "bspline3", "bspline5"])
+@pytest.mark.parametrize(
+    "name",
+    ["central", "trilinear", "catmull-rom", "bspline3", pytest.param("bspline5", marks=pytest.mark.nightly)],
+)
 def test_rays_through_rough_volumes_too(name):
     @given(seed=st.integers(0, 2**32 - 1))
-    @settings(max_examples=12, deadline=None)
+    @settings(max_examples=effort(4, 12), deadline=None)
     def holds(seed):
         scene = rough(seed, name)
         kinds = [("octree", "certain"), ("dda", "brent"), ("steps", "brent")]

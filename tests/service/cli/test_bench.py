@@ -107,6 +107,8 @@ def test_every_benchmark_of_the_checkout_fits_the_frame(path: Path) -> None:
     assert callable(load(path.stem, path.parents[1]))
 
 
+@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_reconstruction_benchmark_measures_what_it_promises() -> None:
     rows = list(load("reconstruction", benchmark_folder())(True, lambda done, total, note="": None))
     assert all(isinstance(row, Row) for row in rows)

@@ -33,6 +33,7 @@ def test_the_whole_path_ends_with_bent_rays_ahead_and_a_picture(
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_it_fails_in_one_line_when_bent_rays_do_not_win(
     bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

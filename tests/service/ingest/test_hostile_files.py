@@ -8,6 +8,7 @@ import pytest
 
 from bentray_workers.files.dataset import write_dataset
 
+from ...effort import effort
 from ...workers.files.datasets import small
 from . import hostile_datasets, hostile_meshes, hostile_volumes
 from .damage import damaged
@@ -16,7 +17,7 @@ from .forked_reader import Read, read_all
 # Of resident memory: what the libraries take, and some hundred megabytes for a file of a few.
 MOST_BYTES = 700 * 2**20
 
-LEAST_REFUSED = 200
+LEAST_REFUSED = effort(50, 200)
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +92,9 @@ def test_a_scene_is_read_once(meshes, name):
 @pytest.mark.slow
 def test_damaged_scans_are_refused(folder, sound):
     files = []
-    for name, content in damaged(sound, flips=280, cuts=60, losses=60, seed=1):
+    for name, content in damaged(
+        sound, flips=effort(70, 280), cuts=effort(15, 60), losses=effort(15, 60), seed=1
+    ):
         path = folder / f"{name}.upload"
         path.write_bytes(content)
         files.append(("dataset", path, {}))

@@ -132,6 +132,7 @@ LARGE = Stored((200, 200, 200), 6)
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["bspline3", "trilinear"])
 def test_a_strip_takes_no_more_memory_than_planned(volumes, name):
     small = RefractionView(iso=(0.9,), filter=name, width=8, height=8)
@@ -144,6 +145,7 @@ def test_a_strip_takes_no_more_memory_than_planned(volumes, name):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "how", [{}, {"size": 4096, "frame": False}, {"size": 4096, "interpolation": "cubic"}]
 )
