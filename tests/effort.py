@@ -1,0 +1,15 @@
+"""How much a test tries: a little for each change (`make test`), a lot at night (`make test-all`)."""
+
+from __future__ import annotations
+
+import os
+from typing import TypeVar
+
+Effort = TypeVar("Effort")
+
+NIGHTLY = os.environ.get("HYPOTHESIS_PROFILE") == "nightly"
+
+
+def effort(push: Effort, nightly: Effort) -> Effort:
+    """What a test takes of the two in this run."""
+    return nightly if NIGHTLY else push
