@@ -95,7 +95,7 @@ class Settings:
             ``ratio`` reads from the traces how much lower the first pulse is than in water; ``spectrum`` how
             much more its high frequencies have lost than its low ones, which focusing and spreading leave
             alone, but which only loss in proportion to the frequency shows; ``centroid`` how far the middle
-            of its spectrum has gone down, which tells the same. See ``acquisition.amplitudes``.
+            of its spectrum has gone down, which tells the same. See ``acquisition.picking.amplitudes``.
         focusing: take off the amplitudes what refraction does to them, by the spreading of ray tubes in the
             speed image; needs its frequency (``amplitude@frequency_hz``). Experimental.
         resolution_check: also tell how much of a checkerboard the rays recover, node by node.

@@ -63,7 +63,7 @@ def ingest(
         memory_bytes: what the process may use of address space.
         seconds: of processor and of wall time, and one more for each ``BYTES_PER_S`` of the source.
         scratch: the folder it runs in.
-        given: what the user says of it: of a volume as ``volume_reading.Given``, of a mesh its title.
+        given: what the user says of it: of a volume as ``volume_formats.Given``, of a mesh its title.
         started: told the id of the process.
         reserve: told the bytes that ``target`` will have at most, before the process writes it; what it
             raises ends the process.

@@ -64,7 +64,7 @@ def read_metadata(header: str) -> tuple[str, Row]:
 
 
 def volume_given(title: str, spacing_m: str | None, shape: str | None, dtype: str | None) -> Row:
-    """As ``volume_reading.Given`` takes it.
+    """As ``volume_formats.Given`` takes it.
 
     Raises:
         InvalidInput: for what are no numbers, or are out of range.

@@ -66,7 +66,7 @@ def read_mesh(data: bytes) -> ReadMesh:
 
     Raises:
         InvalidInput: for anything else, for more than ``LARGEST_BYTES`` or ``MOST_FACES``, for damage, for
-            glTF that refers to other files, and as ``rendering.geometry_field.defects.sound``.
+            glTF that refers to other files, and as ``meshes.defects.sound``.
     """
     if len(data) > LARGEST_BYTES:
         raise InvalidInput("file", f"{len(data)} bytes", f"at most {LARGEST_BYTES} bytes")

@@ -54,7 +54,7 @@ def wave_call_bytes(traces: Traces | None, width_m: float, settings: Settings) -
         settings: as asked for.
 
     Returns:
-        By the call's name in ``wave.chain`` and ``wave.judging``; nothing where no waves are simulated.
+        By the call's name in ``waveform_chain`` and ``validation``; nothing where no waves are simulated.
 
     Raises:
         InvalidInput: for a refinement without traces.
