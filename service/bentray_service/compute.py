@@ -53,8 +53,8 @@ class Compute:
         """How a dataset would be reconstructed by the workers that are connected now.
 
         Args:
-            counts: what ``files.dataset.record.record_of`` keeps of it; None for one from before they were kept,
-                whose file is read then.
+            counts: what ``files.dataset.record.record_of`` keeps of it; None for one from before they were
+                kept, whose file is read then.
             path: of its file.
             settings: of the reconstruction.
 
