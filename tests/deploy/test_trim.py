@@ -1,0 +1,94 @@
+"""deploy/trim.sh: what it takes from the image's libraries, and what it leaves as it is."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import shutil
+import struct
+import subprocess
+from pathlib import Path
+
+import httptools.parser.parser
+import numba
+import pytest
+
+from . import compose
+
+# Shipped unstripped, and no library of others beside it.
+LIBRARY = Path(httptools.parser.parser.__file__)
+# Edited by the wheel's makers after it was linked, as PoCL's is.
+EDITED = next((Path(numba.__file__).parent / "np" / "ufunc").glob("omppool.*.so"))
+
+# Of ELF: the kind of a program header whose segment is loaded, and what it is aligned to.
+LOAD, PAGE = 1, 4096
+
+GONE = (
+    "dask/array/tests/test_core.py",
+    "numba/test/data.bin",
+    "fontTools/varLib/iup.c",
+    "numpy/_core/include/numpy/ndarraytypes.h",
+    "scipy/linalg/cython_blas.pxd",
+    "botocore/data/ec2/2016-11-15/service-2.json",
+)
+KEPT = (
+    "dask/array/core.py",
+    "dask/utils_test.py",
+    "pocl_binary_distribution/.libs/share/pocl/include/_kernel.h",
+    "pyopencl/cl/pyopencl-random123/array.h",
+    "botocore/data/s3/2006-03-01/service-2.json",
+    "botocore/data/sts/2011-06-15/service-2.json",
+    "botocore/data/endpoints.json",
+)
+STRIPPED = ("httptools/parser/parser.so", "pyopencl/.libs/libOpenCL.so.1.0.0", "_cffi_backend.so")
+EDITED_HERE = "numba/np/ufunc/omppool.so"
+
+
+@pytest.fixture
+def trimmed(tmp_path: Path) -> Path:
+    if shutil.which("eu-strip") is None:
+        pytest.skip("no eu-strip here: apt-get install elfutils")
+    for name in (*GONE, *KEPT, *STRIPPED, EDITED_HERE):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+    for name in (*GONE, *KEPT):
+        (tmp_path / name).write_text("content")
+    for name in STRIPPED:
+        shutil.copy(LIBRARY, tmp_path / name)
+    shutil.copy(EDITED, tmp_path / EDITED_HERE)
+    subprocess.run([str(compose.ROOT / "deploy" / "trim.sh"), str(tmp_path)], check=True)
+    return tmp_path
+
+
+def test_tests_sources_and_other_services_of_amazon_go_and_all_else_stays(trimmed: Path) -> None:
+    assert [name for name in GONE if (trimmed / name).exists()] == []
+    assert [name for name in KEPT if not (trimmed / name).exists()] == []
+
+
+def test_libraries_lose_their_symbols_and_still_load(trimmed: Path) -> None:
+    for name in STRIPPED:
+        assert (trimmed / name).stat().st_size < LIBRARY.stat().st_size
+        ctypes.CDLL(str(trimmed / name))
+
+
+def test_libraries_that_were_edited_after_linking_keep_their_segments_on_pages(trimmed: Path) -> None:
+    """What strip breaks: ``ELF load command address/offset not page-aligned``."""
+    content = (trimmed / EDITED_HERE).read_bytes()
+    (table,) = struct.unpack_from("<Q", content, 32)
+    size, count = struct.unpack_from("<HH", content, 54)
+    headers = [struct.unpack_from("<IIQQ", content, table + number * size) for number in range(count)]
+    loaded = [(offset, address) for kind, _, offset, address in headers if kind == LOAD]
+    assert loaded
+    assert all((address - offset) % PAGE == 0 for offset, address in loaded)
+
+
+def test_nothing_is_compiled_that_nothing_imports() -> None:
+    text = (compose.ROOT / "deploy" / "Dockerfile").read_text()
+    installs = [line for line in text.splitlines() if " install " in line and "pip " in line]
+    assert installs
+    assert all("--no-compile" in line for line in installs)
+    assert not re.search("^[^#]*PIP_NO_COMPILE", text, re.M), "pip takes this variable for its opposite"
+
+
+def test_an_image_without_a_device_is_not_built() -> None:
+    text = (compose.ROOT / "deploy" / "Dockerfile").read_text()
+    assert """|| bentray devices --json | grep -q '"usable": true'""" in text
