@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
+from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.volume_export import FORMATS, largest_bytes
 
 from .. import __version__
@@ -70,7 +71,12 @@ async def volume_data(
         parts_of(request).door.check_render(caller_of(request))
         most = largest_bytes(volume["shape"], uploaded="job_id" not in volume)
         async with service.quota.reserved(tenant, made.name, most):
-            await while_connected(request, service.pictures.export(tenant, volume, path, made, format))
+            try:
+                await while_connected(request, service.pictures.export(tenant, volume, path, made, format))
+            except InvalidInput:
+                # Of a volume that was deleted meanwhile nothing is wrong but that it is not there.
+                await run_in_threadpool(service.volumes.get, tenant, volume["id"])
+                raise
             await run_in_threadpool(service.quota.stored, tenant, made.name, size_of(made))
     answer = download(request, made, seed, chosen.media_type, name, tag)
     try:
