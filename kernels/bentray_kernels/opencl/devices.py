@@ -77,7 +77,7 @@ def hidden() -> bool:
 def wished(devices: Sequence[Device], wish: str | None) -> tuple[Device, ...]:
     """The devices to try, in order: the one that ``wish`` names, else GPUs first and processors last.
 
-    Of several drivers for one processor Intel's comes first (measured, see docs/how-to/use-a-device.md).
+    Of several drivers for one processor Intel's comes first (measured, see docs/how-to/use-opencl.md).
 
     Args:
         devices: what there is.

@@ -26,7 +26,7 @@ PASSES, ROBUST_PASSES = 3, 12
 # What is read from traces holds diffraction and later paths, more than is absorbed, and far more where these
 # cancel the pulse. Of details below a Fresnel zone, √(wavelength · longest ray), rays know nothing: the image
 # is smooth over so many of them, and values count as outliers from so much less on. Chosen on scans by waves,
-# where total variation did worse (``benchmarks/results/tried.md``).
+# where total variation did worse (``benchmarks/results/raw_trace_experiments.md``).
 ZONES, TRACES_STRICTER = 3.0, 2.0
 
 # More than any tissue has at the frequencies that pass through it, Np/m.

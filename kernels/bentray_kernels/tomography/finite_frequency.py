@@ -13,7 +13,7 @@ from .settings import Settings
 
 # Rays of a width bend in an image that is blurred so many times as far. With the truth as the image, times of
 # waves (400 kHz, 500 kHz, 1 MHz) were explained best by widths of half a wavelength to one, and bends in what
-# two to three wavelengths leave; see benchmarks/results/tried.md.
+# two to three wavelengths leave; see benchmarks/results/raw_trace_experiments.md.
 BENDS_WIDER = 2.0
 
 

@@ -33,7 +33,7 @@ EXACT = 0.6
 # Where rays miss held-out views by less than this part of the times themselves, both kinds explain the scan
 # and their difference says little: straight ones fit nearly any smooth times by a wrong image, so they must
 # miss by less than the second part of what bent ones do. Rules of thumb, from scans in
-# benchmarks/results/tried.md.
+# benchmarks/results/raw_trace_experiments.md.
 EXPLAINED_PART = 0.1
 STRAIGHT = 0.8
 

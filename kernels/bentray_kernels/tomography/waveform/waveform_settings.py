@@ -71,7 +71,8 @@ def bands(centre_hz: float, water_mps: float = 1500.0) -> tuple[Band, ...]:
 def loss_band(centre_hz: float, water_mps: float = 1500.0) -> Band:
     """The band in which the attenuation is refined once the speed is: that of the pulse about its centre.
 
-    It ends early, for what the speed has wrong is soon taken for loss (``benchmarks/results/tried.md``).
+    It ends early, because errors of the speed are soon fitted as attenuation
+    (``benchmarks/results/raw_trace_experiments.md``).
 
     Args:
         centre_hz: of the pulse, Hz.
