@@ -73,7 +73,6 @@ def by_rays(dataset: Dataset, nodes: int, progress: Step) -> dict[str, Reconstru
         "ratios": Settings(nodes=nodes, amplitudes="ratio"),
         "ratios, focusing taken off": Settings(nodes=nodes, amplitudes="ratio", focusing=True),
         "spectra": Settings(nodes=nodes, amplitudes="spectrum"),
-        "centroids": Settings(nodes=nodes, amplitudes="centroid"),
     }
     found: dict[str, Reconstruction] = {}
     for rays in ("straight", "curved"):

@@ -19,7 +19,6 @@ LADDER = {
 BESIDE = {
     "FSM": {"eikonal": "fsm"},
     "FIM": {"eikonal": "fim"},
-    "no rays": {"rays": "adjoint"},
 }
 THEIRS = {"straight": 25.0, "fixed": 19.0, "FMM data-driven": 10.0, "HAFMM data-driven": 3.0}
 

@@ -1,6 +1,5 @@
 """Travel times of a wave front: the Eikonal equation |∇T| = 1/speed from a point source."""
 
-from .adjoint import adjoint
 from .registry import METHODS, Method, Registry, methods, solve, solve_many
 
-__all__ = ["METHODS", "Method", "Registry", "adjoint", "methods", "solve", "solve_many"]
+__all__ = ["METHODS", "Method", "Registry", "methods", "solve", "solve_many"]

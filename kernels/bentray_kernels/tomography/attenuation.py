@@ -55,7 +55,7 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
         problem,
         seen(problem, settings, slowness),
         emitters,
-        rays=settings.traced,
+        rays=settings.rays,
         eikonal=settings.front,
         front=bending(problem, settings),
     )

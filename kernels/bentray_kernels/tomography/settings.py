@@ -12,7 +12,7 @@ from ..limits import SPEED_MPS
 from ..ranges import SEED, Range, check_ranges, ranged
 
 METHODS = ("sart", "gauss-newton", "auto", "waveform")
-RAYS = ("curved", "straight", "adjoint")
+RAYS = ("curved", "straight")
 
 # The wave front of the compiled pass over a slice; see ``eikonal.deviation``.
 DEVIATION = "deviation"
@@ -20,10 +20,7 @@ DEVIATION = "deviation"
 DECOMPOSITIONS = ("slices", "volume")
 PENALTIES = ("total-variation", "laplacian", "tikhonov")
 SPEED_UPDATES = ("fixed", "data-driven")
-AMPLITUDES = ("recorded", "ratio", "spectrum", "centroid")
-# Those that focusing is not in.
-OF_SPECTRA = ("spectrum", "centroid")
-WAVE_MISFITS = ("correlation", "least-squares")
+AMPLITUDES = ("recorded", "ratio", "spectrum")
 LEAST_NODES = 16
 # What a speed may be, as JSON Schema says it.
 SPEED = {"type": "number", **SPEED_MPS.schema}
@@ -41,11 +38,10 @@ class Settings:
             until the traces that waves through it would make agree with those recorded. It needs slices
             with traces of object and water; its image has the finest grid that its waves ask for, ``nodes``
             is that of the rays.
-        rays: ``curved`` traces down the travel time of the current image; ``straight`` ignores refraction;
-            ``adjoint``, for SART, traces none and takes the sensitivities from the wave front itself.
+        rays: ``curved`` traces down the travel time of the current image; ``straight`` ignores refraction.
         eikonal: the wave-front method for curved rays: ``deviation``, made for slices, or one of
             ``bentray_kernels.eikonal.methods()``. Where ``deviation`` does not serve, which is in volumes,
-            for ``gauss-newton``, ``adjoint`` and the attenuation, ``accurate`` stands in for it.
+            for ``gauss-newton`` and the attenuation, ``accurate`` stands in for it.
         decomposition: ``slices`` reconstructs each height of the ring by itself; ``volume`` all in space.
         axial_room_nodes: in a volume, how far above and below an emitter and its receivers the wave front is
             tracked, nodes; None: everywhere. Fast skin can guide first arrivals far out of a ring's plane.
@@ -77,10 +73,9 @@ class Settings:
         edge_mps: with total variation, speeds that differ by much more than this from node to node cost
             little more for differing further: images become flat parts with sharp edges. For objects that are
             such, as phantoms; 0: every difference costs.
-        huber_s: residuals beyond this count in proportion to their size, not to its square, s (with SART from
-            the second sweep on); 0: all count by their square.
-        huber_spreads: the same for ``gauss-newton`` and the attenuation after it, in standard deviations of
-            the residuals, which their median tells: rays that no image explains do not decide; 0: none.
+        huber_spreads: residuals beyond this count in proportion to their size, not to its square, for
+            ``gauss-newton`` and the attenuation after it, in standard deviations of the residuals, which
+            their median tells: rays that no image explains do not decide; 0: none.
         roi: let only the dataset's region of interest change (``mask/roi``).
         reciprocity: use a missing pair's reverse (emitter and receiver exchanged) in its place.
         picker: how travel times are read where only traces were uploaded.
@@ -94,18 +89,14 @@ class Settings:
         amplitudes: where they come from: ``recorded`` takes those of the file (``amplitude/log_ratio_np``);
             ``ratio`` reads from the traces how much lower the first pulse is than in water; ``spectrum`` how
             much more its high frequencies have lost than its low ones, which focusing and spreading leave
-            alone, but which only loss in proportion to the frequency shows; ``centroid`` how far the middle
-            of its spectrum has gone down, which tells the same. See ``acquisition.picking.amplitudes``.
+            alone, but which only loss in proportion to the frequency shows. See
+            ``acquisition.picking.amplitudes``.
         focusing: take off the amplitudes what refraction does to them, by the spreading of ray tubes in the
             speed image; needs its frequency (``amplitude@frequency_hz``). Experimental.
         resolution_check: also tell how much of a checkerboard the rays recover, node by node.
         wave_bands: of ``waveform``, how many of the bands of frequency are gone through, from the lowest; the
             last two of the four take nearly all of the time.
-        wave_misfit: of ``waveform``: ``correlation`` asks for the form of each trace alone, ``least-squares``
-            for its amplitude too.
         wave_emitters: of ``waveform``, how many are drawn in each band, other ones in each; 0: 32 or 40.
-        wave_variation: of ``waveform``, total variation of the speed to be kept low, as a part of the first
-            misfit of a band; 0: none. For objects of flat parts with sharp edges, as phantoms.
         wave_minutes: of ``auto``, how long a core may work on ``waveform``. Where the scan has what that
             needs and the estimate is not above it, waves follow the rays, and their image is given if it
             predicts emitters that were held out clearly better. Else ``auto`` only says whether they are
@@ -118,7 +109,7 @@ class Settings:
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     method: Literal["sart", "gauss-newton", "auto", "waveform"] = "sart"
-    rays: Literal["curved", "straight", "adjoint"] = "curved"
+    rays: Literal["curved", "straight"] = "curved"
     eikonal: str = field(default=DEVIATION, metadata={"json_schema_extra": {"enum": [DEVIATION, *methods()]}})
     decomposition: Literal["slices", "volume"] = "slices"
     axial_room_nodes: int | None = ranged(None, Range(2, 4096))
@@ -143,7 +134,6 @@ class Settings:
     penalty: Literal["total-variation", "laplacian", "tikhonov"] = "total-variation"
     penalty_strength: float = ranged(0.3, Range(0.0, 10.0))
     edge_mps: float = ranged(0.0, Range(0.0, 1000.0, unit="m/s"))
-    huber_s: float = ranged(0.0, Range(0.0, 1.0, unit="s"))
     huber_spreads: float = ranged(3.0, Range(0.0, 100.0))
     roi: bool = False
     reciprocity: bool = True
@@ -151,13 +141,11 @@ class Settings:
     examine: bool = True
     guided_rounds: int = ranged(0, Range(0, 10))
     attenuation: bool = True
-    amplitudes: Literal["recorded", "ratio", "spectrum", "centroid"] = "recorded"
+    amplitudes: Literal["recorded", "ratio", "spectrum"] = "recorded"
     focusing: bool = False
     resolution_check: bool = False
     wave_bands: int = ranged(4, Range(1, WAVE_BANDS))
-    wave_misfit: Literal["correlation", "least-squares"] = "correlation"
     wave_emitters: int = ranged(0, Range(0, 4096))
-    wave_variation: float = ranged(0.0, Range(0.0, 10.0))
     wave_minutes: float = ranged(0.0, Range(0.0, 1e6))
 
     def __post_init__(self) -> None:
@@ -170,14 +158,11 @@ class Settings:
         _one_of("decomposition", self.decomposition, DECOMPOSITIONS)
         _one_of("penalty", self.penalty, PENALTIES)
         _one_of("amplitudes", self.amplitudes, AMPLITUDES)
-        if self.amplitudes in OF_SPECTRA and self.focusing:
+        if self.amplitudes == "spectrum" and self.focusing:
             raise InvalidInput("focusing", True, f"false: there is none in amplitudes {self.amplitudes}")
-        _one_of("wave_misfit", self.wave_misfit, WAVE_MISFITS)
         _speeds("speed_bounds_mps", self.speed_bounds_mps)
         if self.speed_range_mps is not None:
             _speeds("speed_range_mps", self.speed_range_mps)
-        if self.method != "sart" and self.rays == "adjoint":
-            raise InvalidInput("rays", "'adjoint'", f"curved or straight, with method {self.method}")
         if self.method != "sart" and self.speed_update != "fixed":
             raise InvalidInput("speed_update", repr(self.speed_update), f"fixed, with method {self.method}")
         if self.speed_range_mps is None and self.speed_update == "data-driven":
@@ -208,11 +193,6 @@ class Settings:
     def front(self) -> str:
         """The method of ``bentray_kernels.eikonal`` that the settings ask for where rays are traced."""
         return "accurate" if self.eikonal == DEVIATION else self.eikonal
-
-    @property
-    def traced(self) -> Literal["curved", "straight"]:
-        """The rays of what needs some: bent ones for ``adjoint`` too."""
-        return "straight" if self.rays == "straight" else "curved"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; ``Settings(**settings.to_dict())`` gives the same settings."""

@@ -29,7 +29,7 @@ def solver_of(settings: Settings, dimensions: int) -> Solver:
         dimensions: of an image, 2 or 3.
     """
     straight = settings.rays == "straight"
-    known = straight or (settings.rays == "curved" and settings.eikonal == DEVIATION)
+    known = straight or settings.eikonal == DEVIATION
     if settings.method == "sart" and dimensions == 2 and known:
         return Solver(True, None if straight else DEVIATION)
     return Solver(False, None if straight else settings.front)

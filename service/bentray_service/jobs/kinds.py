@@ -15,7 +15,7 @@ from pydantic import TypeAdapter
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.model_selection.selection import told
 from bentray_kernels.tomography.result import Progress, Reconstruction
-from bentray_kernels.tomography.settings import Settings
+from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_workers.cluster.fair_shares import Share
 from bentray_workers.cluster.task_pool import ClusterTasks
 from bentray_workers.files.reconstruction import write_reconstruction
@@ -92,7 +92,6 @@ class ReconstructionKind:
     """Speed of sound from one dataset."""
 
     table, lane = schema.volumes.name, "recon"
-    settings: TypeAdapter[Settings] = TypeAdapter(Settings)
 
     def source(self, files: TenantFiles, job: Row) -> Path:
         return files.dataset(job["dataset_id"])
@@ -101,7 +100,7 @@ class ReconstructionKind:
         return files.volume(volume_of(job["id"]))
 
     def run(self, task: Task) -> Row | None:
-        settings = self.settings.validate_python(task.settings)
+        settings = from_stored(task.settings)
         progress = task.on_progress, task.stop, task.work_dir, task.on_saved
         result = reconstruction_run.reconstruct(
             task.client, task.source, settings, *progress, share=task.share

@@ -37,11 +37,6 @@ def test_coarse_before_fine_and_straight_before_bent(scan):
     assert len({plan.side_m for plan in found}) == 1
 
 
-def test_sensitivities_without_rays_begin_from_straight_rays_too(scan):
-    found = stages(scan, replace(PLAN, rays="adjoint", straight_sweeps=3))
-    assert [plan.rays for plan in found] == ["straight", "adjoint"]
-
-
 @pytest.mark.parametrize("method", ["sart", "gauss-newton"])
 def test_each_stage_is_in_the_history_and_better_than_water(scan, method):
     plan = replace(PLAN, method=method, coarser_grids=1, straight_sweeps=1)

@@ -49,7 +49,6 @@ def test_the_sweeps_of_all_stages_are_counted():
         (Settings(eikonal="fsm"), "curved rays (fsm)"),
         (Settings(method="gauss-newton"), "curved rays (accurate)"),
         (Settings(decomposition="volume"), "curved rays (accurate)"),
-        (Settings(rays="adjoint"), "adjoint, no rays (accurate)"),
     ],
 )
 def test_the_wave_front_method_is_the_one_that_was_used(settings, words):

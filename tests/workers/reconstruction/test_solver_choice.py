@@ -18,7 +18,7 @@ from bentray_workers.reconstruction.memory.ray_memory import call_bytes
 from bentray_workers.simulation.plane import SimulationSettings, simulate
 from bentray_workers.simulation.volume import VolumeSimulationSettings, simulate_volume
 
-RAYS, CUTS = ("curved", "straight", "adjoint"), ("slices", "volume")
+RAYS, CUTS = ("curved", "straight"), ("slices", "volume")
 SOLVERS = (DEVIATION, *methods())
 # A device is not to be had everywhere, and stands in for itself.
 ON_DEVICE = ("fim-opencl",)

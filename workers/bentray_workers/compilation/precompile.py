@@ -57,7 +57,6 @@ def of_times() -> Iterator[dict[str, Any]]:
     """The settings of reconstructions from travel times and amplitudes."""
     yield {"resolution_check": True}
     yield {"rays": "straight", "reciprocity": False}
-    yield {"rays": "adjoint"}
     yield {"eikonal": "accurate", "speed_update": "data-driven", "speed_range_mps": (1300.0, 1600.0)}
     yield {"method": "auto"}
     for rays, penalty in product(("curved", "straight"), PENALTIES):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import RESIDUAL_EDGES_S, Reconstruction, Settings, Sweep, Trial
+from bentray_kernels.tomography.stored_settings import from_stored
 
 from .dataset.write import write_array
 from .hdf5_reading import Limits, Reader, opened
@@ -215,10 +216,8 @@ def _json(reader: Reader, name: str) -> dict[str, Any]:
 
 
 def _settings(values: dict[str, Any]) -> Settings:
-    # JSON has lists where Settings has tuples.
-    given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
     try:
-        return Settings(**given)
+        return from_stored(values)
     except TypeError as error:
         accepted = "the settings of a reconstruction by this version"
         raise InvalidInput("@settings", str(error), accepted) from None

@@ -77,7 +77,7 @@ def _rays(settings: Settings) -> str:
     if settings.rays == "straight":
         return "straight rays"
     front = solver_of(settings, 3 if settings.decomposition == "volume" else 2).eikonal
-    return f"{'curved rays' if settings.rays == 'curved' else 'adjoint, no rays'} ({front})"
+    return f"curved rays ({front})"
 
 
 def _sweeps(result: Reconstruction) -> str:

@@ -123,7 +123,7 @@ def spectral_ratio(powers: Powers) -> tuple[Floats, Floats]:
 
     is a line whose slope is B (the spectral ratio method; R. Kuc, IEEE Trans. ASSP 32, 1984), and f0 B what
     the centre frequency has lost. Each frequency weighs as it is sure, W O / (W + O) of the powers over their
-    highest. ``spectral_centroid`` tells the same, and was the less sure of the two on simulated waves.
+    highest.
     """
     water, other, heard = _clean(powers)
     level = np.where(heard, 0.5 * np.log(water / other), 0.0)
@@ -138,37 +138,6 @@ def spectral_ratio(powers: Powers) -> tuple[Floats, Floats]:
     moved = share * np.sqrt(unsure)
     sigma = np.sqrt(np.einsum("ri,ij,rj->r", moved, powers.alike, moved))
     return (share * level).sum(axis=1), np.where(heard.sum(axis=1) > 2, sigma, np.nan)
-
-
-def spectral_centroid(powers: Powers) -> tuple[Floats, Floats]:
-    """By how far the middle of the spectrum went down, (nrx,) each.
-
-    With the loss of ``spectral_ratio`` the power is P exp(-2 f B), and its centroid moves by -2 times its
-    variance with each B more. So
-
-        B = (centroid of water - centroid of object) / (variance of water + variance of object),
-
-    exactly where the spectrum is Gaussian, which keeps its width (Quan and Harris, Geophysics 62, 1997), and
-    to the second order in B for any other.
-    """
-    water, other, heard = _clean(powers)
-    middle, width, unsure = _moments(water, powers.water_noise, heard, powers)
-    moved, narrowed, lost = _moments(other, powers.object_noise, heard, powers)
-    both = width + narrowed
-    return (middle - moved) / both, np.where(heard.sum(axis=1) > 2, np.sqrt(unsure + lost) / both, np.nan)
-
-
-def _moments(
-    power: Floats, noise: Floats, heard: NDArray[np.bool_], powers: Powers
-) -> tuple[Floats, Floats, Floats]:
-    """Centroid and variance of spectra, and the variance of the centroid under the noise, (nrx,) each."""
-    share = np.where(heard, power, 0.0)
-    share /= share.sum(axis=1, keepdims=True)
-    centroid = share @ powers.frequency
-    away = powers.frequency - centroid[:, None]
-    # Noise changes a power by twice the product of the amplitudes and the cosine of the angle between them.
-    moved = away * share * np.sqrt(np.where(heard, 2.0 * noise / power, 0.0))
-    return centroid, (share * away**2).sum(axis=1), np.einsum("ri,ij,rj->r", moved, powers.alike, moved)
 
 
 def _clean(powers: Powers) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -187,5 +156,4 @@ def _gain(scale: Floats | None, emission: int) -> Floats | float:
 WAYS: dict[str, Callable[[Powers], tuple[Floats, Floats]]] = {
     "ratio": log_ratio,
     "spectrum": spectral_ratio,
-    "centroid": spectral_centroid,
 }

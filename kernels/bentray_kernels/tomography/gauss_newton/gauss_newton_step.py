@@ -106,7 +106,7 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
 
     In an image without contrast, as the water that the first iteration begins with, rays are straight.
     """
-    rays: Kind = settings.traced if slowness.min() < slowness.max() else "straight"
+    rays: Kind = settings.rays if slowness.min() < slowness.max() else "straight"
     return linearise(
         problem,
         seen(problem, settings, slowness),
@@ -135,7 +135,7 @@ def step(
     number = len(state.history) + 1
     record = Sweep(slice_index, number, rms, len(problem.sounding), given=False)
     history = (*state.history, record)
-    best, limit = state.best, huber.limit(residual, settings.huber_spreads, settings.huber_s or math.inf)
+    best, limit = state.best, huber.limit(residual, settings.huber_spreads)
     against = huber.loss(residual, best.limit)
     here = Measured(state.slowness, number, limit, huber.loss(residual, limit), residual_counts(residual))
     if against < best.loss:

@@ -16,20 +16,19 @@ MEDIAN_PART = 0.6745
 LEAST_PART = 0.7
 
 
-def limit(residual: Floats, spreads: float, most: float = math.inf) -> float:
+def limit(residual: Floats, spreads: float) -> float:
     """Beyond which residuals count by their size, in their unit.
 
     Args:
         residual: any number of them.
-        spreads: how many of their standard deviations; 0: as far as ``most``.
-        most: no more than this.
+        spreads: how many of their standard deviations; 0: none is beyond.
     """
-    if spreads > 0.0:
-        size = np.abs(residual)
-        spread = float(np.median(size)) / MEDIAN_PART
-        most = min(most, max(spreads * spread, LEAST_PART * float(size.mean())))
+    if spreads == 0.0:
+        return math.inf
+    size = np.abs(residual)
+    spread = float(np.median(size)) / MEDIAN_PART
     # All residuals zero: none is an outlier.
-    return most or math.inf
+    return max(spreads * spread, LEAST_PART * float(size.mean())) or math.inf
 
 
 def loss(residual: Floats, limit: float) -> float:

@@ -59,7 +59,6 @@ class EmitterPass:
         source: Floats,
         receivers: Floats,
         measured: Floats,
-        huber: float = math.inf,
     ) -> Floats:
         """Trace the rays of one emitter and back-project what is left of the travel times.
 
@@ -70,7 +69,6 @@ class EmitterPass:
             source: (2,), m, in the grid.
             receivers: (k, 2), m, in the grid.
             measured: (k,), travel times, s.
-            huber: a residual corrects by no more than this, s.
 
         Returns:
             (k,), measured less predicted travel times, s.
@@ -84,7 +82,6 @@ class EmitterPass:
             source / spacing,
             receivers / spacing,
             measured,
-            huber,
             self.shape,
             self.sheets,
             self.rays,
@@ -149,7 +146,6 @@ def _look(
     source: Floats,
     receivers: Floats,
     measured: Floats,
-    huber: float,
     shape: tuple[int, int],
     at: Sheets,
     rays: Bundle,
@@ -191,7 +187,7 @@ def _look(
         r = order[k]
         left[r] = measured[r] - rays.time[k] * unit
         if rays.length[k] > np.float32(0.0):
-            worth[k] = np.float32(min(max(left[r], -huber), huber) / rays.length[k])
+            worth[k] = np.float32(left[r] / rays.length[k])
     spread(worth, steps, shape, rays, sums)
 
 

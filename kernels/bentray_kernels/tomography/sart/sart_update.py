@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import gaussian_filter
 
 from ...arrays import Flags, Floats, Ints
 from ...compiled import kernel
-from ...eikonal import adjoint, solve
+from ...eikonal import solve
 from ...rays.descent import PARTS, STEP, curved_ray, straight_ray, walk
 from ...rays.fan import Fan
 from ..problem import Problem
@@ -77,8 +76,7 @@ def _compiled(problem: Problem) -> Use:
                 front = slowness
                 if settings.speed_update != "fixed" or settings.front_smoothing_nodes > 0.0:
                     front = 1.0 / propagation_speed(slowness, problem.region, settings, warm=sweep > 0)
-            huber = _huber(settings, sweep)
-            left.append(work.look(slowness, front, problem.spacing, source, receivers, measured, huber))
+            left.append(work.look(slowness, front, problem.spacing, source, receivers, measured))
         work.update(
             slowness,
             coverage,
@@ -106,25 +104,19 @@ def _traced(
         if settings.rays != "straight":
             speed = propagation_speed(inside, problem.region[..., slab], settings, warm=sweep > 0)
             tof = solve(speed, problem.spacing, source, settings.front)
-        if settings.rays == "adjoint":
-            more, passed, residual = _adjoint(
-                tof, problem.spacing, source, receivers, measured, _huber(settings, sweep)
-            )
-        else:
-            fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays)
-            more, passed, residual = _back_project(
-                fan.receivers,
-                fan.source,
-                fan.tof,
-                fan.gradient,
-                fan.shape,
-                fan.strides,
-                fan.curved,
-                fan.room,
-                inside.ravel() * problem.spacing,
-                measured,
-                _huber(settings, sweep),
-            )
+        fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays)
+        more, passed, residual = _back_project(
+            fan.receivers,
+            fan.source,
+            fan.tof,
+            fan.gradient,
+            fan.shape,
+            fan.strides,
+            fan.curved,
+            fan.room,
+            inside.ravel() * problem.spacing,
+            measured,
+        )
         corrections[..., slab] += more.reshape(inside.shape)
         weights[..., slab] += passed.reshape(inside.shape)
         left.append(residual)
@@ -159,35 +151,10 @@ def _relaxation(settings: Settings, sweep: int) -> float:
     return settings.relaxation * settings.relaxation_decay**sweep
 
 
-def _huber(settings: Settings, sweep: int) -> float:
-    """Residual, s, that no larger one counts for; none in the first sweep, where all are those of water."""
-    return settings.huber_s if settings.huber_s > 0.0 and sweep > 0 else math.inf
-
-
 def _bounds(settings: Settings) -> tuple[float, float]:
     """Lowest and highest slowness, s/m."""
     low, high = settings.speed_bounds_mps
     return 1.0 / high, 1.0 / low
-
-
-def _adjoint(
-    tof: Floats, spacing: float, source: Floats, receivers: Floats, measured: Floats, huber: float
-) -> tuple[Floats, Floats, Floats]:
-    """As ``_back_project``, without rays: what each node is worth to each time comes by the adjoint state."""
-    residual = measured - _read(tof, receivers / spacing)
-    away = receivers - source
-    length = np.sqrt((away * away).sum(axis=1))
-    # A receiver on the emitter has no length to share its residual out over.
-    apart = length > 0.0
-    share = np.clip(residual[apart], -huber, huber) / length[apart]
-    corrections = adjoint(tof, spacing, source, receivers[apart], share)
-    weights = adjoint(tof, spacing, source, receivers[apart], np.ones(share.size))
-    return corrections, weights / spacing, residual
-
-
-def _read(tof: Floats, nodes: Floats) -> Floats:
-    """Multilinear between nodes."""
-    return np.asarray(map_coordinates(tof, nodes.T, order=1, mode="nearest"))
 
 
 @kernel
@@ -202,14 +169,12 @@ def _back_project(
     room: int,
     crossing: Floats,
     measured: Floats,
-    huber: float,
 ) -> tuple[Floats, Floats, Floats]:
     """Sums of equation 1 over the rays of one emitter.
 
     Args:
         crossing: slowness times spacing, flat, s per node.
         measured: (k,), travel times, s.
-        huber: a residual corrects by no more than this, s.
 
     Returns:
         Σ c·w (s), Σ w (nodes of ray), both flat over the nodes, and measured − predicted, s.
@@ -237,7 +202,7 @@ def _back_project(
         residuals[row] = residual
         if length == 0.0:
             continue
-        correction = min(max(residual, -huber), huber) / length
+        correction = residual / length
         for k in range(entries):
             corrections[nodes[k]] += correction * lengths[k]
             weights[nodes[k]] += lengths[k]

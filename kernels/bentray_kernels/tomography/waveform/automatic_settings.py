@@ -43,11 +43,9 @@ def wave_settings(dataset: Dataset, settings: Settings) -> WaveSettings:
     across, pulse = width / dataset.water_speed_mps, PERIODS / dataset.center_frequency_hz
     return WaveSettings(
         plan_of(dataset.center_frequency_hz, dataset.water_speed_mps, settings),
-        misfit=settings.wave_misfit,
         window_s=(BEFORE * across + pulse, AFTER * across + pulse),
         nearest_m=NEAREST * width,
         speed_bounds_mps=settings.speed_bounds_mps,
-        variation=settings.wave_variation,
         seed=settings.seed,
         roi=settings.roi,
     )

@@ -15,7 +15,6 @@ from ...arrays import Floats, Ints
 from ...wave.adjoint import slope
 from ...wave.simulation import simulate
 from .lbfgs import direction, remember
-from .total_variation import variation, weight
 from .waveform_problem import WaveProblem
 from .waveform_settings import Steps, WaveSettings
 
@@ -84,12 +83,11 @@ class WaveIterate:
         image: (nx, ny), to be looked at next; at the end the last that was taken, or ``best`` where skipped
             and of the attenuation, in which noise and what the speed has wrong show first.
         base: (nx, ny), the last image that was taken, with its ``gradient`` (nx, ny).
-        misfit: of the base, with its total variation; infinite before the first look.
+        misfit: of the base; infinite before the first look.
         way: (nx, ny), what was added to the base.
         illumination: (nx, ny), of the first image; it shapes all steps of the band.
         steps, changes: (pairs, nx, ny), of images and gradients.
         best: (nx, ny), the image that held-out emitters like best; ``best_held`` their misfit.
-        weight: of the total variation, such that it is the asked part of the band's first misfit.
         risen: images in turn that held-out emitters were predicted worse in.
         shortenings: of the step under way.
         skipped: whether held-out emitters ended it, so that cycles were skipped or noise was fitted.
@@ -107,7 +105,6 @@ class WaveIterate:
     changes: Floats
     best: Floats
     best_held: float
-    weight: float = 0.0
     risen: int = 0
     shortenings: int = 0
     skipped: bool = False
@@ -160,18 +157,11 @@ def step(
     if not state.history:
         light = sum(part.illumination for part in looks)
         state = replace(state, illumination=np.asarray(light))
-        part = settings.variation if problem.band.of == "speed" else 0.0
-        state = replace(state, weight=weight(state.image, part * misfit))
-    total = misfit
-    if state.weight:
-        value, rise = variation(state.image)
-        total += state.weight * value
-        gradient += np.where(problem.region, state.weight * rise, 0.0)
-    taken = total < state.misfit
+    taken = misfit < state.misfit
     history = (*state.history, WavePass(misfit, held, taken))
     state = replace(state, history=history)
     if not taken:
-        return _shortened(problem, settings.steps(problem.band.of), state, total)
+        return _shortened(problem, settings.steps(problem.band.of), state, misfit)
     steps, changes = state.steps, state.changes
     if len(history) > 1:
         steps, changes = remember(
@@ -186,7 +176,7 @@ def step(
         state,
         base=state.image,
         gradient=gradient,
-        misfit=total,
+        misfit=misfit,
         steps=steps,
         changes=changes,
         best=best,

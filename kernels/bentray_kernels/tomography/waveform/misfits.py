@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
 
 from ...arrays import Floats
-from ...errors import InvalidInput
 
 
 class Measure(Protocol):
@@ -47,22 +44,6 @@ def correlation(simulated: Floats, recorded: Floats, weight: Floats) -> tuple[fl
     power = np.where(alive, (s**2).sum(axis=1), 1.0)
     slope = window * (s * (alike / power)[:, None] - d / both[:, None])
     return float((1.0 - alike).sum() / count), np.where(alive[:, None], slope / count, 0.0)
-
-
-MEASURES: Mapping[str, Measure] = MappingProxyType(
-    {"least-squares": least_squares, "correlation": correlation}
-)
-
-
-def measure(name: str) -> Measure:
-    """A misfit by its name.
-
-    Raises:
-        InvalidInput: for a name that is none.
-    """
-    if name not in MEASURES:
-        raise InvalidInput("misfit", repr(name), "one of " + ", ".join(MEASURES))
-    return MEASURES[name]
 
 
 def around(arrival_s: Floats, times_s: Floats, before_s: float, after_s: float) -> Floats:

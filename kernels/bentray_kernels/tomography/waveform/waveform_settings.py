@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import MISSING, dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from ...errors import InvalidInput
 from ...limits import SPACING_M, SPEED_MPS
 from ...ranges import SEED, Range, check_ranges, ranged
 from ...wave.simulation import Unknown
-from .misfits import Measure, measure
+from .misfits import Measure, correlation, least_squares
 
 # Of a band, around those that every pulse of a scan asks for.
 CORNER_HZ = Range(1e2, 1e11, unit="Hz")
@@ -106,7 +106,6 @@ class WaveSettings:
 
     Attributes:
         bands: gone through in order, each from the image of the one before.
-        misfit: of the speed, a name of ``waveform.misfits.MEASURES``; the attenuation has ``least-squares``.
         window_s: (before, after) the arrival in water that traces are compared within, s.
         nearest_m: pairs nearer than this are left out, m.
         speed_bounds_mps: (lowest, highest) speed that a node may take, m/s.
@@ -114,13 +113,11 @@ class WaveSettings:
         first_step_mps: rms of the first change of a band, m/s, before anything is known of the curvature.
         memory: pairs of changes that the curvature is read from (L-BFGS).
         held_out: emitters that only judge.
-        variation: total variation of the speed to be kept low, as a part of a band's first misfit; 0: none.
         seed: of the draw of emitters.
         roi: let only the dataset's region of interest change (``mask/roi``).
     """
 
     bands: tuple[Band, ...]
-    misfit: Literal["correlation", "least-squares"] = "correlation"
     window_s: tuple[float, float] = (60e-6, 40e-6)
     nearest_m: float = ranged(0.03, DISTANCE_M)
     speed_bounds_mps: tuple[float, float] = (1350.0, 1650.0)
@@ -128,7 +125,6 @@ class WaveSettings:
     first_step_mps: float = ranged(2.0, STEP_MPS)
     memory: int = ranged(8, Range(1, 1000))
     held_out: int = ranged(4, Range(0, 65_536))
-    variation: float = ranged(0.0, Range(0.0, 10.0))
     seed: int = ranged(0, SEED)
     roi: bool = False
 
@@ -136,7 +132,6 @@ class WaveSettings:
         if not self.bands:
             raise InvalidInput("bands", "none", "at least one band")
         check_ranges(self)
-        measure(self.misfit)
         low, high = self.speed_bounds_mps
         least, most = SPEED_MPS.least, SPEED_MPS.most
         if not least <= low < high <= most:
@@ -154,4 +149,4 @@ class WaveSettings:
 
     def measure(self, of: Unknown) -> Measure:
         """What is made small to find speed or attenuation."""
-        return measure(self.misfit if of == "speed" else "least-squares")
+        return correlation if of == "speed" else least_squares

@@ -49,7 +49,7 @@ OPTIONS = {
         "--rays",
         str,
         "curved",
-        "curved: corrected for refraction; straight; adjoint: sensitivities without rays.",
+        "curved: corrected for refraction; straight.",
     ),
     "eikonal": Option("--eikonal", str, "deviation", "Eikonal solver for curved rays, e.g. fmm or fsm."),
     "nodes": Option("--nodes", int, "128", "Nodes per side of the image."),

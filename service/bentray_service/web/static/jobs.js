@@ -4,7 +4,7 @@ import { showOnceNear, withKey } from "./key.js";
 import { glassOf, queryOf } from "./views.js";
 
 const SVG = "http://www.w3.org/2000/svg";
-const RAYS = { curved: "Bent rays", straight: "Straight rays", adjoint: "Adjoint, no rays" };
+const RAYS = { curved: "Bent rays", straight: "Straight rays" };
 const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton", auto: "automatic", waveform: "full waveform" };
 const cards = new Map();
 

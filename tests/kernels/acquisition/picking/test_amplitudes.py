@@ -25,7 +25,7 @@ from ..traces import FREQUENCY_HZ, RATE_HZ, absorbed, scan
 ELEMENTS, DELAY_S = 10, 2.3e-7
 EVERY = np.arange(ELEMENTS)
 APART = EVERY[:, None] != EVERY
-SPECTRA = ("spectrum", "centroid")
+SPECTRA = ("spectrum",)
 
 
 @cache
@@ -95,22 +95,6 @@ def test_louder_noise_leaves_out_and_never_lies(way):
     assert sorted(counts, reverse=True) == counts
 
 
-@settings(max_examples=20, deadline=None)
-@given(loss=st.floats(0.0, 3.0), middle=st.floats(0.7, 1.3), width=st.floats(0.05, 0.25))
-def test_the_centroid_of_a_gaussian_tells_the_loss_exactly(loss, middle, width):
-    """Quan and Harris: it keeps its width, and moves by the loss times its variance."""
-    frequency = np.linspace(-2.0, 4.0, 400)
-    water = np.exp(-(((frequency - middle) / width) ** 2))[None]
-    nothing = np.zeros((1, 1))
-    powers = Powers(
-        water, water * np.exp(-2.0 * loss * frequency), nothing, nothing, frequency, np.eye(frequency.size)
-    )
-    with np.errstate(invalid="ignore"):
-        value, sigma = WAYS["centroid"](powers)
-    assert value[0] == pytest.approx(loss, abs=1e-9)
-    assert sigma[0] == 0.0
-
-
 @pytest.mark.parametrize("way", SPECTRA)
 def test_the_deviation_that_is_told_is_the_one_that_noise_makes(way):
     """White noise on the values of a spectrum, independent of each other: many draws against the estimate."""
@@ -134,7 +118,7 @@ def test_factors_of_single_traces_count_for_heights_only():
     random = np.random.default_rng(5)
     scales = {name: random.uniform(0.5, 2.0, APART.shape) for name in ("object_scale", "water_scale")}
     change = np.log(scales["water_scale"] / scales["object_scale"])
-    for way, expected in (("ratio", change), ("spectrum", 0.0 * change), ("centroid", 0.0 * change)):
+    for way, expected in (("ratio", change), ("spectrum", 0.0 * change)):
         moved = heard(0.5, way, **scales) - heard(0.5, way)
         np.testing.assert_allclose(moved[APART], expected[APART], atol=1e-9)
 

@@ -47,7 +47,7 @@ def test_data_driven_update_stretches_the_range():
     "changes",
     [
         {},
-        {"subset": 4, "relaxation": 0.4, "huber_s": 2e-7},
+        {"subset": 4, "relaxation": 0.4},
         {"speed_update": "data-driven", "speed_range_mps": (1375.0, 1560.0), "relaxation_decay": 0.5},
         {"front_smoothing_nodes": 1.5, "smoothing_nodes": 1.5},
     ],
@@ -82,15 +82,6 @@ def test_cuts_of_the_compiled_pass_change_no_bit(scan, changes):
     assert np.array_equal(before, begin(start(problem, None)).slowness)
 
 
-def test_without_rays_the_image_comes_back_too(scan):
-    truth, inside = PHANTOM.speed(NODES, TABLE6_SIDE_M), PHANTOM.inside(NODES, TABLE6_SIDE_M)
-    error = {
-        rays: rmse(reconstruct(scan, plan(rays=rays, sweeps=4)).speed, truth, inside)
-        for rays in ("straight", "adjoint", "curved")
-    }
-    assert error["curved"] < error["adjoint"] < error["straight"]
-
-
 def test_a_subset_is_one_update(scan):
     """With all emitters in one subset, nothing of the first hides from the last: seeds give the same."""
     one, other = (reconstruct(scan, plan(subset=64, seed=seed, sweeps=1)).speed for seed in (0, 1))
@@ -106,23 +97,16 @@ def test_relaxation_decays(scan):
     assert np.allclose(first, second, atol=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("method", "limit"),
-    [
-        ("sart", {"huber_s": 2e-7}),
-        ("gauss-newton", {"huber_s": 2e-7}),
-        ("gauss-newton", {"huber_spreads": 3.0}),
-    ],
-)
-def test_huber_makes_wrong_picks_count_less(scan, method, limit):
+def test_huber_makes_wrong_picks_count_less(scan):
     truth, inside = PHANTOM.speed(NODES, TABLE6_SIDE_M), PHANTOM.inside(NODES, TABLE6_SIDE_M)
     random = np.random.default_rng(5)
     wrong = random.random(scan.delta_tof_s.shape) < 0.05
     spoiled = np.where(wrong, scan.delta_tof_s + random.normal(0.0, 4e-6, wrong.shape), scan.delta_tof_s)
     bad = replace(scan, delta_tof_s=spoiled)
+    gauss_newton = plan(method="gauss-newton", sweeps=4)
     plain, robust = (
-        rmse(reconstruct(bad, plan(method=method, sweeps=4, **huber)).speed, truth, inside)
-        for huber in ({"huber_spreads": 0.0}, {"huber_spreads": 0.0, **limit})
+        rmse(reconstruct(bad, replace(gauss_newton, huber_spreads=spreads)).speed, truth, inside)
+        for spreads in (0.0, 3.0)
     )
     assert robust < 0.9 * plain
 

@@ -15,7 +15,6 @@ from bentray_kernels.tomography.waveform.band_inversion import (
     step,
 )
 from bentray_kernels.tomography.waveform.preparation import prepare
-from bentray_kernels.tomography.waveform.total_variation import variation
 from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings
 
 from .scans import WATER, scan
@@ -127,19 +126,3 @@ def test_bounds_hold(problem):
     state = step(problem, tight, state, told(problem, 1.0, 1.0))
     assert state.image.min() == 1499.5
     assert state.image.max() == 1500.5
-
-
-def test_total_variation_is_weighed_by_the_first_misfit_and_pulls_towards_flat_parts(problem):
-    plan = replace(SETTINGS, variation=0.3)
-    start = np.where(problem.region, WATER + change(5, problem.region.shape) * 1e5, WATER)
-    shape, none = problem.region.shape, np.zeros(problem.region.shape)
-    looks = [Look(1.0 * problem.used.size, 1.0 * problem.held.size, none, np.ones(shape))]
-    state = step(problem, plan, begin(start), looks)
-    assert state.weight * variation(start)[0] == pytest.approx(0.3)
-    assert state.misfit == pytest.approx(1.3)
-    # What is told is the misfit of the traces alone.
-    assert state.history[0].misfit == 1.0
-    assert variation(state.image)[0] < variation(start)[0]
-    # The attenuation has none.
-    of_loss = replace(problem, band=replace(problem.band, of="attenuation"))
-    assert step(of_loss, plan, begin(none), looks).weight == 0.0

@@ -5,30 +5,30 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.waveform import misfits
 
+MEASURES = (misfits.correlation, misfits.least_squares)
 
-@given(seed=st.integers(0, 2**32 - 1), name=st.sampled_from(sorted(misfits.MEASURES)))
-def test_derivative_is_that_of_finite_differences(seed, name):
+
+@given(seed=st.integers(0, 2**32 - 1), measure=st.sampled_from(MEASURES))
+def test_derivative_is_that_of_finite_differences(seed, measure):
     rng = np.random.default_rng(seed)
     simulated, recorded, way = rng.standard_normal((3, 4, 20))
     weight = rng.uniform(0.1, 1.0, (4, 20))
-    kind = misfits.measure(name)
     small = 1e-5
     rise = (
-        kind(simulated + small * way, recorded, weight)[0]
-        - kind(simulated - small * way, recorded, weight)[0]
+        measure(simulated + small * way, recorded, weight)[0]
+        - measure(simulated - small * way, recorded, weight)[0]
     )
-    assert (kind(simulated, recorded, weight)[1] * way).sum() == pytest.approx(
+    assert (measure(simulated, recorded, weight)[1] * way).sum() == pytest.approx(
         rise / (2.0 * small), rel=1e-5, abs=1e-8
     )
 
 
-@pytest.mark.parametrize("name", sorted(misfits.MEASURES))
-def test_nothing_is_wrong_with_equal_traces(name):
+@pytest.mark.parametrize("measure", MEASURES)
+def test_nothing_is_wrong_with_equal_traces(measure):
     traces = np.random.default_rng(1).standard_normal((3, 30))
-    value, slope = misfits.measure(name)(traces, traces, np.ones((3, 1)))
+    value, slope = measure(traces, traces, np.ones((3, 1)))
     assert value == pytest.approx(0.0, abs=1e-14)
     assert np.abs(slope).max() < 1e-14
 
@@ -58,8 +58,3 @@ def test_window_holds_the_arrival_and_ends():
     assert (found[26:62] == 1.0).all()
     assert not found[:20].any()
     assert not found[71:].any()
-
-
-def test_unknown_names_are_refused():
-    with pytest.raises(InvalidInput, match="correlation"):
-        misfits.measure("phase")

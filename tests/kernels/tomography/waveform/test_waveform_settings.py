@@ -43,13 +43,11 @@ def test_bad_bands_are_refused(words):
     ("words", "field"),
     [
         ({"bands": ()}, "bands"),
-        ({"misfit": "phase"}, "misfit"),
         ({"window_s": (0.0, 1.0)}, "window_s"),
         ({"nearest_m": -1.0}, "nearest_m"),
         ({"speed_bounds_mps": (1600.0, 1400.0)}, "speed_bounds_mps"),
         ({"first_step_mps": 0.0}, "first_step_mps"),
         ({"memory": 0}, "memory"),
-        ({"variation": -0.1}, "variation"),
     ],
 )
 def test_bad_settings_are_refused(words, field):

@@ -69,7 +69,7 @@ def rays_of(scan: Summary, settings: Settings) -> int:
 
 def _entries(settings: Settings, in_space: bool) -> float:
     """Of a ray's row."""
-    level = settings.decomposition == "slices" or (settings.traced == "straight" and not in_space)
+    level = settings.decomposition == "slices" or (settings.rays == "straight" and not in_space)
     return settings.nodes * (ENTRIES_LEVEL if level else ENTRIES_IN_SPACE)
 
 
