@@ -15,7 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent
 
-# ``from ..rays.descent import STEP, walk``, also over several lines in brackets.
+# ``from ..rays.descent import STEP, trace_ray``, also over several lines in brackets.
 _IMPORT = re.compile(r"^[ \t]*from (\.+)([\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
 # Digests of syntax trees by digests of their text: to parse the whole package takes a second.

@@ -1,9 +1,8 @@
 """One ray down the travel time to its source; the inner loop of every ray kernel.
 
-Positions are in nodes (metres divided by the spacing) and arrays are flat, with ``strides`` a tuple of
-one entry an axis, so that the compiler unrolls the loops over axes; ``scratch`` is (3, ndim), for the
-callee's use. The direction is −∇(T²), not −∇T: near the source T² is a paraboloid, whose gradient is
-linear and vanishes at the source alone, where ∇T would jump from one side to the other.
+Positions are in nodes (metres divided by the spacing) and arrays are flat. The direction is −∇(T²), not
+−∇T: near the source T² is a paraboloid, whose gradient is linear and vanishes only at the source, whereas
+∇T changes sign there. ``path`` and ``scratch`` come from ``empty_path``.
 """
 
 from __future__ import annotations
@@ -16,100 +15,65 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
+from .fan import Fan
 
 # Length of a step, nodes. Half of it gives the same error on Table 6, 3.7 %, in more time, and
 # steps halved where the direction turns change the time along a ray by 2 % of its error, past bone too.
 STEP = 1.0
 
-# Parts of a step that are read for themselves: longer ones would pass nodes by.
+# Parts of a step, each with its own midpoint: with longer ones the path would skip nodes.
 PARTS = 2
 
 # A ray this near its source, nodes, goes straight to it.
 ARRIVED = 1.0
 
-
-@kernel
-def squared_gradient(tof: Floats, shape: tuple[int, ...], strides: tuple[int, ...]) -> Floats:
-    """∇(T²) at the nodes, (nodes, ndim): central differences, one-sided of second order on the rim."""
-    squared = tof * tof
-    axes = len(shape)
-    gradient = np.zeros((tof.size, axes))
-    for node in range(tof.size):
-        rest = node
-        for axis in range(axes):
-            stride = strides[axis]
-            n = shape[axis]
-            if n == 1:
-                continue
-            i = rest // stride
-            rest = rest % stride
-            if n == 2:
-                low = node - i * stride
-                gradient[node, axis] = squared[low + stride] - squared[low]
-            elif i == 0:
-                gradient[node, axis] = (
-                    -1.5 * squared[node] + 2.0 * squared[node + stride] - 0.5 * squared[node + 2 * stride]
-                )
-            elif i == n - 1:
-                gradient[node, axis] = (
-                    1.5 * squared[node] - 2.0 * squared[node - stride] + 0.5 * squared[node - 2 * stride]
-                )
-            else:
-                gradient[node, axis] = 0.5 * (squared[node + stride] - squared[node - stride])
-    return gradient
+# Longest ray, in sums of the lengths of the grid's edges.
+LONGEST = 4
 
 
 @kernel(inline="always")
-def locate(point: Floats, shape: tuple[int, ...], strides: tuple[int, ...], part: Floats) -> int:
-    """Flat index of the lowest node of the point's cell; ``part`` receives the place in the cell."""
+def locate(point: Floats, fan: Fan, part: Floats) -> int:
+    """Flat index of the lowest node of the point's cell; ``part`` receives the position in the cell."""
     node = 0
-    for axis in range(len(shape)):
-        low = min(max(int(point[axis]), 0), max(shape[axis] - 2, 0))
+    for axis in range(len(fan.shape)):
+        low = min(max(int(point[axis]), 0), max(fan.shape[axis] - 2, 0))
         part[axis] = point[axis] - low
-        node += low * strides[axis]
+        node += low * fan.strides[axis]
     return node
 
 
 @kernel(inline="always")
-def corner(
-    which: int, node: int, shape: tuple[int, ...], strides: tuple[int, ...], part: Floats
-) -> tuple[int, float]:
+def corner(which: int, node: int, fan: Fan, part: Floats) -> tuple[int, float]:
     """Flat index and multilinear weight of one of the cell's 2^ndim corners."""
     weight = 1.0
-    for axis in range(len(shape)):
+    for axis in range(len(fan.shape)):
         if (which >> axis) & 1:
             weight *= part[axis]
-            if shape[axis] > 1:
-                node += strides[axis]
+            if fan.shape[axis] > 1:
+                node += fan.strides[axis]
         else:
             weight *= 1.0 - part[axis]
     return node, weight
 
 
 @kernel(inline="always")
-def _direction(
-    point: Floats,
-    gradient: Floats,
-    shape: tuple[int, ...],
-    strides: tuple[int, ...],
-    part: Floats,
-    direction: Floats,
-) -> bool:
+def _direction(point: Floats, fan: Fan, part: Floats, direction: Floats) -> bool:
     """Unit −∇(T²) at a point; returns False where it vanishes."""
-    node = locate(point, shape, strides, part)
-    for axis in range(len(shape)):
+    axes = len(fan.shape)
+    node = locate(point, fan, part)
+    for axis in range(axes):
         direction[axis] = 0.0
-    for which in range(1 << len(shape)):
-        neighbour, weight = corner(which, node, shape, strides, part)
-        for axis in range(len(shape)):
-            direction[axis] -= weight * gradient[neighbour, axis]
+    for which in range(1 << axes):
+        neighbour, weight = corner(which, node, fan, part)
+        for axis in range(axes):
+            direction[axis] -= weight * fan.gradient[neighbour, axis]
     length = 0.0
-    for axis in range(len(shape)):
+    for axis in range(axes):
         length += direction[axis] * direction[axis]
     if not length > 0.0:
         return False
     scale = 1.0 / math.sqrt(length)
-    for axis in range(len(shape)):
+    for axis in range(axes):
         direction[axis] *= scale
     return True
 
@@ -122,64 +86,63 @@ def _distance(a: Floats, b: Floats, axes: int) -> float:
     return math.sqrt(total)
 
 
+@kernel
+def empty_path(fan: Fan) -> tuple[Floats, Floats]:
+    """Memory for one path of the fan, (most points, ndim), and for intermediate values, (3, ndim)."""
+    axes = len(fan.shape)
+    return np.empty((int(LONGEST * sum(fan.shape) / STEP) + 16, axes)), np.empty((3, axes))
+
+
 @kernel(inline="always")
-def curved_ray(
-    receiver: Floats,
-    source: Floats,
-    tof: Floats,
-    gradient: Floats,
-    shape: tuple[int, ...],
-    strides: tuple[int, ...],
-    step: float,
-    path: Floats,
-    scratch: Floats,
-) -> int:
-    """Fill ``path`` (room, ndim) from receiver to source by RK2 descent; returns the number of points.
+def trace_ray(fan: Fan, k: int, step: float, path: Floats, scratch: Floats) -> int:
+    """Fill ``path`` with points from receiver ``k`` to the source; returns their number.
 
-    Steps are ``step`` nodes long.
-
-    A descent that has not arrived when the room is used up has been caught where the discrete gradient
-    has no downhill (a shock, a rough model). It is traced anew from node to lower node, which always
-    ends, since a travel time has no local minimum but its source.
+    Args:
+        step: length of the steps of a curved ray, nodes.
     """
-    axes = len(shape)
+    if fan.curved:
+        return trace_curved(fan, k, step, path, scratch)
+    return _trace_straight(fan, k, path)
+
+
+@kernel(inline="always")
+def trace_curved(fan: Fan, k: int, step: float, path: Floats, scratch: Floats) -> int:
+    """As ``trace_ray`` by second-order Runge-Kutta descent along −∇(T²).
+
+    A descent that does not arrive within the memory of ``path`` is caught where the discrete gradient has no
+    downhill direction (a shock, a rough model). It is repeated from node to lower node, which always ends:
+    a travel time has its only local minimum at the source.
+    """
+    axes = len(fan.shape)
     part, slope, middle = scratch[0], scratch[1], scratch[2]
     for axis in range(axes):
-        path[0, axis] = receiver[axis]
-    room = len(path) - 1
-    for count in range(1, room):
+        path[0, axis] = fan.receivers[k, axis]
+    for count in range(1, len(path) - 1):
         here = path[count - 1]
-        if _distance(here, source, axes) <= max(ARRIVED, step):
+        if _distance(here, fan.source, axes) <= max(ARRIVED, step):
             for axis in range(axes):
-                path[count, axis] = source[axis]
+                path[count, axis] = fan.source[axis]
             return count + 1
-        if not _direction(here, gradient, shape, strides, part, slope):
+        if not _direction(here, fan, part, slope):
             break
         for axis in range(axes):
-            middle[axis] = min(max(here[axis] + 0.5 * step * slope[axis], 0.0), shape[axis] - 1.0)
-        if not _direction(middle, gradient, shape, strides, part, slope):
+            middle[axis] = min(max(here[axis] + 0.5 * step * slope[axis], 0.0), fan.shape[axis] - 1.0)
+        if not _direction(middle, fan, part, slope):
             break
         for axis in range(axes):
-            path[count, axis] = min(max(here[axis] + step * slope[axis], 0.0), shape[axis] - 1.0)
-    return _node_descent(source, tof, shape, strides, path, scratch)
+            path[count, axis] = min(max(here[axis] + step * slope[axis], 0.0), fan.shape[axis] - 1.0)
+    return _trace_nodes(fan, path, scratch[0])
 
 
 @kernel(inline="always")
-def _node_descent(
-    source: Floats,
-    tof: Floats,
-    shape: tuple[int, ...],
-    strides: tuple[int, ...],
-    path: Floats,
-    scratch: Floats,
-) -> int:
+def _trace_nodes(fan: Fan, path: Floats, part: Floats) -> int:
     """From ``path[0]`` along the lowest neighbours to the source; returns the number of points."""
-    axes = len(shape)
-    part = scratch[0]
-    node = locate(path[0], shape, strides, part)
+    axes = len(fan.shape)
+    tof = fan.tof
+    node = locate(path[0], fan, part)
     best = node
     for which in range(1 << axes):
-        neighbour, _ = corner(which, node, shape, strides, part)
+        neighbour, _ = corner(which, node, fan, part)
         if tof[neighbour] < tof[best]:
             best = neighbour
     count = 1
@@ -188,8 +151,8 @@ def _node_descent(
         node = best
         rest = node
         for axis in range(axes):
-            path[count, axis] = rest // strides[axis]
-            rest = rest % strides[axis]
+            path[count, axis] = rest // fan.strides[axis]
+            rest = rest % fan.strides[axis]
         count += 1
         for which in range(neighbours):
             code = which
@@ -199,46 +162,41 @@ def _node_descent(
                 shift = code % 3 - 1
                 code //= 3
                 i = path[count - 1, axis] + shift
-                if i < 0.0 or i > shape[axis] - 1.0:
+                if i < 0.0 or i > fan.shape[axis] - 1.0:
                     inside = False
-                neighbour += shift * strides[axis]
+                neighbour += shift * fan.strides[axis]
             if inside and tof[neighbour] < tof[best]:
                 best = neighbour
         if best == node:
             break
     for axis in range(axes):
-        path[count, axis] = source[axis]
+        path[count, axis] = fan.source[axis]
     return count + 1
 
 
 @kernel(inline="always")
-def straight_ray(receiver: Floats, source: Floats, axes: int, path: Floats) -> int:
-    """Fill ``path`` with equal steps of at most ``STEP`` to the source; returns the number of points."""
+def _trace_straight(fan: Fan, k: int, path: Floats) -> int:
+    """As ``trace_ray`` in equal steps of at most ``STEP``."""
+    axes = len(fan.shape)
+    receiver, source = fan.receivers[k], fan.source
     steps = max(1, math.ceil(_distance(receiver, source, axes) / STEP))
-    for k in range(steps + 1):
+    for i in range(steps + 1):
         for axis in range(axes):
-            path[k, axis] = receiver[axis] + (source[axis] - receiver[axis]) * (k / steps)
+            path[i, axis] = receiver[axis] + (source[axis] - receiver[axis]) * (i / steps)
     return steps + 1
 
 
 @kernel(inline="always")
-def walk(
-    path: Floats,
-    count: int,
-    shape: tuple[int, ...],
-    strides: tuple[int, ...],
-    parts: int,
-    nodes: Ints,
-    lengths: Floats,
-    scratch: Floats,
+def list_entries(
+    fan: Fan, path: Floats, count: int, parts: int, nodes: Ints, lengths: Floats, scratch: Floats
 ) -> int:
-    """Nodes that a path weighs on and by how much; returns the number of entries.
+    """Nodes to which a path contributes, and the lengths; returns the number of entries.
 
-    Each of ``parts`` equal parts of a piece gives its length to the corners of the cell at its middle,
+    Each of ``parts`` equal parts of a segment gives its length to the corners of the cell at its midpoint,
     multilinearly, so that Σ lengths·slowness is the midpoint rule for the slowness integral. A node appears
     once for every part near it.
     """
-    axes = len(shape)
+    axes = len(fan.shape)
     part, middle = scratch[0], scratch[1]
     entries = 0
     for k in range(1, count):
@@ -247,9 +205,9 @@ def walk(
             along = (q + 0.5) / parts
             for axis in range(axes):
                 middle[axis] = path[k - 1, axis] + along * (path[k, axis] - path[k - 1, axis])
-            node = locate(middle, shape, strides, part)
+            node = locate(middle, fan, part)
             for which in range(1 << axes):
-                neighbour, weight = corner(which, node, shape, strides, part)
+                neighbour, weight = corner(which, node, fan, part)
                 if weight != 0.0:
                     nodes[entries] = neighbour
                     lengths[entries] = weight * length
@@ -258,7 +216,7 @@ def walk(
 
 
 @kernel(inline="always")
-def merge(
+def merge_entries(
     nodes: Ints,
     weights: Floats,
     entries: int,
@@ -267,7 +225,7 @@ def merge(
     lengths: NDArray[Any],
     filled: int,
 ) -> int:
-    """Add what ``walk`` found to a sparse row, each node once; returns how far the row's arrays are filled.
+    """Append the entries of ``list_entries`` to a sparse row, each node once; returns the filled length.
 
     Args:
         total: zeros, one a node; zeros again afterwards.

@@ -3,46 +3,42 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
+from ..compiled import kernel
 from ..errors import InvalidInput
-from .descent import STEP, squared_gradient
 
 Kind = Literal["curved", "straight"]
 
-# A ray longer than this many times the straight way round the grid has left the physics behind.
-LONGEST = 4
 
-
-@dataclass(frozen=True)
-class Fan:
-    """The rays from every receiver to one source, ready for the kernels; positions in nodes.
+class Fan(NamedTuple):
+    """The rays from every receiver to one source, the first argument of the ray kernels; positions in nodes.
 
     Attributes:
+        receivers: (k, ndim); source: (ndim,).
         tof: flat travel time, s.
         gradient: (nodes, ndim) ∇(T²) for curved rays, empty for straight ones.
-        shape, strides: of the grid, one entry an axis.
-        receivers: (k, ndim); source: (ndim,).
+        shape, strides: of the grid; tuples, so that the compiler unrolls the loops over axes.
+        curved: whether the rays follow the gradient.
     """
 
+    receivers: Floats
+    source: Floats
     tof: Floats
     gradient: Floats
     shape: tuple[int, ...]
     strides: tuple[int, ...]
-    receivers: Floats
-    source: Floats
     curved: bool
 
     @classmethod
     def checked(
         cls, tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, kind: Kind
     ) -> Fan:
-        """The fan of ``trace``.
+        """The fan for the arguments of ``trace``.
 
         Raises:
             InvalidInput: see ``bentray_kernels.rays.trace``.
@@ -71,12 +67,38 @@ class Fan:
         curved = kind == "curved"
         flat = times.ravel()
         gradient = squared_gradient(flat, times.shape, strides) if curved else np.empty((0, times.ndim))
-        return cls(flat, gradient, times.shape, strides, nodes, origin, curved)
+        return cls(nodes, origin, flat, gradient, times.shape, strides, curved)
 
-    @property
-    def room(self) -> int:
-        """Points that no ray of this grid needs more than."""
-        return int(LONGEST * sum(self.shape) / STEP) + 16
+
+@kernel
+def squared_gradient(tof: Floats, shape: tuple[int, ...], strides: tuple[int, ...]) -> Floats:
+    """∇(T²) at the nodes, (nodes, ndim): central differences, one-sided of second order on the rim."""
+    squared = tof * tof
+    axes = len(shape)
+    gradient = np.zeros((tof.size, axes))
+    for node in range(tof.size):
+        rest = node
+        for axis in range(axes):
+            stride = strides[axis]
+            n = shape[axis]
+            if n == 1:
+                continue
+            i = rest // stride
+            rest = rest % stride
+            if n == 2:
+                low = node - i * stride
+                gradient[node, axis] = squared[low + stride] - squared[low]
+            elif i == 0:
+                gradient[node, axis] = (
+                    -1.5 * squared[node] + 2.0 * squared[node + stride] - 0.5 * squared[node + 2 * stride]
+                )
+            elif i == n - 1:
+                gradient[node, axis] = (
+                    1.5 * squared[node] - 2.0 * squared[node - stride] + 0.5 * squared[node - 2 * stride]
+                )
+            else:
+                gradient[node, axis] = 0.5 * (squared[node + stride] - squared[node - stride])
+    return gradient
 
 
 def _inside(name: str, points: Floats, last: Floats, spacing: float) -> Floats:

@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
-from .descent import PARTS, STEP, curved_ray, merge, straight_ray, walk
+from .descent import PARTS, STEP, empty_path, list_entries, merge_entries, trace_ray
 from .fan import Fan, Kind
 
 
@@ -31,44 +31,30 @@ def sensitivities(
         InvalidInput: as ``trace``.
     """
     fan = Fan.checked(tof, spacing, receivers, source, kind)
-    pointers, columns, lengths = _rows(
-        fan.receivers, fan.source, fan.tof, fan.gradient, fan.shape, fan.strides, fan.curved, fan.room
-    )
+    pointers, columns, lengths = _rows(fan)
     return csr_array((lengths * spacing, columns, pointers), shape=(len(fan.receivers), fan.tof.size))
 
 
 @kernel
-def _rows(
-    receivers: Floats,
-    source: Floats,
-    tof: Floats,
-    gradient: Floats,
-    shape: tuple[int, ...],
-    strides: tuple[int, ...],
-    curved: bool,
-    room: int,
-) -> tuple[Ints, Ints, Floats]:
-    axes = len(shape)
-    path = np.empty((room, axes))
-    scratch = np.empty((3, axes))
-    nodes = np.empty((PARTS * room) << axes, np.int64)
-    lengths = np.empty((PARTS * room) << axes)
-    total = np.zeros(tof.size)
-    pointers = np.zeros(len(receivers) + 1, np.int64)
-    capacity = max(16, len(receivers) * 4 * sum(shape))
+def _rows(fan: Fan) -> tuple[Ints, Ints, Floats]:
+    """Pointers, columns and lengths, nodes, of the compressed sparse rows."""
+    path, scratch = empty_path(fan)
+    nodes = np.empty((PARTS * len(path)) << len(fan.shape), np.int64)
+    lengths = np.empty(nodes.size)
+    total = np.zeros(fan.tof.size)
+    rays = len(fan.receivers)
+    pointers = np.zeros(rays + 1, np.int64)
+    capacity = max(16, rays * 4 * sum(fan.shape))
     columns = np.empty(capacity, np.int64)
     values = np.empty(capacity)
     filled = 0
-    for row in range(len(receivers)):
-        if curved:
-            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, STEP, path, scratch)
-        else:
-            count = straight_ray(receivers[row], source, axes, path)
-        entries = walk(path, count, shape, strides, PARTS, nodes, lengths, scratch)
+    for row in range(rays):
+        count = trace_ray(fan, row, STEP, path, scratch)
+        entries = list_entries(fan, path, count, PARTS, nodes, lengths, scratch)
         while filled + entries > capacity:
             columns = np.concatenate((columns, np.empty(capacity, np.int64)))
             values = np.concatenate((values, np.empty(capacity)))
             capacity *= 2
-        filled = merge(nodes, lengths, entries, total, columns, values, filled)
+        filled = merge_entries(nodes, lengths, entries, total, columns, values, filled)
         pointers[row + 1] = filled
     return pointers, columns[:filled], values[:filled]

@@ -21,7 +21,7 @@ from ..arrays import Floats
 from ..compiled import kernel
 from ..splines.cubic import jet_2d, jet_3d
 from .bending import STRIDE, bend, bending
-from .descent import curved_ray
+from .descent import empty_path, trace_curved
 from .fan import Fan
 from .travel_time import log_slowness
 
@@ -88,46 +88,28 @@ def _followed(
 ) -> tuple[Floats, Floats]:
     """Relative spreading, and speed at the source over that at the receiver."""
     fan = Fan.checked(tof, spacing, receivers, source, "curved")
-    return _tubes(
-        fan.receivers,
-        fan.source,
-        fan.tof,
-        fan.gradient,
-        fan.shape,
-        fan.strides,
-        log_slowness(fan, speed, spacing),
-        fan.room,
-    )
+    return _tubes(fan, log_slowness(fan, speed, spacing))
 
 
 @kernel
-def _tubes(
-    receivers: Floats,
-    source: Floats,
-    tof: Floats,
-    gradient: Floats,
-    shape: tuple[int, ...],
-    strides: tuple[int, ...],
-    spline: Floats,
-    room: int,
-) -> tuple[Floats, Floats]:
-    axes = len(shape)
-    path = np.empty((room, axes))
-    scratch = np.empty((3, axes))
-    space = bending(room, shape)
-    relative = np.ones(len(receivers))
-    ends = np.ones(len(receivers))
-    for k in range(len(receivers)):
+def _tubes(fan: Fan, spline: Floats) -> tuple[Floats, Floats]:
+    path, scratch = empty_path(fan)
+    rays = len(fan.receivers)
+    space = bending(len(path), fan.shape)
+    relative = np.ones(rays)
+    ends = np.ones(rays)
+    for k in range(rays):
         square = 0.0
-        for a in range(axes):
-            square += (receivers[k, a] - source[a]) ** 2
+        for a in range(len(fan.shape)):
+            square += (fan.receivers[k, a] - fan.source[a]) ** 2
         if square == 0.0:
             continue
-        count = curved_ray(receivers[k], source, tof, gradient, shape, strides, STRIDE, path, scratch)
-        _, count = bend(path, count, spline, shape, space)
+        count = trace_curved(fan, k, STRIDE, path, scratch)
+        _, count = bend(path, count, spline, fan.shape, space)
         start = space.slowness[count - 1]
         ends[k] = space.slowness[0] / start
-        if axes == 2:
+        # The compiler prunes the other branch by the number of dimensions of an argument.
+        if spline.ndim == 2:
             relative[k] = _width(path, count, start, spline) / math.sqrt(square)
         else:
             relative[k] = _area(path, count, start, spline) / square

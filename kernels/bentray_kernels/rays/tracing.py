@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
-from .descent import STEP, curved_ray, straight_ray
+from .descent import STEP, empty_path, trace_ray
 from .fan import Fan, Kind
 
 
@@ -33,35 +33,20 @@ def trace(
         InvalidInput: naming the argument: shapes, travel times that are not finite, points outside the grid.
     """
     fan = Fan.checked(tof, spacing, receivers, source, kind)
-    points, counts = _all(
-        fan.receivers, fan.source, fan.tof, fan.gradient, fan.shape, fan.strides, fan.curved, fan.room
-    )
+    points, counts = _trace_all(fan)
     return np.split(points * spacing, np.cumsum(counts)[:-1]) if len(counts) else []
 
 
 @kernel
-def _all(
-    receivers: Floats,
-    source: Floats,
-    tof: Floats,
-    gradient: Floats,
-    shape: tuple[int, ...],
-    strides: tuple[int, ...],
-    curved: bool,
-    room: int,
-) -> tuple[Floats, Ints]:
-    """Points of all paths one after the other, (points, ndim), nodes, and how many each path has."""
-    axes = len(shape)
-    path = np.empty((room, axes))
-    scratch = np.empty((3, axes))
-    counts = np.empty(len(receivers), np.int64)
-    points = np.empty((len(receivers) * max(16, sum(shape) // 2), axes))
+def _trace_all(fan: Fan) -> tuple[Floats, Ints]:
+    """Points of all paths one after the other, (points, ndim), nodes, and the length of each path."""
+    path, scratch = empty_path(fan)
+    rays, axes = fan.receivers.shape
+    counts = np.empty(rays, np.int64)
+    points = np.empty((rays * max(16, sum(fan.shape) // 2), axes))
     filled = 0
-    for k in range(len(receivers)):
-        if curved:
-            count = curved_ray(receivers[k], source, tof, gradient, shape, strides, STEP, path, scratch)
-        else:
-            count = straight_ray(receivers[k], source, axes, path)
+    for k in range(rays):
+        count = trace_ray(fan, k, STEP, path, scratch)
         while filled + count > len(points):
             points = np.concatenate((points, np.empty_like(points)))
         points[filled : filled + count] = path[:count]

@@ -11,7 +11,7 @@ from ..eikonal.problem import Medium
 from ..errors import InvalidInput
 from ..splines import coefficients
 from .bending import STRIDE, bend, bending
-from .descent import curved_ray
+from .descent import empty_path, trace_curved
 from .fan import Fan
 
 
@@ -40,17 +40,7 @@ def travel_times(
         InvalidInput: as ``trace``, and for speeds that are not of the shape of ``tof``, finite and > 0.
     """
     fan = Fan.checked(tof, spacing, receivers, source, "curved")
-    times = _bent_times(
-        fan.receivers,
-        fan.source,
-        fan.tof,
-        fan.gradient,
-        fan.shape,
-        fan.strides,
-        log_slowness(fan, speed, spacing),
-        fan.room,
-    )
-    return np.asarray(times * spacing)
+    return np.asarray(_bent_times(fan, log_slowness(fan, speed, spacing)) * spacing)
 
 
 def log_slowness(fan: Fan, speed: ArrayLike, spacing: float) -> Floats:
@@ -65,21 +55,12 @@ def log_slowness(fan: Fan, speed: ArrayLike, spacing: float) -> Floats:
 
 
 @kernel
-def _bent_times(
-    receivers: Floats,
-    source: Floats,
-    tof: Floats,
-    gradient: Floats,
-    shape: tuple[int, ...],
-    strides: tuple[int, ...],
-    spline: Floats,
-    room: int,
-) -> Floats:
-    path = np.empty((room, len(shape)))
-    scratch = np.empty((3, len(shape)))
-    space = bending(room, shape)
-    times = np.empty(len(receivers))
-    for k in range(len(receivers)):
-        count = curved_ray(receivers[k], source, tof, gradient, shape, strides, STRIDE, path, scratch)
-        times[k], _ = bend(path, count, spline, shape, space)
+def _bent_times(fan: Fan, spline: Floats) -> Floats:
+    """Times for a spacing of 1, (k,)."""
+    path, scratch = empty_path(fan)
+    space = bending(len(path), fan.shape)
+    times = np.empty(len(fan.receivers))
+    for k in range(len(times)):
+        count = trace_curved(fan, k, STRIDE, path, scratch)
+        times[k], _ = bend(path, count, spline, fan.shape, space)
     return times

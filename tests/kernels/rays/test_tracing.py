@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels import eikonal, rays
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.rays.descent import squared_gradient
+from bentray_kernels.rays.fan import squared_gradient
 
 from ...opencl import methods
 

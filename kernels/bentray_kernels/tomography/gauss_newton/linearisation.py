@@ -13,7 +13,7 @@ from ...arrays import Floats, Ints
 from ...compiled import kernel
 from ...eikonal import solve
 from ...rays.bending import STRIDE, bend, bending
-from ...rays.descent import PARTS, curved_ray, merge, straight_ray, walk
+from ...rays.descent import PARTS, empty_path, list_entries, merge_entries, trace_ray
 from ...rays.fan import Fan, Kind
 from ...splines import coefficients
 from ..problem import Problem
@@ -122,15 +122,8 @@ def _trace(
             tof = solve(tof, problem.spacing, source, eikonal)
         fan = Fan.checked(tof, problem.spacing, receivers, source, rays)
         counts, columns, lengths, predicted = _rows(
-            fan.receivers,
-            fan.source,
-            fan.tof,
-            fan.gradient,
-            fan.shape,
-            fan.strides,
-            fan.curved,
+            fan,
             front > 0.0,
-            fan.room,
             inside.ravel(),
             spline,
         )
@@ -149,41 +142,28 @@ def _trace(
 
 @kernel
 def _rows(
-    receivers: Floats,
-    source: Floats,
-    tof: Floats,
-    gradient: Floats,
-    shape: tuple[int, ...],
-    strides: tuple[int, ...],
-    curved: bool,
-    smooth: bool,
-    room: int,
-    slowness: Floats,
-    spline: Floats,
+    fan: Fan, smooth: bool, slowness: Floats, spline: Floats
 ) -> tuple[Ints, NDArray[np.int32], NDArray[np.float32], Floats]:
     """Entries a ray, flat node and nodes of ray of each entry, and predicted times for a spacing of 1."""
-    axes = len(shape)
-    path = np.empty((room, axes))
-    scratch = np.empty((3, axes))
-    space = bending(room, shape)
-    nodes = np.empty((BENT_PARTS * room) << axes, np.int64)
-    weights = np.empty((BENT_PARTS * room) << axes)
-    total = np.zeros(tof.size)
-    counts = np.zeros(len(receivers), np.int64)
-    predicted = np.zeros(len(receivers))
-    capacity = max(16, len(receivers) * 4 * sum(shape))
+    path, scratch = empty_path(fan)
+    space = bending(len(path), fan.shape)
+    nodes = np.empty((BENT_PARTS * len(path)) << len(fan.shape), np.int64)
+    weights = np.empty(nodes.size)
+    total = np.zeros(fan.tof.size)
+    rays = len(fan.receivers)
+    counts = np.zeros(rays, np.int64)
+    predicted = np.zeros(rays)
+    capacity = max(16, rays * 4 * sum(fan.shape))
     columns = np.empty(capacity, np.int32)
     lengths = np.empty(capacity, np.float32)
     filled = 0
-    for row in range(len(receivers)):
-        if curved:
-            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, STRIDE, path, scratch)
-            predicted[row], count = bend(path, count, spline, shape, space)
-            entries = walk(path, count, shape, strides, BENT_PARTS, nodes, weights, scratch)
-        else:
-            count = straight_ray(receivers[row], source, axes, path)
-            entries = walk(path, count, shape, strides, PARTS, nodes, weights, scratch)
-        if smooth or not curved:
+    for row in range(rays):
+        count, parts = trace_ray(fan, row, STRIDE, path, scratch), PARTS
+        if fan.curved:
+            predicted[row], count = bend(path, count, spline, fan.shape, space)
+            parts = BENT_PARTS
+        entries = list_entries(fan, path, count, parts, nodes, weights, scratch)
+        if smooth or not fan.curved:
             # The spline is not that of the image.
             predicted[row] = 0.0
             for k in range(entries):
@@ -193,6 +173,6 @@ def _rows(
             lengths = np.concatenate((lengths, np.empty(capacity, np.float32)))
             capacity *= 2
         start = filled
-        filled = merge(nodes, weights, entries, total, columns, lengths, filled)
+        filled = merge_entries(nodes, weights, entries, total, columns, lengths, filled)
         counts[row] = filled - start
     return counts, columns[:filled].copy(), lengths[:filled].copy(), predicted

@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter
 from ...arrays import Flags, Floats, Ints
 from ...compiled import kernel
 from ...eikonal import solve
-from ...rays.descent import PARTS, STEP, curved_ray, straight_ray, walk
+from ...rays.descent import PARTS, STEP, empty_path, list_entries, trace_ray
 from ...rays.fan import Fan
 from ..problem import Problem
 from ..settings import Settings
@@ -105,18 +105,7 @@ def _traced(
             speed = propagation_speed(inside, problem.region[..., slab], settings, warm=sweep > 0)
             tof = solve(speed, problem.spacing, source, settings.front)
         fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays)
-        more, passed, residual = _back_project(
-            fan.receivers,
-            fan.source,
-            fan.tof,
-            fan.gradient,
-            fan.shape,
-            fan.strides,
-            fan.curved,
-            fan.room,
-            inside.ravel() * problem.spacing,
-            measured,
-        )
+        more, passed, residual = _back_project(fan, inside.ravel() * problem.spacing, measured)
         corrections[..., slab] += more.reshape(inside.shape)
         weights[..., slab] += passed.reshape(inside.shape)
         left.append(residual)
@@ -159,14 +148,7 @@ def _bounds(settings: Settings) -> tuple[float, float]:
 
 @kernel
 def _back_project(
-    receivers: Floats,
-    source: Floats,
-    tof: Floats,
-    gradient: Floats,
-    shape: tuple[int, ...],
-    strides: tuple[int, ...],
-    curved: bool,
-    room: int,
+    fan: Fan,
     crossing: Floats,
     measured: Floats,
 ) -> tuple[Floats, Floats, Floats]:
@@ -179,20 +161,15 @@ def _back_project(
     Returns:
         Σ c·w (s), Σ w (nodes of ray), both flat over the nodes, and measured − predicted, s.
     """
-    axes = len(shape)
-    path = np.empty((room, axes))
-    scratch = np.empty((3, axes))
-    nodes = np.empty((PARTS * room) << axes, np.int64)
-    lengths = np.empty((PARTS * room) << axes)
-    corrections = np.zeros(tof.size)
-    weights = np.zeros(tof.size)
-    residuals = np.empty(len(receivers))
-    for row in range(len(receivers)):
-        if curved:
-            count = curved_ray(receivers[row], source, tof, gradient, shape, strides, STEP, path, scratch)
-        else:
-            count = straight_ray(receivers[row], source, axes, path)
-        entries = walk(path, count, shape, strides, PARTS, nodes, lengths, scratch)
+    path, scratch = empty_path(fan)
+    nodes = np.empty((PARTS * len(path)) << len(fan.shape), np.int64)
+    lengths = np.empty(nodes.size)
+    corrections = np.zeros(fan.tof.size)
+    weights = np.zeros(fan.tof.size)
+    residuals = np.empty(len(measured))
+    for row in range(len(measured)):
+        count = trace_ray(fan, row, STEP, path, scratch)
+        entries = list_entries(fan, path, count, PARTS, nodes, lengths, scratch)
         predicted = 0.0
         length = 0.0
         for k in range(entries):
