@@ -1,10 +1,10 @@
 #!/bin/sh
-# Make a certificate authority and one certificate for scheduler, workers and clients:
+# Create a certificate authority and one certificate for scheduler, workers and clients:
 #   certificates.sh [--containers] FOLDER [DAYS]
 #
-# With --containers the account inside of a container can read them too: the folder alone keeps others out.
-# FOLDER/authority-key.pem signs further certificates: keep it off the cluster. Each machine gets the other
-# three files. Whoever holds them may run code on every worker.
+# With --containers the user inside a container can read them too; the mode of the folder excludes other users.
+# FOLDER/authority-key.pem signs further certificates: keep it off the cluster. Each machine needs the other
+# three files. The owner of these files can run code on every worker.
 set -eu
 containers=
 if [ "${1:-}" = --containers ]; then
@@ -17,7 +17,7 @@ umask 077
 mkdir -p "$folder"
 cd "$folder"
 if [ -e authority-key.pem ]; then
-  echo "certificates.sh: $folder has an authority already; remove it to begin anew" >&2
+  echo "certificates.sh: $folder has an authority already; remove it to start again" >&2
   exit 1
 fi
 openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days "$days" -subj "/CN=Bentray authority" \
@@ -32,4 +32,4 @@ if [ -n "$containers" ]; then
   chmod 700 .
   chmod 444 authority.pem certificate.pem key.pem
 fi
-echo "$folder: authority.pem, certificate.pem and key.pem for every machine; keep authority-key.pem to yourself"
+echo "$folder: authority.pem, certificate.pem and key.pem for every machine; keep authority-key.pem private"

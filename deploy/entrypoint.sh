@@ -1,5 +1,5 @@
 #!/bin/sh
-# Start of every container: lay the kernels that were compiled with the image where numba looks, then the command.
+# Entry point of every container: copy the compiled kernels of the image to numba's cache, then run the command.
 set -eu
 compiled=${BENTRAY_COMPILED:-/app/compiled}
 if [ -d "$compiled" ] && [ -z "$(ls -A "$NUMBA_CACHE_DIR")" ]; then

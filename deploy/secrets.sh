@@ -1,8 +1,8 @@
 #!/bin/sh
-# Make the password of the database and the first API key once, in deploy/secrets/, which git ignores.
+# Create the database password and the first API key once, in deploy/secrets/ (ignored by git).
 set -eu
 folder=${1:-$(dirname "$0")/secrets}
-# Closed to others by the folder: in the containers the files belong to whoever made them, and two accounts read them.
+# The mode of the folder excludes other users. In the containers two users read the files, so the files are readable.
 umask 077
 mkdir -p "$folder"
 
@@ -12,7 +12,7 @@ random() {
 
 keep() {
   if [ -e "$folder/$1" ]; then
-    echo "secrets.sh: $folder/$1 is there already and stays" >&2
+    echo "secrets.sh: $folder/$1 already exists and is kept" >&2
     return
   fi
   printf '%s' "$2" > "$folder/$1"

@@ -1,14 +1,14 @@
 #!/bin/sh
-# Remove from the image's libraries what nothing runs there: trim.sh SITE_PACKAGES
+# Remove unused files from the libraries of the image: trim.sh SITE_PACKAGES
 set -eu
 cd "${1:?usage: trim.sh SITE_PACKAGES}"
 find . -type d \( -name tests -o -name test \) -prune -exec rm -rf {} +
-# Sources and headers for compilers, but for those with which PoCL compiles kernels.
+# Sources and headers for compilers, except those that PoCL needs to compile kernels.
 find . \( -path ./pyopencl -o -path ./pocl_binary_distribution \) -prune -o -type f \( -name '*.c' -o -name '*.cpp' \
   -o -name '*.h' -o -name '*.hpp' -o -name '*.pyx' -o -name '*.pxd' -o -name '*.a' \) -exec rm -f {} +
-# Symbols for debuggers. It is eu-strip, as strip breaks libraries that were edited after they were linked (PoCL, NumPy).
+# Debug symbols. strip would break libraries that were edited after linking (PoCL, NumPy); eu-strip does not.
 find . -type f \( -name '*.so' -o -name '*.so.*' \) -exec eu-strip {} +
-# Of botocore's descriptions of Amazon's services: a bucket's, and those of signing in to one.
+# botocore's descriptions of AWS services, except S3 and the sign-in services.
 for service in botocore/data/*/; do
   case ${service#botocore/data/} in
     s3/ | sts/ | sso/ | sso-oidc/ | signin/) ;;

@@ -1,4 +1,4 @@
-"""How Sphinx builds the documentation: `make docs` calls it, with warnings as errors."""
+"""Sphinx configuration of the documentation; `make docs` treats warnings as errors."""
 
 from __future__ import annotations
 

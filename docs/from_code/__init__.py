@@ -1,4 +1,4 @@
-"""A Sphinx extension: fills the reference pages with what the code itself says."""
+"""Sphinx extension: generates tables of the reference pages from the code."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ from typing import Any
 
 from .command_line import commands
 from .dispersion import dispersion
-from .rest import addresses, records
+from .rest import records, routes
 from .scan_limits import scan_limits
 from .service_settings import settings_table
 
-# A page asks for one of these by a comment on a line of its own: <!-- from the code: commands -->
+# A page includes one of these by a comment on its own line: <!-- from the code: commands -->
 PARTS: dict[str, Callable[[], str]] = {
     "commands": commands,
-    "addresses": addresses,
+    "routes": routes,
     "records": records,
     "dispersion": dispersion,
     "scan limits": scan_limits,
     "service settings": settings_table,
 }
-# Between bars a docstring has an absolute value, reStructuredText a substitution.
+# Docstrings write absolute values between bars, which reStructuredText reads as substitutions.
 BARS = re.compile(r"``[^`]*``|\|")
-ASKED = re.compile(r"^<!-- from the code: ([a-z ]+) -->$", re.MULTILINE)
+MARK = re.compile(r"^<!-- from the code: ([a-z ]+) -->$", re.MULTILINE)
 
 
 def filled(text: str) -> str:
-    """The text of a page with every part that it asks for.
+    """The text of a page with every mark replaced by its generated part.
 
     Raises:
-        KeyError: for a part that is not there.
+        KeyError: for an unknown part.
     """
-    return ASKED.sub(lambda asked: PARTS[asked[1]](), text)
+    return MARK.sub(lambda mark: PARTS[mark[1]](), text)
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Let Sphinx fill the pages as it reads them, and leave bars in docstrings as they are."""
+    """Register the extension: fill pages when they are read, and escape bars in docstrings."""
 
     def fill(app: Any, page: str, source: list[str]) -> None:
         source[0] = filled(source[0])

@@ -1,4 +1,4 @@
-"""The commands of `bentray` with their options, as its `--help` tells them."""
+"""The commands of `bentray` with their options, from the `--help` texts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .tables import table
 
 
 def commands() -> str:
-    """One section a command, in the order of `bentray --help`."""
+    """One section per command, in the order of `bentray --help`."""
     known = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     return "\n\n".join(_section(name, command) for name, command in known.items())
 
@@ -33,7 +33,7 @@ def _section(name: str, command: Any) -> str:
 
 
 def _prose(text: str) -> str:
-    """The help without its marks for the terminal; examples as blocks."""
+    """The help text without terminal markup; examples as code blocks."""
     paragraphs = []
     for paragraph in inspect.cleandoc(text).replace("\b", "").replace("\f", "").split("\n\n"):
         words = " ".join(paragraph.split())
@@ -70,5 +70,5 @@ def _default(param: Any, context: Any) -> str:
 
 
 def _plain(text: str) -> str:
-    """Angle brackets and stars as themselves."""
+    """Text with escaped angle brackets, stars and underscores."""
     return text.replace("<", "&lt;").replace("*", "\\*").replace("_", "\\_")

@@ -1,4 +1,4 @@
-"""The error of the phase that the wave simulator makes, by the nodes in a wave, as a table."""
+"""Table of the numerical dispersion of the wave simulator, by nodes per wavelength."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from bentray_kernels.wave.stencil import longest_step, phase_error
 from .tables import table
 
 POINTS = (2.5, 3.0, 4.0, 4.5, 5.0, 6.0, 7.0, 11.0)
-# Heads with the order in space and the time step, part of the longest stable one.
+# Column title: order in space, and time step as a fraction of the longest stable one.
 COLUMNS = {
-    "space alone, order 6": (6, 0.0),
-    "space alone, order 8": (8, 0.0),
+    "space only, order 6": (6, 0.0),
+    "space only, order 8": (8, 0.0),
     "order 6, half the longest step": (6, 0.5),
     "order 8, half the longest step": (8, 0.5),
     "order 8, the longest step": (8, 1.0),
@@ -18,20 +18,20 @@ COLUMNS = {
 
 
 def dispersion() -> str:
-    """Degrees that a wave is ahead after a path of ten wavelengths along a grid line."""
+    """Phase advance in degrees after ten wavelengths along a grid line."""
     rows = [
         (f"{points:g}", *(f"{ahead(points, *how):+.1f}" for how in COLUMNS.values())) for points in POINTS
     ]
-    return table(("nodes in a wave", *COLUMNS), rows)
+    return table(("nodes per wavelength", *COLUMNS), rows)
 
 
 def ahead(points: float, order: int, part: float) -> float:
-    """Degrees after ten wavelengths.
+    """Phase advance, degrees.
 
     Args:
-        points: nodes in a wave.
-        order: in space.
-        part: of the longest stable time step; 0: what space alone does.
+        points: nodes per wavelength.
+        order: order in space.
+        part: fraction of the longest stable time step; 0: without time discretisation.
     """
     # With nodes 1 m apart and a speed of 1 m/s the Courant number is the time step.
     courant = part * longest_step(1.0, 1.0)

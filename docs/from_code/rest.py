@@ -1,4 +1,4 @@
-"""The addresses and records of the REST interface, from its OpenAPI description."""
+"""The routes and records of the REST API, from its OpenAPI description."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ Node = dict[str, Any]
 
 @functools.cache
 def document() -> Node:
-    """What `/openapi.json` answers."""
+    """The content of `/openapi.json`."""
     with tempfile.TemporaryDirectory() as folder:
         return dict(create_app(ServiceSettings(data_dir=Path(folder))).openapi())
 
 
-def addresses() -> str:
-    """One section an address and method, in the order of the description."""
+def routes() -> str:
+    """One section per route and method, in the order of the description."""
     return "\n\n".join(
-        _address(method, path, operation)
+        _route(method, path, operation)
         for path, methods in document()["paths"].items()
         for method, operation in methods.items()
     )
 
 
 def records() -> str:
-    """One section a schema: its fields, their types and meanings."""
+    """One section per schema: its fields, types and meanings."""
     schemas = document()["components"]["schemas"]
     return "\n\n".join(_record(name, schemas[name]) for name in sorted(schemas))
 
 
-def _address(method: str, path: str, operation: Node) -> str:
+def _route(method: str, path: str, operation: Node) -> str:
     parts = [f"### {method.upper()} {path}", _plain(operation.get("description", ""))]
     if given := operation.get("parameters"):
         rows = [
@@ -49,11 +49,11 @@ def _address(method: str, path: str, operation: Node) -> str:
     if body := operation.get("requestBody"):
         kinds = [f"{_type(content['schema'])} as `{media}`" for media, content in body["content"].items()]
         parts.append("Body: " + "; ".join(kinds) + ".")
-    parts.append("Answers: " + ", ".join(_answers(operation["responses"])) + ".")
+    parts.append("Responses: " + ", ".join(_responses(operation["responses"])) + ".")
     return "\n\n".join(part for part in parts if part)
 
 
-def _answers(responses: Node) -> list[str]:
+def _responses(responses: Node) -> list[str]:
     found = []
     for code, answer in responses.items():
         if code == "default":
@@ -87,5 +87,5 @@ def _type(schema: Node) -> str:
 
 
 def _plain(text: str) -> str:
-    """Angle brackets and stars as themselves; newlines are spaces."""
+    """Text on one line with escaped angle brackets and stars."""
     return " ".join(text.replace("<", "&lt;").replace("*", "\\*").split())

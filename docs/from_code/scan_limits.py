@@ -1,4 +1,4 @@
-"""The limits of a scan's counts and numbers as a table."""
+"""Table of the limits of scan files."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ MEANING = {
     "EMISSIONS": "emissions of a slice",
     "RECEIVERS": "receivers of an emission",
     "SLICES": "slices",
-    "PAIRS": "pairs of emission and receiver, of all slices together",
+    "PAIRS": "pairs of emission and receiver, in all slices",
     "SAMPLES": "samples of a trace",
     "NODES": "nodes of a region of interest or of the truth",
     "SPEED_MPS": "speed of the coupling medium",
     "TRUE_SPEED_MPS": "speed in the truth of a phantom",
-    "WIDTH_M": "from one end of the array to the other",
+    "WIDTH_M": "width of the array",
     "RADIUS_M": "radius of a ring",
     "PLACE_M": "coordinate of an element",
     "SPACING_M": "node spacing",
@@ -28,13 +28,13 @@ MEANING = {
     "ATTENUATION_NP_M": "attenuation",
     "LOG_RATIO_NP": "logarithm of an amplitude ratio",
     "TEMPERATURE_C": "temperature of the water",
-    "SCALE": "scale of the traces, its size",
+    "SCALE": "absolute scale of the traces",
     "PRESSURE": "sample of a trace times its scale",
 }
 
 
 def scan_limits() -> str:
-    """What is limited and between which bounds, for every ``Range`` of ``bentray_kernels.limits``."""
+    """Quantity and accepted range, for every ``Range`` of ``bentray_kernels.limits``."""
     found = {name: value for name, value in vars(limits).items() if isinstance(value, Range)}
     rows = [(MEANING[name], within.words.removeprefix("a number ")) for name, within in found.items()]
     return table(("what", "accepted"), rows)

@@ -1,4 +1,4 @@
-"""The settings of the service as a table of environment variables."""
+"""Table of the environment variables of the service."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Markdown tables whose cells may hold anything."""
+"""Markdown tables with escaped cells."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table with one line a row; a bar in a cell is told from one between cells."""
+    """A table with one line per row; bars in cells are escaped."""
     lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
     lines += ["| " + " | ".join(map(_cell, row)) + " |" for row in rows]
     return "\n".join(lines)
