@@ -1,6 +1,6 @@
-"""Make the pictures of the documentation anew: `.venv/bin/python docs/pictures.py [NAME …]`, a few minutes.
+"""Generate the pictures of the documentation: `.venv/bin/python docs/pictures.py [NAME …]`, a few minutes.
 
-`demo.png` is that of `make demo`. That of the page needs Debian's Chromium.
+`make demo` makes `demo.png`. The pictures of the web page need Debian's Chromium.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ MM = 1e3
 
 
 def fronts() -> Image.Image:
-    """The speed of the phantom with wave fronts and rays: in its fat's water, and in a faster one."""
+    """Phantom with wave fronts and rays, in water of the speed of its fat and in faster water."""
     figure, axes = plt.subplots(1, 2, figsize=(10, 4.9), layout="constrained")
     nodes, half = 256, TABLE6_SIDE_M / 2
     spacing = TABLE6_SIDE_M / (nodes - 1)
@@ -63,7 +63,7 @@ def fronts() -> Image.Image:
 
 
 def coupling() -> Image.Image:
-    """The phantom in water of four speeds, and its images by straight and by bent rays."""
+    """Phantom in water of four speeds, with its images by straight and bent rays."""
     waters = (1375.0, 1425.0, 1475.0, 1500.0)
     figure, axes = plt.subplots(3, 4, figsize=(10, 7.8), layout="constrained")
     ways = {"straight rays": Settings(rays="straight", nodes=96), "bent rays": Settings(nodes=96)}
@@ -110,7 +110,7 @@ def glass() -> Image.Image:
 
 
 def mesh() -> Image.Image:
-    """A torus as glass, as a mirror, and laid out on a square."""
+    """A torus as glass and as a mirror, and its geometry image."""
     with tempfile.TemporaryDirectory() as folder:
         torus, made = Path(folder) / "torus.ply", Path(folder) / "made"
         shape = trimesh.creation.torus(1.0, 0.4, major_sections=96, minor_sections=48)
@@ -125,7 +125,7 @@ def mesh() -> Image.Image:
 
 
 def overview() -> Image.Image:
-    """The page of the service beside the truth and what straight and bent rays make of it."""
+    """The web page beside the truth and the images by straight and bent rays."""
     scan = simulate(None, SimulationSettings(nodes=128, elements=256, coupling_mps=1375.0), lambda _: None)
     assert scan.truth is not None
     straight, bent = (reconstruct(scan, Settings(rays=rays)) for rays in ("straight", "curved"))
@@ -152,7 +152,7 @@ def viewer(
     settings: Mapping[str, Any] = MappingProxyType({"nodes": 96}),
     size: tuple[int, int] = (1100, 560),
 ) -> Image.Image:
-    """The page of a service with one job that is done."""
+    """The web page with one finished job."""
     from playwright.sync_api import sync_playwright
 
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
@@ -188,7 +188,7 @@ def _opened(path: Path) -> Image.Image:
 
 
 def _beside(images: list[Image.Image]) -> Image.Image:
-    """Pictures of one height in a row."""
+    """Pictures of equal height in a row."""
     row = Image.new("RGB", (sum(one.width for one in images), images[0].height))
     left = 0
     for one in images:
@@ -210,7 +210,7 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
 
 
 def main(names: list[str]) -> None:
-    """Make those named, or all."""
+    """Generate the named pictures, or all."""
     FOLDER.mkdir(exist_ok=True)
     for name in names or PICTURES:
         buffer = io.BytesIO()
