@@ -9,7 +9,6 @@ import numpy as np
 
 from bentray_kernels.acquisition import Dataset, Truth, Waveform
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
-from bentray_kernels.wave.absorption import Absorbing, simulate_absorbed
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
 from bentray_service.cli.output.terminal import Step
@@ -21,6 +20,8 @@ from bentray_workers.simulation.waves import (
     SAMPLES_A_PERIOD,
     WaveSimulationSettings,
 )
+
+from ._absorption import Absorbing, simulate_absorbed
 
 # Loss grows as the frequency. Table 6 names none: at this one its gland, 50 Np/m, is as gland is, which
 # loses 0.87 dB/cm at 1 MHz.

@@ -9,15 +9,16 @@ import numpy as np
 
 from bentray_kernels.geometry_field.image.geometry_image import GeometryImage
 from bentray_kernels.geometry_field.tables.accurate_lookup import STEPS, find
+from bentray_kernels.geometry_field.tables.agreement import agreement
 from bentray_kernels.geometry_field.tables.cube import samples
-from bentray_kernels.geometry_field.tables.linear_lookup import agreement, find_linear
 from bentray_kernels.geometry_field.tables.outer_field import OuterField
-from bentray_kernels.geometry_field.tables.plane_lookup import PlaneTable, find_by_plane, plane_table
-from bentray_kernels.geometry_field.tables.reference_lookup import linear_uv, nearest_uv, uv_table
 from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import Surface, surface_of
 
 from ._field_rays import built, in_rows
+from ._linear_lookup import find_linear
+from ._plane_lookup import PlaneTable, find_by_plane, plane_table
+from ._reference_lookup import linear_uv, nearest_uv, uv_table
 
 # Samples along an edge of the cube, as the dissertation has them, and pixels of the geometry image.
 SAMPLES, PIXELS = 24, 512

@@ -29,10 +29,13 @@ def digest(module: str) -> str:
     """Hex digest for a module of this package, as ``bentray_kernels.rays.descent``.
 
     An edit elsewhere in the package leaves it as it is, and so does one of comments and docstrings. A module
-    of somebody else may use all of the package.
+    outside the package, as of a benchmark, may use all of the package and of its own folder.
     """
     package, *parts = module.split(".")
-    reached = _reached(*_located(ROOT, parts)) if package == ROOT.name else set(ROOT.rglob("*.py"))
+    if package == ROOT.name:
+        reached = _reached(*_located(ROOT, parts))
+    else:
+        reached = {*ROOT.rglob("*.py"), *_folder(module).glob("*.py")}
     found, memory = hashlib.sha256(), _memory()
     known = len(memory)
     for path in sorted(reached):
@@ -40,6 +43,11 @@ def digest(module: str) -> str:
     if len(memory) > known:
         _keep(memory)
     return found.hexdigest()
+
+
+def _folder(module: str) -> Path:
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return Path(file).parent if file else ROOT
 
 
 def _syntax(path: Path, memory: dict[str, str]) -> str:

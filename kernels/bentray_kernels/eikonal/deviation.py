@@ -18,11 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
 from ..compiled import kernel
-from ..errors import InvalidInput
 from .diagonals import FIRST, Diagonals, move, turn
-from .problem import PointSource
 
 Singles = NDArray[np.float32]
 
@@ -80,30 +77,6 @@ def sheets(shape: tuple[int, ...]) -> Sheets:
     grid = Diagonals.of(shape)
     later, slope_j, slope_k, crossing = np.full((4, 2, grid.size), UNKNOWN, np.float32)
     return Sheets(later, slope_j, slope_k, crossing, grid.shape, grid.stored)
-
-
-def factored_sweeping(problem: PointSource) -> Floats:
-    """Travel time by the deviation.
-
-    Args:
-        problem: the checked problem.
-
-    Returns:
-        (nx, ny), s.
-
-    Raises:
-        InvalidInput: for a grid of three axes.
-    """
-    slowness = problem.slowness
-    if slowness.ndim != 2 or min(slowness.shape) < 2:
-        raise InvalidInput("speed", f"shape {slowness.shape}", "a 2-D array of at least 2 by 2 nodes")
-    at_source = problem.source_slowness()
-    into = np.empty(slowness.size, np.float32)
-    j, k = problem.source / problem.spacing
-    deviate((slowness / at_source).astype(np.float32).ravel(), j, k, sheets(slowness.shape), into)
-    x, y = (np.arange(n) for n in slowness.shape)
-    distance = np.hypot(x[:, None] - j, y[None, :] - k)
-    return np.asarray((distance + into.reshape(slowness.shape)) * at_source * problem.spacing)
 
 
 @kernel

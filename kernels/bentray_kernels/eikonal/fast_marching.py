@@ -5,31 +5,27 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
 from .heap import DONE, FAR, Nodes, change, enter, take
 from .problem import PointSource
-from .stopping import awaited, passed
 from .updates import TIE, factored_update, plain_update
 
 
-def fast_marching(problem: PointSource, *, order: int = 2, stop_at: ArrayLike | None = None) -> Floats:
+def fast_marching(problem: PointSource, *, order: int = 2) -> Floats:
     """Travel time by one pass in order of arrival, O(N log N).
 
     Args:
         problem: the checked problem.
         order: 1 or 2; second order falls back to first where a second neighbour is not upwind.
-        stop_at: (k, ndim), m; the march ends when it has the times and gradients at these points.
 
     Returns:
-        (nx, ny[, nz]), s; infinite where a march that was to stop did not come. The source's singularity
-        limits the accuracy near it; see ``hafmm``.
+        (nx, ny[, nz]), s. The source's singularity limits the accuracy near it; see ``hafmm``.
 
     Raises:
-        InvalidInput: for another order, or points that are not in the grid.
+        InvalidInput: for another order.
     """
     if order not in (1, 2):
         raise InvalidInput("order", order, "1 or 2")
@@ -42,12 +38,11 @@ def fast_marching(problem: PointSource, *, order: int = 2, stop_at: ArrayLike | 
         seeds,
         times,
         order == 2,
-        awaited(problem, stop_at),
     )
     return problem.interior(time)
 
 
-def high_accuracy_fast_marching(problem: PointSource, *, stop_at: ArrayLike | None = None) -> Floats:
+def high_accuracy_fast_marching(problem: PointSource) -> Floats:
     """Second-order fast marching that is accurate at the source too (HAFMM, chapter 6.2.2).
 
     The dissertation starts the second-order scheme from exact times around the source. Here the
@@ -55,13 +50,9 @@ def high_accuracy_fast_marching(problem: PointSource, *, stop_at: ArrayLike | No
 
     Args:
         problem: the checked problem.
-        stop_at: as for ``fast_marching``.
 
     Returns:
-        (nx, ny[, nz]), s; infinite where a march that was to stop did not come.
-
-    Raises:
-        InvalidInput: for points that are not in the grid.
+        (nx, ny[, nz]), s.
     """
     seeds, times = problem.seeds()
     time = _march_factored(
@@ -74,7 +65,6 @@ def high_accuracy_fast_marching(problem: PointSource, *, stop_at: ArrayLike | No
         problem.least_factor(),
         seeds,
         times,
-        awaited(problem, stop_at),
     )
     return problem.interior(time)
 
@@ -88,7 +78,6 @@ def _march(
     seeds: Ints,
     seed_times: Floats,
     second_order: bool,
-    goals: Ints,
 ) -> Floats:
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
@@ -97,7 +86,6 @@ def _march(
     keys = np.empty(slowness.size)
     group = np.empty(slowness.size, np.int32)
     length = 0
-    reached = 0
     for k in range(seeds.size):
         length = enter(heap, keys, place, length, seeds[k], seed_times[k])
     while length > 0:
@@ -109,9 +97,6 @@ def _march(
             members += 1
             settled[heap[0]] = keys[0]
             length = take(heap, keys, place, length)
-        reached = passed(goals, place, reached)
-        if 0 < goals.size == reached:
-            break
         for k in range(members):
             node = group[k]
             for axis in range(3):
@@ -139,7 +124,6 @@ def _march_factored(
     least: float,
     seeds: Ints,
     seed_times: Floats,
-    goals: Ints,
 ) -> Floats:
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
@@ -149,7 +133,6 @@ def _march_factored(
     keys = np.empty(slowness.size)
     group = np.empty(slowness.size, np.int32)
     length = 0
-    reached = 0
     # No difference is better than the straight lines from the source: the seeds' times are final.
     members = seeds.size
     for k in range(members):
@@ -171,9 +154,6 @@ def _march_factored(
                         neighbour, steps, spacing, slowness, squares, tau, settled, limit, least
                     )
                     length = change(heap, keys, place, length, neighbour, trial)
-        reached = passed(goals, place, reached)
-        if 0 < goals.size == reached:
-            break
         # Nodes that tie are accepted together, or the second differences would depend on their order.
         latest = keys[0] * (1.0 + TIE)
         members = 0

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
 from .heap import DONE, FAR, Nodes
 from .problem import PointSource
-from .stopping import awaited, passed
 from .untidy_queue import leave, wait
 from .updates import TIE, plain_update
 
@@ -20,24 +18,24 @@ from .updates import TIE, plain_update
 BUCKETS = 1 << 16
 
 
-def fast_marching_untidy(
-    problem: PointSource, *, order: int = 2, width: float = 0.01, stop_at: ArrayLike | None = None
-) -> Floats:
+def fast_marching_untidy(problem: PointSource, *, order: int = 2, width: float = 0.01) -> Floats:
     """As ``fast_marching``, but nodes within ``width`` of each other leave the queue together.
 
     Args:
         problem: the checked problem.
         order: 1 or 2.
         width: bucket width as a part of the smallest crossing time, spacing times lowest slowness.
-        stop_at: as for ``fast_marching``.
 
     Returns:
-        (nx, ny[, nz]), s; infinite where a march that was to stop did not come. At order 1 between the
-        time T of ``fast_marching`` and T·(1 + bound), the bound being that of ``untidy_error_bound``.
+        (nx, ny[, nz]), s. At order 1 between the time T of ``fast_marching`` and T·(1 + δ·√ndim/f), with the
+        bucket width δ and the smallest crossing time f. A node that leaves too early misses neighbours at
+        most one bucket earlier, so its time is at most δ above its own update. The update grows with the
+        crossing time at a rate of at least 1/√ndim: the time is no later than the exact one in a medium
+        slower by this factor. At order 2, where an early node also changes between second- and first-order
+        differences, the bound holds in smooth media.
 
     Raises:
-        InvalidInput: for another order, a width that is not above 0 and at most 1, or points that are not
-            in the grid.
+        InvalidInput: for another order, or a width that is not above 0 and at most 1.
     """
     if order not in (1, 2):
         raise InvalidInput("order", order, "1 or 2")
@@ -57,27 +55,8 @@ def fast_marching_untidy(
         order == 2,
         bucket,
         buckets,
-        awaited(problem, stop_at),
     )
     return problem.interior(time)
-
-
-def untidy_error_bound(problem: PointSource, *, width: float = 0.01) -> float:
-    """By which part a first-order untidy time may be later than that of ``fast_marching``.
-
-    A node that leaves too early misses neighbours at most one bucket width δ earlier, so its time is at most
-    δ above its own update. The update grows with the crossing time f = spacing·slowness at a rate of at
-    least 1/√ndim: the untidy time is no later than the exact one in a medium slower by 1 + δ·√ndim/f, and
-    that is the exact time, longer by this factor. The least f bounds it everywhere.
-
-    At order 2 an early node also changes between second- and first-order differences. There the bound was met
-    in smooth media only.
-
-    Raises:
-        InvalidInput: for a width that is not above 0 and at most 1.
-    """
-    least = problem.spacing * float(problem.slowness.min())
-    return _bucket_width(problem, width) * math.sqrt(problem.slowness.ndim) / least
 
 
 def _bucket_width(problem: PointSource, width: float) -> float:
@@ -99,7 +78,6 @@ def _march(
     second_order: bool,
     width: float,
     buckets: int,
-    goals: Ints,
 ) -> Floats:
     # A constant 0 for the third of two axes lets the compiler drop its code.
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
@@ -109,7 +87,6 @@ def _march(
     links = np.zeros((slowness.size, 2), np.int32)
     group = np.empty(slowness.size, np.int32)
     waiting = 0
-    reached = 0
     for k in range(seeds.size):
         trials[seeds[k]] = seed_times[k]
         waiting += wait(heads, links, place, width, seeds[k], seed_times[k])
@@ -127,9 +104,6 @@ def _march(
             settled[node] = trials[node]
             latest = max(latest, trials[node])
         waiting -= members
-        reached = passed(goals, place, reached)
-        if 0 < goals.size == reached:
-            break
         for k in range(members):
             node = group[k]
             for axis in range(3):

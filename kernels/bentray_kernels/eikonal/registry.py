@@ -91,16 +91,14 @@ METHODS = (
             "factored second order in the order of a first-order sweep (default); option supersample",
         )
     )
-    .register(
-        Method("fmm", fast_marching, 2, False, "fast marching, binary heap; options order=1 or 2, stop_at")
-    )
+    .register(Method("fmm", fast_marching, 2, False, "fast marching, binary heap; options order=1 or 2"))
     .register(
         Method(
             "hafmm",
             high_accuracy_fast_marching,
             2,
             True,
-            "fast marching, factored second order; option stop_at",
+            "fast marching, factored second order",
         )
     )
     .register(
@@ -131,7 +129,7 @@ METHODS = (
             fast_marching_untidy,
             2,
             False,
-            "fast marching, O(N), error bounded; options order=1 or 2, width of a bucket, stop_at",
+            "fast marching, O(N), error bounded; options order=1 or 2, width of a bucket",
         )
     )
 )
@@ -152,10 +150,8 @@ def solve(
         spacing: node spacing, m, the same along every axis.
         source: (ndim,), m, anywhere in the grid; node 0 lies at 0.
         method: one of ``methods()``.
-        options: keyword options of that method. The marching methods take ``stop_at``, (k, ndim) m: they
-            end once time and gradient can be read there, and leave infinity elsewhere; rays need whole
-            fields. ``accurate`` takes
-            ``supersample``: 2 or more solves on a grid that many times as fine.
+        options: keyword options of that method. ``accurate`` takes ``supersample``: 2 or more solves on a
+            grid that many times as fine.
 
     Returns:
         (nx, ny[, nz]), s, float64.

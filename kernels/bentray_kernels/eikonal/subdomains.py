@@ -12,7 +12,6 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import InvalidInput
 from .fast_sweeping import Sweeper
-from .problem import PointSource
 
 # The sides of a block in the order of Faces: axis, and whether its high end.
 Side = tuple[int, bool]
@@ -59,7 +58,7 @@ def sweep_block(
     if times.shape != slowness.shape:
         raise InvalidInput("times", f"shape {times.shape}", f"the block's shape, {slowness.shape}")
     padded = np.pad(times, 1, constant_values=math.inf)
-    for number, (given, (axis, high)) in enumerate(zip(faces, _sides(times.ndim), strict=True)):
+    for number, (given, (axis, high)) in enumerate(zip(faces, sides(times.ndim), strict=True)):
         if given is None:
             continue
         expected = times.shape[:axis] + times.shape[axis + 1 :]
@@ -74,59 +73,12 @@ def sweep_block(
     )
     new = np.ascontiguousarray(padded[(slice(1, -1),) * times.ndim])
     changed = []
-    for side in _sides(times.ndim):
-        before, after = _face(times, side), _face(new, side)
+    for side in sides(times.ndim):
+        before, after = face_of(times, side), face_of(new, side)
         earlier = after < before
         drop = before[earlier] - after[earlier]
-        changed.append(bool((drop > tolerance * spacing * _face(slowness, side)[earlier]).any()))
-    return BlockSweep(new, tuple(_face(new, side).copy() for side in _sides(times.ndim)), tuple(changed))
-
-
-def solve_by_blocks(problem: PointSource, blocks: Sequence[int], *, tolerance: float = 1e-12) -> Floats:
-    """The driver that a scheduler of tasks follows: all waiting blocks at once, then the faces they sent.
-
-    Args:
-        problem: the checked problem.
-        blocks: number of blocks along each axis, from 1 to the nodes there.
-        tolerance: as for ``fast_sweeping``, for every block.
-
-    Returns:
-        (nx, ny[, nz]), s; equal to ``fast_sweeping`` of the whole to rounding.
-
-    Raises:
-        InvalidInput: for numbers of blocks that do not fit the grid.
-    """
-    shape = problem.slowness.shape
-    boxes = cut(shape, blocks)
-    start = np.full(problem.padded_slowness.size, math.inf)
-    seeds, times = problem.seeds()
-    start[seeds] = times
-    time = problem.interior(start)
-    held: dict[Place, list[Floats | None]] = {}
-    for place in boxes:
-        held[place] = [None for _ in _sides(len(shape))]
-    seeded = [place for place, box in boxes.items() if (time[box] < math.inf).any()]
-    waiting = set(seeded)
-    # Seeds at a face are news to the block beyond.
-    for place in seeded:
-        for side, beyond in neighbours(place, boxes):
-            held[beyond][opposite(side)] = _face(time[boxes[place]], _sides(len(shape))[side]).copy()
-            waiting.add(beyond)
-    while waiting:
-        sent = {
-            place: sweep_block(
-                problem.slowness[boxes[place]], time[boxes[place]], held[place], problem.spacing, tolerance
-            )
-            for place in sorted(waiting)
-        }
-        waiting = set()
-        for place, swept in sent.items():
-            time[boxes[place]] = swept.times
-            for side, beyond in neighbours(place, boxes):
-                if swept.changed[side]:
-                    held[beyond][opposite(side)] = swept.faces[side]
-                    waiting.add(beyond)
-    return time
+        changed.append(bool((drop > tolerance * spacing * face_of(slowness, side)[earlier]).any()))
+    return BlockSweep(new, tuple(face_of(new, side).copy() for side in sides(times.ndim)), tuple(changed))
 
 
 def cut(shape: tuple[int, ...], blocks: Sequence[int]) -> dict[Place, Box]:
@@ -144,7 +96,8 @@ def cut(shape: tuple[int, ...], blocks: Sequence[int]) -> dict[Place, Box]:
     }
 
 
-def _sides(axes: int) -> list[Side]:
+def sides(axes: int) -> list[Side]:
+    """The sides of a block in the order of ``Faces``."""
     return [(axis, high) for axis in range(axes) for high in (False, True)]
 
 
@@ -153,7 +106,8 @@ def opposite(side: int) -> int:
     return side ^ 1
 
 
-def _face(block: Floats, side: Side) -> Floats:
+def face_of(block: Floats, side: Side) -> Floats:
+    """The outermost nodes of a block on one side."""
     axis, high = side
     face: Floats = np.take(block, -1 if high else 0, axis)
     return face
@@ -162,7 +116,7 @@ def _face(block: Floats, side: Side) -> Floats:
 def neighbours(place: Place, boxes: Mapping[Place, Box]) -> list[tuple[int, Place]]:
     """Numbers of the sides that have a block beyond, and where it is."""
     found = []
-    for side, (axis, high) in enumerate(_sides(len(place))):
+    for side, (axis, high) in enumerate(sides(len(place))):
         beyond = (*place[:axis], place[axis] + (1 if high else -1), *place[axis + 1 :])
         if beyond in boxes:
             found.append((side, beyond))

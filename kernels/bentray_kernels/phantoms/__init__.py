@@ -2,7 +2,7 @@
 
 from .cube_fields import CubeField, eight_bit, in_nodes, sampled
 from .ellipses import Ellipse, EllipsePhantom
-from .fringe_sphere import ONE_HOLE, TWO_HOLES, DistanceSphere, FringeSphere
+from .fringe_sphere import ONE_HOLE, TWO_HOLES, FringeSphere
 from .marschner_lobb import MarschnerLobb
 from .solids import Dome, Ellipsoid
 from .table6 import TABLE6_SIDE_M, table6
@@ -17,7 +17,6 @@ __all__ = [
     "TABLE7_SIDE_M",
     "TWO_HOLES",
     "CubeField",
-    "DistanceSphere",
     "Dome",
     "Ellipse",
     "EllipsePhantom",

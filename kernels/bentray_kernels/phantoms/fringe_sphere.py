@@ -78,25 +78,3 @@ class FringeSphere:
 # Glass balls as in figures 18 and 19, with one and two holes.
 ONE_HOLE = FringeSphere(0.6, 0.06, (((0.0, 0.0, 0.0), 0.2),))
 TWO_HOLES = FringeSphere(0.6, 0.06, (((-0.28, 0.0, 0.0), 0.1), ((0.28, 0.0, 0.0), 0.1)))
-
-
-@dataclass(frozen=True)
-class DistanceSphere:
-    """The distance to a sphere about the cube's centre, above 0 inside: linear along each radius.
-
-    A ``CubeField`` whose iso-surface 0 is the sphere itself.
-
-    Attributes:
-        radius: in half edges of the cube.
-    """
-
-    radius: float = 0.7
-
-    def value(self, points: Floats) -> Floats:
-        """As ``CubeField.value``."""
-        return np.asarray(self.radius - np.linalg.norm(points, axis=-1))
-
-    def gradient(self, points: Floats) -> Floats:
-        """As ``CubeField.gradient``; NaN at the centre, where there is none."""
-        with np.errstate(invalid="ignore"):
-            return np.asarray(-points / np.linalg.norm(points, axis=-1, keepdims=True))

@@ -7,8 +7,10 @@ from hypothesis import strategies as st
 
 from bentray_kernels import eikonal
 from bentray_kernels.eikonal.problem import PointSource
-from bentray_kernels.eikonal.subdomains import solve_by_blocks, sweep_block
+from bentray_kernels.eikonal.subdomains import sweep_block
 from bentray_kernels.errors import InvalidInput
+
+from .blocks import solve_by_blocks
 
 GRIDS = st.sampled_from([((20, 17), (3, 2)), ((5, 6), (5, 3)), ((30, 4), (1, 4)), ((8, 9, 7), (2, 3, 2))])
 

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.phantoms import ONE_HOLE, TWO_HOLES, DistanceSphere, FringeSphere
+from bentray_kernels.phantoms import ONE_HOLE, TWO_HOLES, FringeSphere
 
-FIELDS = [FringeSphere(), ONE_HOLE, TWO_HOLES, DistanceSphere()]
+FIELDS = [FringeSphere(), ONE_HOLE, TWO_HOLES]
 
 
 @pytest.mark.parametrize("field", FIELDS)
@@ -38,12 +38,6 @@ def test_plateaus_are_1_in_glass_and_0_in_air():
 
 def test_a_gradient_on_a_plateau_is_0():
     assert FringeSphere(0.5, 0.1).gradient(np.zeros(3)).tolist() == [0.0, 0.0, 0.0]
-
-
-def test_the_distance_falls_outwards():
-    sphere = DistanceSphere(0.7)
-    assert sphere.value(np.array([[0.7, 0.0, 0.0], [0.0, 0.0, 0.2]])) == pytest.approx([0.0, 0.5])
-    assert sphere.gradient(np.array([0.0, 0.3, 0.0])) == pytest.approx([0.0, -1.0, 0.0])
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 from bentray_kernels import eikonal
 from bentray_kernels.eikonal.problem import PointSource
-from bentray_kernels.eikonal.subdomains import solve_by_blocks
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.reconstruction import subdomains
+
+from ...kernels.eikonal.blocks import solve_by_blocks
 
 GRIDS = st.sampled_from([((20, 17), (3, 2)), ((5, 6), (5, 3)), ((30, 4), (1, 4)), ((8, 9, 7), (2, 3, 2))])
 

@@ -94,8 +94,7 @@ def solve(
         tolerance: as for ``eikonal.fast_sweeping``, for every block.
 
     Returns:
-        (nx, ny[, nz]), s. Equal to ``eikonal.solve(..., "fsm")`` to 1e-12 of each time, and to the bit to
-        ``solve_by_blocks``, which does the same in one process.
+        (nx, ny[, nz]), s. Equal to ``eikonal.solve(..., "fsm")`` to 1e-12 of each time.
 
     Raises:
         InvalidInput: for a speed, source or number of blocks that does not fit.

@@ -8,9 +8,8 @@ Each face has n² samples at the middles of its squares. A sample (x, y) of face
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats
 from ...compiled import kernel
 from ...errors import InvalidInput
 from ...float32 import higher, lower, real, whole
@@ -56,30 +55,6 @@ def samples(n: int) -> Floats:
         places[:, face, :, first] = middle[None, :]
         places[:, face, :, second] = middle[:, None]
     return places.reshape(-1, 3)
-
-
-def numbers_of(points: ArrayLike, n: int) -> Ints:
-    """Numbers of the samples nearest to points of the cube's surface, on the face that each lies on.
-
-    Args:
-        points: (points, 3), edges of the cube.
-        n: samples along an edge.
-
-    Raises:
-        InvalidInput: as ``check_samples``, and for a point off the surface by more than 1e-6.
-    """
-    check_samples(n)
-    places = np.asarray(points, dtype=np.float64).reshape(-1, 3)
-    away = np.stack([np.abs(places), np.abs(1.0 - places)], axis=-1).reshape(-1, 6)
-    face = away.argmin(axis=1)
-    off = away.min(axis=1, initial=np.inf) > 1e-6
-    off |= (places < -1e-6).any(axis=1) | (places > 1.0 + 1e-6).any(axis=1)
-    if off.any():
-        raise InvalidInput("points", places[off][0].tolist(), "points of the unit cube's surface")
-    others = np.array([[1, 2], [0, 2], [0, 1]])[face // 2]
-    x, y = np.clip((np.take_along_axis(places, others, axis=1) * n).astype(np.int64), 0, n - 1).T
-    numbers: Ints = 6 * n * y + face * n + x
-    return numbers
 
 
 @kernel(inline="always")
@@ -139,21 +114,3 @@ def number_at(face: int, x: float, y: float, n: int) -> int:
     j = real(whole(lower(higher(y * count, zero), last)))
     number: int = whole(real(6.0) * count * j + i + real(face) * count)
     return number
-
-
-@kernel
-def number_lines(origins: NDArray[np.float32], directions: NDArray[np.float32], n: int, pairs: Ints) -> None:
-    """Numbers of the samples at which lines enter and leave the cube.
-
-    Args:
-        origins, directions: (3, rays) float32, one row an axis.
-        n: samples along an edge.
-        pairs: (2, rays), filled: entry, exit; −1 for lines that miss the cube.
-    """
-    for k in range(origins.shape[1]):
-        near, far, s, sx, sy, t, tx, ty = line_of(
-            origins[0, k], origins[1, k], origins[2, k], directions[0, k], directions[1, k], directions[2, k]
-        )
-        meets = near < far
-        pairs[0, k] = number_at(s, sx, sy, n) if meets else -1
-        pairs[1, k] = number_at(t, tx, ty, n) if meets else -1

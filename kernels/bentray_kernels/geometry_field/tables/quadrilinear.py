@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from ...compiled import kernel
 from ...float32 import higher, lower, real, whole
-from ...meshes.surface import Reals, Words
-from .accurate_lookup import NOTHING
-from .cube import line_of
+from ...meshes.surface import Reals
 
 # The entry with the lower samples; the way from there to the next sample in x₀, x₁, x₂, x₃.
 Corner = tuple[int, float, float, float, float]
@@ -35,30 +33,6 @@ def _between(x: float, n: int) -> tuple[float, float]:
     place = lower(higher(x * real(n) - real(0.5), real(0.0)), real(n - 1))
     before = real(whole(lower(place, real(n - 2))))
     return before, place - before
-
-
-@kernel(inline="always")
-def corners(
-    n: int, origins: Reals, directions: Reals, start: int, first: Words, ways: Reals, near: Reals, far: Reals
-) -> None:
-    """``corner_of`` the rays from ``start`` on, and their distances of entry and exit.
-
-    Args:
-        n: samples along an edge of the cube.
-        origins, directions: (3, rays) float32.
-        start: the first of the rays.
-        first: (block,), filled; ``NOTHING`` for rays that miss the cube.
-        ways: (4, at least block), filled.
-        near, far: (at least block,), filled.
-    """
-    for k in range(len(first)):
-        r = start + k
-        a, b, s, sx, sy, t, tx, ty = line_of(
-            origins[0, r], origins[1, r], origins[2, r], directions[0, r], directions[1, r], directions[2, r]
-        )
-        at, ways[0, k], ways[1, k], ways[2, k], ways[3, k] = corner_of(n, s, sx, sy, t, tx, ty)
-        first[k] = at if a < b else NOTHING
-        near[k], far[k] = a, b
 
 
 @kernel(inline="always")
@@ -88,14 +62,3 @@ def _lerp2(entries: Reals, n: int, at: int, a2: float, a3: float, channels: int,
     second = entries[above] + a2 * (entries[above + channels] - entries[above])
     mean: float = first + a3 * (second - first)
     return mean
-
-
-@kernel(inline="always")
-def nearest_of(n: int, corner: Corner) -> int:
-    """The entry with the largest weight."""
-    at, a0, a1, a2, a3 = corner
-    half = real(0.5)
-    exit_ = 6 * n * whole(a3 >= half) + whole(a2 >= half)
-    entry = 6 * n * whole(a1 >= half) + whole(a0 >= half)
-    nearest: int = at + entry * (6 * n * n) + exit_
-    return nearest

@@ -10,8 +10,8 @@ from ...meshes.face_plane import meet_plane
 from ...meshes.intersector import closest
 from ...meshes.surface import Words
 from ..tables.accurate_lookup import STEPS, settle
+from ..tables.agreement import AGREE
 from ..tables.cube import line_of, number_at
-from ..tables.linear_lookup import AGREE
 from ..tables.outer_field import beside
 from ..tables.quadrilinear import corner_of, lerp4
 from .packed_scene import World

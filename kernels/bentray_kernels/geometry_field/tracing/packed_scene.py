@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats, Ints
 from ...meshes.surface import Reals, Surface, Words
-from ..tables.linear_lookup import agreement
+from ..tables.agreement import agreement
 from .scene import Scene, Shape
 
 # Flags of an instance.
@@ -25,7 +25,7 @@ class World(NamedTuple):
         shapes: (shapes, 5): first node; samples of the outer field, 0 for none, and the place of its first
             entry; the same of the inner field.
         faces, fractions: all outer tables.
-        known: ``tables.linear_lookup.agreement`` of them.
+        known: ``tables.agreement.agreement`` of them.
         inner_faces: all inner tables.
         starts: (faces,) row of the inner table in which rays that leave a face are.
         to_local: (instances, 3, 4) from m to the unit cube.

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
+from benchmarks.acquisition._absorption import Absorbing, simulate_absorbed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.wave.absorption import Absorbing, simulate_absorbed
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
 from bentray_kernels.wave.stencil import longest_step
 
-from .test_simulation import WATER, pulse
+from ..kernels.wave.test_simulation import WATER, pulse
 
 CENTRE_HZ, STEP_S = 2e5, 2.5e-7
 SOURCE = np.array([0.008, 0.015])

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from benchmarks.geometry_field._linear_lookup import find_linear
 
-from bentray_kernels.geometry_field.tables.linear_lookup import (
-    AGREE,
-    APART,
-    MIXED,
-    NONE,
-    agreement,
-    find_linear,
-)
+from bentray_kernels.geometry_field.tables.agreement import agreement
 from bentray_kernels.meshes.surface import surface_of
 
-from ...meshes.test_intersector import first_faces
-from ..shapes import dented, field_of, octahedron, over_the_poles, turned
-from .test_accurate_lookup import rays_through_the_cube
+from ..kernels.geometry_field.shapes import dented, field_of, octahedron, over_the_poles, turned
+from ..kernels.geometry_field.tables.test_accurate_lookup import rays_through_the_cube
+from ..kernels.meshes.test_intersector import first_faces
 
 N = 12
 
@@ -26,24 +20,6 @@ def found(surface, field, origins, directions):
     o, d = np.float32(origins).T.copy(), np.float32(directions).T.copy()
     find_linear(surface, field, agreement(field), o, d, faces, distances)
     return faces, distances
-
-
-def test_agreement_is_that_of_the_sixteen():
-    field = field_of(surface_of(over_the_poles(dented(3))), 3)
-    known = agreement(field)
-    row, seen = 18, set()
-    for entry in range(36):
-        for exit_ in range(36):
-            if entry % 3 == 2 or exit_ % 3 == 2:
-                continue
-            at = np.ix_(entry + np.array([0, 1, row, row + 1]), exit_ + np.array([0, 1, row, row + 1]))
-            meets, places = field.faces[at] >= 0, field.fractions[at]
-            expected = NONE if not meets.any() else MIXED
-            if meets.all() and np.ptp(places) <= np.float32(APART / 3):
-                expected = AGREE
-            assert known[entry, exit_] == expected
-            seen.add(expected)
-    assert seen == {NONE, AGREE, MIXED}
 
 
 def test_places_err_less_than_a_tenth_of_a_sample():

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from benchmarks.geometry_field._plane_lookup import find_by_plane, plane_table
 
 from bentray_kernels.geometry_field.tables.cube import samples
-from bentray_kernels.geometry_field.tables.plane_lookup import find_by_plane, plane_table
 from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import surface_of
 
-from ...meshes.test_intersector import first_faces
-from ..shapes import ball, dented, field_of, over_the_poles, random_triangles
-from .test_accurate_lookup import rays_through_the_cube
+from ..kernels.geometry_field.shapes import ball, dented, field_of, over_the_poles, random_triangles
+from ..kernels.geometry_field.tables.test_accurate_lookup import rays_through_the_cube
+from ..kernels.meshes.test_intersector import first_faces
 
 
 def found(table, origins, directions):

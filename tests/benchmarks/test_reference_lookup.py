@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from benchmarks.geometry_field._reference_lookup import linear_uv, nearest_uv, uv_table
 
 from bentray_kernels.geometry_field.tables.cube import samples
-from bentray_kernels.geometry_field.tables.reference_lookup import linear_uv, nearest_uv, uv_table
 from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import surface_of
 
-from ...meshes.test_intersector import first_faces
-from ..shapes import field_of, octahedron, over_the_poles, turned
-from .test_accurate_lookup import rays_through_the_cube
+from ..kernels.geometry_field.shapes import field_of, octahedron, over_the_poles, turned
+from ..kernels.geometry_field.tables.test_accurate_lookup import rays_through_the_cube
+from ..kernels.meshes.test_intersector import first_faces
 
 N = 12
 

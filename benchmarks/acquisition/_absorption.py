@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..arrays import Floats
-from ..compiled import kernel
-from ..errors import InvalidInput
-from .medium import EDGE_NODES, Medium
-from .points import Points
-from .simulation import placed
-from .stencil import HALO, longest_step, weights
-from .time_step import advance, inject, read
+from bentray_kernels.arrays import Floats
+from bentray_kernels.compiled import kernel
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.wave.medium import EDGE_NODES, Medium
+from bentray_kernels.wave.points import Points
+from bentray_kernels.wave.simulation import placed
+from bentray_kernels.wave.stencil import HALO, longest_step, weights
+from bentray_kernels.wave.time_step import advance, inject, read
 
 
 @dataclass(frozen=True)

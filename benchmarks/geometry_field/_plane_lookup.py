@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats
-from ...compiled import kernel
-from ...float32 import real, whole
-from ...meshes.surface import Reals, Surface, Words
-from .accurate_lookup import TOGETHER, enter
-from .cube import samples
-from .outer_field import OuterField
+from bentray_kernels.arrays import Floats
+from bentray_kernels.compiled import kernel
+from bentray_kernels.float32 import real, whole
+from bentray_kernels.geometry_field.tables.accurate_lookup import TOGETHER, enter
+from bentray_kernels.geometry_field.tables.cube import samples
+from bentray_kernels.geometry_field.tables.outer_field import OuterField
+from bentray_kernels.meshes.surface import Reals, Surface, Words
 
 # Half of what two bytes count to: what the components of a normal add up to.
 HALF = 32767

@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import Ints
-from ...compiled import kernel
-from ...float32 import higher, lower, real
-from ...meshes.face_plane import meet_plane
-from ...meshes.surface import Reals, Surface
-from .accurate_lookup import NOTHING, TOGETHER
-from .cube import line_of, number_at
-from .outer_field import OuterField
-from .quadrilinear import Corner, corners, lerp4, nearest_of
+from bentray_kernels.arrays import Ints
+from bentray_kernels.compiled import kernel
+from bentray_kernels.float32 import higher, lower, real
+from bentray_kernels.geometry_field.tables.accurate_lookup import NOTHING, TOGETHER
+from bentray_kernels.geometry_field.tables.cube import line_of, number_at
+from bentray_kernels.geometry_field.tables.outer_field import OuterField
+from bentray_kernels.geometry_field.tables.quadrilinear import Corner, lerp4
+from bentray_kernels.meshes.face_plane import meet_plane
+from bentray_kernels.meshes.surface import Reals, Surface
+
+from ._linear_lookup import corners, nearest_of
 
 
 def uv_table(surface: Surface, field: OuterField, samples: Reals) -> Reals:
