@@ -31,9 +31,10 @@ from .housekeeping import Housekeeper
 from .ingest.append import Hold
 from .ingest.canonical import Limits
 from .ingest.fair_queue import FairQueue, readers_at_once
-from .ingest.reader import Store, UploadReader
+from .ingest.reader import UploadReader
 from .ingest.upload_limits import UploadLimits
 from .jobs.feed import Feed
+from .jobs.kinds import KINDS
 from .jobs.runner import Runner
 from .metrics import Metrics
 from .pictures import Pictures
@@ -54,15 +55,12 @@ from .routes import (
 from .rows.ages import Ages
 from .rows.checksums import Checksums
 from .rows.database import open_database
-from .rows.datasets import Datasets
-from .rows.geometry_fields import GeometryFields
 from .rows.job_queue import Queue
 from .rows.jobs import Jobs
 from .rows.keys import Keys
-from .rows.meshes import Meshes
 from .rows.observed_time import ObservedTime
+from .rows.stored_tables import Datasets, GeometryFields, Meshes, UploadedTable, Volumes
 from .rows.uploads import Uploads
-from .rows.volumes import Volumes
 from .settings import ServiceSettings
 from .web import errors
 from .web.description import Described
@@ -116,7 +114,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     )
     # Set by whoever stops the server, so that endless answers end before it waits for them.
     app.state.leaving = threading.Event()
-    errors.install(app)
+    errors.install(app, tuple(KINDS))
     app.add_middleware(Pace, seconds=settings.upload_patience_s)
     app.add_middleware(TusHeaders)
     app.add_middleware(Guard)
@@ -181,7 +179,7 @@ def _open(
     runner.start()
     stack.callback(runner.stop)
     pieces, deletion, hold = Uploads(database), Deletion(database, files), Hold()
-    stores: dict[str, Store] = {
+    stores: dict[str, UploadedTable[Any]] = {
         "dataset": Datasets(database),
         "volume": Volumes(database),
         "mesh": Meshes(database),

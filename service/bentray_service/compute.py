@@ -12,9 +12,22 @@ from bentray_workers.files.dataset.counts import DatasetCounts
 from bentray_workers.files.dataset.summary import counts_in
 from bentray_workers.reconstruction import planning
 from bentray_workers.rendering import picture_cost
-from bentray_workers.rendering.refraction_view import RefractionView
+from bentray_workers.rendering.refraction_view import RefractionView, check_even
+from bentray_workers.rendering.scene_cache import check_size
 from bentray_workers.simulation import simulation_planning
 from bentray_workers.simulation.request import AskedSimulation
+
+from .rows.records import VolumeRow
+
+
+def check_renderable(volume: VolumeRow) -> None:
+    """Refuse a volume that cannot be shown as glass: not in space, uneven, or too large for any worker.
+
+    Raises:
+        InvalidInput: naming ``volume``.
+    """
+    check_even(tuple(volume["shape"]), tuple(volume["spacing_m"]))
+    check_size(tuple(volume["shape"]))
 
 
 class Cluster(Protocol):

@@ -6,7 +6,6 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -18,12 +17,10 @@ from .ingest.append import Hold, remove
 from .refusals import DatabaseAway, InUse, Locked, StorageAway, UnknownId
 from .rows.ages import Aged, Ages
 from .rows.observed_time import ObservedTime
-from .rows.tenants import Tenant
+from .rows.records import UploadRow
 from .rows.uploads import Uploads
 
 log = logging.getLogger("bentray.housekeeping")
-
-Row = dict[str, Any]
 
 INTERVAL_SECONDS = 60.0
 # The store is looked through less often, for it may hold much.
@@ -112,7 +109,7 @@ class Housekeeper:
     def sweep(self) -> None:
         """Mark what is too old now, and remove what has been so for long enough."""
         now = self._now()
-        uploads = {Aged(Tenant(row["tenant"]), UPLOAD, row["id"]): row for row in self._uploads.expired(now)}
+        uploads = {Aged(row["tenant"], UPLOAD, row["id"]): row for row in self._uploads.expired(now)}
         stored: dict[Aged, Stored] = {}
         if self._keep_days is not None:
             old = self._deletion.older_than(now - DAY_S * self._keep_days)
@@ -149,7 +146,7 @@ class Housekeeper:
             # A job still needs it, or it went with what it was made of.
             pass
 
-    def forget(self, row: Row) -> None:
+    def forget(self, row: UploadRow) -> None:
         """Remove an upload; what it has become stays.
 
         Raises:
@@ -157,5 +154,5 @@ class Housekeeper:
         """
         if row["state"] == "reading":
             raise InUse("upload", f"{row['id']}, which is being read", "one that is not")
-        remove(self._files.of(Tenant(row["tenant"])).upload(row["id"]))
+        remove(self._files.of(row["tenant"]).upload(row["id"]))
         self._uploads.remove(row["id"])

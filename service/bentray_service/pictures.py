@@ -29,6 +29,7 @@ from bentray_workers.rendering.tiles import Tasks
 from .compute import Cluster
 from .picture_queue import LONG_S, PictureQueue
 from .refusals import Busy, StorageFull
+from .rows.records import DatasetRow, FieldRow, VolumeRow
 from .rows.tenants import Tenant
 
 # From the admission of a picture to its end.
@@ -43,7 +44,6 @@ FULL = (errno.ENOSPC, errno.EDQUOT)
 # How often a task may see its worker leave.
 MOST_TRIES = 2
 
-Row = Mapping[str, Any]
 Found = TypeVar("Found")
 
 
@@ -67,7 +67,7 @@ class Pictures:
         self._asking: asyncio.Future[dict[str, Offer]] | None = None
         self._queue = PictureQueue(self._workers)
 
-    async def slice_png(self, tenant: Tenant, volume: Row, path: Path, how: dict[str, Any]) -> bytes:
+    async def slice_png(self, tenant: Tenant, volume: VolumeRow, path: Path, how: dict[str, Any]) -> bytes:
         """One slice of a volume as PNG.
 
         Args:
@@ -80,41 +80,43 @@ class Pictures:
         draw = drawing_tasks.slice_png if "job_id" in volume else drawing_tasks.volume_slice_png
         return bytes(await self._one(tenant, ("size", "this slice", cost), path, draw, how))
 
-    async def refraction_png(self, tenant: Tenant, volume: Row, path: Path, view: RefractionView) -> bytes:
+    async def refraction_png(
+        self, tenant: Tenant, volume: VolumeRow, path: Path, view: RefractionView
+    ) -> bytes:
         """A volume as glass."""
         cost = picture_cost.refraction_cost(Stored.of(volume), view)
         what = "volume", f"shape {tuple(volume['shape'])}", cost
         return bytes(await self._made(tenant, what, path, lambda here: refraction.tasks_of(here, view)))
 
-    async def field_png(self, tenant: Tenant, field: Row, folder: Path, view: FieldView) -> bytes:
+    async def field_png(self, tenant: Tenant, field: FieldRow, folder: Path, view: FieldView) -> bytes:
         """A scene with a geometry field."""
         what = "field", str(field["id"]), picture_cost.field_cost(field["figures"], view)
         return bytes(await self._made(tenant, what, folder, lambda here: field_picture.tasks_of(here, view)))
 
-    async def field_map_png(self, tenant: Tenant, field: Row, folder: Path, which: str) -> bytes:
+    async def field_map_png(self, tenant: Tenant, field: FieldRow, folder: Path, which: str) -> bytes:
         """The geometry image of a field, as ``bentray_workers.rendering.field_picture.map_png``."""
         what = "field", str(field["id"]), picture_cost.map_cost(field["figures"])
         return bytes(await self._one(tenant, what, folder, field_picture.map_png, {"what": which}))
 
-    async def quality(self, tenant: Tenant, dataset: Row, path: Path, picker: str) -> dict[str, Any]:
+    async def quality(self, tenant: Tenant, dataset: DatasetRow, path: Path, picker: str) -> dict[str, Any]:
         """The examination of a dataset file, see ``bentray_workers.reconstruction.quality_report``."""
         what = "dataset", str(dataset["id"]), picture_cost.quality_cost(dataset)
         return dict(await self._one(tenant, what, path, quality_report, {"picker": picker}))
 
-    async def quality_png(self, tenant: Tenant, dataset: Row, path: Path, picker: str) -> bytes:
+    async def quality_png(self, tenant: Tenant, dataset: DatasetRow, path: Path, picker: str) -> bytes:
         """The page about it."""
         what = "dataset", str(dataset["id"]), picture_cost.quality_cost(dataset)
         return bytes(await self._one(tenant, what, path, quality_page, {"picker": picker}))
 
     async def mesh_volume(
-        self, tenant: Tenant, volume: Row, path: Path, iso: float | None, step: int, target: Path
+        self, tenant: Tenant, volume: VolumeRow, path: Path, iso: float | None, step: int, target: Path
     ) -> dict[str, Any]:
         """The iso-surface of a volume as a mesh file; as ``isosurface_mesh.mesh_volume``."""
         what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.mesh_cost(Stored.of(volume))
         how = {"iso": iso, "step": step, "target": target}
         return dict(await self._one(tenant, what, path, mesh_volume, how))
 
-    async def export(self, tenant: Tenant, volume: Row, path: Path, target: Path, name: str) -> None:
+    async def export(self, tenant: Tenant, volume: VolumeRow, path: Path, target: Path, name: str) -> None:
         """A volume in another format, a key of ``volume_export.FORMATS``."""
         what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.export_cost(Stored.of(volume))
         how = {"target": target, "name": name}

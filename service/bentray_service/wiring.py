@@ -25,14 +25,11 @@ from .jobs.runner import Runner
 from .pictures import Pictures
 from .readiness import Readiness
 from .rows.database import Database
-from .rows.datasets import Datasets
-from .rows.geometry_fields import GeometryFields
 from .rows.job_queue import Queue
 from .rows.jobs import Jobs
-from .rows.meshes import Meshes
+from .rows.stored_tables import Datasets, GeometryFields, Meshes, Volumes
 from .rows.tenants import Tenant
 from .rows.uploads import Uploads
-from .rows.volumes import Volumes
 from .settings import ServiceSettings
 
 

@@ -18,6 +18,7 @@ from .output.terminal import AsJson, print_json, print_lines, print_table, remar
 
 if TYPE_CHECKING:
     from ..rows.keys import Keys
+    from ..rows.records import KeyRow
 
 Data = Annotated[
     Path | None,
@@ -134,7 +135,7 @@ def _seconds(text: str) -> float:
     return int(found[1]) * SECONDS[found[2]]
 
 
-def _shown(row: dict[str, Any]) -> dict[str, Any]:
+def _shown(row: KeyRow) -> dict[str, Any]:
     times = {name: _time(row[name]) for name in ("created", "expires", "revoked", "used")}
     same = {name: row[name] for name in ("id", "tenant", "name", "scopes")}
     expired = row["expires"] is not None and row["expires"] <= time.time()

@@ -13,8 +13,9 @@ from operator import itemgetter
 from pathlib import Path
 
 from ..refusals import Damaged, DatabaseAway, DatabaseFull, Deleted
-from ..rows.checksums import Checksums, Row
+from ..rows.checksums import Checksums
 from ..rows.digests import Digest, digest_of, stamp_of
+from ..rows.records import ChecksumRow
 from ..rows.tenants import Tenant
 from .store import Store
 from .tenant_files import KEPT
@@ -97,7 +98,7 @@ class CheckedStore:
     def tidy(self, stop: Callable[[], bool]) -> None:
         self._inner.tidy(stop)
 
-    def _is_sound(self, path: Path, row: Row) -> bool:
+    def _is_sound(self, path: Path, row: ChecksumRow) -> bool:
         """Whether a thing holds what its row says; read once, unless it was written anew."""
         with self._alone(path):
             known = row["sha256"], stamp_of(path)
@@ -122,7 +123,7 @@ class CheckedStore:
             raise Deleted(name)
         log.info("%s of %s had no checksum yet; it is taken as it is", name, tenant)
 
-    def _mend(self, path: Path, row: Row) -> None:
+    def _mend(self, path: Path, row: ChecksumRow) -> None:
         """Take another copy in place of a damaged one, if there is one.
 
         Raises:
@@ -137,7 +138,7 @@ class CheckedStore:
         if row["damaged"] is not None:
             self._checksums.damaged(row["tenant"], row["id"], None)
 
-    def _damaged(self, row: Row, found: str) -> Damaged:
+    def _damaged(self, row: ChecksumRow, found: str) -> Damaged:
         if row["damaged"] is None:
             log.error("%s of %s is damaged: %s", row["id"], row["tenant"], found)
             with suppress(DatabaseAway, DatabaseFull):
@@ -160,5 +161,5 @@ class CheckedStore:
         return Tenant(tenant), name.partition(".")[0], f"{kind}/{name}"
 
 
-def _of(row: Row) -> Digest:
+def _of(row: ChecksumRow) -> Digest:
     return Digest(row["bytes"], row["sha256"])

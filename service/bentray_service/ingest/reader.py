@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -23,6 +23,8 @@ from bentray_kernels.errors import InvalidInput
 from ..access.quota import Quota
 from ..files.data_folder import Files
 from ..refusals import StorageAway, StorageFull, UnknownId
+from ..rows.records import UploadRow
+from ..rows.stored_tables import UploadedTable
 from ..rows.tenants import Tenant
 from ..rows.uploads import Uploads
 from ..web.errors import INTERNAL, Problem, from_exception, make
@@ -33,21 +35,11 @@ from .receive import BATCH_BYTES
 
 log = logging.getLogger("bentray.ingest")
 
-Row = dict[str, Any]
-
 # How long it waits before it looks by itself, s; a whole upload wakes it at once.
 IDLE_SECONDS = 5.0
 # How long it waits when the disk is full or the database or the storage away, s.
 PATIENCE_SECONDS = 30.0
 STOP_SECONDS = 30.0
-
-
-class Store(Protocol):
-    """The rows of what an upload becomes."""
-
-    def add(self, tenant: Tenant, name: str, /, *, size: int, sha256: str, summary: Row) -> Row: ...
-
-    def get(self, tenant: Tenant, name: str, /) -> Row: ...
 
 
 class UploadReader:
@@ -60,7 +52,7 @@ class UploadReader:
         self,
         uploads: Uploads,
         files: Files,
-        stores: Mapping[str, Store],
+        stores: Mapping[str, UploadedTable[Any]],
         limits: Limits,
         keep_s: float,
         queue: FairQueue,
@@ -94,7 +86,7 @@ class UploadReader:
     def start(self) -> None:
         """Take up what a dead process left, then begin."""
         for row in self._uploads.receiving():
-            path = self._files.of(Tenant(row["tenant"])).upload(row["id"])
+            path = self._files.of(row["tenant"]).upload(row["id"])
             discard_unverified(path)
             # It died between the last byte and saying so.
             if size_of(path) == row["length"]:
@@ -138,7 +130,7 @@ class UploadReader:
             queued = set(self._queued)
             room = Counter({tenant: -count for tenant, count in Counter(self._queued.values()).items()})
         for row in self._uploads.unread():
-            tenant = Tenant(row["tenant"])
+            tenant = row["tenant"]
             if row["id"] in queued or room[tenant] + self._queue.share <= 0 or not self._is_here(row):
                 continue
             room[tenant] -= 1
@@ -160,16 +152,16 @@ class UploadReader:
         log.warning("uploads wait: %s", error)
         self._put_off = True
 
-    def _is_here(self, row: Row) -> bool:
+    def _is_here(self, row: UploadRow) -> bool:
         """Whether it lies in this data folder, and not with another service that uses this database."""
-        tenant = Tenant(row["tenant"])
+        tenant = row["tenant"]
         path = self._files.of(tenant).upload(row["id"])
         return path.exists() or self._known(self._stores[row["what"]], tenant, row["result_id"])
 
-    def _read(self, row: Row) -> None:
+    def _read(self, row: UploadRow) -> None:
         if self._leaving.is_set():
             return
-        tenant, store = Tenant(row["tenant"]), self._stores[row["what"]]
+        tenant, store = row["tenant"], self._stores[row["what"]]
         path = self._files.of(tenant).upload(row["id"])
         if not self._known(store, tenant, row["result_id"]):
             problem = self._refusal(row, tenant, store, path)
@@ -181,7 +173,9 @@ class UploadReader:
         self._uploads.done(row["id"], self._keep_s)
         path.unlink(missing_ok=True)
 
-    def _refusal(self, row: Row, tenant: Tenant, store: Store, path: Path) -> Problem | None:
+    def _refusal(
+        self, row: UploadRow, tenant: Tenant, store: UploadedTable[Any], path: Path
+    ) -> Problem | None:
         """Read and store an upload; why it cannot be, or None."""
         instance, files = f"/v1/uploads/{row['id']}", self._files.of(tenant)
         try:
@@ -211,7 +205,7 @@ class UploadReader:
                 self._children.pop(row["id"], None)
         return None
 
-    def _known(self, store: Store, tenant: Tenant, name: str) -> bool:
+    def _known(self, store: UploadedTable[Any], tenant: Tenant, name: str) -> bool:
         """Whether a service died after it had stored the result."""
         try:
             store.get(tenant, name)

@@ -7,18 +7,16 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
 
 import anyio
 from sqlalchemy.exc import SQLAlchemyError
 
 from ..refusals import DatabaseAway, TooManyStreams
 from ..rows.jobs import Jobs
+from ..rows.records import EventRow, JobProgress
 from ..rows.tenants import Tenant
 
 log = logging.getLogger("bentray.jobs")
-
-Row = dict[str, Any]
 
 # How often the database is asked, and how soon again for those who have just come.
 INTERVAL_SECONDS = 0.5
@@ -39,9 +37,9 @@ class WatchedJob:
     """
 
     def __init__(self) -> None:
-        self.row: Row | None = None
+        self.row: JobProgress | None = None
         self.gone = False
-        self.events: list[Row] = []
+        self.events: list[EventRow] = []
         self.watchers = 0
         self._news = asyncio.Event()
 
@@ -56,7 +54,7 @@ class WatchedJob:
         self._news.set()
         self._news = asyncio.Event()
 
-    def update(self, row: Row | None, events: list[Row]) -> None:
+    def update(self, row: JobProgress | None, events: list[EventRow]) -> None:
         """Take in what was found."""
         changed = row != self.row or bool(events) or (row is None) != self.gone
         self.row, self.gone = row, row is None

@@ -1,106 +1,81 @@
-"""The kinds of job: how each reads its settings and what it runs."""
+"""The kinds of job, each declared once: reconstruction, simulation, refraction, geometry field."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
-from pydantic import TypeAdapter
+from fastapi.openapi.models import Example
+from pydantic import BeforeValidator, Field, TypeAdapter
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.model_selection.selection import told
-from bentray_kernels.tomography.result import Progress, Reconstruction
-from bentray_kernels.tomography.stored_settings import from_stored
-from bentray_workers.cluster.fair_shares import Share
+from bentray_kernels.tomography.result import Reconstruction
+from bentray_kernels.tomography.settings import Settings
 from bentray_workers.cluster.task_pool import ClusterTasks
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction import reconstruction_run
 from bentray_workers.rendering import geometry_field
-from bentray_workers.rendering.field_settings import FieldSettings
+from bentray_workers.rendering.field_settings import FieldSettings, check_faces
 from bentray_workers.rendering.turntable import PRIORITY, Turntable, turn
 from bentray_workers.simulation.request import AskedSimulation
 from bentray_workers.simulation.simulation_run import simulate_scan
 
+from ..asked_settings import known_only
+from ..compute import check_renderable
 from ..files.tenant_files import TenantFiles
 from ..rows import schema
-from ..rows.ids import dataset_of, volume_of
+from ..rows.ids import dataset_of, field_of, volume_of
+from ..rows.records import JobRow, Plain
+from ..rows.tenants import Tenant
+from .kind import JobRequest, Kind, Order, Sources, Task
 
-Row = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Task:
-    """One job, as its kind is given it.
-
-    Attributes:
-        client: the ``distributed.Client`` of the worker pool.
-        source: what it reads, as ``Kind.source`` says.
-        settings: as stored with the job.
-        target: the file to write, atomically, as ``Kind.target`` says.
-        work_dir: a folder of its own, which every worker can read and write. What an unfinished run left in
-            it is still there, and is gone on from.
-        on_progress: told how far it is; may be called often.
-        on_saved: told whenever it has kept something to go on from.
-        stop: whether to give up, by raising ``slices.Cancelled``.
-        share: of the workers; how many tasks the job may have in flight.
-    """
-
-    client: Any
-    source: Path
-    settings: dict[str, Any]
-    target: Path
-    work_dir: Path
-    on_progress: Callable[[Progress], None]
-    on_saved: Callable[[], None]
-    stop: Callable[[], bool]
-    share: Share
+DEFAULTS = "What is left out takes its default."
 
 
-class Kind(Protocol):
-    """A kind of job.
+class ReconstructionRequest(JobRequest):
+    """Reconstruct a dataset."""
 
-    Attributes:
-        table: the name of that in which its results are.
-        lane: what its tasks ask of a worker, a key of ``bentray_workers.cluster.resources.OFFERED``.
-    """
-
-    @property
-    def table(self) -> str: ...
-
-    @property
-    def lane(self) -> str: ...
-
-    def source(self, files: TenantFiles, job: Row) -> Path:
-        """The file that the job reads; one that reads nothing has its own folder."""
-
-    def target(self, files: TenantFiles, job: Row) -> Path:
-        """The file that it writes; fixed, so that a job which is run again writes the same one."""
-
-    def run(self, task: Task) -> Row | None:
-        """Do the work, write ``task.target``, and return the row that tells of it, if there is one."""
-
-    def discard(self, files: TenantFiles, target: Path) -> None:
-        """Remove what was written, of a job that was cancelled at its very end."""
+    kind: Literal["reconstruction"]
+    dataset: str = Field(description="Id of an uploaded dataset.")
+    settings: Annotated[Settings, BeforeValidator(known_only)] = Field(
+        default_factory=Settings, description=DEFAULTS
+    )
 
 
-class ReconstructionKind:
+class ReconstructionKind(Kind[ReconstructionRequest]):
     """Speed of sound from one dataset."""
 
+    request, settings = ReconstructionRequest, TypeAdapter(Settings)
     table, lane = schema.volumes.name, "recon"
+    example: ClassVar[Example] = {
+        "summary": "Sound speed from a scan",
+        "value": {
+            "kind": "reconstruction",
+            "dataset": "ds-0123456789abcdef0123",
+            "settings": {"nodes": 128, "sweeps": 8, "rays": "curved"},
+        },
+    }
 
-    def source(self, files: TenantFiles, job: Row) -> Path:
-        return files.dataset(job["dataset_id"])
+    def plan(self, request: ReconstructionRequest, tenant: Tenant, sources: Sources) -> Order:
+        dataset = sources.datasets.get(tenant, request.dataset)
+        path = sources.files.of(tenant).dataset(dataset["id"])
+        plan = sources.compute.plan(dataset["counts"], path, request.settings)
+        return Order(request.settings.to_dict(), plan["stored_bytes"], {"dataset_id": dataset["id"]}, plan)
 
-    def target(self, files: TenantFiles, job: Row) -> Path:
+    def source(self, files: TenantFiles, job: JobRow) -> Path:
+        return files.dataset(job["dataset_id"] or "")
+
+    def target(self, files: TenantFiles, job: JobRow) -> Path:
         return files.volume(volume_of(job["id"]))
 
-    def run(self, task: Task) -> Row | None:
-        settings = from_stored(task.settings)
+    def run(self, task: Task) -> Plain | None:
+        settings = self.settings.validate_python(task.settings)
         progress = task.on_progress, task.stop, task.work_dir, task.on_saved
         result = reconstruction_run.reconstruct(
             task.client, task.source, settings, *progress, share=task.share
@@ -112,106 +87,165 @@ class ReconstructionKind:
         write_reconstruction(task.target, result)
         return {"id": task.target.stem, **_describe(result), "bytes": task.target.stat().st_size}
 
-    def discard(self, files: TenantFiles, target: Path) -> None:
-        files.drop(target)
+    def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
+        volume = volume_of(job["id"])
+        here = f"/v1/volumes/{volume}"
+        return {"volume": volume}, {"volume": here, "image": f"{here}/slice.png", "data": f"{here}/data"}
 
 
-class SimulationKind:
+class SimulationRequest(JobRequest):
+    """Simulate the scan of a phantom; it becomes a dataset, with the truth in it."""
+
+    kind: Literal["simulation"]
+    settings: Annotated[AskedSimulation, BeforeValidator(partial(known_only, of=AskedSimulation))] = Field(
+        default_factory=AskedSimulation, description=DEFAULTS
+    )
+
+
+class SimulationKind(Kind[SimulationRequest]):
     """The scan of a phantom, as a dataset."""
 
+    request, settings = SimulationRequest, TypeAdapter(AskedSimulation)
     table, lane = schema.datasets.name, "recon"
-    settings: TypeAdapter[AskedSimulation] = TypeAdapter(AskedSimulation)
+    example: ClassVar[Example] = {
+        "summary": "A scan of a phantom, with noise on its travel times",
+        "value": {"kind": "simulation", "settings": {"nodes": 64, "elements": 64, "noise_s": 2e-8}},
+    }
 
-    def source(self, files: TenantFiles, job: Row) -> Path:
+    def plan(self, request: SimulationRequest, tenant: Tenant, sources: Sources) -> Order:
+        plan = sources.compute.plan_simulation(request.settings)
+        # Its parts, and the file that is made of them.
+        return Order(request.settings.plain(), 2 * plan["result_bytes"], plan=plan)
+
+    def source(self, files: TenantFiles, job: JobRow) -> Path:
         return files.work(job["id"])
 
-    def target(self, files: TenantFiles, job: Row) -> Path:
+    def target(self, files: TenantFiles, job: JobRow) -> Path:
         return files.dataset(dataset_of(job["id"]))
 
-    def run(self, task: Task) -> Row | None:
+    def run(self, task: Task) -> Plain | None:
         asked = self.settings.validate_python(task.settings)
         progress = task.on_progress, task.on_saved, task.stop, task.share
         found = simulate_scan(task.client, asked, task.target, task.work_dir, *progress)
         return {"id": task.target.stem, **found}
 
-    def discard(self, files: TenantFiles, target: Path) -> None:
-        files.drop(target)
+    def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
+        dataset = dataset_of(job["id"])
+        return {"dataset": dataset}, {"dataset": f"/v1/datasets/{dataset}"}
 
 
-class RefractionKind:
+class RefractionRequest(JobRequest):
+    """Show a volume as glass from all sides."""
+
+    kind: Literal["refraction"]
+    volume: str = Field(description="Id of a volume in space with even spacing.")
+    settings: Annotated[Turntable, BeforeValidator(partial(known_only, of=Turntable))] = Field(
+        default_factory=Turntable, description=DEFAULTS
+    )
+
+
+class RefractionKind(Kind[RefractionRequest]):
     """A turntable of one volume; it has no row but the job's."""
 
+    request, settings = RefractionRequest, TypeAdapter(Turntable)
     table, lane = schema.volumes.name, "render"
-    settings: TypeAdapter[Turntable] = TypeAdapter(Turntable)
+    example: ClassVar[Example] = {
+        "summary": "A volume as glass from all sides",
+        "value": {"kind": "refraction", "volume": "vol-0123456789abcdef0123", "settings": {"format": "zip"}},
+    }
 
-    def source(self, files: TenantFiles, job: Row) -> Path:
-        return files.volume(job["volume_id"])
+    def plan(self, request: RefractionRequest, tenant: Tenant, sources: Sources) -> Order:
+        volume, settings = sources.volumes.get(tenant, request.volume), request.settings
+        check_renderable(volume)
+        sources.compute.check_turntable(volume["shape"], settings)
+        low, high = volume["value_range"]
+        return Order(settings.within(low, high).plain(), settings.largest_bytes, {"volume_id": volume["id"]})
 
-    def target(self, files: TenantFiles, job: Row) -> Path:
+    def source(self, files: TenantFiles, job: JobRow) -> Path:
+        return files.volume(job["volume_id"] or "")
+
+    def target(self, files: TenantFiles, job: JobRow) -> Path:
         return files.animation(job["id"], job["settings"]["format"])
 
-    def run(self, task: Task) -> Row | None:
-        turntable = self.settings.validate_python(task.settings)
-        turn(
-            task.client,
-            task.source,
-            turntable,
-            task.target,
-            task.work_dir,
-            task.on_progress,
-            task.on_saved,
-            task.stop,
-            task.share,
-        )
+    def run(self, task: Task) -> Plain | None:
+        settings = self.settings.validate_python(task.settings)
+        progress = task.on_progress, task.on_saved, task.stop, task.share
+        turn(task.client, task.source, settings, task.target, task.work_dir, *progress)
         return None
 
-    def discard(self, files: TenantFiles, target: Path) -> None:
-        files.drop(target)
+    def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
+        return {}, {"animation": f"/v1/jobs/{job['id']}/animation"}
 
 
-class GeometryFieldKind:
+class GeometryFieldRequest(JobRequest):
+    """Make the geometry field of a mesh; the same mesh and settings have it at once the second time."""
+
+    kind: Literal["geometry-field"]
+    mesh: str = Field(description="Id of a mesh.")
+    settings: Annotated[FieldSettings, BeforeValidator(partial(known_only, of=FieldSettings))] = Field(
+        default_factory=FieldSettings, description=DEFAULTS
+    )
+
+
+class GeometryFieldKind(Kind[GeometryFieldRequest]):
     """The geometry field of one mesh."""
 
+    request, settings = GeometryFieldRequest, TypeAdapter(FieldSettings)
     table, lane = schema.geometry_fields.name, "render"
-    settings: TypeAdapter[FieldSettings] = TypeAdapter(FieldSettings)
+    example: ClassVar[Example] = {
+        "summary": "The geometry field of a mesh",
+        "value": {"kind": "geometry-field", "mesh": "mesh-0123456789abcdef0123"},
+    }
 
-    def source(self, files: TenantFiles, job: Row) -> Path:
-        return files.mesh(job["mesh_id"])
+    def plan(self, request: GeometryFieldRequest, tenant: Tenant, sources: Sources) -> Order:
+        mesh, settings = sources.meshes.get(tenant, request.mesh), request.settings
+        check_faces(mesh["faces"])
+        references = {"mesh_id": mesh["id"], "field_id": field_of(settings.content(mesh["content"]))}
+        return Order(settings.plain(), settings.largest_bytes(mesh["faces"]), references)
 
-    def target(self, files: TenantFiles, job: Row) -> Path:
-        return files.field(job["field_id"])
+    def source(self, files: TenantFiles, job: JobRow) -> Path:
+        return files.mesh(job["mesh_id"] or "")
 
-    def run(self, task: Task) -> Row | None:
+    def target(self, files: TenantFiles, job: JobRow) -> Path:
+        return files.field(job["field_id"] or "")
+
+    def run(self, task: Task) -> Plain | None:
         settings = self.settings.validate_python(task.settings)
-        figures = geometry_field.build(
-            ClusterTasks(task.client, PRIORITY, task.share),
-            task.source,
-            settings,
-            task.target,
-            task.work_dir,
-            task.on_progress,
-            task.on_saved,
-            task.stop,
-        )
+        tasks = ClusterTasks(task.client, PRIORITY, task.share)
+        progress = task.on_progress, task.on_saved, task.stop
+        figures = geometry_field.build(tasks, task.source, settings, task.target, task.work_dir, *progress)
         size = geometry_field.bytes_of(task.target)
         found = {"id": task.target.name, "mesh_id": task.source.stem, "bytes": size}
         return {**found, "settings": settings.plain(), "figures": figures}
+
+    def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
+        field = job["field_id"] or ""
+        return {"field": field}, field_links(field)
 
     def discard(self, files: TenantFiles, target: Path) -> None:
         """Keep it: it is named by its content, and may be another job's too."""
 
 
-KINDS: Mapping[str, Kind] = MappingProxyType(
+KINDS: Mapping[str, Kind[Any]] = MappingProxyType(
     {
-        "reconstruction": ReconstructionKind(),
-        "simulation": SimulationKind(),
-        "refraction": RefractionKind(),
-        "geometry-field": GeometryFieldKind(),
+        get_args(kind.request.model_fields["kind"].annotation)[0]: kind
+        for kind in (ReconstructionKind(), SimulationKind(), RefractionKind(), GeometryFieldKind())
     }
 )
 
 
-def _describe(result: Reconstruction) -> Row:
+def field_links(field_id: str) -> dict[str, str]:
+    """The addresses of a geometry field and its pictures."""
+    here = f"/v1/geometry-fields/{field_id}"
+    return {
+        "field": here,
+        "image": f"{here}/image.png",
+        "geometry_image": f"{here}/geometry-image.png",
+        "normal_map": f"{here}/normal-map.png",
+    }
+
+
+def _describe(result: Reconstruction) -> Plain:
     return {
         "axes": ",".join("xyz"[: result.speed.ndim]),
         "shape": list(result.speed.shape),

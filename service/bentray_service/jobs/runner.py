@@ -27,10 +27,11 @@ from ..files.tenant_files import TenantFiles
 from ..logs import about
 from ..refusals import Damaged, DatabaseAway, DatabaseFull, StorageAway
 from ..rows.job_queue import LEASE_S, Queue
+from ..rows.records import JobRow
 from ..rows.schema import ENDED
-from ..rows.tenants import Tenant
 from .failures import CRASHED, explain
-from .kinds import KINDS, Kind, Task
+from .kind import Kind, Task
+from .kinds import KINDS
 from .reporter import Reporter
 
 log = logging.getLogger("bentray.jobs")
@@ -177,7 +178,7 @@ class Runner:
             raise
         return True
 
-    def _see_to_its_end(self, job: dict[str, Any]) -> None:
+    def _see_to_its_end(self, job: JobRow) -> None:
         try:
             self._run(job)
         except Exception:
@@ -190,12 +191,12 @@ class Runner:
     def _has_room(self) -> bool:
         return shutil.disk_usage(self._files.root).free >= self._min_free_bytes
 
-    def _run(self, job: dict[str, Any]) -> None:
+    def _run(self, job: JobRow) -> None:
         with about(job=job["id"]):
             self._run_known(job)
 
-    def _run_known(self, job: dict[str, Any]) -> None:
-        job_id, files = job["id"], self._files.of(Tenant(job["tenant"]))
+    def _run_known(self, job: JobRow) -> None:
+        job_id, files = job["id"], self._files.of(job["tenant"])
         reporter = Reporter(
             self._queue, job_id, self._leaving.is_set, taken=lambda: bytes_in(files.work(job_id))
         )
@@ -295,7 +296,7 @@ class Runner:
         job_id: str,
         files: TenantFiles,
         reporter: Reporter,
-        kind: Kind,
+        kind: Kind[Any],
         result: dict[str, Any] | None,
         target: Path,
     ) -> None:

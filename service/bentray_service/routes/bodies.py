@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import Request, Response
+from fastapi import Query, Request, Response
 from fastapi.routing import APIRoute
 from starlette.types import Message
 
 from ..refusals import TooLarge, WrongMediaType
 
+# How many records a list holds.
+Limit = Annotated[int, Query(ge=1, le=1000, description="At most so many.")]
 # Settings are a few hundred bytes.
 LONGEST_JSON = 64 * 1024
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
-
-from fastapi import APIRouter, Depends, Query, Request, Response, status
+from fastapi import APIRouter, Depends, Request, Response, status
 
 from ..files.deletion import Stored
-from ..rows.ids import new_id
 from ..web.errors import described
 from ..wiring import CallerTenant, Service
 from . import quality
-from .bodies import only
+from .bodies import Limit, only
 from .downloads import download, download_of
 from .models.records import DatasetList, DatasetRecord, dataset_record
 from .uploads import body_of, take_in
@@ -34,12 +31,8 @@ async def upload_dataset(
     request: Request, response: Response, service: Service, tenant: CallerTenant
 ) -> DatasetRecord:
     """Upload a scan. A process of its own reads it and stores it in canonical form, or says why not."""
-    dataset_id = new_id("dataset")
-
-    def store(size: int, sha256: str, summary: dict[str, Any]) -> dict[str, Any]:
-        return service.datasets.add(tenant, dataset_id, size=size, sha256=sha256, summary=summary)
-
-    record = dataset_record(await take_in(request, service, tenant, "dataset", dataset_id, store, {}))
+    row = await take_in(request, service, tenant, service.datasets, {})
+    record = dataset_record(row)
     response.headers["Location"] = record.links["self"]
     return record
 
@@ -48,7 +41,7 @@ async def upload_dataset(
 def list_datasets(
     service: Service,
     tenant: CallerTenant,
-    limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.")] = 100,
+    limit: Limit = 100,
 ) -> DatasetList:
     """Datasets, newest first."""
     return DatasetList(datasets=[dataset_record(row) for row in service.datasets.newest(tenant, limit)])

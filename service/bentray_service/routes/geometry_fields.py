@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from ..asked_view import AskedFieldView
 from ..rows.tenants import Tenant
 from ..web.errors import described
 from ..wiring import CallerTenant, Parts, Service
+from .bodies import Limit
 from .models.surface_records import FieldList, FieldRecord, field_record
 from .pictures import PICTURE, picture
 
@@ -21,7 +20,7 @@ router = APIRouter(prefix="/v1/geometry-fields", tags=["geometry-fields"])
 def list_fields(
     service: Service,
     tenant: CallerTenant,
-    limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.")] = 100,
+    limit: Limit = 100,
 ) -> FieldList:
     """Geometry fields, newest first."""
     rows = service.geometry_fields.newest(tenant, limit)

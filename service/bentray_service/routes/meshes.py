@@ -13,13 +13,15 @@ from starlette.concurrency import run_in_threadpool
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.rendering.isosurface_mesh import MOST_STEP, check_nodes, largest_bytes
 
+from ..compute import check_renderable
 from ..files.deletion import Stored
 from ..rows.ids import new_id
+from ..rows.records import MeshRow
 from ..web.errors import described
 from ..wiring import Asking, CallerTenant, Service
-from .bodies import only
+from .bodies import Limit, only
 from .models.surface_records import MeshList, MeshRecord, mesh_record
-from .pictures import check_renderable, while_connected
+from .pictures import while_connected
 from .uploads import body_of, take_in
 
 MEDIA_TYPES = (
@@ -48,12 +50,8 @@ async def upload_mesh(
     title: Annotated[str, Query(max_length=200, description="What it is.")] = "",
 ) -> MeshRecord:
     """Upload a mesh. A process of its own reads it and makes one sound surface of it, or says why not."""
-    mesh_id = new_id("mesh")
-
-    def store(size: int, sha256: str, summary: dict[str, Any]) -> dict[str, Any]:
-        return service.meshes.add(tenant, mesh_id, size=size, sha256=sha256, summary=summary)
-
-    record = mesh_record(await take_in(request, service, tenant, "mesh", mesh_id, store, {"title": title}))
+    row = await take_in(request, service, tenant, service.meshes, {"title": title})
+    record = mesh_record(row)
     response.headers["Location"] = record.links["self"]
     return record
 
@@ -62,7 +60,7 @@ async def upload_mesh(
 def list_meshes(
     service: Service,
     tenant: CallerTenant,
-    limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.")] = 100,
+    limit: Limit = 100,
 ) -> MeshList:
     """Meshes, newest first."""
     return MeshList(meshes=[mesh_record(row) for row in service.meshes.newest(tenant, limit)])
@@ -102,7 +100,7 @@ async def mesh_of_volume(
     """Make a mesh of a volume's iso-surface: the largest piece of it, closed at the faces of the volume."""
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     check_renderable(volume)
-    check_nodes(volume["shape"], step)
+    check_nodes(tuple(volume["shape"]), step)
     low, high = volume["value_range"]
     # NaN is between nothing.
     if iso is not None and not (math.isfinite(iso) and low <= iso < high):
@@ -111,7 +109,7 @@ async def mesh_of_volume(
     service.door.check_render(caller)
     path = files.volume(volume["id"])
 
-    def store(made: Path, summary: dict[str, Any]) -> dict[str, Any]:
+    def store(made: Path, summary: dict[str, Any]) -> MeshRow:
         service.quota.resize(tenant, mesh_id, made.stat().st_size)
         content = files.adopt(mesh_id).read_bytes()
         digest = hashlib.sha256(content).hexdigest()

@@ -10,9 +10,6 @@ from typing import Any, TypeVar
 from fastapi import Request, Response
 from starlette.requests import ClientDisconnect
 
-from bentray_workers.rendering.refraction_view import check_even
-from bentray_workers.rendering.scene_cache import check_size
-
 from .. import __version__
 from ..web.errors import described
 from ..wiring import caller_of, parts_of
@@ -25,16 +22,6 @@ PICTURE: dict[int | str, dict[str, Any]] = {
     304: {"description": "The picture that the client has is still right."},
     **described(404, 422, 429, 503),
 }
-
-
-def check_renderable(volume: Mapping[str, Any]) -> None:
-    """Refuse a volume that cannot be shown as glass: not in space, uneven, or too large for any worker.
-
-    Raises:
-        InvalidInput: naming ``volume``.
-    """
-    check_even(volume["shape"], volume["spacing_m"])
-    check_size(volume["shape"])
 
 
 async def picture(

@@ -6,8 +6,9 @@ from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from ..asked_view import AskedView
+from ..compute import check_renderable
 from ..wiring import CallerTenant, Service
-from .pictures import PICTURE, check_renderable, picture
+from .pictures import PICTURE, picture
 
 router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 import shutil
 from datetime import UTC, datetime
 from email.utils import format_datetime
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Request, Response, status
 from starlette.concurrency import run_in_threadpool
 
 from ..ingest.append import ALGORITHMS, CHECKSUM, Checksum, append, size_of
 from ..refusals import StorageFull, TooLarge, WrongOffset, WrongProtocol
+from ..rows.records import UploadRow
 from ..rows.tenants import Tenant
 from ..web.errors import described
 from ..web.tus_headers import PLACE, VERSION
@@ -28,7 +29,6 @@ from .upload_metadata import METADATA, read_metadata
 MEDIA_TYPE = "application/offset+octet-stream"
 EXTENSIONS = "creation,checksum,expiration,termination"
 
-Row = dict[str, Any]
 Offset = Annotated[int, Header(ge=0, le=2**63 - 1, description="Where the body begins: what HEAD says.")]
 
 
@@ -193,7 +193,7 @@ def end_upload(upload_id: str, service: Service, tenant: CallerTenant) -> None:
         service.housekeeper.forget(service.uploads.get(tenant, upload_id))
 
 
-def offset_of(service: Parts, tenant: Tenant, row: Row) -> int:
+def offset_of(service: Parts, tenant: Tenant, row: UploadRow) -> int:
     """How many bytes are there: the size of the file, of one that is whole its length.
 
     Those of a piece that is to be checked do not count before it is.

@@ -13,8 +13,6 @@ from bentray_kernels.ranges import Range
 
 from ..ingest.child import ACCEPTED
 
-Row = dict[str, Any]
-
 LONGEST_TITLE = 200
 # Nodes along an axis of a volume of raw bytes.
 SIDE = Range(2, 2**31)
@@ -30,7 +28,7 @@ _COUNT = r"[1-9][0-9]{0,9}"
 SHAPE = f"^{_COUNT}, ?{_COUNT}, ?{_COUNT}$"
 
 
-def read_metadata(header: str) -> tuple[str, Row]:
+def read_metadata(header: str) -> tuple[str, dict[str, Any]]:
     """What the upload becomes, and what the ingest process is told of it.
 
     Args:
@@ -63,7 +61,7 @@ def read_metadata(header: str) -> tuple[str, Row]:
     return what, {}
 
 
-def volume_given(title: str, spacing_m: str | None, shape: str | None, dtype: str | None) -> Row:
+def volume_given(title: str, spacing_m: str | None, shape: str | None, dtype: str | None) -> dict[str, Any]:
     """As ``volume_formats.Given`` takes it.
 
     Raises:

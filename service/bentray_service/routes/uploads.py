@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from fastapi import Request
 from starlette.concurrency import run_in_threadpool
@@ -16,13 +16,16 @@ from ..ingest.child import ACCEPTED
 from ..ingest.fair_queue import FairQueue
 from ..ingest.receive import Received, receive
 from ..refusals import Busy
+from ..rows.ids import new_id
+from ..rows.stored_tables import UploadedTable
 from ..rows.tenants import Tenant
 from ..wiring import Parts
 
 # How long a request waits for its turn, s. Proxies hardly wait longer; uploads in pieces do.
 LONGEST_WAIT_S = 300.0
 
-Row = dict[str, Any]
+Record = TypeVar("Record")
+Made = TypeVar("Made")
 
 
 def body_of(what: str, media_types: tuple[str, ...]) -> dict[str, Any]:
@@ -36,32 +39,29 @@ async def take_in(
     request: Request,
     service: Parts,
     tenant: Tenant,
-    what: str,
-    upload_id: str,
-    store: Callable[[int, str, Row], Row],
+    table: UploadedTable[Record],
     given: Mapping[str, Any],
-) -> Row:
+) -> Record:
     """From the body of a request to a stored row; nothing is left behind when it is refused.
 
     Args:
         request: whose body is read.
         service: the parts of the service.
         tenant: whose upload it is.
-        what: a key of ``ACCEPTED``.
-        upload_id: its new id.
-        store: writes the row, from the size and SHA-256 of the body and the summary of its content.
+        table: of what it becomes.
         given: what the user says of it.
     """
+    what, upload_id = table.what, new_id(table.what)
     announced = request.headers.get("content-length")
     wanted = int(announced) if announced else None
     files, settings, quota = service.files.of(tenant), service.settings, service.quota
     path = files.incoming(upload_id)
     resize = partial(quota.resize, tenant, upload_id)
 
-    def check_and_store(received: Received) -> Row:
+    def check_and_store(received: Received) -> Record:
         limits = Limits(settings.ingest_memory_bytes, settings.ingest_seconds, service.files.scratch)
         summary = make_canonical(what, path, upload_id, files, limits, given, resize)
-        return store(received.size, received.sha256, summary)
+        return table.add(tenant, upload_id, size=received.size, sha256=received.sha256, summary=summary)
 
     with service.upload_limits(tenant):
         async with quota.reserved(tenant, upload_id, wanted or 1):
@@ -75,7 +75,7 @@ async def take_in(
                 await run_in_threadpool(path.unlink, missing_ok=True)
 
 
-async def in_turn(request: Request, queue: FairQueue, tenant: Tenant, work: Callable[[], Row]) -> Row:
+async def in_turn(request: Request, queue: FairQueue, tenant: Tenant, work: Callable[[], Made]) -> Made:
     """What ``work`` returns, once it is the tenant's turn.
 
     Args:
@@ -89,7 +89,7 @@ async def in_turn(request: Request, queue: FairQueue, tenant: Tenant, work: Call
         Busy: when its turn did not come in ``LONGEST_WAIT_S``.
     """
     task = queue.submit(tenant, work)
-    result: asyncio.Future[Row] = asyncio.wrap_future(task)
+    result: asyncio.Future[Made] = asyncio.wrap_future(task)
     gone = asyncio.ensure_future(request.receive())
     either: list[asyncio.Future[Any]] = [result, gone]
     try:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Request, Response, status
 
 from bentray_workers.files.volume_formats import RAW_TYPES
 
 from ..files.deletion import Stored
-from ..rows.ids import new_id
 from ..web.errors import described
 from ..wiring import CallerTenant, Service
 from . import slices, volume_data
-from .bodies import only
+from .bodies import Limit, only
 from .models.records import VolumeList, VolumeRecord, volume_record
 from .upload_metadata import SHAPE, SPACING, volume_given
 from .uploads import body_of, take_in
@@ -65,12 +64,8 @@ async def upload_volume(
 ) -> VolumeRecord:
     """Upload a volume. Its content tells the format; a process of its own reads it, or says why not."""
     given = volume_given(title, spacing_m, shape, dtype)
-    volume_id = new_id("volume")
-
-    def store(size: int, sha256: str, summary: dict[str, Any]) -> dict[str, Any]:
-        return service.volumes.add(tenant, volume_id, size=size, sha256=sha256, summary=summary)
-
-    record = volume_record(await take_in(request, service, tenant, "volume", volume_id, store, given))
+    row = await take_in(request, service, tenant, service.volumes, given)
+    record = volume_record(row)
     response.headers["Location"] = record.links["self"]
     return record
 
@@ -79,7 +74,7 @@ async def upload_volume(
 def list_volumes(
     service: Service,
     tenant: CallerTenant,
-    limit: Annotated[int, Query(ge=1, le=1000, description="At most so many.")] = 100,
+    limit: Limit = 100,
 ) -> VolumeList:
     """Volumes, reconstructed and uploaded, newest first."""
     return VolumeList(volumes=[volume_record(row) for row in service.volumes.newest(tenant, limit)])

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection
-from typing import Any
+from typing import cast
 
 from sqlalchemy import Connection, delete, insert, select, update
 
 from .database import Database
 from .digests import Digest
+from .records import ChecksumRow, Plain
 from .schema import checksums, datasets, geometry_fields, jobs, meshes, uploaded_volumes, volumes
 from .tenants import Tenant
-
-Row = dict[str, Any]
 
 # Where a thing that is stored has its row; that of a turntable is its job's.
 STORED = (datasets, uploaded_volumes, volumes, meshes, geometry_fields, jobs)
@@ -55,18 +54,16 @@ class Checksums:
                 _note(connection, tenant, name, path, found, as_written=False)
             return known
 
-    def get(self, tenant: Tenant, name: str) -> Row | None:
+    def get(self, tenant: Tenant, name: str) -> ChecksumRow | None:
         """The row of a thing; None of one that has none, as from before version 4 or deleted."""
         mine = select(checksums).where(checksums.c.tenant == tenant, checksums.c.id == name)
-        with self._database.read() as connection:
-            row = connection.execute(mine).mappings().one_or_none()
-        return None if row is None else dict(row)
+        found = self._database.rows(mine)
+        return cast(ChecksumRow, found[0]) if found else None
 
-    def all(self) -> list[Row]:
+    def all(self) -> list[ChecksumRow]:
         """Every tenant's."""
-        with self._database.read() as connection:
-            found = connection.execute(select(checksums).order_by(checksums.c.tenant, checksums.c.path))
-            return [dict(row) for row in found.mappings()]
+        query = select(checksums).order_by(checksums.c.tenant, checksums.c.path)
+        return cast(list[ChecksumRow], self._database.rows(query))
 
     def damaged(self, tenant: Tenant, name: str, since: float | None) -> None:
         """Say since when a thing holds something else, in s since 1970; None: it is as it was."""
@@ -83,7 +80,7 @@ class Checksums:
 def _note(
     connection: Connection, tenant: Tenant, name: str, path: str, found: Digest, as_written: bool
 ) -> None:
-    now: Row = {"path": path, "bytes": found.bytes, "sha256": found.sha256, "noted": time.time()}
+    now: Plain = {"path": path, "bytes": found.bytes, "sha256": found.sha256, "noted": time.time()}
     now |= {"as_written": as_written, "damaged": None}
     mine = checksums.c.tenant == tenant, checksums.c.id == name
     if not connection.execute(update(checksums).where(*mine).values(**now)).rowcount:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event, exc, insert, inspect, select, update
+from sqlalchemy import Connection, Engine, Select, create_engine, event, exc, insert, inspect, select, update
 from sqlalchemy.engine import make_url
 
 from bentray_kernels.errors import InvalidInput
@@ -75,6 +75,11 @@ class Database:
                     self._said = time.monotonic()
                     log.warning("the database cannot be used: %s", getattr(error, "orig", None) or error)
                 raise refusal from error
+
+    def rows(self, query: Select[Any]) -> list[dict[str, Any]]:
+        """The rows that a query gives, in a transaction of its own."""
+        with self.read() as connection:
+            return [dict(row) for row in connection.execute(query).mappings()]
 
     def probe(self) -> None:
         """Write one number, as a proof that writing works; raises what goes wrong."""

@@ -7,17 +7,17 @@ import secrets
 import socket
 import time
 from collections.abc import Collection
-from typing import Any
+from typing import Any, cast
 
 from sqlalchemy import ColumnElement, Connection, and_, func, insert, or_, select, update
 
 from . import schema, usage
 from .database import Database
 from .job_states import RUNNING, change
+from .records import JobRow, Plain
 from .schema import ENDED, jobs, volumes
 from .tenants import Tenant
 
-Row = dict[str, Any]
 MAX_ATTEMPTS = 3
 
 # How long a service that says nothing is believed to be at work on its jobs, s.
@@ -58,7 +58,7 @@ class Queue:
         with self._database.read() as connection:
             return set(connection.execute(select(jobs.c.id).where(jobs.c.state.not_in(ENDED))).scalars())
 
-    def claim(self, *, idle_only: bool = False) -> Row | None:
+    def claim(self, *, idle_only: bool = False) -> JobRow | None:
         """Turn a queued job into a running one of this service and return it; None when none waits.
 
         Of the tenants that wait, the one with the fewest running jobs is next, then the one whose last job
@@ -83,7 +83,7 @@ class Queue:
             if job_id is None:
                 return None
             now = time.time()
-            fresh: Row = {
+            fresh: Plain = {
                 "done": 0,
                 "total": 0,
                 "phase": None,
@@ -91,10 +91,10 @@ class Queue:
                 "attempts": jobs.c.attempts + 1,
                 "started": now,
             }
-            lease: Row = {"lease_owner": self._owner, "lease_until": now + LEASE_S}
+            lease: Plain = {"lease_owner": self._owner, "lease_until": now + LEASE_S}
             change(connection, job_id, ("queued",), "running", self._owner, **fresh, **lease)
             claimed = select(jobs).where(jobs.c.id == job_id)
-            return dict(connection.execute(claimed).mappings().one())
+            return cast(JobRow, dict(connection.execute(claimed).mappings().one()))
 
     def renew(self, held: Collection[str]) -> None:
         """Say that this service is still at work on some jobs."""
@@ -118,13 +118,13 @@ class Queue:
     def _held(self, job_id: str) -> ColumnElement[bool]:
         return and_(jobs.c.id == job_id, jobs.c.lease_owner == self._owner, jobs.c.state.in_(RUNNING))
 
-    def progress(self, job_id: str, done: int, total: int, history: list[Row], phase: str = "") -> None:
+    def progress(self, job_id: str, done: int, total: int, history: list[Plain], phase: str = "") -> None:
         """Store how far a running job is."""
-        now: Row = {"done": done, "total": total, "history": history, "phase": phase}
+        now: Plain = {"done": done, "total": total, "history": history, "phase": phase}
         with self._database.write() as connection:
             connection.execute(update(jobs).where(self._held(job_id)).values(**now))
 
-    def succeed(self, job_id: str, result: Row | None, into: str = volumes.name, size: int = 0) -> bool:
+    def succeed(self, job_id: str, result: Plain | None, into: str = volumes.name, size: int = 0) -> bool:
         """Store the success and the result, if there is one; False when it was cancelled in the meantime.
 
         Args:
@@ -151,7 +151,7 @@ class Queue:
                     usage.store(connection, tenant, result["id"], result["bytes"])
             return True
 
-    def fail(self, job_id: str, problem: Row) -> None:
+    def fail(self, job_id: str, problem: Plain) -> None:
         """End a job with the problem that stopped it."""
         with self._database.write() as connection:
             note, now = str(problem["detail"])[:500], time.time()
@@ -165,7 +165,7 @@ class Queue:
     def release(self, job_id: str, note: str) -> None:
         """Put a running job back in the queue for a reason that is no fault of the job."""
         with self._database.write() as connection:
-            again: Row = {"started": None, "attempts": jobs.c.attempts - 1}
+            again: Plain = {"started": None, "attempts": jobs.c.attempts - 1}
             if not self._end(connection, job_id, ("running",), "queued", note, **again):
                 self._end(connection, job_id, ("cancelling",), "cancelled", finished=time.time())
 
@@ -184,7 +184,7 @@ class Queue:
             connection, job_id, before, after, note, held, **values, lease_owner=None, lease_until=None
         )
 
-    def recover(self, crashed: Row, *, alone: bool, held: Collection[str] = ()) -> int:
+    def recover(self, crashed: Plain, *, alone: bool, held: Collection[str] = ()) -> int:
         """Take up what a dead service left: running jobs go back to the queue, cancelling ones end.
 
         A job that saw ``MAX_ATTEMPTS`` services die without getting any further is failed with the problem
@@ -206,7 +206,7 @@ class Queue:
             dead = or_(dead, jobs.c.lease_owner.is_distinct_from(self._owner))
         dead = and_(dead, jobs.c.id.not_in(held))
         left = select(jobs).where(jobs.c.state.in_(RUNNING), dead).with_for_update(skip_locked=True)
-        free: Row = {"lease_owner": None, "lease_until": None}
+        free: Plain = {"lease_owner": None, "lease_until": None}
         with self._database.write() as connection:
             for row in connection.execute(left).mappings().all():
                 job_id = row["id"]

@@ -7,50 +7,48 @@ import json
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import cast
 
 from sqlalchemy import Connection, func, insert, select
 from sqlalchemy.exc import IntegrityError
 
 from ..refusals import Finished, KeyReused, QueueFull, UnknownId
 from . import schema, usage
-from .database import Database
 from .ids import checked, new_id
 from .job_states import change, tell
+from .records import EventRow, JobProgress, JobRow, Plain
 from .schema import ENDED, jobs
+from .stored_tables import TenantTable
 from .tenants import Tenant
-
-Row = dict[str, Any]
 
 BATCH = 500
 
 
-class Jobs:
+class Jobs(TenantTable[JobRow]):
     """Jobs of a tenant; who runs them is :class:`bentray_service.rows.job_queue.Queue`."""
 
-    def __init__(self, database: Database) -> None:
-        self._database = database
+    table, what = jobs, "job"
 
     def add(
         self,
         tenant: Tenant,
         kind: str,
-        settings: Row,
+        settings: Plain,
         dataset_id: str | None = None,
         volume_id: str | None = None,
         mesh_id: str | None = None,
         field_id: str | None = None,
         *,
-        plan: Row | None = None,
+        plan: Plain | None = None,
         reserve: tuple[int, int] | None = None,
         most_queued: int | None = None,
         key: str | None = None,
-    ) -> Row:
+    ) -> JobRow:
         """Store a queued job on its dataset, volume or mesh; it survives a crash once this returns.
 
         Args:
             tenant: whose it is.
-            kind: a key of ``rows.jobs.kinds.KINDS``.
+            kind: a key of ``jobs.kinds.KINDS``.
             settings: as its kind reads them.
             dataset_id, volume_id, mesh_id: what it reads.
             field_id: what it makes, where that is named before.
@@ -110,19 +108,6 @@ class Jobs:
             tell(connection, job_id, "queued")
         return self.get(tenant, job_id)
 
-    def get(self, tenant: Tenant, job_id: str) -> Row:
-        """One job of this tenant.
-
-        Raises:
-            UnknownId: when it has no such one.
-        """
-        mine = select(jobs).where(jobs.c.tenant == tenant, jobs.c.id == checked("job", job_id))
-        with self._database.read() as connection:
-            row = connection.execute(mine).mappings().one_or_none()
-        if row is None:
-            raise UnknownId("job", job_id)
-        return dict(row)
-
     def newest(
         self,
         tenant: Tenant,
@@ -130,7 +115,7 @@ class Jobs:
         state: str | None = None,
         kind: str | None = None,
         before: str | None = None,
-    ) -> list[Row]:
+    ) -> list[JobRow]:
         """Up to ``limit`` jobs of this tenant, newest first.
 
         Args:
@@ -149,10 +134,9 @@ class Jobs:
             query = query.where(jobs.c.kind == kind)
         if before is not None:
             query = query.where(jobs.c.number < self.get(tenant, before)["number"])
-        with self._database.read() as connection:
-            return [dict(row) for row in connection.execute(query).mappings()]
+        return cast(list[JobRow], self._database.rows(query))
 
-    def events(self, tenant: Tenant, job_id: str, after: int = 0) -> list[Row]:
+    def events(self, tenant: Tenant, job_id: str, after: int = 0) -> list[EventRow]:
         """The events of one job of this tenant, oldest first, from the one after number ``after``."""
         table = schema.events
         mine = (
@@ -161,10 +145,9 @@ class Jobs:
             .where(jobs.c.tenant == tenant, table.c.job_id == job_id, table.c.number > after)
             .order_by(table.c.number)
         )
-        with self._database.read() as connection:
-            return [dict(row) for row in connection.execute(mine).mappings()]
+        return cast(list[EventRow], self._database.rows(mine))
 
-    def news(self, known: Mapping[str, int]) -> tuple[dict[str, Row], dict[str, list[Row]]]:
+    def news(self, known: Mapping[str, int]) -> tuple[dict[str, JobProgress], dict[str, list[EventRow]]]:
         """How jobs are, and their events after those that are known, whoever's they are.
 
         Args:
@@ -174,15 +157,15 @@ class Jobs:
             the jobs that there are, by id, with ``state``, ``done``, ``total`` and ``phase``; and, of those
             that have new ones, the events, oldest first.
         """
-        found: dict[str, Row] = {}
-        events: dict[str, list[Row]] = {}
+        found: dict[str, JobProgress] = {}
+        events: dict[str, list[EventRow]] = {}
         table = schema.events
         # The jobs first: an event that comes in between is told next time, never left out at the end.
         for ids in _batches(list(known)):
             with self._database.read() as connection:
                 columns = jobs.c.id, jobs.c.state, jobs.c.done, jobs.c.total, jobs.c.phase
                 rows = connection.execute(select(*columns).where(jobs.c.id.in_(ids))).mappings()
-                found.update({row["id"]: dict(row) for row in rows})
+                found.update({row["id"]: cast(JobProgress, dict(row)) for row in rows})
                 last = (
                     select(table.c.job_id, func.max(table.c.number))
                     .where(table.c.job_id.in_(ids))
@@ -195,10 +178,10 @@ class Jobs:
                 query = select(table).where(table.c.job_id.in_(newer), table.c.number > least)
                 for row in connection.execute(query.order_by(table.c.number)).mappings():
                     if row["number"] > known[row["job_id"]]:
-                        events.setdefault(row["job_id"], []).append(dict(row))
+                        events.setdefault(row["job_id"], []).append(cast(EventRow, dict(row)))
         return found, events
 
-    def request_cancel(self, tenant: Tenant, job_id: str) -> Row:
+    def request_cancel(self, tenant: Tenant, job_id: str) -> JobRow:
         """Ask a job to stop: a queued one ends at once, a running one when it next looks.
 
         Raises:
@@ -224,11 +207,11 @@ def _batches(ids: list[str]) -> Iterator[list[str]]:
         yield ids[begin : begin + BATCH]
 
 
-def _of_key(connection: Connection, tenant: Tenant, key: str) -> Row | None:
+def _of_key(connection: Connection, tenant: Tenant, key: str) -> JobRow | None:
     """The job that was asked for under a key."""
     mine = select(jobs).where(jobs.c.tenant == tenant, jobs.c.idempotency_key == key)
     found = connection.execute(mine).mappings().one_or_none()
-    return None if found is None else dict(found)
+    return None if found is None else cast(JobRow, dict(found))
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import hmac
 import logging
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import cast
 
 from sqlalchemy import insert, or_, select, update
 from sqlalchemy.exc import IntegrityError, SQLAlchemyError
@@ -15,12 +15,11 @@ from bentray_kernels.errors import InvalidInput
 
 from .api_key import Token
 from .database import Database
+from .records import KeyRow
 from .schema import keys
 from .tenants import Tenant
 
 log = logging.getLogger("bentray.access")
-
-Row = dict[str, Any]
 
 # How exactly it is kept when a key was last used, s: a write for each request would be a slow one.
 USED_S = 60.0
@@ -34,7 +33,7 @@ class Keys:
 
     def add(
         self, token: Token, tenant: Tenant, name: str, scopes: Sequence[str], expires: float | None = None
-    ) -> Row:
+    ) -> KeyRow:
         """Store a key, without its secret.
 
         Raises:
@@ -54,10 +53,9 @@ class Keys:
         with self._database.read() as connection:
             return connection.execute(select(keys.c.number).limit(1)).first() is not None
 
-    def owner(self, token: Token) -> Row | None:
+    def owner(self, token: Token) -> KeyRow | None:
         """The row of a key that is valid now; None for one that is unknown, revoked or expired."""
-        with self._database.read() as connection:
-            row = connection.execute(select(keys).where(keys.c.id == token.id)).mappings().one_or_none()
+        row = self._find(token.id)
         # Compared in constant time, and against nothing as long as against something.
         same = hmac.compare_digest(token.digest(), row["sha256"] if row is not None else "0" * 64)
         now = time.time()
@@ -67,7 +65,7 @@ class Keys:
             return None
         if row["used"] is None or now - row["used"] > USED_S:
             self._note(token.id, now)
-        return dict(row)
+        return row
 
     def ended(self, key_ids: Sequence[str]) -> list[str]:
         """Those of some keys that are not valid any more."""
@@ -77,15 +75,14 @@ class Keys:
         with self._database.read() as connection:
             return list(connection.execute(query).scalars())
 
-    def all(self, tenant: Tenant | None = None) -> list[Row]:
+    def all(self, tenant: Tenant | None = None) -> list[KeyRow]:
         """Every key, or those of one tenant, oldest first."""
         query = select(keys).order_by(keys.c.number)
         if tenant is not None:
             query = query.where(keys.c.tenant == tenant)
-        with self._database.read() as connection:
-            return [dict(row) for row in connection.execute(query).mappings()]
+        return cast(list[KeyRow], self._database.rows(query))
 
-    def revoke(self, key_id: str) -> Row:
+    def revoke(self, key_id: str) -> KeyRow:
         """End a key for good, at once.
 
         Raises:
@@ -96,12 +93,15 @@ class Keys:
             connection.execute(mine.values(revoked=time.time()))
         return self._row(key_id)
 
-    def _row(self, key_id: str) -> Row:
-        with self._database.read() as connection:
-            row = connection.execute(select(keys).where(keys.c.id == key_id)).mappings().one_or_none()
+    def _row(self, key_id: str) -> KeyRow:
+        row = self._find(key_id)
         if row is None:
             raise InvalidInput("key", repr(key_id[:80]), "the id of a key; see bentray keys list")
-        return dict(row)
+        return row
+
+    def _find(self, key_id: str) -> KeyRow | None:
+        found = self._database.rows(select(keys).where(keys.c.id == key_id))
+        return cast(KeyRow, found[0]) if found else None
 
     def _note(self, key_id: str, now: float) -> None:
         try:

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import Any, cast
 
 from sqlalchemy import ColumnElement, Connection, func, insert, select, update
 from sqlalchemy import delete as delete_from
 
-from ..refusals import TooOften, UnknownId
+from ..refusals import TooOften
 from . import usage
-from .database import Database
-from .ids import checked, new_id
+from .ids import new_id
+from .records import Plain, UploadRow
 from .schema import uploads
+from .stored_tables import TenantTable
 from .tenants import Tenant
-
-Row = dict[str, Any]
 
 # Of a tenant, begun and not whole. A client that is done with one ends it; the others expire.
 MOST_BEGUN = 100
@@ -23,25 +22,24 @@ MOST_BEGUN = 100
 AGAIN_S = 60.0
 
 
-class Uploads:
+class Uploads(TenantTable[UploadRow]):
     """Uploads from ``receiving`` through ``reading`` to ``done`` or ``refused``.
 
     A row goes some time after its last change, however it ended.
     """
 
-    def __init__(self, database: Database) -> None:
-        self._database = database
+    table, what = uploads, "upload"
 
     def add(
         self,
         tenant: Tenant,
         what: str,
         length: int,
-        given: Row,
+        given: Plain,
         metadata: str,
         keep_s: float,
         most_bytes: int,
-    ) -> Row:
+    ) -> UploadRow:
         """Store a new upload, and reserve the room for it.
 
         Args:
@@ -80,27 +78,15 @@ class Uploads:
             )
         return self.get(tenant, upload_id)
 
-    def get(self, tenant: Tenant, upload_id: str) -> Row:
-        """One upload of this tenant.
-
-        Raises:
-            UnknownId: when it has no such one.
-        """
-        name = checked("upload", upload_id)
-        found = self._where(uploads.c.tenant == tenant, uploads.c.id == name)
-        if not found:
-            raise UnknownId("upload", upload_id)
-        return found[0]
-
-    def unread(self) -> list[Row]:
+    def unread(self) -> list[UploadRow]:
         """Every tenant's uploads that are whole and not yet read, the oldest first."""
         return self._where(uploads.c.state == "reading")
 
-    def receiving(self) -> list[Row]:
+    def receiving(self) -> list[UploadRow]:
         """Every tenant's uploads that are not whole, as far as was noticed."""
         return self._where(uploads.c.state == "receiving")
 
-    def expired(self, now: float) -> list[Row]:
+    def expired(self, now: float) -> list[UploadRow]:
         """Every tenant's uploads whose time is over, but for those that are being read.
 
         Args:
@@ -122,7 +108,7 @@ class Uploads:
         """It has become what it was sent as."""
         self._change(upload_id, state="done", expires=time.time() + keep_s)
 
-    def refuse(self, upload_id: str, problem: Row, keep_s: float) -> None:
+    def refuse(self, upload_id: str, problem: Plain, keep_s: float) -> None:
         """It cannot be read."""
         self._change(upload_id, released=True, state="refused", problem=problem, expires=time.time() + keep_s)
 
@@ -132,10 +118,9 @@ class Uploads:
             _release(connection, upload_id)
             connection.execute(delete_from(uploads).where(uploads.c.id == upload_id))
 
-    def _where(self, *conditions: ColumnElement[bool]) -> list[Row]:
+    def _where(self, *conditions: ColumnElement[bool]) -> list[UploadRow]:
         query = select(uploads).where(*conditions).order_by(uploads.c.number)
-        with self._database.read() as connection:
-            return [dict(row) for row in connection.execute(query).mappings()]
+        return cast(list[UploadRow], self._database.rows(query))
 
     def _change(self, upload_id: str, *, released: bool = False, **values: Any) -> None:
         with self._database.write() as connection:

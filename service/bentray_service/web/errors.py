@@ -34,8 +34,6 @@ LONGEST_FOUND = 120
 RETRY_AFTER = "10"
 METHODS = ("DELETE", "GET", "HEAD", "OPTIONS", "PATCH", "POST", "PUT")
 
-JOB_KINDS = ("reconstruction", "simulation", "refraction", "geometry-field")
-
 
 class Fault(BaseModel):
     """One wrong value."""
@@ -164,19 +162,19 @@ def described(*statuses: int | str) -> dict[int | str, dict[str, Any]]:
     return {status: {"description": words[status], "content": content} for status in statuses}
 
 
-def fault_of(error: Mapping[str, Any]) -> Fault:
+def fault_of(error: Mapping[str, Any], job_kinds: Sequence[str] = ()) -> Fault:
     """One entry of ``ValidationError.errors()`` as field, found, accepted."""
     where = [str(part) for part in error["loc"]]
     if where and where[0] in ("body", "query", "path", "header") and len(where) > 1:
         where = where[1:]
         # Pydantic names the kind of a job in the place of an error; the user wrote none there.
-        if where[0] in JOB_KINDS:
+        if where[0] in job_kinds:
             where = where[1:] or ["body"]
     context = error.get("ctx", {})
     if error["type"] in ("union_tag_invalid", "union_tag_not_found"):
         field = str(context["discriminator"]).strip("'")
         found = repr(context["tag"])[:LONGEST_FOUND] if "tag" in context else "nothing"
-        return Fault(field=field, found=found, accepted=" or ".join(map(repr, JOB_KINDS)))
+        return Fault(field=field, found=found, accepted=" or ".join(map(repr, job_kinds)))
     cause = context.get("error")
     if isinstance(cause, InvalidInput):
         return Fault(field=".".join([*where, cause.field]), found=cause.value, accepted=cause.accepted)
@@ -193,11 +191,18 @@ def fault_of(error: Mapping[str, Any]) -> Fault:
     return Fault(field=".".join(where), found=_short(error["input"]), accepted=accepted)
 
 
-def install(app: FastAPI) -> None:
-    """Make every error of ``app`` a problem."""
+def install(app: FastAPI, job_kinds: Sequence[str]) -> None:
+    """Make every error of ``app`` a problem; ``job_kinds`` are the accepted kinds of job."""
+
+    def invalid_request(request: Request, error: Exception) -> Response:
+        assert isinstance(error, RequestValidationError)
+        faults = [fault_of(one, job_kinds) for one in error.errors()]
+        words = "; ".join(f"{one.field}: found {one.found}; accepted: {one.accepted}" for one in faults)
+        return _respond(make(INVALID_REQUEST, words, faults, errors=faults, instance=request.url.path))
+
     app.add_exception_handler(InvalidInput, _refused)
     app.add_exception_handler(refusals.NotReady, _not_ready)
-    app.add_exception_handler(RequestValidationError, _invalid_request)
+    app.add_exception_handler(RequestValidationError, invalid_request)
     app.add_exception_handler(ClientDisconnect, _gone)
     app.add_exception_handler(HTTPException, _http)
     app.add_exception_handler(OSError, _of_the_system)
@@ -242,13 +247,6 @@ def _not_ready(request: Request, error: Exception) -> Response:
     faults = [Fault(field=part, found=found, accepted=needed) for part, found, needed in error.faults]
     problem = make(PROBLEMS[refusals.NotReady], str(error), faults, errors=faults, instance=request.url.path)
     return _respond(problem, {"Retry-After": "5"})
-
-
-def _invalid_request(request: Request, error: Exception) -> Response:
-    assert isinstance(error, RequestValidationError)
-    faults = [fault_of(one) for one in error.errors()]
-    words = "; ".join(f"{one.field}: found {one.found}; accepted: {one.accepted}" for one in faults)
-    return _respond(make(INVALID_REQUEST, words, faults, errors=faults, instance=request.url.path))
 
 
 def _http(request: Request, error: Exception) -> Response:

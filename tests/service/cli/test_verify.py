@@ -15,8 +15,8 @@ from bentray_service.files.data_folder import Files
 from bentray_service.files.local_store import LocalStore
 from bentray_service.rows.checksums import Checksums
 from bentray_service.rows.database import open_database
-from bentray_service.rows.datasets import Datasets
 from bentray_service.rows.ids import new_id
+from bentray_service.rows.stored_tables import Datasets
 from bentray_service.rows.tenants import LOCAL
 
 Run = Callable[..., Result]

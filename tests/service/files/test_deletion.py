@@ -15,15 +15,12 @@ from bentray_service.refusals import InUse, UnknownId
 from bentray_service.rows import schema
 from bentray_service.rows.ages import Ages
 from bentray_service.rows.database import open_database
-from bentray_service.rows.datasets import Datasets
-from bentray_service.rows.geometry_fields import GeometryFields
 from bentray_service.rows.ids import new_id, volume_of
 from bentray_service.rows.jobs import Jobs
-from bentray_service.rows.meshes import Meshes
 from bentray_service.rows.observed_time import ObservedTime
+from bentray_service.rows.stored_tables import Datasets, GeometryFields, Meshes, Volumes
 from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.rows.uploads import Uploads
-from bentray_service.rows.volumes import Volumes
 
 OTHER = Tenant("other")
 SCAN = {"title": "", "source": "", "license": "", "dimension": 2, "elements": 8, "ntx": 8, "nrx": 8}

@@ -7,8 +7,8 @@ import pytest
 from bentray_service.files.data_folder import Files
 from bentray_service.files.orphans import SAFE_S, STAMP, Orphans
 from bentray_service.rows.database import open_database
-from bentray_service.rows.datasets import Datasets
 from bentray_service.rows.ids import new_id
+from bentray_service.rows.stored_tables import Datasets
 from bentray_service.rows.tenants import LOCAL
 from bentray_service.rows.uploads import Uploads
 

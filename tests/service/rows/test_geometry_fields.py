@@ -4,10 +4,10 @@ import pytest
 
 from bentray_service.refusals import UnknownId
 from bentray_service.rows.database import open_database
-from bentray_service.rows.geometry_fields import GeometryFields
 from bentray_service.rows.ids import field_of, new_id
 from bentray_service.rows.job_queue import Queue
 from bentray_service.rows.jobs import Jobs
+from bentray_service.rows.stored_tables import GeometryFields
 from bentray_service.rows.tenants import LOCAL, Tenant
 
 

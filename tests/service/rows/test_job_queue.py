@@ -9,8 +9,8 @@ import pytest
 from bentray_service.refusals import UnknownId
 from bentray_service.rows.ids import volume_of
 from bentray_service.rows.job_queue import LEASE_S, Queue
+from bentray_service.rows.stored_tables import Volumes
 from bentray_service.rows.tenants import LOCAL, Tenant
-from bentray_service.rows.volumes import Volumes
 
 PROBLEM = {"type": "/problems/x", "title": "t", "status": 500, "detail": "why"}
 

@@ -13,9 +13,9 @@ from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import new_id, volume_of
 from bentray_service.rows.job_queue import Queue
 from bentray_service.rows.jobs import Jobs
+from bentray_service.rows.stored_tables import Volumes
 from bentray_service.rows.tenants import LOCAL
 from bentray_service.rows.usage import Usage, usage_of
-from bentray_service.rows.volumes import Volumes
 
 # The tables of version 1, word for word as SQLite kept them.
 VERSION_1 = """

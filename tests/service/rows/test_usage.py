@@ -13,8 +13,8 @@ from bentray_service.files.deletion import Deletion, Stored
 from bentray_service.refusals import DatabaseAway, QuotaUsedUp, TooOften
 from bentray_service.rows import uploads as uploading
 from bentray_service.rows.database import open_database
-from bentray_service.rows.datasets import Datasets
 from bentray_service.rows.ids import new_id
+from bentray_service.rows.stored_tables import Datasets
 from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.rows.uploads import Uploads
 from bentray_service.rows.usage import Usage

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
@@ -12,18 +12,17 @@ from pydantic import BaseModel, Field
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.rendering.refraction_view import check_even
 
-from ...rows.ids import dataset_of, volume_of
+from ...jobs.kinds import KINDS
+from ...rows.records import DatasetRow, JobRow, VolumeRow
 from ...web.errors import Problem
-from .surface_records import field_links
 
 State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
-JobKind = Literal["reconstruction", "simulation", "refraction", "geometry-field"]
-Row = dict[str, Any]
 # A list in the description, and no tuple: some generators of clients know none.
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
-# What the rows of reconstructed and of uploaded volumes have in common.
-SHARED = ("id", "title", "axes", "shape", "spacing_m", "origin_m", "value_range", "unit", "bytes")
+# What jobs read, and where it is found.
+READ = ("dataset", "volume", "mesh")
+LISTED = {"dataset": "datasets", "volume": "volumes", "mesh": "meshes"}
 
 
 class DatasetRecord(BaseModel):
@@ -176,81 +175,40 @@ class VolumeList(BaseModel):
     volumes: list[VolumeRecord]
 
 
-def dataset_record(row: Row) -> DatasetRecord:
+def dataset_record(row: DatasetRow) -> DatasetRecord:
     here, job = f"/v1/datasets/{row['id']}", row["job_id"]
     links = {"self": here, "file": f"{here}/file"}
     if job is not None:
         links["job"] = f"/v1/jobs/{job}"
-    return DatasetRecord(**{**row, "created": _time(row["created"])}, job=job, links=links)
+    return DatasetRecord.model_validate({**row, "job": job, "links": links})
 
 
-def job_record(row: Row) -> JobRecord:
+def job_record(row: JobRow) -> JobRecord:
     here = f"/v1/jobs/{row['id']}"
-    links, volume, done = {"self": here}, row["volume_id"], row["state"] == "succeeded"
-    dataset, simulated = row["dataset_id"], row["kind"] == "simulation"
-    if simulated and done:
-        dataset = dataset_of(row["id"])
-    if dataset is not None:
-        links["dataset"] = f"/v1/datasets/{dataset}"
-    if volume is not None:
-        links["volume"] = f"/v1/volumes/{volume}"
-        if done:
-            links["animation"] = f"{here}/animation"
-    elif row["mesh_id"] is not None:
-        links["mesh"] = f"/v1/meshes/{row['mesh_id']}"
-        links |= field_links(row["field_id"]) if done else {}
-    elif done and not simulated:
-        volume = volume_of(row["id"])
-        links["volume"] = f"/v1/volumes/{volume}"
-        links["image"] = f"/v1/volumes/{volume}/slice.png"
-        links["data"] = f"/v1/volumes/{volume}/data"
+    reads = {what: row[f"{what}_id"] for what in READ}  # type: ignore[literal-required]
+    links = {"self": here} | {what: f"/v1/{LISTED[what]}/{name}" for what, name in reads.items() if name}
+    made: dict[str, str] = {}
+    if row["state"] == "succeeded":
+        made, more = KINDS[row["kind"]].results(row)
+        links |= more
     if row["state"] in ("queued", "running"):
         links["cancel"] = f"{here}/cancel"
-    end = row["finished"] or time.time()
-    return JobRecord(
-        id=row["id"],
-        kind=row["kind"],
-        state=row["state"],
-        dataset=dataset,
-        settings=row["settings"],
-        plan=row["plan"],
-        advice=row["advice"],
-        progress=ProgressRecord(done=row["done"], total=row["total"], phase=row["phase"] or ""),
-        history=row["history"],
-        volume=volume,
-        mesh=row["mesh_id"],
-        field=row["field_id"] if done else None,
-        error=row["error"],
-        created=_time(row["created"]),
-        started=_time(row["started"]) if row["started"] else None,
-        finished=_time(row["finished"]) if row["finished"] else None,
-        seconds=end - row["started"] if row["started"] else None,
-        links=links,
-    )
+    started, progress = row["started"], {**row, "phase": row["phase"] or ""}
+    seconds = None if started is None else (row["finished"] or time.time()) - started
+    found = {**row, **reads, "field": None, **made, "progress": progress, "seconds": seconds, "links": links}
+    return JobRecord.model_validate(found)
 
 
-def volume_record(row: Row) -> VolumeRecord:
+def volume_record(row: VolumeRow) -> VolumeRecord:
     here = f"/v1/volumes/{row['id']}"
     links = {"self": here, "image": f"{here}/slice.png", "data": f"{here}/data"}
     with suppress(InvalidInput):
-        check_even(row["shape"], row["spacing_m"])
+        check_even(tuple(row["shape"]), tuple(row["spacing_m"]))
         links["refraction"] = f"{here}/refraction.png"
     job = row.get("job_id")
     if job is not None:
         links["job"] = f"/v1/jobs/{job}"
-    return VolumeRecord(
-        source="upload" if job is None else "reconstruction",
-        job=job,
-        dataset=row.get("dataset_id"),
-        speed_range_mps=row.get("speed_range_mps"),
-        water_speed_mps=row.get("water_speed_mps"),
-        provenance=row.get("provenance", {}),
-        sha256=row.get("sha256"),
-        created=_time(row["created"]),
-        links=links,
-        **{name: row[name] for name in SHARED},
-    )
-
-
-def _time(seconds: float) -> datetime:
-    return datetime.fromtimestamp(seconds, UTC)
+    absent = dict.fromkeys(("speed_range_mps", "water_speed_mps", "sha256"))
+    source = "upload" if job is None else "reconstruction"
+    more = {"source": source, "job": job, "dataset": row.get("dataset_id"), "links": links}
+    return VolumeRecord.model_validate({**absent, "provenance": {}, **row, **more})

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 from pydantic import BaseModel, Field
 
-Row = dict[str, Any]
+from ...jobs.kinds import field_links
+from ...rows.records import FieldRow, MeshRow
 
 
 class Repairs(BaseModel):
@@ -109,48 +110,20 @@ class FieldList(BaseModel):
     geometry_fields: list[FieldRecord]
 
 
-def mesh_record(row: Row) -> MeshRecord:
+def mesh_record(row: MeshRow) -> MeshRecord:
     links = {"self": f"/v1/meshes/{row['id']}"}
     if row["volume_id"] is not None:
         links["volume"] = f"/v1/volumes/{row['volume_id']}"
-    same = ("id", "title", "format", "iso", "vertices", "faces", "genus", "holes", "coloured", "repairs")
-    return MeshRecord(
-        volume=row["volume_id"],
-        closed=row["holes"] == 0,
-        created=datetime.fromtimestamp(row["created"], UTC),
-        links=links,
-        **{name: row[name] for name in (*same, "bytes", "sha256")},
-    )
+    more = {"volume": row["volume_id"], "closed": row["holes"] == 0, "links": links}
+    return MeshRecord.model_validate({**row, **more})
 
 
-def field_links(field_id: str) -> dict[str, str]:
-    """Where a field is found, and its pictures."""
-    here = f"/v1/geometry-fields/{field_id}"
-    return {
-        "field": here,
-        "image": f"{here}/image.png",
-        "geometry_image": f"{here}/geometry-image.png",
-        "normal_map": f"{here}/normal-map.png",
-    }
-
-
-def field_record(row: Row) -> FieldRecord:
-    links = field_links(row["id"])
-    figures = row["figures"]
-    return FieldRecord(
-        id=row["id"],
-        mesh=row["mesh_id"],
-        job=row["job_id"],
-        settings=row["settings"],
-        sizes=FieldSizes(**{name: figures[name] for name in FieldSizes.model_fields}),
-        errors=FieldErrors(**{name: figures[name] for name in FieldErrors.model_fields}),
-        seconds=FieldSeconds(**{name: figures[f"{name}_seconds"] for name in FieldSeconds.model_fields}),
-        bytes=row["bytes"],
-        created=datetime.fromtimestamp(row["created"], UTC),
-        links={
-            "self": links.pop("field"),
-            "mesh": f"/v1/meshes/{row['mesh_id']}",
-            "job": f"/v1/jobs/{row['job_id']}",
-            **links,
-        },
+def field_record(row: FieldRow) -> FieldRecord:
+    links, figures = field_links(row["id"]), row["figures"]
+    seconds = {name: figures[f"{name}_seconds"] for name in FieldSeconds.model_fields}
+    links["self"] = links.pop("field")
+    links |= {"mesh": f"/v1/meshes/{row['mesh_id']}", "job": f"/v1/jobs/{row['job_id']}"}
+    more = {"mesh": row["mesh_id"], "job": row["job_id"], "links": links}
+    return FieldRecord.model_validate(
+        {**row, **more, "sizes": figures, "errors": figures, "seconds": seconds}
     )

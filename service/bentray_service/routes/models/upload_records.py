@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
-from typing import Any, Literal
+from datetime import datetime
+from typing import Literal
 
 from pydantic import BaseModel, Field
 
+from ...rows.records import UploadRow
 from ...web.errors import Problem
-
-Row = dict[str, Any]
 
 # Where each kind is listed.
 PLACES = {"dataset": "/v1/datasets", "volume": "/v1/volumes", "mesh": "/v1/meshes"}
@@ -30,25 +29,16 @@ class UploadRecord(BaseModel):
     links: dict[str, str]
 
 
-def upload_record(row: Row, offset: int) -> UploadRecord:
+def upload_record(row: UploadRow, offset: int) -> UploadRecord:
     links = {"self": f"/v1/uploads/{row['id']}"}
     done = row["state"] == "done"
     if done:
         links["result"] = result_link(row)
-    return UploadRecord(
-        id=row["id"],
-        kind=row["what"],
-        state=row["state"],
-        offset=offset,
-        length=row["length"],
-        result=row["result_id"] if done else None,
-        problem=row["problem"],
-        created=datetime.fromtimestamp(row["created"], UTC),
-        expires=datetime.fromtimestamp(row["expires"], UTC),
-        links=links,
-    )
+    result = row["result_id"] if done else None
+    more = {"kind": row["what"], "offset": offset, "result": result, "links": links}
+    return UploadRecord.model_validate({**row, **more})
 
 
-def result_link(row: Row) -> str:
+def result_link(row: UploadRow) -> str:
     """The address of what an upload became."""
     return f"{PLACES[row['what']]}/{row['result_id']}"

@@ -1,0 +1,175 @@
+"""The rows of the database as typed records; the columns are those of ``rows.schema``."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NotRequired, TypedDict
+
+from .tenants import Tenant
+
+Plain = dict[str, Any]
+
+
+class StoredRow(TypedDict):
+    """What the rows of all stored things have; times are seconds since 1970."""
+
+    id: str
+    tenant: Tenant
+    created: float
+    bytes: int
+
+
+class DatasetRow(StoredRow):
+    """A scan; ``counts`` is None and ``job_id`` set as in ``rows.schema``."""
+
+    number: int
+    sha256: str
+    title: str
+    source: str
+    license: str
+    dimension: int
+    elements: int
+    ntx: int
+    nrx: int
+    slices: int
+    has_traces: bool
+    has_travel_times: bool
+    has_truth: bool
+    water_speed_mps: float
+    counts: Plain | None
+    job_id: str | None
+
+
+class VolumeRow(StoredRow):
+    """A volume: of a reconstruction (``job_id`` and what follows it) or uploaded (``sha256``)."""
+
+    title: str
+    axes: str
+    shape: list[int]
+    spacing_m: list[float | None]
+    origin_m: list[float | None]
+    value_range: list[float]
+    unit: str
+    job_id: NotRequired[str]
+    dataset_id: NotRequired[str]
+    speed_range_mps: NotRequired[list[float]]
+    water_speed_mps: NotRequired[float]
+    provenance: NotRequired[dict[str, str]]
+    sha256: NotRequired[str]
+
+
+class MeshRow(StoredRow):
+    """A triangle mesh; ``volume_id`` and ``iso`` are those of an iso-surface."""
+
+    number: int
+    sha256: str
+    title: str
+    format: str
+    volume_id: str | None
+    iso: float | None
+    vertices: int
+    faces: int
+    genus: int
+    holes: int
+    coloured: bool
+    repairs: dict[str, int]
+    content: str
+
+
+class FieldRow(StoredRow):
+    """A geometry field, of the mesh and the job that it was first made for."""
+
+    number: int
+    mesh_id: str
+    job_id: str
+    settings: Plain
+    figures: Plain
+
+
+class JobProgress(TypedDict):
+    """How far a job is."""
+
+    id: str
+    state: str
+    done: int
+    total: int
+    phase: str | None
+
+
+class JobRow(JobProgress):
+    """A job."""
+
+    number: int
+    tenant: Tenant
+    kind: str
+    dataset_id: str | None
+    volume_id: str | None
+    mesh_id: str | None
+    field_id: str | None
+    settings: Plain
+    attempts: int
+    history: list[Plain]
+    error: Plain | None
+    plan: Plain | None
+    advice: str | None
+    created: float
+    started: float | None
+    finished: float | None
+    idempotency_key: str | None
+    request_sha256: str | None
+    lease_owner: str | None
+    lease_until: float | None
+
+
+class EventRow(TypedDict):
+    """A change of state of a job; ``number`` is the id of the server-sent event."""
+
+    number: int
+    job_id: str
+    time: float
+    state: str
+    note: str
+
+
+class UploadRow(TypedDict):
+    """An upload in pieces; ``what`` becomes ``result_id`` of ``length`` bytes."""
+
+    number: int
+    id: str
+    tenant: Tenant
+    what: Literal["dataset", "volume", "mesh"]
+    result_id: str
+    length: int
+    given: Plain
+    metadata: str
+    state: Literal["receiving", "reading", "done", "refused"]
+    problem: Plain | None
+    created: float
+    expires: float
+
+
+class KeyRow(TypedDict):
+    """An API key without its secret."""
+
+    number: int
+    id: str
+    tenant: Tenant
+    name: str
+    sha256: str
+    scopes: list[str]
+    created: float
+    expires: float | None
+    revoked: float | None
+    used: float | None
+
+
+class ChecksumRow(TypedDict):
+    """The checksum of a stored file, and since when its content is known to differ."""
+
+    tenant: Tenant
+    id: str
+    path: str
+    bytes: int
+    sha256: str
+    noted: float
+    as_written: bool
+    damaged: float | None

@@ -1,0 +1,113 @@
+"""The tables of what tenants store: one implementation, and the datasets, meshes, fields and volumes."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, ClassVar, Generic, TypeVar, cast
+
+from sqlalchemy import Table, insert, select
+
+from ..refusals import UnknownId
+from . import schema
+from .database import Database
+from .ids import checked
+from .records import DatasetRow, FieldRow, MeshRow, Plain, VolumeRow
+from .schema import datasets, jobs, uploaded_volumes, volumes
+from .tenants import Tenant
+from .usage import keep
+
+Record = TypeVar("Record")
+
+
+class TenantTable(Generic[Record]):
+    """The rows of one table, each query for one tenant only.
+
+    Attributes:
+        table: which one.
+        what: its things, a key of ``ids.PREFIXES``.
+    """
+
+    table: ClassVar[Table]
+    what: ClassVar[str]
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def get(self, tenant: Tenant, name: str) -> Record:
+        """One row of this tenant, by its id.
+
+        Raises:
+            UnknownId: when it has no such one.
+        """
+        found = self._select(tenant, 1, checked(self.what, name))
+        if not found:
+            raise UnknownId(self.what, name)
+        return cast(Record, found[0])
+
+    def newest(self, tenant: Tenant, limit: int) -> list[Record]:
+        """Up to ``limit`` rows of this tenant, newest first."""
+        return cast(list[Record], self._select(tenant, limit))
+
+    def _select(self, tenant: Tenant, limit: int, name: str | None = None) -> list[Plain]:
+        table = self.table.c
+        query = select(self.table).where(table.tenant == tenant)
+        if name is not None:
+            query = query.where(table.id == name)
+        return self._database.rows(query.order_by(table.number.desc()).limit(limit))
+
+
+class UploadedTable(TenantTable[Record]):
+    """A table of what is uploaded; its rows are never changed."""
+
+    def add(self, tenant: Tenant, name: str, *, size: int, sha256: str, summary: Plain) -> Record:
+        """Store a row; ``summary`` holds the columns that describe the content of its file."""
+        row = {"tenant": tenant, "id": name, "created": time.time(), "bytes": size, "sha256": sha256}
+        with self._database.write() as connection:
+            connection.execute(insert(self.table).values(**row, **summary))
+            keep(connection, tenant, name, size)
+        return self.get(tenant, name)
+
+
+class Datasets(UploadedTable[DatasetRow]):
+    """Scans, uploaded or simulated."""
+
+    table, what = datasets, "dataset"
+
+
+class Meshes(UploadedTable[MeshRow]):
+    """Meshes, uploaded or made of a volume."""
+
+    table, what = schema.meshes, "mesh"
+
+
+class GeometryFields(TenantTable[FieldRow]):
+    """Geometry fields; jobs write their rows when they succeed."""
+
+    table, what = schema.geometry_fields, "field"
+
+
+class Volumes(UploadedTable[VolumeRow]):
+    """Volumes: uploads, and the results of reconstructions, which are in a table of their own."""
+
+    table, what = uploaded_volumes, "volume"
+
+    def _select(self, tenant: Tenant, limit: int, name: str | None = None) -> list[Plain]:
+        reconstructed: Any = (
+            select(volumes, jobs.c.dataset_id, datasets.c.title)
+            .join(jobs, jobs.c.id == volumes.c.job_id)
+            .join(datasets, datasets.c.id == jobs.c.dataset_id)
+        )
+        found: list[Plain] = []
+        for table, query in ((volumes, reconstructed), (uploaded_volumes, select(uploaded_volumes))):
+            mine = query.where(table.c.tenant == tenant)
+            if name is not None:
+                mine = mine.where(table.c.id == name)
+            found += self._database.rows(mine.order_by(table.c.created.desc()).limit(limit))
+        for row in found:
+            made = "job_id" in row
+            row |= (
+                {"unit": "m/s", "value_range": row["speed_range_mps"]}
+                if made
+                else {"unit": "", "axes": "x,y,z"}
+            )
+        return sorted(found, key=lambda row: float(row["created"]), reverse=True)[:limit]

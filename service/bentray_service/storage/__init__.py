@@ -1,1 +1,0 @@
-"""What outlives the process: the database rows and the files of the service."""
