@@ -10,18 +10,39 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
-from .diagonals import FIRST, NONE, RUN, Diagonals, include
+from ..float32 import higher, lower
+from .diagonals import FIRST, NONE, RUN, Columns, Diagonals, include
 from .problem import PointSource
 
 # First and last changed node of a run, the same of those whose change the nodes just left must hear of
 # (diagonal, then plane), and whether a change was above the tolerance.
 Outcome = tuple[int, int, int, int, int, int, int]
+
+
+class Grid(NamedTuple):
+    """What a sweep reads and changes, stored by diagonals.
+
+    Attributes:
+        time: s; changed in place.
+        crossing: slowness times spacing of each node, s.
+        waiting: nodes to update.
+        changed: nodes that a sweep has changed.
+        shape, stored: as in ``Diagonals``.
+    """
+
+    time: Floats
+    crossing: Floats
+    waiting: Columns
+    changed: Columns
+    shape: tuple[int, int, int]
+    stored: tuple[int, int]
 
 
 def fast_sweeping(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
@@ -114,14 +135,9 @@ class Sweeper:
             here, there = self._times[side], self._times[1 - side]
             waiting = self._waiting[side]
             self._changed.clear()
+            crossing = self._crossing(side, slowness, spacing)
             moved = self._sweep(
-                here,
-                self._crossing(side, slowness, spacing),
-                *waiting,
-                *self._changed,
-                grid.shape,
-                grid.stored,
-                tolerance,
+                Grid(here, crossing, waiting, self._changed, grid.shape, grid.stored), tolerance
             )
             quiet = 0 if moved else quiet + 1
             if quiet == 2 or not waiting.any():
@@ -150,68 +166,36 @@ def _same(a: Floats, b: Floats) -> bool:
 
 
 @kernel
-def _sweep_2d(
-    time: Floats,
-    crossing: Floats,
-    low: Ints,
-    high: Ints,
-    lowest: Ints,
-    highest: Ints,
-    shape: tuple[int, int, int],
-    stored: tuple[int, int],
-    tolerance: float,
-) -> int:
+def _sweep_2d(grid: Grid, tolerance: float) -> int:
     moved = 0
     for way in (1, -1):
-        moved |= _sweep_plane(time, crossing, low, high, lowest, highest, shape, stored, tolerance, 0, way, 0)
+        moved |= _sweep_plane(grid, tolerance, 0, way, 0)
     return moved
 
 
 @kernel
-def _sweep_3d(
-    time: Floats,
-    crossing: Floats,
-    low: Ints,
-    high: Ints,
-    lowest: Ints,
-    highest: Ints,
-    shape: tuple[int, int, int],
-    stored: tuple[int, int],
-    tolerance: float,
-) -> int:
+def _sweep_3d(grid: Grid, tolerance: float) -> int:
     moved = 0
     for up in (1, -1):
-        for step in range(shape[0]):
-            plane = 2 + step if up > 0 else shape[0] + 1 - step
+        for step in range(grid.shape[0]):
+            plane = 2 + step if up > 0 else grid.shape[0] + 1 - step
             # Both ways while the plane is in the cache.
             for way in (1, -1):
-                moved |= _sweep_plane(
-                    time, crossing, low, high, lowest, highest, shape, stored, tolerance, plane, way, up
-                )
+                moved |= _sweep_plane(grid, tolerance, plane, way, up)
     return moved
 
 
 @kernel
-def _sweep_plane(
-    time: Floats,
-    crossing: Floats,
-    low: Ints,
-    high: Ints,
-    lowest: Ints,
-    highest: Ints,
-    shape: tuple[int, int, int],
-    stored: tuple[int, int],
-    tolerance: float,
-    plane: int,
-    way: int,
-    up: int,
-) -> int:
+def _sweep_plane(grid: Grid, tolerance: float, plane: int, way: int, up: int) -> int:
     """Update the diagonals of a plane that wait for it, in rising (``way`` 1) or falling (−1) order.
 
-    The columns ``low`` to ``high`` of a diagonal wait; ``lowest`` to ``highest`` take in those that changed.
+    Columns that change are added to ``grid.changed``, their later neighbours to ``grid.waiting``.
     """
+    time, crossing, shape = grid.time, grid.crossing, grid.shape
+    low, high = grid.waiting
+    lowest, highest = grid.changed
     _, nj, nk = shape
-    rows, width = stored
+    rows, width = grid.stored
     base = plane * rows * width
     moved = 0
     for step in range(nj + nk - 1):
@@ -288,15 +272,15 @@ def _relax_2d(
     """
     first, last, first_behind, last_behind, moved = NONE, -1, NONE, -1, 0
     for x in range(np.uint64(count)):
-        a = _earlier(time[before + x], time[after + x + np.uint64(1)])
-        b = _earlier(time[before + x + np.uint64(1)], time[after + x])
+        a = lower(time[before + x], time[after + x + np.uint64(1)])
+        b = lower(time[before + x + np.uint64(1)], time[after + x])
         rhs = crossing[at + x]
-        gap = _earlier(abs(a - b), rhs)
-        new = _earlier(a, b) + 0.5 * (gap + math.sqrt(2.0 * rhs * rhs - gap * gap))
+        gap = lower(abs(a - b), rhs)
+        new = lower(a, b) + 0.5 * (gap + math.sqrt(2.0 * rhs * rhs - gap * gap))
         old = time[at + x]
         changed = new < old
         # A neighbour that an opposite neighbour reached earlier has nothing to gain from this one.
-        heard = changed & (new < _later(time[behind + x], time[behind + x + np.uint64(2)]))
+        heard = changed & (new < higher(time[behind + x], time[behind + x + np.uint64(2)]))
         place = int(np.int64(x))
         first = min(first, place if changed else NONE)
         last = max(last, place if changed else -1)
@@ -325,17 +309,17 @@ def _relax_3d(
     first, last, first_behind, last_behind, moved = NONE, -1, NONE, -1, 0
     first_below, last_below = NONE, -1
     for x in range(np.uint64(count)):
-        a = _earlier(time[before + x], time[after + x + np.uint64(1)])
-        b = _earlier(time[before + x + np.uint64(1)], time[after + x])
-        c = _earlier(time[below + x], time[above + x])
+        a = lower(time[before + x], time[after + x + np.uint64(1)])
+        b = lower(time[before + x + np.uint64(1)], time[after + x])
+        c = lower(time[below + x], time[above + x])
         rhs = crossing[at + x]
-        less = _earlier(a, b)
-        more = _later(a, b)
-        low = _earlier(less, c)
-        high = _later(more, c)
-        middle = _later(less, _earlier(more, c))
+        less = lower(a, b)
+        more = higher(a, b)
+        low = lower(less, c)
+        high = higher(more, c)
+        middle = higher(less, lower(more, c))
         square = rhs * rhs
-        near = _earlier(middle - low, rhs)
+        near = lower(middle - low, rhs)
         time_2 = 0.5 * (near + math.sqrt(2.0 * square - near * near))
         far = high - low
         total = near + far
@@ -343,7 +327,7 @@ def _relax_3d(
         new = low + (time_3 if time_2 > far else time_2)
         old = time[at + x]
         changed = new < old
-        heard = changed & (new < _later(time[behind + x], time[behind + x + np.uint64(2)]))
+        heard = changed & (new < higher(time[behind + x], time[behind + x + np.uint64(2)]))
         heard_below = changed & (new < time[beneath + x])
         place = int(np.int64(x))
         first = min(first, place if changed else NONE)
@@ -355,14 +339,3 @@ def _relax_3d(
         moved |= 1 if old - new > tolerance * rhs else 0
         time[at + x] = new if changed else old
     return first, last, first_behind, last_behind, first_below, last_below, moved
-
-
-@kernel(inline="always")
-def _earlier(a: float, b: float) -> float:
-    """The lower of two times, as one instruction: ``min`` would also sort out NaN and signs of zero."""
-    return a if a < b else b
-
-
-@kernel(inline="always")
-def _later(a: float, b: float) -> float:
-    return a if a > b else b

@@ -44,11 +44,7 @@ def spreading(
     one, ray theory gives no amplitude, and the spreading is NaN.
 
     Args:
-        tof: (nx, ny[, nz]), s, as ``eikonal.solve`` gives it for ``source``.
-        speed: as ``tof``, m/s.
-        spacing: node spacing, m.
-        receivers: (k, ndim), m, in the grid; node 0 lies at 0.
-        source: (ndim,), m.
+        tof, speed, spacing, receivers, source: as ``travel_times``.
 
     Returns:
         (k,), of no unit; 1 for a receiver on the source.
@@ -56,8 +52,8 @@ def spreading(
     Raises:
         InvalidInput: as ``travel_times``.
     """
-    relative, _ = _followed(tof, speed, spacing, receivers, source)
-    return relative
+    fan = Fan.checked(tof, spacing, receivers, source, "curved")
+    return _tubes(fan, log_slowness(fan, speed, spacing))[0]
 
 
 def log_amplitudes(
@@ -79,20 +75,14 @@ def log_amplitudes(
     Raises:
         InvalidInput: as ``travel_times``.
     """
-    relative, ends = _followed(tof, speed, spacing, receivers, source)
-    return np.asarray(-0.5 * np.log(relative * ends))
-
-
-def _followed(
-    tof: ArrayLike, speed: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike
-) -> tuple[Floats, Floats]:
-    """Relative spreading, and speed at the source over that at the receiver."""
     fan = Fan.checked(tof, spacing, receivers, source, "curved")
-    return _tubes(fan, log_slowness(fan, speed, spacing))
+    relative, ends = _tubes(fan, log_slowness(fan, speed, spacing))
+    return np.asarray(-0.5 * np.log(relative * ends))
 
 
 @kernel
 def _tubes(fan: Fan, spline: Floats) -> tuple[Floats, Floats]:
+    """Relative spreading, and speed at the source over that at the receiver, (k,) each."""
     path, scratch = empty_path(fan)
     rays = len(fan.receivers)
     space = bending(len(path), fan.shape)

@@ -107,12 +107,9 @@ def backward(
             end,
             fields[0],
             fields[1],
-            medium.keep,
-            medium.fade,
-            medium.drive,
+            medium.factors,
             taps,
-            heard.first,
-            heard.weights,
+            heard,
             sources,
             medium.margin,
             every,
@@ -129,12 +126,9 @@ def _backward(
     end: int,
     now: Any,
     old: Any,
-    keep: Any,
-    fade: Any,
-    drive: Any,
+    factors: Any,
     weights: Any,
-    first: Any,
-    along: Any,
+    receivers: Any,
     residual: Any,
     margin: int,
     every: int,
@@ -144,6 +138,7 @@ def _backward(
 ) -> None:
     # At the top of turn n, ``now`` is the adjoint field of equation n. Every equation of the scheme is
     # symmetric but for the order of time, so the field runs backwards under the same step.
+    keep, fade, drive = factors
     nx, ny = image.shape
     last = residual.shape[1] - 1
     for n in range(last - begin, last - end, -1):
@@ -157,5 +152,5 @@ def _backward(
                     energy[j] += wave[j] * wave[j]
         advance(now, old, keep, fade, drive, weights)
         for r in range(residual.shape[0]):
-            inject(old, drive, first[r], along[r], residual[r, n])
+            inject(old, drive, receivers.first[r], receivers.weights[r], residual[r, n])
         now, old = old, now

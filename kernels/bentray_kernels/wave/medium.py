@@ -47,6 +47,11 @@ class Medium:
     time_step_s: float
     margin: int
 
+    @property
+    def factors(self) -> tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]]:
+        """keep, fade and drive, as the compiled time steps take them."""
+        return self.keep, self.fade, self.drive
+
     @classmethod
     def of(
         cls,

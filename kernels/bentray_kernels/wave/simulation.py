@@ -137,14 +137,10 @@ def forward(
             end,
             fields[0],
             fields[1],
-            medium.keep,
-            medium.fade,
-            medium.drive,
+            medium.factors,
             taps,
-            source.first[0],
-            source.weights[0],
-            heard.first,
-            heard.weights,
+            source,
+            heard,
             pulse,
             medium.margin,
             every,
@@ -163,14 +159,10 @@ def _forward(
     end: int,
     now: Any,
     old: Any,
-    keep: Any,
-    fade: Any,
-    drive: Any,
+    factors: Any,
     weights: Any,
-    first: Any,
-    along: Any,
-    heard_first: Any,
-    heard_along: Any,
+    source: Any,
+    heard: Any,
     wavelet: Any,
     margin: int,
     every: int,
@@ -179,9 +171,11 @@ def _forward(
     traces: Any,
     scattered: Any,
 ) -> None:
+    keep, fade, drive = factors
+    first, along = source.first[0], source.weights[0]
     for n in range(begin, end):
         for r in range(traces.shape[0]):
-            traces[r, n] = read(now, heard_first[r], heard_along[r])
+            traces[r, n] = read(now, heard.first[r], heard.weights[r])
         kept = every > 0 and n % every == 0
         if kept and by_loss:
             braked(now, old, turn, margin, scattered[n // every])

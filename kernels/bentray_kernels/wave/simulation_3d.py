@@ -25,9 +25,8 @@ def forward_in_space(
     taps, pulse = weights(order).astype(kind), (wavelet / scale).astype(kind)
     traces = np.empty((len(heard.first), wavelet.size), kind)
     fields = np.zeros((2, *medium.keep.shape), kind)
-    factors = medium.keep, medium.fade, medium.drive
     for begin, end in strips(wavelet.size, medium.keep.size, poll):
-        _forward(begin, end, fields[0], fields[1], factors, taps, source, heard, pulse, traces)
+        _forward(begin, end, fields[0], fields[1], medium.factors, taps, source, heard, pulse, traces)
     # A point is 1 / spacing^3 on its node, of which the factors hold spacing^2.
     traces *= kind.type(scale / medium.spacing)
     return traces

@@ -93,7 +93,8 @@ def test_the_square_root_is_taken_of_vectors():
     fresh = njit(nogil=True, error_model="numpy")(fast_sweeping._sweep_plane.py_func)
     grid = Diagonals.of((4, 4))
     time, crossing = np.full((2, grid.size), np.inf)
-    fresh(time, crossing, *grid.nobody(), *grid.nobody(), grid.shape, grid.stored, 0.0, 0, 1, 0)
+    waiting, changed = grid.nobody(), grid.nobody()
+    fresh(fast_sweeping.Grid(time, crossing, waiting, changed, grid.shape, grid.stored), 0.0, 0, 1, 0)
     (assembly,) = fresh.inspect_asm().values()
     if "vsqrt" not in assembly:
         pytest.skip("not a processor with AVX")
