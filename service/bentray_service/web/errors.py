@@ -191,7 +191,7 @@ def fault_of(error: Mapping[str, Any], job_kinds: Sequence[str] = ()) -> Fault:
     return Fault(field=".".join(where), found=_short(error["input"]), accepted=accepted)
 
 
-def install(app: FastAPI, job_kinds: Sequence[str]) -> None:
+def install(app: FastAPI, job_kinds: Sequence[str] = ()) -> None:
     """Make every error of ``app`` a problem; ``job_kinds`` are the accepted kinds of job."""
 
     def invalid_request(request: Request, error: Exception) -> Response:
