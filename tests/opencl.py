@@ -17,4 +17,4 @@ def refusal() -> str:
 
 def methods() -> tuple[str, ...]:
     """The Eikonal methods that run here; those on a device only where one passes."""
-    return tuple(name for name, method in METHODS.by_name.items() if not (method.on_device and refusal()))
+    return tuple(name for name, method in METHODS.items() if not (method.on_device and refusal()))

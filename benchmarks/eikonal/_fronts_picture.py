@@ -60,7 +60,7 @@ class Case:
 
 def picture(cases: Sequence[Case]) -> bytes:
     """PNG: for each case a row of wave fronts and a row of errors; all cases have the same methods."""
-    methods = [eikonal.METHODS.get(name) for name in cases[0].solved]
+    methods = [eikonal.METHODS[name] for name in cases[0].solved]
     # More is done against the error from column to column.
     methods.sort(key=lambda method: (method.order, method.factored))
     names = [method.name for method in methods]

@@ -34,7 +34,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
     """
     nodes = 128 if quick else 256
     device = choose().device
-    names = [name for name in eikonal.methods() if device or not eikonal.METHODS.get(name).on_device]
+    names = [name for name in eikonal.methods() if device or not eikonal.METHODS[name].on_device]
     makers = (breast_case, gradient_case)
     cases = []
     for k, make in enumerate(makers):

@@ -34,7 +34,7 @@ LEAST_SECONDS = 0.5
 def rows(quick: bool, progress: Step) -> Iterable[Row]:
     """A row a method, dimension and quantity; speed 1 to 5 along x, one thread."""
     sides = QUICK_SIDES if quick else SIDES
-    names = [name for name in eikonal.methods() if not eikonal.METHODS.get(name).on_device]
+    names = [name for name in eikonal.methods() if not eikonal.METHODS[name].on_device]
     cases = [(name, ndim) for ndim in sides for name in names]
     total = 2 * len(cases)
     for k, (name, ndim) in enumerate(cases):

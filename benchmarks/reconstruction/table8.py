@@ -66,10 +66,10 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         found: dict[str, Figures] = {}
         for k, name in enumerate(names):
             progress(i * len(names) + k, len(sides) * len(names), f"{name} {nodes}²")
-            if device or not eikonal.METHODS.get(name).on_device:
+            if device or not eikonal.METHODS[name].on_device:
                 found[name] = measured(name, nodes)
         for column in COLUMNS:
-            ran_on = device if eikonal.METHODS.get(column.ours).on_device else "one core"
+            ran_on = device if eikonal.METHODS[column.ours].on_device else "one core"
             yield from beside(column, nodes, found.get(column.ours), ran_on, refusal)
     progress(len(sides) * len(names), len(sides) * len(names), "done")
 
@@ -97,7 +97,7 @@ def measured(name: str, nodes: int) -> Figures:
     angle = 2.0 * np.pi * np.arange(SOURCES) / SOURCES
     ring = TABLE6_SIDE_M * (0.5 + 0.475 * np.column_stack((np.cos(angle), np.sin(angle))))
     alone = least_seconds(lambda: eikonal.solve(speed, spacing, ring[0], name))
-    if eikonal.METHODS.get(name).run_many is None:
+    if eikonal.METHODS[name].run_many is None:
         return Figures(alone, None)
     together = least_seconds(lambda: eikonal.solve_many(speed[None], spacing, ring, name))
     return Figures(alone, together / SOURCES)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -52,92 +52,52 @@ class Method:
         return tuple(p.name for p in kinds if p.kind is inspect.Parameter.KEYWORD_ONLY)
 
 
-@dataclass(frozen=True)
-class Registry:
-    """A frozen set of methods; ``register`` gives a larger one and leaves this one as it is."""
-
-    by_name: Mapping[str, Method] = field(default_factory=lambda: MappingProxyType({}))
-
-    def register(self, method: Method) -> Registry:
-        """This registry and one more method.
-
-        Raises:
-            InvalidInput: when the name is taken.
-        """
-        if method.name in self.by_name:
-            raise InvalidInput("method", repr(method.name), "a name not yet registered")
-        return Registry(MappingProxyType({**self.by_name, method.name: method}))
-
-    def get(self, name: str) -> Method:
-        """The method of that name.
-
-        Raises:
-            InvalidInput: listing the known names.
-        """
-        try:
-            return self.by_name[name]
-        except KeyError:
-            raise InvalidInput("method", repr(name), "one of " + ", ".join(self.by_name)) from None
-
-
-METHODS = (
-    Registry()
-    .register(
-        Method(
-            "accurate",
-            accurate,
-            2,
-            True,
-            "factored second order in the order of a first-order sweep (default); option supersample",
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        method.name: method
+        for method in (
+            Method(
+                "accurate",
+                accurate,
+                2,
+                True,
+                "factored second order in the order of a first-order sweep (default); option supersample",
+            ),
+            Method("fmm", fast_marching, 2, False, "fast marching, binary heap; options order=1 or 2"),
+            Method("hafmm", high_accuracy_fast_marching, 2, True, "fast marching, factored second order"),
+            Method(
+                "fsm",
+                fast_sweeping,
+                1,
+                False,
+                "fast sweeping, first order; option tolerance",
+                fast_sweeping_many,
+            ),
+            Method("fim", fast_iterative, 1, False, "fast iterative, first order; option tolerance"),
+            Method(
+                "fim-opencl",
+                fast_iterative_opencl,
+                1,
+                False,
+                "fim in blocks on an OpenCL device (BENTRAY_OPENCL_DEVICE); option tolerance",
+                fast_iterative_opencl_many,
+                on_device=True,
+            ),
+            Method(
+                "fmm-untidy",
+                fast_marching_untidy,
+                2,
+                False,
+                "fast marching, O(N), error bounded; options order=1 or 2, width of a bucket",
+            ),
         )
-    )
-    .register(Method("fmm", fast_marching, 2, False, "fast marching, binary heap; options order=1 or 2"))
-    .register(
-        Method(
-            "hafmm",
-            high_accuracy_fast_marching,
-            2,
-            True,
-            "fast marching, factored second order",
-        )
-    )
-    .register(
-        Method(
-            "fsm",
-            fast_sweeping,
-            1,
-            False,
-            "fast sweeping, first order; option tolerance",
-            fast_sweeping_many,
-        )
-    )
-    .register(Method("fim", fast_iterative, 1, False, "fast iterative, first order; option tolerance"))
-    .register(
-        Method(
-            "fim-opencl",
-            fast_iterative_opencl,
-            1,
-            False,
-            "fim in blocks on an OpenCL device (BENTRAY_OPENCL_DEVICE); option tolerance",
-            fast_iterative_opencl_many,
-            on_device=True,
-        )
-    )
-    .register(
-        Method(
-            "fmm-untidy",
-            fast_marching_untidy,
-            2,
-            False,
-            "fast marching, O(N), error bounded; options order=1 or 2, width of a bucket",
-        )
-    )
+    }
 )
 
 
 def methods() -> tuple[str, ...]:
     """Names that ``solve`` accepts, the default first."""
-    return tuple(METHODS.by_name)
+    return tuple(METHODS)
 
 
 def solve(
@@ -232,7 +192,9 @@ def solve_many(
 
 
 def _with_options(name: str, options: Mapping[str, Any]) -> Method:
-    method = METHODS.get(name)
+    if name not in METHODS:
+        raise InvalidInput("method", repr(name), "one of " + ", ".join(METHODS))
+    method = METHODS[name]
     for option in options:
         if option not in method.options():
             known = ", ".join(method.options()) or "none"

@@ -39,4 +39,4 @@ def needs_device(settings: Settings) -> bool:
     """Whether a call of the reconstruction tracks wave fronts on an OpenCL device."""
     # Methods that are tried bend rays whatever was asked for.
     straight = settings.rays == "straight" and not settings.tries
-    return not straight and METHODS.get(settings.front).on_device
+    return not straight and METHODS[settings.front].on_device

@@ -6,7 +6,7 @@ from bentray_kernels import eikonal
 
 
 def marked(name):
-    return pytest.param(name, marks=pytest.mark.opencl if eikonal.METHODS.get(name).on_device else ())
+    return pytest.param(name, marks=pytest.mark.opencl if eikonal.METHODS[name].on_device else ())
 
 
 @pytest.fixture(params=map(marked, eikonal.methods()), scope="session")

@@ -72,11 +72,11 @@ def test_converges_with_its_order(method, ndim):
         )
         ring.append(np.sqrt((error[away] ** 2).mean()))
     rate = np.log2(ring[0] / ring[2]) / 2.0
-    chosen = eikonal.METHODS.get(method)
+    chosen = eikonal.METHODS[method]
     assert rate > (1.5 if chosen.order == 2 and chosen.factored else 0.75)
 
 
-@pytest.mark.parametrize("method", [m.name for m in eikonal.METHODS.by_name.values() if m.factored])
+@pytest.mark.parametrize("method", [m.name for m in eikonal.METHODS.values() if m.factored])
 def test_factored_methods_are_exact_in_a_homogeneous_medium(method, ndim):
     source = np.array([0.031, 0.077, 0.05])[:ndim]
     tof = eikonal.solve(np.full((14,) * ndim, 2.0), 0.01, source, method)
@@ -99,7 +99,7 @@ def test_models_over_four_decades_give_times(ndim, longest):
     for seed in range(effort(500, 10_000)):
         speed, source = four_decade_problem(seed, longest, ndim)
         marched = eikonal.solve(speed, 1.0, source, "fmm", order=1)
-        for chosen in eikonal.METHODS.by_name.values():
+        for chosen in eikonal.METHODS.values():
             # A call to a device takes as long as twenty solves.
             if chosen.on_device and seed % 20 != 0:
                 continue
@@ -160,7 +160,7 @@ def test_reciprocity_on_a_smooth_model(method):
         there = eikonal.solve(speed, spacing, a * spacing, method)[tuple(b)]
         back = eikonal.solve(speed, spacing, b * spacing, method)[tuple(a)]
         gaps.append(abs(there / back - 1.0))
-    chosen = eikonal.METHODS.get(method)
+    chosen = eikonal.METHODS[method]
     assert gaps[0] < (5e-4 if chosen.factored else 1e-2)
     assert gaps[1] < gaps[0] * (0.35 if chosen.factored else 0.8)
 
@@ -234,12 +234,3 @@ def test_bad_input_is_named(change, field, words):
         eikonal.solve(**arguments)
     assert refusal.value.field == field
     assert words in str(refusal.value)
-
-
-def test_registry_is_frozen():
-    extra = eikonal.Method("twice", lambda problem: 2 * problem.slowness, 1, False, "for this test")
-    larger = eikonal.METHODS.register(extra)
-    assert "twice" in larger.by_name
-    assert "twice" not in eikonal.methods()
-    with pytest.raises(InvalidInput, match="twice"):
-        larger.register(extra)

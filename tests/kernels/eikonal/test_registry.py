@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from bentray_kernels import eikonal
 from bentray_kernels.errors import InvalidInput
 
-METHODS = [name for name in eikonal.methods() if not eikonal.METHODS.get(name).on_device]
+METHODS = [name for name in eikonal.methods() if not eikonal.METHODS[name].on_device]
 
 
 @pytest.mark.parametrize("method", METHODS)
