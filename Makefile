@@ -8,11 +8,13 @@ BIN := .venv/bin
 HOST ?= 127.0.0.1
 PORT ?= 8000
 NAME ?= reconstruction
+# Tests often wait for other processes, so one more than there are cores.
+PROCESSES ?= $(shell n=$$(nproc); echo $$((n < 4 ? n + 1 : 4)))
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests and jobs start hundreds of Python processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install install-dev install-docs demo test test-all serve lint docs bench lock clean
+.PHONY: help install compiled install-dev install-docs demo test test-all serve lint docs bench lock clean
 
 help: ## list the targets
 	@echo "Bentray: make TARGET"
@@ -28,11 +30,11 @@ demo: install ## simulate a scan, submit it to a service, compare straight and b
 serve: install ## start the service; HOST=127.0.0.1 PORT=8000
 	@$(BIN)/bentray serve --host $(HOST) --port $(PORT)
 
-test: install-dev ## run the tests, up to four files at once; ARGS="tests/kernels -x" narrows them
-	@$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m "not nightly" $(ARGS)
+test: install-dev compiled ## run the tests, up to four files at once; ARGS="tests/kernels -x" narrows them
+	@$(BIN)/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder -m "not nightly" $(ARGS)
 
-test-all: install-dev ## run the tests, with the long searches and the soak tests; ARGS as above
-	@HYPOTHESIS_PROFILE=nightly $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS)
+test-all: install-dev compiled ## run the tests, with the long searches and the soak tests; ARGS as above
+	@HYPOTHESIS_PROFILE=nightly $(BIN)/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder $(ARGS)
 
 lint: install-dev ## check style, types and the import rules
 	$(BIN)/ruff check .
@@ -74,6 +76,10 @@ endef
 	done; \
 	echo "Bentray requires Python 3.11 or newer with the venv module; none was found on the PATH." >&2; \
 	echo "On Debian or Ubuntu: apt-get install python3 python3-venv" >&2; exit 1
+
+# Once, in two processes: test processes that start together would each compile the same kernels.
+compiled: install
+	@$(BIN)/python -m bentray_workers.compilation.precompile
 
 .venv/.installed: requirements.lock pyproject.toml | .venv/bin/python
 	@echo "Installing the packages of requirements.lock (about a minute the first time)"

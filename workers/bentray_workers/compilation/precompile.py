@@ -1,32 +1,38 @@
-"""Compile the kernels of all kinds of jobs, for an image.
+"""Compile the kernels of all kinds of jobs ahead: for an image, and before tests.
 
-Run it as ``python -m bentray_workers.compilation.precompile``. Numba compiles at the first call, so that
-each kind of job is run once on the smallest scan that has all it needs. A worker's own start (``warmup``)
-does less: what is compiled here is loaded when it is first called.
+Run it as ``python -m bentray_workers.compilation.precompile``. Numba compiles at the first call, so each
+kind of job runs once on the smallest scan that has all it needs. A worker's own start (``warmup``) does less:
+what is compiled here is loaded when it is first called. A second run for the same sources ends at once.
 """
 
 from __future__ import annotations
 
+import hashlib
+import os
 import sys
 import tempfile
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from itertools import product
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from llvmlite import binding  # type: ignore[import-untyped]
 
 from bentray_kernels.acquisition import PICKERS, Dataset, Waveform
 from bentray_kernels.meshes.example_surfaces import bumpy_ball
 from bentray_kernels.phantoms import ONE_HOLE, sampled
+from bentray_kernels.sources import ROOT, digest
 from bentray_kernels.splines import FILTERS
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.settings import DECOMPOSITIONS, PENALTIES
 
 from ..cluster.task_pool import ThreadTasks
-from ..files.dataset import write_dataset
+from ..files.dataset import read_dataset, write_dataset
 from ..files.mesh import StoredMesh, write_mesh
 from ..files.volume import Volume
 from ..reconstruction import quality_report as quality
@@ -50,6 +56,7 @@ TIMES = SimulationSettings(nodes=16, elements=16, coupling_mps=1375.0, attenuati
 HEIGHTS = VolumeSimulationSettings(nodes=32, slices=2, elements=8, refinement=4, coupling_mps=1375.0)
 SPACE = replace(HEIGHTS, refinement=2, three_d=True)
 WAVES = WaveSimulationSettings(frequency_hz=2e5, side_m=0.05, elements=24, emissions=12, nodes=32)
+WAVES_FILE = "waves.h5"
 WAVES_IN_SPACE = VolumeWaveSettings(frequency_hz=1e5, side_m=0.03, elements=8, emissions=1, nodes=16)
 
 
@@ -90,31 +97,44 @@ def digitised(scan: Dataset) -> Dataset:
     return replace(scan, waveform=Waveform(both[0], both[1], scale=step))
 
 
-def compile_all(folder: Path) -> None:
-    """Run each kind of job once; ``folder`` is for its files."""
+def compile_rays(folder: Path) -> None:
+    """Reconstruct from travel times and amplitudes; ``folder`` is for files."""
     warmup.warm_up()
+    for number, (scan, wanted) in enumerate(
+        (
+            (simulate(None, TIMES), of_times()),
+            (simulate_volume(None, HEIGHTS), of_heights()),
+            (simulate_volume(None, SPACE), of_heights()),
+        )
+    ):
+        _reconstruct(folder / f"times-{number}.h5", scan, wanted)
+
+
+def compile_pictures(folder: Path) -> None:
+    """Render volumes, trace a geometry field, and simulate waves: little of it uses the kernels of rays."""
     warmup.warm_up_rendering()
     warmup.warm_up_tracing()
-    simulate_emission(WAVES_IN_SPACE, 0)
-    waves = simulate_waves(None, WAVES)
-    scans: tuple[tuple[Dataset, Iterator[dict[str, Any]]], ...] = (
-        (simulate(None, TIMES), of_times()),
-        (simulate_volume(None, HEIGHTS), of_heights()),
-        (simulate_volume(None, SPACE), of_heights()),
-        (waves, of_traces()),
-        (digitised(waves), of_traces()),
-    )
-    for number, (scan, wanted) in enumerate(scans):
-        path = folder / f"scan-{number}.h5"
-        write_dataset(path, scan)
-        quality.quality_report(path, "aic")
-        for settings in wanted:
-            reconstruct(None, path, Settings(nodes=NODES, sweeps=1, **settings))
-    _glass()
+    _refraction()
     _field(folder)
+    simulate_emission(WAVES_IN_SPACE, 0)
+    write_dataset(folder / WAVES_FILE, simulate_waves(None, WAVES))
 
 
-def _glass() -> None:
+def compile_traces(folder: Path) -> None:
+    """Reconstruct from the waves of ``compile_pictures``, along the rays of ``compile_rays``."""
+    waves = read_dataset(folder / WAVES_FILE)
+    for number, scan in enumerate((waves, digitised(waves))):
+        _reconstruct(folder / f"traces-{number}.h5", scan, of_traces())
+
+
+def _reconstruct(path: Path, scan: Dataset, wanted: Iterator[dict[str, Any]]) -> None:
+    write_dataset(path, scan)
+    quality.quality_report(path, "aic")
+    for settings in wanted:
+        reconstruct(None, path, Settings(nodes=NODES, sweeps=1, **settings))
+
+
+def _refraction() -> None:
     """A ball through every filter, refracted and lit, with both kinds of supersampling."""
     volume = Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3)
     views = (
@@ -147,12 +167,41 @@ def _field(folder: Path) -> None:
     )
 
 
-def main() -> None:
-    """For the build of an image."""
+def compiled_in(part: Callable[[Path], None], folder: Path) -> int:
+    """How many kernels a part has compiled, in a process of its own."""
     warnings.simplefilter("ignore")
-    with compiled_kernels() as kernels, tempfile.TemporaryDirectory() as folder:
-        compile_all(Path(folder))
-    sys.stdout.write(f"{len(kernels)} kernels compiled\n")
+    with compiled_kernels() as kernels:
+        part(folder)
+    return len(kernels)
+
+
+def marker() -> Path:
+    """The file that says that all is compiled, beside what was: named for sources and processor."""
+    found = hashlib.sha256(Path(__file__).read_bytes())
+    processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    for part in (digest(__name__), sys.version, *processor):
+        found.update(part.encode())
+    folder = os.environ.get("NUMBA_CACHE_DIR") or ROOT / "__pycache__"
+    return Path(folder) / f"compiled-{found.hexdigest()[:16]}"
+
+
+def main() -> None:
+    """Two processes side by side, as compilation uses one core; then what needs the kernels of both."""
+    done = marker()
+    if done.exists():
+        sys.stdout.write("All kernels are compiled already\n")
+        return
+    with (
+        tempfile.TemporaryDirectory() as name,
+        ProcessPoolExecutor(2, get_context("spawn")) as processes,
+    ):
+        folder = Path(name)
+        first = [processes.submit(compiled_in, part, folder) for part in (compile_rays, compile_pictures)]
+        total = sum(part.result() for part in first)
+        total += processes.submit(compiled_in, compile_traces, folder).result()
+    done.parent.mkdir(parents=True, exist_ok=True)
+    done.touch()
+    sys.stdout.write(f"{total} kernels compiled\n")
 
 
 if __name__ == "__main__":
