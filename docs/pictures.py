@@ -28,7 +28,8 @@ from bentray_service.cli.service_process import running_service
 from bentray_service.client import Client
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.images.truth_comparison import compare
-from bentray_workers.simulation.plane import SimulationSettings, simulate
+from bentray_workers.simulation.plane import SimulationSettings
+from bentray_workers.simulation.simulation_run import simulate
 
 # The benchmarks are a namespace package of the checkout.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -68,7 +69,7 @@ def coupling() -> Image.Image:
     figure, axes = plt.subplots(3, 4, figsize=(10, 7.8), layout="constrained")
     ways = {"straight rays": Settings(rays="straight", nodes=96), "bent rays": Settings(nodes=96)}
     for column, water in zip(axes.T, waters, strict=True):
-        scan = simulate(None, SimulationSettings(nodes=96, elements=128, coupling_mps=water), lambda _: None)
+        scan = simulate(SimulationSettings(nodes=96, elements=128, coupling_mps=water), lambda _: None)
         assert scan.truth is not None
         images = {"truth": scan.truth.sound_speed_mps}
         images |= {name: reconstruct(scan, settings).speed for name, settings in ways.items()}
@@ -126,7 +127,7 @@ def mesh() -> Image.Image:
 
 def overview() -> Image.Image:
     """The web page beside the truth and the images by straight and bent rays."""
-    scan = simulate(None, SimulationSettings(nodes=128, elements=256, coupling_mps=1375.0), lambda _: None)
+    scan = simulate(SimulationSettings(nodes=128, elements=256, coupling_mps=1375.0), lambda _: None)
     assert scan.truth is not None
     straight, bent = (reconstruct(scan, Settings(rays=rays)) for rays in ("straight", "curved"))
     panels = [("Truth", scan.truth.sound_speed_mps)]
@@ -158,7 +159,7 @@ def viewer(
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         file = Path(folder) / "phantom.h5"
         usual = SimulationSettings(nodes=96, elements=64, coupling_mps=1375.0)
-        write_dataset(file, scan or simulate(None, usual, lambda _: None))
+        write_dataset(file, scan or simulate(usual, lambda _: None))
         with running_service(Path(folder) / "data", Path(folder) / "log") as url, Client(url) as client:
             client.wait(client.submit(client.upload(file)["id"], dict(settings))["id"])
             browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])

@@ -19,7 +19,8 @@ import typer
 from bentray_service.cli import app
 from bentray_service.cli.service_process import running_service
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.simulation.plane import SimulationSettings, simulate
+from bentray_workers.simulation.plane import SimulationSettings
+from bentray_workers.simulation.simulation_run import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -66,7 +67,7 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What the reader brings: a scan with times."""
     folder = tmp_path_factory.mktemp("scans")
     settings = SimulationSettings(nodes=48, elements=24, coupling_mps=1375.0)
-    write_dataset(folder / "scan.h5", simulate(None, settings, lambda _: None))
+    write_dataset(folder / "scan.h5", simulate(settings, lambda _: None))
     return folder
 
 

@@ -15,7 +15,8 @@ from bentray_kernels.tomography.guided_picking import alternate
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.dataset import read_dataset
-from bentray_workers.simulation.waves import WaveSimulationSettings, simulate_waves
+from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ._ideal_times import ideal
 
@@ -48,7 +49,7 @@ def scan(quick: bool, progress: Step) -> tuple[str, Dataset]:
     if OTHERS.exists() and not quick:
         return "ring_wave_a", read_dataset(OTHERS)
     asked = WaveSimulationSettings(3e5, 0.05, 32, 16, nodes=64) if quick else WaveSimulationSettings()
-    made = simulate_waves(None, asked, lambda now: progress(now.done, now.total, "simulating waves"))
+    made = simulate(asked, lambda now: progress(now.done, now.total, "simulating waves"))
     return f"simulated {1e-3 * asked.frequency_hz:.0f} kHz", made
 
 

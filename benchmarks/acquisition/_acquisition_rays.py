@@ -12,13 +12,14 @@ import numpy as np
 
 from bentray_kernels.acquisition import Dataset, Waveform, pick
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
-from bentray_kernels.tomography.model_selection.finite_frequency_candidates import wide
-from bentray_kernels.tomography.model_selection.selection import reason
+from bentray_kernels.tomography.model_selection.finite_frequency_candidates import finite_frequency_candidates
+from bentray_kernels.tomography.model_selection.selection import explain_trials
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.dataset import read_dataset
 from bentray_workers.images.truth_comparison import compare
-from bentray_workers.simulation.waves import WaveSimulationSettings, simulate_waves
+from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ._ideal_times import ideal
 from ._registration import registered
@@ -45,7 +46,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
     """R4 for each scan and noise; R7, unless quick."""
     for asked in (QUICK,) if quick else SCANS:
         name = f"simulated {1e-3 * asked.frequency_hz:.0f} kHz, {1e3 * asked.side_m:.0f} mm"
-        clean = simulate_waves(None, asked, lambda now, n=name: progress(now.done, now.total, n))
+        clean = simulate(asked, lambda now, n=name: progress(now.done, now.total, n))
         for snr in (30.0,) if quick else SNRS:
             told = name + (f", SNR {snr:g}" if snr < np.inf else ", no noise")
             yield from judged(told, noisy(clean, snr), 48 if quick else 128)
@@ -77,7 +78,7 @@ def judged(name: str, dataset: Dataset, nodes: int) -> Iterable[Row]:
     picked = replace(pick(dataset), waveform=None)
     plan = Settings(nodes=nodes, attenuation=False)
     all_at_once = {"method": "gauss-newton"}
-    straight_as_waves, bent_as_waves, _ = wide(picked, plan)
+    straight_as_waves, bent_as_waves, _ = finite_frequency_candidates(picked, plan)
     ways: Mapping[str, Mapping[str, Any]] = {
         "straight": {"rays": "straight"},
         "straight, Gauss-Newton": {"rays": "straight", **all_at_once},
@@ -99,7 +100,7 @@ def judged(name: str, dataset: Dataset, nodes: int) -> Iterable[Row]:
     fair = min(found[way] for way in ways if way.startswith("straight"))
     yield Row(f"R4 {name}, bent over straight", bent / found["straight"], 0.9, "<=", "", told)
     yield Row(f"R4 {name}, bent over ideal times", bent / found["ideal times"], 1.15, "<=", "", told)
-    why = reason(advised.trials)
+    why = explain_trials(advised.trials)
     yield Row(f"R4 {name}, auto over straight", found["auto"] / found["straight"], 1.0, "<=", "", why)
     yield Row(f"R4 {name}, auto over the best straight", found["auto"] / fair, 1.0, "<=", "", told)
 
@@ -125,6 +126,6 @@ def measured(quick: bool) -> Iterable[Row]:
     seconds = time.perf_counter() - begun
     found = registered(result, dataset.truth, RADIUS_M)
     x, y = (1e3 * shift for shift in found.shift_m)
-    told = f"truth shifted by {x:.1f}, {y:.1f} mm; {reason(result.trials)}"
+    told = f"truth shifted by {x:.1f}, {y:.1f} mm; {explain_trials(result.trials)}"
     yield Row(labels[0], found.rms_mps, 12.0, "<=", "m/s", told)
     yield Row(labels[1], seconds, 20.0, "<=", "s", "one process, trials included")

@@ -12,14 +12,15 @@ from typing import Any
 
 from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.tomography import Reconstruction, Settings
-from bentray_kernels.tomography.model_selection.finite_frequency_candidates import wide
+from bentray_kernels.tomography.model_selection.finite_frequency_candidates import finite_frequency_candidates
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.images.truth_comparison import compare
 from bentray_workers.reconstruction import reconstruction_run
-from bentray_workers.simulation.waves import WaveSimulationSettings, simulate_waves
+from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ._acquisition_picture import picture
 from ._ideal_times import ideal
@@ -74,7 +75,7 @@ def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
     small = WaveSimulationSettings(3e5, 0.05, 32, 16, nodes=64, snr=30.0)
     for asked in (small,) if quick else (WaveSimulationSettings(snr=30.0),):
         name = f"simulated {1e-3 * asked.frequency_hz:.0f} kHz"
-        yield name, simulate_waves(None, asked, lambda now, n=name: progress(now.done, now.total, n))
+        yield name, simulate(asked, lambda now, n=name: progress(now.done, now.total, n))
     if not quick and OTHERS.exists():
         yield "ring_wave_a 400 kHz", read_dataset(OTHERS)
 
@@ -83,7 +84,7 @@ def made(name: str, dataset: Dataset, nodes: int, progress: Step) -> dict[str, M
     """Each way to an image of one scan; rays share their picks, and ``ideal`` has times without picking."""
     picked = pick(dataset)
     found = {}
-    _, bent_as_waves, _ = wide(picked, Settings(nodes=nodes))
+    _, bent_as_waves, _ = finite_frequency_candidates(picked, Settings(nodes=nodes))
     for way, changes in {**RAYS, "bent, wide": bent_as_waves}.items():
         found[way] = carried_out(replace(picked, waveform=None), Settings(nodes=nodes, **changes), progress)
     found["ideal times"] = carried_out(

@@ -19,7 +19,7 @@ from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.cluster.dask_settings import NO_DASHBOARD, ours
 from bentray_workers.cluster.fair_shares import IN_FLIGHT
 from bentray_workers.cluster.resources import RECONSTRUCTION, THREADS
-from bentray_workers.cluster.task_loop import finished
+from bentray_workers.cluster.task_pool import finished
 
 from ._scaling_tasks import pause
 from ._scaling_work import Work

@@ -13,11 +13,12 @@ import numpy as np
 from distributed.protocol.pickle import dumps
 
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.reconstruct import carried_out
-from bentray_kernels.tomography.task_chains import Chain
+from bentray_kernels.tomography.reconstruct import run_reconstruction
+from bentray_kernels.tomography.reconstruction_graph import TomographyGraph
 from bentray_workers.files.dataset import read_dataset, write_dataset
-from bentray_workers.reconstruction.file_scan import FileScan
-from bentray_workers.simulation.plane import SimulationSettings, simulate
+from bentray_workers.reconstruction.file_scan import FileScan, FileWaveScan
+from bentray_workers.simulation.plane import SimulationSettings
+from bentray_workers.simulation.simulation_run import simulate
 
 
 @dataclass(frozen=True)
@@ -38,32 +39,36 @@ class Work:
 
 
 def of_a_slice(nodes: int, elements: int, sweeps: int) -> Work:
-    """Reconstruct one slice of Table 6 here, call by call as a cluster would be given them."""
+    """Reconstruct one slice of the 2-D phantom in this process, task by task as on a cluster."""
     seconds: list[float] = []
     sent: list[int] = []
     returned: list[int] = []
 
-    def drive(chains: Sequence[Chain], before: int, after: int) -> None:
-        for chain in chains:
-            ready = list(chain.first())
+    def run_graphs(graphs: Sequence[TomographyGraph], before: int, after: int) -> None:
+        for graph in graphs:
+            ready = list(graph.first())
             while ready:
-                call = ready.pop(0)
-                sent.append(len(dumps((call.function, call.arguments))))
-                begun = time.thread_time()
-                given = call.function(*call.arguments)
-                seconds.append(time.thread_time() - begun)
-                returned.append(len(pickle.dumps(given, protocol=5)))
-                ready = [*chain.after(call, given), *ready]
+                task = ready.pop(0)
+                sent.append(len(dumps((task.function, task.arguments))))
+                started = time.thread_time()
+                result = task.function(*task.arguments)
+                seconds.append(time.thread_time() - started)
+                returned.append(len(pickle.dumps(result, protocol=5)))
+                ready = [*graph.after(task, result), *ready]
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "slice.h5"
-        write_dataset(path, simulate(None, SimulationSettings(nodes=nodes, elements=elements)))
+        write_dataset(path, simulate(SimulationSettings(nodes=nodes, elements=elements)))
         stamp = path.stat().st_mtime_ns
         settings = Settings(nodes=nodes, sweeps=sweeps)
         # A few nodes, to compile and read.
         for asked in (replace(settings, nodes=16, sweeps=1), settings):
             seconds.clear(), sent.clear(), returned.clear()
-            carried_out(
-                read_dataset(path), asked, lambda plan, part: FileScan(path, stamp, plan, part), drive
+            run_reconstruction(
+                read_dataset(path),
+                asked,
+                lambda plan, part: FileScan(path, stamp, plan, part),
+                run_graphs,
+                lambda plan, index: FileWaveScan(path, stamp, plan, index, path),
             )
     return Work(len(seconds), *(float(np.mean(column)) for column in (seconds, sent, returned)))

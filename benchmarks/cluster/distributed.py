@@ -17,6 +17,7 @@ from distributed import Future
 
 from bentray_kernels import eikonal
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.task_graph import Cancelled, Task
 from bentray_kernels.tomography import Settings
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
@@ -24,7 +25,7 @@ from bentray_service.compute import Compute
 from bentray_workers.cluster.attempts import Attempts
 from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.cluster.fair_shares import IN_FLIGHT
-from bentray_workers.cluster.task_loop import Cancelled, finished
+from bentray_workers.cluster.task_pool import finished
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 from bentray_workers.reconstruction.subdomains import settle
@@ -99,11 +100,11 @@ def empty_calls(cluster: Cluster, folder: Path, count: int) -> float:
     begun, left = time.perf_counter(), count
     while left or running:
         while left and len(running) < 2 * IN_FLIGHT:
-            running.append(attempts.submit(bool))
+            running.append(attempts.submit(Task(bool)))
             left -= 1
         for future in finished(cluster.client, running):
             running.remove(future)
-            attempts.ended(future)
+            attempts.result(future)
     return time.perf_counter() - begun
 
 

@@ -13,10 +13,9 @@ from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere, torus
 from bentray_kernels.meshes.mesh import TriangleMesh
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.cluster.task_pool import ThreadTasks
 from bentray_workers.files.mesh import StoredMesh, write_mesh
 from bentray_workers.rendering.field_settings import FieldSettings
-from bentray_workers.rendering.geometry_field import build
+from bentray_workers.rendering.geometry_field import build_field
 
 
 class Theirs(NamedTuple):
@@ -75,14 +74,5 @@ def made(mesh: TriangleMesh, settings: FieldSettings) -> tuple[dict[str, float],
         (folder / "work").mkdir()
         write_mesh(folder / "mesh.h5", StoredMesh(mesh))
         started = time.perf_counter()
-        figures = build(
-            ThreadTasks(),
-            folder / "mesh.h5",
-            settings,
-            folder / "field",
-            folder / "work",
-            on_progress=lambda told: None,
-            on_saved=lambda: None,
-            stop=lambda: False,
-        )
+        figures = build_field(None, folder / "mesh.h5", settings, folder / "field", folder / "work")
         return figures, time.perf_counter() - started

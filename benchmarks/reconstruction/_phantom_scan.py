@@ -20,7 +20,8 @@ from bentray_kernels.tomography import (
     rmse,
 )
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.simulation.plane import SimulationSettings, ring_radius, simulate
+from bentray_workers.simulation.plane import SimulationSettings, ring_radius
+from bentray_workers.simulation.simulation_run import simulate
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class PhantomScan:
     def of_table6(cls, asked: SimulationSettings, progress: Step) -> PhantomScan:
         """Simulate with the cores of this machine."""
         what = f"simulating, coupling {asked.coupling_mps:g}"
-        dataset = simulate(None, asked, lambda p: progress(p.done, p.total, what))
+        dataset = simulate(asked, lambda p: progress(p.done, p.total, what))
         return cls(asked.scan(), dataset)
 
     @classmethod

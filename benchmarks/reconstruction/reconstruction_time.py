@@ -16,13 +16,14 @@ from bentray_kernels.tomography import Problem, Settings, rmse
 from bentray_kernels.tomography.gauss_newton.gauss_newton_step import look
 from bentray_kernels.tomography.grid_schedule import start
 from bentray_kernels.tomography.sart.sart_step import advance, begin
-from bentray_kernels.tomography.task_chains import cut
+from bentray_kernels.tomography.stage_graphs import batches_of
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
-from bentray_workers.simulation.volume import VolumeSimulationSettings, simulate_volume
+from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.volume import VolumeSimulationSettings
 
 from ._pass_split import split
 
@@ -90,10 +91,10 @@ def scan(
 ) -> tuple[Dataset, np.ndarray, np.ndarray]:
     """A scan whose slices repeat a few, with the true speed and the inside of the breast."""
     asked = VolumeSimulationSettings(nodes, distinct, elements, COUPLING_MPS)
-    few = simulate_volume(
-        cluster.client,
+    few = simulate(
         asked,
         lambda p: progress(p.done, p.total, f"simulating {distinct} slices of {nodes}²"),
+        cluster.client,
     )
     which = np.arange(slices) % distinct
     many = replace(
@@ -169,9 +170,9 @@ def sweep(nodes: int, elements: int) -> tuple[float, int]:
     state = advance(problem, settings, state, elements)
     seconds = time.perf_counter() - started
     once = problem.each_pair_once()
-    parts = [look(once, settings, state.slowness, emitters) for emitters in cut(once.sounding)[:1]]
+    parts = [look(once, settings, state.slowness, emitters) for emitters in batches_of(once.sounding)[:1]]
     held = sum(part.columns.nbytes + part.lengths.nbytes + part.pointers.nbytes for part in parts)
-    return seconds, held * len(cut(once.sounding))
+    return seconds, held * len(batches_of(once.sounding))
 
 
 def exponent(points: list[tuple[int, float]]) -> float:

@@ -19,7 +19,8 @@ from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.files.atomic import write_bytes
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
-from bentray_workers.simulation.volume import VolumeSimulationSettings, simulate_volume
+from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.volume import VolumeSimulationSettings
 
 from ._volume_picture import picture
 
@@ -45,7 +46,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         def show(what: str):
             return lambda p: progress(p.done, p.total, what)
 
-        clean = simulate_volume(cluster.client, asked, show("simulating in space"))
+        clean = simulate(asked, show("simulating in space"), cluster.client)
         delta = clean.delta_tof_s
         sigma = float(np.sqrt(np.nanmean(delta**2))) / SNR
         noise = np.random.default_rng(0).normal(0.0, sigma, delta.shape)

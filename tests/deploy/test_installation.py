@@ -17,7 +17,8 @@ from bentray_service.healthcheck import check_scheduler
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.reconstruction import read_reconstruction
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
-from bentray_workers.simulation.plane import SimulationSettings, simulate
+from bentray_workers.simulation.plane import SimulationSettings
+from bentray_workers.simulation.simulation_run import simulate
 
 from .. import postgresql
 from ..listening import beyond_loopback, listening, pages
@@ -49,7 +50,7 @@ def installation(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Installat
 @pytest.fixture(scope="module")
 def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("scan") / "scan.h5"
-    write_dataset(path, simulate(None, SimulationSettings(nodes=32, elements=24, coupling_mps=1375.0)))
+    write_dataset(path, simulate(SimulationSettings(nodes=32, elements=24, coupling_mps=1375.0)))
     return path
 
 

@@ -9,14 +9,13 @@ import pytest
 from distributed import Client, KilledWorker, LocalCluster
 from distributed.scheduler import NoValidWorkerError, NoWorkerError
 
+from bentray_kernels.task_graph import run
 from bentray_kernels.tomography import Settings, reconstruct
-from bentray_kernels.tomography.task_chains import Chain
-from bentray_workers.cluster.attempts import Attempts, ResultsLostError
-from bentray_workers.cluster.checkpoints import Checkpoints
+from bentray_kernels.tomography.reconstruction_graph import ReconstructionGraph
+from bentray_workers.cluster.attempts import ResultsLostError
 from bentray_workers.cluster.dask_settings import NO_DASHBOARD, ours
-from bentray_workers.cluster.fair_shares import alone
 from bentray_workers.cluster.resources import OFFERED, THREADS
-from bentray_workers.cluster.task_loop import run_on_cluster
+from bentray_workers.cluster.task_pool import open_pool
 from bentray_workers.reconstruction import reconstruction_run
 
 pytestmark = pytest.mark.slow
@@ -44,12 +43,9 @@ def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):
             )
 
         def poisoned():
-            chain = Chain(PoisonedScan(scan_file, PLAN, os.getpid()), 0)
-            kept = Checkpoints(tmp_path / "checkpoints")
-            attempts = Attempts(client, tmp_path)
+            graph = ReconstructionGraph(PoisonedScan(scan_file, PLAN, os.getpid()), 0)
             try:
-                run = run_on_cluster(client, attempts, alone(client, "recon"), None)
-                reconstruction_run._drive(run, {"0": chain}, 0, 0, kept, lambda progress: None)
+                run({"0": graph}, open_pool(client, tmp_path))
             except KilledWorker as error:
                 ends["poisoned"] = error
 

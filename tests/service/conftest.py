@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
+from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.tomography.result import Progress, Reconstruction, Sweep, Trial
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.app import create_app
@@ -130,7 +131,7 @@ class FakeWork:
         for stage, sweep in passes:
             while True:
                 if stop():
-                    raise reconstruction_run.Cancelled
+                    raise Cancelled
                 if self.hold.wait(0.01):
                     break
             history += (Sweep(0, sweep, 2e-6 / sweep, 8, stage),)

@@ -1,4 +1,4 @@
-"""A chain's state as JSON and arrays, and back to the bit: what a checkpoint holds."""
+"""Checkpoint format: the state of a task graph as JSON and arrays, and back, bit for bit."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..task_graph import Checkpoint
 from .gauss_newton import gauss_newton_step
+from .reconstruction_graph import ReconstructionCheckpoint
 from .result import Sweep
 from .sart import sart_step
-from .task_chains import ChainState, Standing
 
-# Records that states are made of, by name. What goes on from a finished image, as ``wave``, adds its own.
+# Records in checkpoints of a reconstruction, by name; ``waveform`` adds its own.
 TYPES: Mapping[str, type] = MappingProxyType(
     {
         kind.__name__: kind
         for kind in (
-            ChainState,
+            ReconstructionCheckpoint,
             sart_step.State,
             gauss_newton_step.Iterate,
             gauss_newton_step.Measured,
@@ -32,26 +33,26 @@ TYPES: Mapping[str, type] = MappingProxyType(
 Arrays = list[NDArray[Any]]
 
 
-def packed(state: Standing) -> tuple[Any, Arrays]:
-    """What ``json.dumps`` takes, and the arrays that it refers to by number."""
+def pack(checkpoint: Checkpoint) -> tuple[Any, Arrays]:
+    """A checkpoint as a value for ``json.dumps``, and the arrays that it refers to by number."""
     arrays: Arrays = []
-    return _pack(state, arrays), arrays
+    return _pack(checkpoint, arrays), arrays
 
 
-def unpacked(tree: Any, arrays: Sequence[NDArray[Any]], types: Mapping[str, type] = TYPES) -> Standing:
-    """The state again.
+def unpack(tree: Any, arrays: Sequence[NDArray[Any]], types: Mapping[str, type] = TYPES) -> Checkpoint:
+    """The checkpoint again.
 
     Args:
-        tree, arrays: as ``packed`` gave them.
-        types: of the records that may be in it, by name.
+        tree, arrays: from ``pack``.
+        types: records that may be in it, by name.
 
     Raises:
-        KeyError, TypeError, IndexError: for what ``packed`` never gave.
+        KeyError, TypeError, IndexError: for anything that ``pack`` cannot return.
     """
-    state = _unpack(tree, arrays, types)
-    if not isinstance(state, Standing):
-        raise TypeError(f"the state of a chain, not {type(state).__name__}")
-    return state
+    checkpoint = _unpack(tree, arrays, types)
+    if not isinstance(checkpoint, Checkpoint):
+        raise TypeError(f"the state of a task graph, not {type(checkpoint).__name__}")
+    return checkpoint
 
 
 def _pack(value: Any, arrays: Arrays) -> Any:
@@ -65,7 +66,7 @@ def _pack(value: Any, arrays: Arrays) -> Any:
         return [_pack(part, arrays) for part in value]
     if value is None or isinstance(value, bool | int | float):
         return value
-    raise TypeError(f"a state has no {type(value).__name__}")
+    raise TypeError(f"{type(value).__name__} in a checkpoint")
 
 
 def _unpack(tree: Any, arrays: Sequence[NDArray[Any]], types: Mapping[str, type]) -> Any:

@@ -1,4 +1,4 @@
-"""Whole reconstructions: in this process, or by whatever drives the chains; and their assembly."""
+"""Reconstruction of a dataset: model selection, task graphs, optional refinement, assembled result."""
 
 from __future__ import annotations
 
@@ -13,135 +13,148 @@ from ..acquisition import Dataset
 from ..acquisition.picking.amplitudes import with_log_ratios
 from ..arrays import Floats
 from ..errors import InvalidInput
+from ..task_graph import ThreadPool, run
 from . import pairs
 from .grid_schedule import stages
 from .model_selection.held_out import Part, part_of
-from .model_selection.selection import advise
+from .model_selection.selection import select_model
 from .problem import Problem
+from .reconstruction_graph import (
+    ReconstructionGraph,
+    Run,
+    TomographyGraph,
+    check_resolution,
+    progress_of,
+    solve_attenuation,
+)
 from .result import Progress, Reconstruction, Trial
 from .settings import Settings
+from .stage_graphs import Scan
 from .stopping import noise_of
-from .task_chains import Calls, Chain, Drive, Scan, attenuate, measured, recover
-from .waveform.frequency_continuation import Here as WavesHere
+from .waveform.memory_scan import MemoryWaveScan
 from .waveform.refinement import Following, WaveScanOf
-from .waveform.waveform_chain import WaveScan
+from .waveform.refinement_graph import WaveScan
 from .waveform.waveform_settings import WaveSettings
 
 
 def reconstruct(
     dataset: Dataset, settings: Settings, progress: Callable[[Progress], None] | None = None
 ) -> Reconstruction:
-    """Reconstruct every slice of a dataset one after the other, or its volume.
+    """Reconstruct a dataset in this process.
 
     Args:
-        dataset: with travel times, for ``method`` waveform beside the traces that they were picked from. From
-            traces come amplitudes too where the settings want that; without traces they have been read.
+        dataset: with travel times, for ``method`` waveform also the traces that they were picked from.
+            Amplitudes are read from traces where the settings say so.
         settings: see ``Settings``.
         progress: called after each batch of emitters.
 
     Returns:
-        The images and how they came about. The same dataset and settings give the same bits.
+        The images and how they were computed. The same dataset and settings give the same bits.
 
     Raises:
         InvalidInput: from the dataset or a setting that does not fit it.
     """
-
-    def drive(chains: Sequence[Calls], before: int, after: int) -> None:
-        for chain in chains:
-            waiting = chain.first()
-            while waiting:
-                call = waiting.pop(0)
-                waiting = chain.after(call, call.function(*call.arguments)) + waiting
-                if progress is not None:
-                    progress(measured(chains, before, after))
-
     if settings.listens and dataset.waveform is not None:
         dataset = with_log_ratios(dataset, settings.amplitudes)
 
-    def waves_of(plan: WaveSettings, index: int) -> WaveScan:
-        return WavesHere(dataset, plan, index=index)
+    def run_graphs(graphs: Sequence[TomographyGraph], before: int, after: int) -> None:
+        def report(_name: str) -> None:
+            if progress is not None:
+                progress(progress_of(graphs, before, after))
+
+        run({str(k): graph for k, graph in enumerate(graphs)}, ThreadPool(), report)
+
+    def wave_scan(plan: WaveSettings, index: int) -> WaveScan:
+        return MemoryWaveScan(dataset, plan, index=index)
 
     samples = 0
     if dataset.waveform is not None and dataset.waveform.water is not None:
         samples = dataset.waveform.object.shape[-1]
-    return carried_out(
-        dataset, settings, lambda plan, part: Here(dataset, plan, part), drive, waves_of, samples
+    return run_reconstruction(
+        dataset,
+        settings,
+        lambda plan, part: MemoryScan(dataset, plan, part),
+        run_graphs,
+        wave_scan,
+        samples,
     )
 
 
-def carried_out(
+def run_reconstruction(
     dataset: Dataset,
     settings: Settings,
     scan_of: Callable[[Settings, Part], Scan],
-    drive: Drive,
-    waves_of: WaveScanOf,
+    run_graphs: Run,
+    wave_scan_of: WaveScanOf,
     samples: int = 0,
 ) -> Reconstruction:
-    """A reconstruction whose calls are run by ``drive``.
+    """Reconstruct a dataset by task graphs that the caller runs.
 
     Args:
         dataset: with travel times.
         settings: see ``Settings``.
-        scan_of: makes what tells calls their data.
-        drive: runs chains to their end.
-        waves_of: makes what tells the calls of a slice's refinement their data.
+        scan_of: makes the scan in which tasks find their data.
+        run_graphs: runs graphs to their end.
+        wave_scan_of: the same as ``scan_of`` for the refinement of a slice.
         samples: of each trace of object and water; 0: none.
 
     Raises:
-        InvalidInput: from the dataset or a setting that does not fit it, and what ``drive`` raises.
+        InvalidInput: from the dataset or a setting that does not fit it, and errors of ``run_graphs``.
     """
     count = pairs.count(dataset, settings)
     trials: tuple[Trial, ...] = ()
     before = 0
-    waves = _waves(dataset, settings, samples, waves_of)
+    waves = _refinement(dataset, settings, samples, wave_scan_of)
     allowed = waves is not None and (settings.method == "waveform" or waves.minutes <= settings.wave_minutes)
-    following = waves if allowed else None
-    after = following.total if following is not None else waves.passes if waves is not None else 0
+    refinement = waves if allowed else None
+    after = refinement.total if refinement is not None else waves.passes if waves is not None else 0
     if settings.tries:
-        settings, trials, before = advise(dataset, settings, count // 2, scan_of, drive, after)
+        settings, trials, before = select_model(dataset, settings, count // 2, scan_of, run_graphs, after)
     scan = scan_of(settings, "all")
-    chains = [Chain(scan, index) for index in range(count)]
-    drive(chains, before, after)
-    rays = _assembled(dataset, settings, scan.problem(0), chains, trials)
+    graphs = [ReconstructionGraph(scan, index) for index in range(count)]
+    run_graphs(graphs, before, after)
+    rays = _assembled(dataset, settings, scan.problem(0), graphs, trials)
     if waves is None:
         return rays
-    made = before + sum(chain.total for chain in chains)
-    if following is None:
-        return waves.advised(rays, noise_of(dataset), drive, made)
-    return following.refined(rays, drive, made)
+    done = before + sum(graph.total for graph in graphs)
+    if refinement is None:
+        return waves.advised(rays, noise_of(dataset), run_graphs, done)
+    return refinement.refined(rays, run_graphs, done)
 
 
-def _waves(dataset: Dataset, settings: Settings, samples: int, waves_of: WaveScanOf) -> Following | None:
-    """What may come after the rays; None where only they are asked for, or ``auto`` could not go on."""
+def _refinement(
+    dataset: Dataset, settings: Settings, samples: int, wave_scan_of: WaveScanOf
+) -> Following | None:
+    """The waveform refinement that may follow; None if not requested, or impossible with ``auto``."""
     if settings.method not in ("waveform", "auto") or (settings.method == "auto" and not samples):
         return None
     try:
-        return Following(dataset, settings, samples, waves_of)
+        return Following(dataset, settings, samples, wave_scan_of)
     except InvalidInput:
         if settings.method == "waveform":
             raise
         return None
 
 
-class Here:
-    """A scan in this process; see ``tomography.task_chains.Scan``."""
+class MemoryScan:
+    """A scan in the memory of this process; see ``stage_graphs.Scan``."""
 
     def __init__(self, dataset: Dataset, settings: Settings, part: Part) -> None:
         plans = stages(dataset, settings)
-        shown = part_of(dataset, part)
+        chosen = part_of(dataset, part)
         self._plans = plans
-        self._made = cache(lambda index, stage: problem_of(shown, plans[stage], index))
+        self._problem = cache(lambda index, stage: problem_of(chosen, plans[stage], index))
 
     def stages(self) -> tuple[Settings, ...]:
         return self._plans
 
     def problem(self, index: int, stage: int = -1) -> Problem:
-        found: Problem = self._made(index, stage % len(self._plans))
-        return found
+        problem: Problem = self._problem(index, stage % len(self._plans))
+        return problem
 
 
 def problem_of(dataset: Dataset, settings: Settings, index: int) -> Problem:
-    """One slice's problem as the settings' method wants it.
+    """The problem of one slice for the method of the settings.
 
     Raises:
         InvalidInput: as ``Problem.of``.
@@ -155,10 +168,10 @@ def _assembled(
     dataset: Dataset,
     settings: Settings,
     first: Problem,
-    chains: Sequence[Chain],
+    graphs: Sequence[ReconstructionGraph],
     trials: tuple[Trial, ...],
 ) -> Reconstruction:
-    """The result of finished chains: (nx, ny) for one slice, (nx, ny, nz) for several and for a volume."""
+    """The result of finished graphs: (nx, ny) for one slice, (nx, ny, nz) for several and for a volume."""
     spacing: tuple[float, ...] = (first.spacing,) * first.region.ndim
     origin = first.origin
     z = pairs.heights(dataset)
@@ -172,32 +185,32 @@ def _assembled(
     def image(parts: Sequence[Floats]) -> Floats:
         return np.ascontiguousarray(np.stack(parts, axis=-1)) if stacked else parts[0]
 
-    def wanted(then: Callable[..., Floats]) -> Floats | None:
-        parts = [chain.found(then) for chain in chains]
+    def evaluated(evaluate: Callable[..., Floats]) -> Floats | None:
+        parts = [graph.value_of(evaluate) for graph in graphs]
         return None if any(part is None for part in parts) else image(parts)
 
     return Reconstruction(
-        speed=image([1.0 / chain.state.slowness for chain in chains]),
-        coverage=image([chain.state.coverage for chain in chains]),
+        speed=image([1.0 / graph.state.slowness for graph in graphs]),
+        coverage=image([graph.state.coverage for graph in graphs]),
         spacing_m=spacing,
         origin_m=origin,
         water_speed_mps=dataset.water_speed_mps,
         settings=settings,
-        history=measured(chains).history,
-        attenuation=wanted(attenuate),
-        recovery=wanted(recover),
-        residuals=np.sum([chain.state.residuals for chain in chains], axis=0),
+        history=progress_of(graphs).history,
+        attenuation=evaluated(solve_attenuation),
+        recovery=evaluated(check_resolution),
+        residuals=np.sum([graph.state.residuals for graph in graphs], axis=0),
         trials=trials,
         provenance=provenance(),
     )
 
 
 def provenance() -> dict[str, str]:
-    """Versions of what computes here, for exact repetition."""
-    found = {"python": platform.python_version()}
+    """Versions of the software, for exact repetition."""
+    versions = {"python": platform.python_version()}
     for package in ("bentray", "numpy", "numba", "scipy"):
         try:
-            found[package] = version(package)
+            versions[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "unknown"
-    return found
+            versions[package] = "unknown"
+    return versions

@@ -88,8 +88,8 @@ def reconstruct_one(
     client: Any, entry: Entry, results: Path, settings: Settings, stop: Callable[[], bool]
 ) -> None:
     """Reconstruct one dataset into its folder of results; the picture is drawn by the cluster too."""
+    from bentray_kernels.task_graph import Cancelled
     from bentray_workers.cluster.resources import RENDER
-    from bentray_workers.cluster.task_loop import Cancelled
     from bentray_workers.files.dataset import read_dataset
     from bentray_workers.reconstruction.batch import report_of
     from bentray_workers.reconstruction.reconstruction_run import reconstruct

@@ -45,7 +45,8 @@ def demo(
 
     from bentray_workers.files.dataset import write_dataset
     from bentray_workers.images.comparison import comparison_png
-    from bentray_workers.simulation.plane import SimulationSettings, simulate
+    from bentray_workers.simulation.plane import SimulationSettings
+    from bentray_workers.simulation.simulation_run import simulate
 
     from ..client import Client
     from .output.figures import figures
@@ -60,9 +61,7 @@ def demo(
     ):
         remark(f"A service is at {url}. Simulating a scan: {elements} transducers, {nodes}² nodes.")
         with progress_bar("Simulating") as step:
-            dataset = simulate(
-                None, settings, lambda progress: step(progress.done, progress.total, "emitters")
-            )
+            dataset = simulate(settings, lambda progress: step(progress.done, progress.total, "emitters"))
         scan = folder / "phantom.h5"
         write_dataset(scan, dataset)
         with progress_bar("Uploading") as step:

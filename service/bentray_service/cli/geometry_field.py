@@ -40,11 +40,10 @@ def geometry_field(
     settings, view = asked.settings(), asked.view()
 
     from bentray_service.rows.ids import field_of
-    from bentray_workers.cluster.task_pool import ThreadTasks
     from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
     from bentray_workers.files.mesh_formats import read_mesh
     from bentray_workers.rendering.field_settings import check_faces
-    from bentray_workers.rendering.geometry_field import build
+    from bentray_workers.rendering.geometry_field import build_field
 
     read: ReadMesh = read_mesh(source.read_bytes())
     check_faces(len(read.surface.mesh.faces))
@@ -60,9 +59,7 @@ def geometry_field(
         def show(progress: Progress) -> None:
             step(progress.done, progress.total, "" if progress.total else "laying the mesh out")
 
-        figures = build(
-            ThreadTasks(), work / "mesh.h5", settings, target, work, show, lambda: None, lambda: False
-        )
+        figures = build_field(None, work / "mesh.h5", settings, target, work, show)
     shutil.rmtree(work)
     made = time.perf_counter()
     with progress_bar("Drawing") as step:

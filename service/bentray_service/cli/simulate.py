@@ -97,8 +97,8 @@ def simulate(
 
     from bentray_workers.files.dataset import write_dataset
     from bentray_workers.simulation.plane import SimulationSettings
-    from bentray_workers.simulation.plane import simulate as simulate_plane
-    from bentray_workers.simulation.volume import VolumeSimulationSettings, simulate_volume
+    from bentray_workers.simulation.simulation_run import simulate as simulate_scan
+    from bentray_workers.simulation.volume import VolumeSimulationSettings
 
     own_of_waves = {"--frequency": frequency, "--emissions": emissions, "--side": side}
     if waveform:
@@ -135,13 +135,12 @@ def simulate(
             own: dict[str, Any] = {"slices": slices, "array": array and array.value}
             own = {name: value for name, value in own.items() if value is not None}
             settings = VolumeSimulationSettings(**both, **own, three_d=three_d)
-            dataset = simulate_volume(None, settings, lambda now: step(now.done, now.total, "emitters"))
         else:
             _refuse(
                 "--phantom is table7", {"--slices": slices, "--array": array, "--three-d": three_d or None}
             )
             settings = SimulationSettings(**both, noise_s=(noise_ns or 0.0) * 1e-9)
-            dataset = simulate_plane(None, settings, lambda now: step(now.done, now.total, "emitters"))
+        dataset = simulate_scan(settings, lambda now: step(now.done, now.total, "tasks"))
     seconds = time.perf_counter() - started
     write_dataset(path, dataset)
     if as_json:

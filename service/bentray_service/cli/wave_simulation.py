@@ -20,13 +20,14 @@ def simulate_to(path: Path, asked: dict[str, Any], *, in_space: bool, as_json: b
         as_json: for machines.
     """
     from bentray_workers.files.dataset import write_dataset
+    from bentray_workers.simulation.simulation_run import simulate
     from bentray_workers.simulation.volume_waves import VolumeWaveSettings
-    from bentray_workers.simulation.waves import WaveSimulationSettings, simulate_waves
+    from bentray_workers.simulation.waves import WaveSimulationSettings
 
     settings = VolumeWaveSettings(**asked) if in_space else WaveSimulationSettings(**asked)
     started = time.perf_counter()
     with progress_bar("Simulating") as step:
-        dataset = simulate_waves(None, settings, lambda now: step(now.done, now.total, "emissions"))
+        dataset = simulate(settings, lambda now: step(now.done, now.total, "tasks"))
     seconds = time.perf_counter() - started
     write_dataset(path, dataset)
     centre, highest = settings.dispersion

@@ -14,17 +14,16 @@ from fastapi.openapi.models import Example
 from pydantic import BeforeValidator, Field, TypeAdapter
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography.model_selection.selection import told
+from bentray_kernels.tomography.model_selection.selection import advice_of
 from bentray_kernels.tomography.result import Reconstruction
 from bentray_kernels.tomography.settings import Settings
-from bentray_workers.cluster.task_pool import ClusterTasks
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction import reconstruction_run
 from bentray_workers.rendering import geometry_field
 from bentray_workers.rendering.field_settings import FieldSettings, check_faces
-from bentray_workers.rendering.turntable import PRIORITY, Turntable, turn
+from bentray_workers.rendering.turntable import Turntable, draw_turntable
 from bentray_workers.simulation.request import AskedSimulation
-from bentray_workers.simulation.simulation_run import simulate_scan
+from bentray_workers.simulation.simulation_run import simulate_to_file
 
 from ..asked_settings import known_only
 from ..compute import check_renderable
@@ -126,7 +125,7 @@ class SimulationKind(Kind[SimulationRequest]):
     def run(self, task: Task) -> Plain | None:
         asked = self.settings.validate_python(task.settings)
         progress = task.on_progress, task.on_saved, task.stop, task.share
-        found = simulate_scan(task.client, asked, task.target, task.work_dir, *progress)
+        found = simulate_to_file(task.client, asked.chosen(), task.target, task.work_dir, *progress)
         return {"id": task.target.stem, **found}
 
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
@@ -170,7 +169,7 @@ class RefractionKind(Kind[RefractionRequest]):
     def run(self, task: Task) -> Plain | None:
         settings = self.settings.validate_python(task.settings)
         progress = task.on_progress, task.on_saved, task.stop, task.share
-        turn(task.client, task.source, settings, task.target, task.work_dir, *progress)
+        draw_turntable(task.client, task.source, settings, task.target, task.work_dir, *progress)
         return None
 
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
@@ -211,9 +210,9 @@ class GeometryFieldKind(Kind[GeometryFieldRequest]):
 
     def run(self, task: Task) -> Plain | None:
         settings = self.settings.validate_python(task.settings)
-        tasks = ClusterTasks(task.client, PRIORITY, task.share)
-        progress = task.on_progress, task.on_saved, task.stop
-        figures = geometry_field.build(tasks, task.source, settings, task.target, task.work_dir, *progress)
+        paths = task.source, settings, task.target, task.work_dir
+        progress = task.on_progress, task.on_saved, task.stop, task.share
+        figures = geometry_field.build_field(task.client, *paths, *progress)
         size = geometry_field.bytes_of(task.target)
         found = {"id": task.target.name, "mesh_id": task.source.stem, "bytes": size}
         return {**found, "settings": settings.plain(), "figures": figures}
@@ -253,7 +252,7 @@ def _describe(result: Reconstruction) -> Plain:
         "origin_m": [finite(value) for value in result.origin_m],
         "speed_range_mps": [float(result.speed.min()), float(result.speed.max())],
         "water_speed_mps": float(result.water_speed_mps),
-        "provenance": {**result.provenance, **({"advice": told(result)} if result.trials else {})},
+        "provenance": {**result.provenance, **({"advice": advice_of(result)} if result.trials else {})},
     }
 
 

@@ -17,8 +17,8 @@ from distributed.comm import CommClosedError
 from distributed.scheduler import NoValidWorkerError, NoWorkerError
 from sqlalchemy.exc import SQLAlchemyError
 
+from bentray_kernels.task_graph import Cancelled
 from bentray_workers.cluster.fair_shares import Shares
-from bentray_workers.cluster.task_loop import Cancelled
 
 from ..compute import Compute
 from ..files.data_folder import Files

@@ -1,4 +1,4 @@
-"""Chains cut off anywhere and gone on with from a checkpoint's content end as if nothing had happened."""
+"""Task graphs interrupted anywhere and resumed from a checkpoint give the same bits."""
 
 import json
 from dataclasses import replace
@@ -12,10 +12,14 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.checkpoint import packed, unpacked
-from bentray_kernels.tomography.model_selection.candidates import TrialChain
-from bentray_kernels.tomography.reconstruct import Here
-from bentray_kernels.tomography.task_chains import Chain, attenuate, recover
+from bentray_kernels.tomography.checkpoint import pack, unpack
+from bentray_kernels.tomography.model_selection.candidates import CandidateGraph
+from bentray_kernels.tomography.reconstruct import MemoryScan
+from bentray_kernels.tomography.reconstruction_graph import (
+    ReconstructionGraph,
+    check_resolution,
+    solve_attenuation,
+)
 
 PLANS = {
     "sart": Settings(nodes=32, side_m=TABLE6_SIDE_M, sweeps=2, resolution_check=True),
@@ -33,64 +37,67 @@ def dataset():
     return Dataset(ring.positions(), emitters, emitters, 1500.0, delta_tof_s=delta, log_ratio_np=ratio)
 
 
-def stored(chain):
-    """Where it stands, through what a file can hold."""
-    tree, arrays = packed(chain.standing)
-    return unpacked(json.loads(json.dumps(tree)), [array.copy() for array in arrays])
+def stored(graph):
+    """Its checkpoint, written to JSON and arrays and read again."""
+    tree, arrays = pack(graph.checkpoint)
+    return unpack(json.loads(json.dumps(tree)), [array.copy() for array in arrays])
 
 
 def run(make, cuts=()):
-    """A chain to its end; before each call whose number is among ``cuts`` it is lost and made anew."""
-    chain = make()
-    ready, done = chain.first(), 0
+    """Run a graph; before each task whose number is in ``cuts`` it is lost and restored."""
+    graph = make()
+    ready, done = graph.first(), 0
     while ready:
         if done in cuts:
-            standing = stored(chain)
-            chain = make()
-            chain.restore(standing)
-            ready = chain.first()
+            checkpoint = stored(graph)
+            graph = make()
+            graph.restore(checkpoint)
+            ready = graph.first()
         done += 1
-        call = ready.pop(0)
-        ready += chain.after(call, call.function(*call.arguments))
-    return chain, done
+        task = ready.pop(0)
+        ready += graph.after(task, task.function(*task.arguments))
+    return graph, done
 
 
 @pytest.mark.parametrize("name", PLANS)
 @settings(max_examples=6, deadline=None)
 @given(cuts=st.sets(st.integers(0, 12), min_size=1, max_size=4))
-def test_a_chain_cut_off_anywhere_ends_with_the_same_bits(dataset, name, cuts):
+def test_a_graph_interrupted_anywhere_gives_the_same_bits(dataset, name, cuts):
     def make():
-        return Chain(Here(dataset, PLANS[name], "all"), 0)
+        return ReconstructionGraph(MemoryScan(dataset, PLANS[name], "all"), 0)
 
     whole, _ = run(make)
     resumed, _ = run(make, cuts)
     assert resumed.history == whole.history
     assert resumed.done == whole.done == whole.total
-    for then in (attenuate, recover):
-        assert np.array_equal(resumed.found(then), whole.found(then)) or whole.found(then) is None
+    for evaluate in (solve_attenuation, check_resolution):
+        assert (
+            np.array_equal(resumed.value_of(evaluate), whole.value_of(evaluate))
+            or whole.value_of(evaluate) is None
+        )
     assert np.array_equal(resumed.state.slowness, whole.state.slowness)
     assert np.array_equal(resumed.state.coverage, whole.state.coverage)
     assert np.array_equal(resumed.state.residuals, whole.state.residuals)
 
 
-def test_the_chain_of_a_trial_keeps_its_misfit(dataset):
+def test_the_graph_of_a_candidate_keeps_its_misfit(dataset):
     plan = replace(PLANS["sart"], attenuation=False, resolution_check=False)
 
     def make():
-        return TrialChain(Here(dataset, plan, "shown"), 0, Here(dataset, plan, "held-out"))
+        return CandidateGraph(MemoryScan(dataset, plan, "shown"), 0, MemoryScan(dataset, plan, "held-out"))
 
-    whole, calls = run(make)
+    whole, tasks = run(make)
     again = make()
     again.restore(stored(whole))
     assert again.first() == []
     assert again.held_out_rms_s == whole.held_out_rms_s > 0.0
-    resumed, more = run(make, {calls - 1})
+    resumed, more = run(make, {tasks - 1})
     assert resumed.held_out_rms_s == whole.held_out_rms_s
-    assert more <= calls + 1
+    assert more <= tasks + 1
 
 
-def test_what_is_no_state_is_refused():
+def test_a_value_that_is_no_checkpoint_is_rejected():
     with pytest.raises(TypeError):
-        unpacked([1, 2], [])
+        unpack([1, 2], [])
     with pytest.raises(KeyError):
-        unpacked({"of": "Path", "fields": {}}, [])
+        unpack({"of": "Path", "fields": {}}, [])

@@ -10,7 +10,8 @@ from typer.testing import CliRunner, Result
 
 from bentray_kernels.acquisition import Dataset
 from bentray_service.cli import app
-from bentray_workers.simulation.plane import SimulationSettings, simulate
+from bentray_workers.simulation.plane import SimulationSettings
+from bentray_workers.simulation.simulation_run import simulate
 
 Run = Callable[..., Result]
 
@@ -28,7 +29,7 @@ def bentray() -> Run:
 @pytest.fixture(scope="session")
 def scan() -> Dataset:
     """A phantom scan small enough for a test."""
-    return simulate(None, SimulationSettings(nodes=32, elements=24, coupling_mps=1375.0))
+    return simulate(SimulationSettings(nodes=32, elements=24, coupling_mps=1375.0))
 
 
 @pytest.fixture(scope="session")

@@ -14,6 +14,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.defects import sound
 from bentray_kernels.meshes.example_surfaces import torus
 from bentray_kernels.phantoms import TWO_HOLES, sampled
+from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.tomography import Progress
 from bentray_service.app import create_app
 from bentray_service.jobs import kinds
@@ -22,7 +23,6 @@ from bentray_service.rows.ids import new_id
 from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
-from bentray_workers.cluster.task_loop import Cancelled
 from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.rendering import field_settings, geometry_field

@@ -88,7 +88,7 @@ def test_from_settings_to_an_image(serving, until, tmp_path):
         }
         plan = job["plan"]
         assert (plan["tasks"], plan["workers"], plan["lane"]) == (2, 1, "recon")
-        assert set(plan["call_bytes"]) == {"make_part", "finish"}
+        assert set(plan["call_bytes"]) == {"make_part", "write_scan"}
         assert plan["minutes"] > 0.0
         assert plan["field_bytes"] is None
         done = until(http, job["id"])

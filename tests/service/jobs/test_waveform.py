@@ -40,27 +40,24 @@ def http(tmp_path):
 @pytest.fixture
 def torn(monkeypatch):
     """The scheduler goes once the waves have kept something; what was restored after it, by name."""
-    restored, real_keep, real_last = (
-        [],
-        reconstruction_run.Checkpoints.keep,
-        reconstruction_run.Checkpoints.last,
-    )
+    store = reconstruction_run.Checkpoints
+    restored, real_save, real_load = [], store.save, store.load
     gone = []
 
-    def keep(self, name, standing):
-        real_keep(self, name, standing)
-        if not gone and type(standing).__module__.startswith("bentray_kernels.tomography.waveform"):
+    def save(self, name, checkpoint):
+        real_save(self, name, checkpoint)
+        if not gone and type(checkpoint).__module__.startswith("bentray_kernels.tomography.waveform"):
             gone.append(name)
             raise CommClosedError("gone")
 
-    def last(self, name):
-        found = real_last(self, name)
+    def load(self, name):
+        found = real_load(self, name)
         if found is not None:
             restored.append(name)
         return found
 
-    monkeypatch.setattr(reconstruction_run.Checkpoints, "keep", keep)
-    monkeypatch.setattr(reconstruction_run.Checkpoints, "last", last)
+    monkeypatch.setattr(store, "save", save)
+    monkeypatch.setattr(store, "load", load)
     return gone, restored
 
 

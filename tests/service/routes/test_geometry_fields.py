@@ -17,11 +17,10 @@ from bentray_service.rows.schema import geometry_fields
 from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
-from bentray_workers.cluster.task_pool import ThreadTasks
 from bentray_workers.files.mesh import StoredMesh, write_mesh
 from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.field_view import FieldView
-from bentray_workers.rendering.geometry_field import build, bytes_of
+from bentray_workers.rendering.geometry_field import build_field, bytes_of
 
 SMALL = {"width": 32, "height": 24}
 COARSE = {"samples": 6, "inner_samples": 4, "divisions": 4, "image_size": 33}
@@ -34,7 +33,7 @@ def made(tmp_path_factory):
     write_mesh(folder / "mesh.h5", StoredMesh(torus(16, 10)))
     (folder / "work").mkdir()
     given = FieldSettings(**COARSE), folder / "field", folder / "work"
-    figures = build(ThreadTasks(), folder / "mesh.h5", *given, lambda told: None, lambda: None, lambda: False)
+    figures = build_field(None, folder / "mesh.h5", *given)
     return folder / "field", figures
 
 

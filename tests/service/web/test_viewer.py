@@ -16,7 +16,6 @@ from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.jobs import kinds
 from bentray_service.rows.api_key import Token
-from bentray_workers.cluster.task_pool import ThreadTasks
 
 CHROMIUM = Path("/usr/bin/chromium")
 # The first picture waits for its compiled functions where none are kept from before.
@@ -215,7 +214,8 @@ def test_what_cannot_be_shown_is_told_in_words(page, serve, tmp_path):
 
 
 def test_a_mesh_is_uploaded_and_its_field_looked_at(page, serve, tmp_path, monkeypatch):
-    monkeypatch.setattr(kinds, "ClusterTasks", lambda *given: ThreadTasks())
+    build = kinds.geometry_field.build_field
+    monkeypatch.setattr(kinds.geometry_field, "build_field", lambda _, *given: build(None, *given))
     ring = torus(16, 10)
     content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
     (tmp_path / "ring.ply").write_bytes(content)

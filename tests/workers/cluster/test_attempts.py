@@ -1,11 +1,12 @@
-"""Attempts: a call that only waited on a dead worker is innocent, one that ran there is not for ever."""
+"""Retries: a task that only waited on a dead worker is always retried, one that ran there a few times."""
 
 import distributed
 import pytest
 from distributed import KilledWorker
 
+from bentray_kernels.task_graph import Task
 from bentray_workers.cluster import attempts
-from bentray_workers.cluster.attempts import MOST_STRIKES, Attempts, ResultsLostError, watched
+from bentray_workers.cluster.attempts import MOST_DEATHS, Attempts, ResultsLostError, marked
 
 
 class Future(distributed.Future):
@@ -20,7 +21,7 @@ class Future(distributed.Future):
         self.error = None
 
     def __repr__(self):
-        return f"<{self.status} {self.work[1:]}>"
+        return f"<{self.status} {self.work[2:]}>"
 
     def __del__(self):
         """Nothing of a real one is to be released."""
@@ -42,7 +43,7 @@ class Future(distributed.Future):
 
 class Client:
     def submit(self, task, *work, resources, priority, pure):
-        assert task is watched
+        assert task is marked
         assert (resources, pure) == (attempts.RECONSTRUCTION, False)
         return Future(work)
 
@@ -53,48 +54,48 @@ def made(tmp_path):
 
 
 def test_who_only_waited_is_tried_again_for_ever(made):
-    future = made.submit(print, 1)
+    future = made.submit(Task(print, (1,)))
     for _ in range(20):
-        future, _ = made.ended(future.killed(while_running=False))
-        assert future.work[1:] == (print, 1)
+        future, _ = made.result(future.killed(while_running=False))
+        assert future.work[2:] == (print, 1)
 
 
 def test_who_ran_is_given_up(made):
-    future = made.submit(print, 1)
-    for _ in range(MOST_STRIKES):
-        future, _ = made.ended(future.killed(while_running=True))
+    future = made.submit(Task(print, (1,)))
+    for _ in range(MOST_DEATHS):
+        future, _ = made.result(future.killed(while_running=True))
         assert not future.work[0].exists()
     with pytest.raises(KilledWorker):
-        made.ended(future.killed(while_running=True))
+        made.result(future.killed(while_running=True))
 
 
 def test_a_result_that_went_with_its_worker_is_made_again(made):
-    future = made.submit(print, 1)
+    future = made.submit(Task(print, (1,)))
     future.killed(while_running=False).status = "finished"
-    again, _ = made.ended(future)
-    assert again.work[1:] == (print, 1)
+    again, _ = made.result(future)
+    assert again.work[2:] == (print, 1)
 
 
 def test_what_is_kept_is_not_fetched(made):
-    future = made.submit(print)
+    future = made.submit(Task(print, keep_on_worker=True))
     future.error = AssertionError("it was fetched")
     future.status = "finished"
-    assert made.ended(future, keep=True) == (None, future)
+    assert made.result(future) == (None, future)
 
 
 def test_what_needs_a_lost_result_is_not_tried_for_ever(made):
-    needed = made.submit(print).ended("finished")
-    future = made.submit(print, [needed], 1)
-    future, _ = made.ended(future.killed(while_running=False))
+    needed = made.submit(Task(print)).ended("finished")
+    future = made.submit(Task(print, ([needed], 1)))
+    future, _ = made.result(future.killed(while_running=False))
     needed.status = "error"
     with pytest.raises(ResultsLostError):
-        made.ended(future.killed(while_running=False))
+        made.result(future.killed(while_running=False))
 
 
 def test_an_end_is_an_end(made):
-    assert made.ended(made.submit(print).ended("finished")) == (None, "given")
+    assert made.result(made.submit(Task(print)).ended("finished")) == (None, "given")
     with pytest.raises(ZeroDivisionError):
-        made.ended(made.submit(print).ended("error", ZeroDivisionError()), keep=True)
+        made.result(made.submit(Task(print, (), True)).ended("error", ZeroDivisionError()))
 
 
 def test_the_file_is_there_as_long_as_the_call_runs(tmp_path):
@@ -107,8 +108,8 @@ def test_the_file_is_there_as_long_as_the_call_runs(tmp_path):
             raise ValueError(value)
         return value
 
-    assert watched(marker, work, 3) == 3
+    assert marked(marker, True, work, 3) == 3
     with pytest.raises(ValueError, match="-1"):
-        watched(marker, work, -1)
+        marked(marker, True, work, -1)
     assert seen == [True, True]
     assert not marker.exists()

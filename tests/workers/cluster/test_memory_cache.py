@@ -3,7 +3,7 @@
 import pytest
 
 from bentray_workers.cluster import memory_cache
-from bentray_workers.cluster.attempts import watched
+from bentray_workers.cluster.attempts import marked
 from bentray_workers.cluster.capacities import USABLE, WARM_BYTES
 from bentray_workers.cluster.memory_cache import Kept, limit
 
@@ -31,10 +31,16 @@ def test_a_job_finds_little_kept(worker, tmp_path):
     store = Kept(1000 * MIB)
     store.get("a", 30 * MIB, str)
     store.get("b", 10 * MIB, str)
-    assert watched(tmp_path / "marker", store.held) == 10 * MIB
+    assert marked(tmp_path / "marker", True, store.held) == 10 * MIB
 
 
 def test_without_a_limit_all_is_kept(tmp_path):
     store = Kept(1000 * MIB)
     store.get("a", 900 * MIB, str)
-    assert watched(tmp_path / "marker", store.held) == 900 * MIB
+    assert marked(tmp_path / "marker", True, store.held) == 900 * MIB
+
+
+def test_a_task_that_draws_finds_all_that_is_kept(worker, tmp_path):
+    store = Kept(1000 * MIB)
+    store.get("a", 90 * MIB, str)
+    assert marked(tmp_path / "marker", False, store.held) == 90 * MIB

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from bentray_workers.compilation.precompile import WAVES, digitised
-from bentray_workers.simulation.waves import simulate_waves
+from bentray_workers.simulation.simulation_run import simulate
 
 # Jobs of a process that finds the cache of another: the kernels that it compiles all the same.
 JOBS = """
@@ -20,16 +20,17 @@ from bentray_kernels.tomography import Settings
 from bentray_workers.compilation import cache_misses
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.compilation.precompile import digitised
-from bentray_workers.simulation.plane import SimulationSettings, simulate
+from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
-from bentray_workers.simulation.waves import WaveSimulationSettings, simulate_waves
+from bentray_workers.simulation.waves import WaveSimulationSettings
 
 warnings.simplefilter("ignore")
 cache_misses.announce()
 times, waves = Path(sys.argv[1], "times.h5"), Path(sys.argv[1], "waves.h5")
 with cache_misses.compiled_kernels() as kernels:
-    write_dataset(times, simulate(None, SimulationSettings(nodes=32, elements=32, coupling_mps=1425.0)))
-    scan = simulate_waves(None, WaveSimulationSettings(3e5, 0.04, 32, 16, 32, snr=30.0))
+    write_dataset(times, simulate(SimulationSettings(nodes=32, elements=32, coupling_mps=1425.0)))
+    scan = simulate(WaveSimulationSettings(3e5, 0.04, 32, 16, 32, snr=30.0))
     write_dataset(waves, digitised(scan))
     for method in ("sart", "auto", "gauss-newton"):
         reconstruct(None, times, Settings(nodes=32, method=method))
@@ -39,7 +40,7 @@ print(*kernels, sep="\\n")
 
 
 def test_a_digitised_scan_holds_the_same_traces() -> None:
-    scan = simulate_waves(None, WAVES)
+    scan = simulate(WAVES)
     assert scan.waveform is not None
     found = digitised(scan).waveform
     assert found is not None

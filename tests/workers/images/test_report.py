@@ -9,7 +9,7 @@ import pytest
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction, Sweep, Trial
-from bentray_kernels.tomography.model_selection.selection import reason
+from bentray_kernels.tomography.model_selection.selection import explain_trials
 from bentray_workers.images.report import report_png
 from bentray_workers.images.truth_comparison import compare
 
@@ -78,7 +78,7 @@ def test_the_stages_are_named_and_the_choice_of_auto_is_told(drawn):
     assert {"32 nodes", "64 nodes"} <= set(drawn.words())
     under = " ".join(drawn[-1].get_supxlabel().split())
     assert "3 sweeps in 2 stages" in under
-    assert under.endswith(reason(trials))
+    assert under.endswith(explain_trials(trials))
 
 
 def test_the_errors_in_the_title_are_those_of_compare_with_their_region(drawn):

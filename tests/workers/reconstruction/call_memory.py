@@ -1,7 +1,7 @@
-"""Peak memory of the calls of a reconstruction, in processes of their own: prints bytes by call as JSON.
+"""Peak memory of the calls of a reconstruction, in processes of their own: prints bytes by task as JSON.
 
 Called as ``call_memory.py SETTINGS ELEMENTS HEIGHTS``, the settings as JSON, with the repository on the
-path; 0 heights for one slice. As in ``benchmarks/shared/_peak_memory.py`` each call runs in a fork of a warm
+path; 0 heights for one slice. As in ``benchmarks/shared/_peak_memory.py`` each task runs in a fork of a warm
 process, less a fork that does nothing; the bytes of what was there before are added: dataset, problem and
 arguments.
 """
@@ -19,8 +19,8 @@ from benchmarks.shared._peak_memory import peak
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.reconstruct import Here
-from bentray_kernels.tomography.task_chains import Call, Chain
+from bentray_kernels.tomography.reconstruct import MemoryScan
+from bentray_kernels.tomography.reconstruction_graph import ReconstructionGraph
 
 
 def scan(elements: int, heights: int) -> Dataset:
@@ -56,17 +56,17 @@ def held(*things: Any) -> int:
 
 
 def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
-    """The most that a call of each name takes, over one slice or the volume."""
-    here = Here(dataset, settings, "all")
-    chain, found = Chain(here, 0), {}
-    waiting = chain.first()
+    """The most that a task of each name takes, over one slice or the volume."""
+    scan = MemoryScan(dataset, settings, "all")
+    graph, found = ReconstructionGraph(scan, 0), {}
+    waiting = graph.first()
     while waiting:
-        call: Call = waiting.pop(0)
-        name = call.function.__name__
-        if (name, chain.state.sweep) not in found:
-            taken = peak(lambda call=call: call.function(*call.arguments)) - peak(lambda: None)
-            found[name, chain.state.sweep] = taken + held(dataset, here.problem(0), call.arguments[1:])
-        waiting = chain.after(call, call.function(*call.arguments)) + waiting
+        task = waiting.pop(0)
+        name = task.function.__name__
+        if (name, graph.state.sweep) not in found:
+            taken = peak(lambda task=task: task.function(*task.arguments)) - peak(lambda: None)
+            found[name, graph.state.sweep] = taken + held(dataset, scan.problem(0), task.arguments[1:])
+        waiting = graph.after(task, task.function(*task.arguments)) + waiting
     return {name: max(most for (one, _), most in found.items() if one == name) for name, _ in found}
 
 

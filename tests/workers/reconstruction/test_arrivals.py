@@ -11,14 +11,14 @@ import pytest
 from bentray_kernels.acquisition import PICKERS, Waveform, pick
 from bentray_kernels.acquisition.quality import examine
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.task_graph import Cancelled, ThreadPool, run
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers.cluster.job_cancellation import Unwanted
-from bentray_workers.cluster.task_loop import run_here
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.files.findings import read_findings
 from bentray_workers.reconstruction import reconstruction_run
-from bentray_workers.reconstruction.arrivals import PICKED, Arrivals, Files, Source, measure, read
+from bentray_workers.reconstruction.arrivals import PICKED, Files, PickingGraph, Source, measure, read
 from bentray_workers.reconstruction.memory import arrival_memory
 
 from ...kernels.acquisition.traces import RATE_HZ, blob_delay, scan
@@ -66,8 +66,8 @@ def arrived(dataset, folder, picker="aic", *, examined=True):
     path = folder / "scan.h5"
     write_dataset(path, dataset)
     files = Files.of(folder)
-    arrivals = Arrivals(Source(path, path.stat().st_mtime_ns, folder, picker, examined), files)
-    run_here(None)([("", call) for call in arrivals.first()], {"": arrivals}, lambda name: None)
+    graph = PickingGraph(Source(path, path.stat().st_mtime_ns, folder, picker, examined), files)
+    run({"picking": graph}, ThreadPool())
     found = read_findings(files.findings)
     return read_dataset(files.picked if found.changed else path), found
 
@@ -107,16 +107,15 @@ def test_faults_are_found_and_corrected_as_in_one_piece(tmp_path, monkeypatch, w
     assert "slice 0" not in told
 
 
-def test_a_clean_scan_gives_the_image_that_it_gave_unexamined(cluster, tmp_path):
+def test_a_clean_scan_gives_the_image_that_it_gave_unexamined(tmp_path):
     write_dataset(tmp_path / "scan.h5", clean())
     expected = reconstruct_here(pick(clean()), PLAN)
-    for client in (cluster.client, None):
-        result = reconstruction_run.reconstruct(client, tmp_path / "scan.h5", PLAN)
-        np.testing.assert_array_equal(result.speed, expected.speed)
-        assert result.provenance == {**expected.provenance, "quality": "nothing found"}
-        plain = reconstruction_run.reconstruct(client, tmp_path / "scan.h5", replace(PLAN, examine=False))
-        np.testing.assert_array_equal(plain.speed, expected.speed)
-        assert plain.provenance == expected.provenance
+    result = reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN)
+    np.testing.assert_array_equal(result.speed, expected.speed)
+    assert result.provenance == {**expected.provenance, "quality": "nothing found"}
+    plain = reconstruction_run.reconstruct(None, tmp_path / "scan.h5", replace(PLAN, examine=False))
+    np.testing.assert_array_equal(plain.speed, expected.speed)
+    assert plain.provenance == expected.provenance
 
 
 def test_it_tells_how_many_emissions_are_examined_and_picked(tmp_path, monkeypatch):
@@ -150,25 +149,22 @@ def test_calls_end_with_their_emission_once_the_job_has(tmp_path):
             function(source, 0, *arguments)
 
 
-def test_channels_put_back_give_the_image_of_the_clean_scan(cluster, tmp_path):
+def test_channels_put_back_give_the_image_of_the_clean_scan(tmp_path):
     path = tmp_path / "scan.h5"
     write_dataset(path, spoilt(clean(), disordered))
     right = reconstruct_here(pick(clean()), PLAN).speed
-    for client in (None, cluster.client):
-        result = reconstruction_run.reconstruct(client, path, PLAN)
-        np.testing.assert_array_equal(result.speed, right)
-        assert "swapped channels" in result.provenance["quality"]
+    result = reconstruction_run.reconstruct(None, path, PLAN)
+    np.testing.assert_array_equal(result.speed, right)
+    assert "swapped channels" in result.provenance["quality"]
     taken = reconstruction_run.reconstruct(None, path, replace(PLAN, examine=False))
     assert not np.array_equal(taken.speed, right)
     assert "quality" not in taken.provenance
 
 
-@pytest.mark.parametrize("embedded", [True, False])
-def test_a_scan_that_must_not_be_used_is_refused(cluster, tmp_path, embedded):
+def test_a_scan_that_must_not_be_used_is_refused(tmp_path):
     write_dataset(tmp_path / "scan.h5", replace(clean(), sampling_rate_hz=1.2 * RATE_HZ))
-    client = cluster.client if embedded else None
     with pytest.raises(InvalidInput, match=r"sampling rate: found arrivals in water at .* examine false"):
-        reconstruction_run.reconstruct(client, tmp_path / "scan.h5", PLAN)
+        reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN)
 
 
 def test_times_that_came_with_a_scan_are_examined_where_half_a_period_is_known(tmp_path):
@@ -192,15 +188,11 @@ def test_without_a_water_shot_nothing_is_begun(tmp_path):
         arrived(replace(clean(), waveform=Waveform(clean().waveform.object)), tmp_path)
 
 
-def test_what_was_picked_before_a_death_is_not_picked_again(cluster, tmp_path, monkeypatch):
+def test_what_was_picked_before_a_death_is_not_picked_again(tmp_path, monkeypatch):
     write_dataset(tmp_path / "scan.h5", spoilt(clean(), damaged))
-    expected = reconstruction_run.reconstruct(
-        cluster.client, tmp_path / "scan.h5", PLAN, work_dir=tmp_path / "work"
-    )
-    monkeypatch.setattr(reconstruction_run, "Arrivals", None)
-    again = reconstruction_run.reconstruct(
-        cluster.client, tmp_path / "scan.h5", PLAN, work_dir=tmp_path / "work"
-    )
+    expected = reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN, work_dir=tmp_path / "work")
+    monkeypatch.setattr(reconstruction_run, "PickingGraph", None)
+    again = reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN, work_dir=tmp_path / "work")
     np.testing.assert_array_equal(again.speed, expected.speed)
     assert again.provenance == expected.provenance
 
@@ -211,12 +203,12 @@ def test_waves_are_refined_from_channels_put_back(tmp_path, monkeypatch):
 
     def begun(dataset, settings, scan_of, drive, waves_of, samples):
         problems.append(waves_of(SETTINGS, 0).problem(0))
-        raise reconstruction_run.Cancelled
+        raise Cancelled
 
-    monkeypatch.setattr(reconstruction_run, "carried_out", begun)
+    monkeypatch.setattr(reconstruction_run, "run_reconstruction", begun)
     for name, by in (("clean.h5", np.array), ("wrong.h5", disordered)):
         write_dataset(tmp_path / name, spoilt(wave_scan(), by))
-        with pytest.raises(reconstruction_run.Cancelled):
+        with pytest.raises(Cancelled):
             reconstruction_run.reconstruct(None, tmp_path / name, replace(PLAN, method="waveform"))
     clean_one, put_right = problems
     np.testing.assert_array_equal(put_right.wavelet, clean_one.wavelet)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bentray_kernels.tomography.waveform.band_inversion import Model
-from bentray_kernels.tomography.waveform.waveform_chain import look_at_waves
+from bentray_kernels.tomography.waveform.refinement_graph import look_at_waves
 from bentray_kernels.wave import time_blocks
 from bentray_workers.cluster.job_cancellation import Unwanted
 from bentray_workers.files.dataset import write_dataset

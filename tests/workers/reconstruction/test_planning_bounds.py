@@ -27,9 +27,9 @@ from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.counts import DatasetCounts
 from bentray_workers.files.dataset.summary import counts_in
 from bentray_workers.reconstruction.planning import plan
+from bentray_workers.simulation.parts import count_of, parts_of
 from bentray_workers.simulation.request import AskedSimulation
 from bentray_workers.simulation.simulation_planning import plan_simulation
-from bentray_workers.simulation.tasks import count_of, parts_of
 
 from ..files.datasets import datasets
 

@@ -15,8 +15,9 @@ from bentray_kernels.tomography.solver_choice import needs_device, solver_of
 from bentray_workers.cluster.capacities import MIB, lane_of
 from bentray_workers.files.dataset.counts import Summary
 from bentray_workers.reconstruction.memory.ray_memory import call_bytes
-from bentray_workers.simulation.plane import SimulationSettings, simulate
-from bentray_workers.simulation.volume import VolumeSimulationSettings, simulate_volume
+from bentray_workers.simulation.plane import SimulationSettings
+from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.volume import VolumeSimulationSettings
 
 RAYS, CUTS = ("curved", "straight"), ("slices", "volume")
 SOLVERS = (DEVIATION, *methods())
@@ -26,9 +27,9 @@ ON_DEVICE = ("fim-opencl",)
 
 @pytest.fixture(scope="module")
 def scans():
-    plane = simulate(None, SimulationSettings(nodes=16, elements=8), lambda _: None)
+    plane = simulate(SimulationSettings(nodes=16, elements=8), lambda _: None)
     small = VolumeSimulationSettings(nodes=16, slices=2, elements=8, refinement=2, three_d=True)
-    return {"slices": plane, "volume": simulate_volume(None, small, lambda _: None)}
+    return {"slices": plane, "volume": simulate(small, lambda _: None)}
 
 
 @pytest.mark.parametrize(("rays", "cut", "eikonal"), list(product(RAYS, CUTS, SOLVERS)))
@@ -64,7 +65,7 @@ def test_what_runs_is_what_was_chosen(scans, monkeypatch, rays, cut, eikonal):
 def test_the_plan_counts_the_arrays_of_what_runs(rays, eikonal):
     scan = Summary(1024, 1024, 1024**2, 1, False, 0.0, 0.2, 0, False)
     size = {
-        name: call_bytes(scan, Settings(nodes=1024, rays=rays, eikonal=name))["advance"]
+        name: call_bytes(scan, Settings(nodes=1024, rays=rays, eikonal=name))["update_sart"]
         for name in (eikonal, DEVIATION)
     }
     settings = Settings(nodes=1024, rays=rays, eikonal=eikonal)

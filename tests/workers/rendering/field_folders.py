@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from bentray_kernels.meshes.mesh import TriangleMesh
-from bentray_workers.cluster.task_pool import ThreadTasks
 from bentray_workers.files.mesh import StoredMesh, write_mesh
 from bentray_workers.rendering.field_settings import FieldSettings
-from bentray_workers.rendering.geometry_field import build
+from bentray_workers.rendering.geometry_field import build_field
 
 SMALL = FieldSettings(samples=6, inner_samples=4, divisions=4, image_size=33)
 
@@ -25,14 +24,5 @@ def field_of(folder: Path, mesh: TriangleMesh, settings: FieldSettings = SMALL) 
     work = folder / "work"
     work.mkdir()
     target = folder / "made"
-    build(
-        ThreadTasks(),
-        stored(folder, mesh),
-        settings,
-        target,
-        work,
-        lambda p: None,
-        lambda: None,
-        lambda: False,
-    )
+    build_field(None, stored(folder, mesh), settings, target, work)
     return target

@@ -8,26 +8,13 @@ from bentray_kernels.geometry_field.tables.inner_field import build_inner_rows, 
 from bentray_kernels.geometry_field.tables.outer_field import build_rows, outer_field
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, torus
 from bentray_kernels.meshes.surface import surface_of
-from bentray_workers.cluster.fair_shares import alone
-from bentray_workers.cluster.task_loop import Cancelled
-from bentray_workers.cluster.task_pool import ClusterTasks, ThreadTasks
+from bentray_kernels.task_graph import Cancelled
 from bentray_workers.files.geometry_field_folder import FieldFiles, mapped, read_chart
 from bentray_workers.rendering import field_tasks, geometry_field
 from bentray_workers.rendering.field_settings import FieldSettings
-from bentray_workers.rendering.geometry_field import build, bytes_of
+from bentray_workers.rendering.geometry_field import build_field, bytes_of
 
 from .field_folders import SMALL, stored
-
-
-def nothing():
-    """Told of something that does not matter here."""
-
-
-@pytest.fixture(params=["cluster", "threads"])
-def tasks(request, cluster):
-    if request.param == "threads":
-        return ThreadTasks()
-    return ClusterTasks(cluster.client, 0, alone(cluster.client, "render"))
 
 
 @pytest.fixture
@@ -42,15 +29,14 @@ def small_batches(monkeypatch):
     monkeypatch.setattr(geometry_field, "TASK_RAYS", 32 * 6 * 6**2)
 
 
-def made(tasks, path, tmp_path, name="field", told=None, stop=lambda: False, settings=SMALL):
-    """Build into a folder of that name."""
-    report = (lambda progress: None) if told is None else told.append
-    return build(tasks, path, settings, tmp_path / name, tmp_path / "work", report, nothing, stop)
+def made(path, tmp_path, name="field", on_progress=None, stop=None, settings=SMALL, client=None):
+    """The figures of the field, built into a folder of that name."""
+    return build_field(client, path, settings, tmp_path / name, tmp_path / "work", on_progress, stop=stop)
 
 
-def test_the_tables_are_those_of_the_kernels(tasks, path, tmp_path, small_batches):
+def test_the_tables_are_those_of_the_kernels(path, tmp_path, small_batches):
     told = []
-    figures = made(tasks, path, tmp_path, told=told)
+    figures = made(path, tmp_path, on_progress=told.append)
     files = FieldFiles(tmp_path / "field")
     surface = surface_of(read_chart(files.chart))
     outer = outer_field(6, [build_rows(surface, 6, 0, 216)])
@@ -72,10 +58,10 @@ def test_the_tables_are_those_of_the_kernels(tasks, path, tmp_path, small_batche
     assert [(one.done, one.total) for one in told] == [(0, 0), *((k, total) for k in range(1, total + 1))]
 
 
-def test_a_torn_job_is_gone_on_from(tasks, path, tmp_path, small_batches):
+def test_a_torn_job_is_gone_on_from(path, tmp_path, small_batches):
     told = []
     with pytest.raises(Cancelled):
-        made(tasks, path, tmp_path, told=told, stop=lambda: len(told) > 4)
+        made(path, tmp_path, on_progress=told.append, stop=lambda: len(told) > 4)
     assert not (tmp_path / "field").exists()
     done = {mark.name: mark.stat().st_mtime_ns for mark in (tmp_path / "work" / "done").glob("*.json")}
     assert len(done) >= 2
@@ -87,47 +73,38 @@ def test_a_torn_job_is_gone_on_from(tasks, path, tmp_path, small_batches):
     mapped(table, "r+")[first : first + 5] = 77
     layout = FieldFiles(tmp_path / "work" / "field").layout.stat().st_mtime_ns
     again = []
-    made(tasks, path, tmp_path, told=again)
+    made(path, tmp_path, on_progress=again.append)
     # The layout in place of the torn batch; what was in flight at the stop may have ended since.
     assert again[0].done >= len(done)
     assert FieldFiles(tmp_path / "field").layout.stat().st_mtime_ns == layout
     kept = {mark.name: mark.stat().st_mtime_ns for mark in (tmp_path / "work" / "done").glob("*.json")}
     assert all(kept[name] == when for name, when in done.items() if name != torn)
     (tmp_path / "other").mkdir()
-    build(
-        tasks, path, SMALL, tmp_path / "whole", tmp_path / "other", lambda told: None, nothing, lambda: False
-    )
+    build_field(None, path, SMALL, tmp_path / "whole", tmp_path / "other")
     for name in ("outer-faces.npy", "outer-fractions.npy", "inner-faces.npy"):
         assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "field" / name).read_bytes()
 
 
 def test_a_death_after_the_borders_were_marked(path, tmp_path, monkeypatch):
-    tasks = ThreadTasks()
-    whole = made(tasks, path, tmp_path, "whole")
+    whole = made(path, tmp_path, "whole")
     (tmp_path / "whole").rename(tmp_path / "work" / "field")
     FieldFiles(tmp_path / "work" / "field").figures.unlink()
     before = FieldFiles(tmp_path / "work" / "field").outer[0].read_bytes()
-    again = made(tasks, path, tmp_path, "again")
+    again = made(path, tmp_path, "again")
     assert FieldFiles(tmp_path / "again").outer[0].read_bytes() == before
     assert again["lookup_wrong"] == whole["lookup_wrong"]
 
 
-def test_what_is_there_is_taken(path, tmp_path):
-    first = made(ThreadTasks(), path, tmp_path)
-
-    class NoTasks:
-        window = 1
-
-        def submit(self, *given):
-            raise AssertionError("nothing is to be done")
-
+def test_what_is_there_is_taken(path, tmp_path, monkeypatch):
+    first = made(path, tmp_path)
     told = []
-    assert made(NoTasks(), path, tmp_path, told=told) == first
+    monkeypatch.setattr(geometry_field, "GeometryFieldGraph", None)
+    assert made(path, tmp_path, on_progress=told.append) == first
     assert told[-1].done == told[-1].total
 
 
 def test_two_at_once_make_one(path, tmp_path):
-    made(ThreadTasks(), path, tmp_path)
+    made(path, tmp_path)
     before = FieldFiles(tmp_path / "field").figures.read_bytes()
     geometry_field._move(FieldFiles(tmp_path / "field").folder, tmp_path / "field")
     (tmp_path / "late").mkdir()
@@ -138,19 +115,19 @@ def test_two_at_once_make_one(path, tmp_path):
 
 def test_a_threshold_halves_the_image(path, tmp_path):
     settings = FieldSettings(samples=4, inner_samples=4, divisions=2, image_size=129, image_threshold=1e-3)
-    assert made(ThreadTasks(), path, tmp_path, settings=settings)["image_rms"] < 1e-3
+    assert made(path, tmp_path, settings=settings)["image_rms"] < 1e-3
     coarser = FieldSettings(samples=4, inner_samples=4, divisions=2, image_size=129, image_threshold=0.02)
-    figures = made(ThreadTasks(), path, tmp_path, "coarser", settings=coarser)
+    figures = made(path, tmp_path, "coarser", settings=coarser)
     assert (figures["image_pixels"], figures["image_rms"] > 1e-3) == (33, True)
 
 
 def test_what_is_refused(path, tmp_path, monkeypatch):
     settings = FieldSettings(samples=4, inner_samples=4, image_size=33, image_threshold=1e-9)
     with pytest.raises(InvalidInput, match="threshold"):
-        made(ThreadTasks(), path, tmp_path, settings=settings)
+        made(path, tmp_path, settings=settings)
     monkeypatch.setattr(field_tasks, "MOST_INNER", 100)
     with pytest.raises(InvalidInput, match="fewer divisions"):
-        made(ThreadTasks(), path, tmp_path)
+        made(path, tmp_path)
     assert not (tmp_path / "field").exists()
 
 
@@ -159,6 +136,6 @@ def test_an_open_surface(tmp_path):
     whole = bumpy_ball(500)
     keep = whole.corners.mean(axis=1)[:, 2] < 0.5
     path = stored(tmp_path, type(whole)(whole.vertices, whole.faces[keep]))
-    figures = made(ThreadTasks(), path, tmp_path)
+    figures = made(path, tmp_path)
     assert figures["faces"] == keep.sum()
     assert figures["lookup_median"] < 1e-6

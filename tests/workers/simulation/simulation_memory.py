@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from benchmarks.shared._peak_memory import peak
 
-from bentray_workers.simulation.assembly import finish
+from bentray_workers.simulation.assembly import write_scan
+from bentray_workers.simulation.parts import Part, make_part, parts_of
 from bentray_workers.simulation.request import AskedSimulation, Simulated
-from bentray_workers.simulation.tasks import Part, make_part, parts_of
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
 TINY: list[dict[str, Any]] = [
@@ -39,7 +39,7 @@ def bytes_of(settings: Simulated, folder: Path) -> dict[str, int]:
     for part in parts:
         arrays = made_up(settings, part)
         np.savez(part.path(folder), **{str(k): array for k, array in enumerate(arrays)})
-    found["finish"] = peak(lambda: finish(settings, folder, folder / "scan.h5")) - nothing
+    found["write_scan"] = peak(lambda: write_scan(settings, folder, folder / "scan.h5")) - nothing
     return found
 
 
@@ -53,7 +53,7 @@ def main(scans: list[dict[str, Any]]) -> None:
                 # Loading compiled code takes memory too, here and not in the forks.
                 for part in parts_of(settings):
                     make_part(settings, part, folder)
-                finish(settings, folder, folder / "scan.h5")
+                write_scan(settings, folder, folder / "scan.h5")
             else:
                 found.append(bytes_of(settings, folder))
         sys.stdout.write(json.dumps(found) + "\n")

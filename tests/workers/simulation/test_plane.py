@@ -1,4 +1,4 @@
-"""Simulated datasets: the same on a cluster and here, noise as asked, refusals."""
+"""Simulated datasets of the 2-D phantom: shapes, noise, rejected settings."""
 
 from dataclasses import replace
 
@@ -7,30 +7,30 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import read_dataset, write_dataset
-from bentray_workers.simulation.plane import SimulationSettings, simulate
+from bentray_workers.simulation.plane import SimulationSettings
+from bentray_workers.simulation.simulation_run import simulate
 
 SMALL = SimulationSettings(nodes=32, elements=20, coupling_mps=1400.0)
 
 
-def test_cluster_and_this_machine_agree(cluster):
+def test_progress_and_shapes():
     seen = []
-    here, there = simulate(None, SMALL, seen.append), simulate(cluster.client, SMALL)
-    assert np.array_equal(here.delta_tof_s, there.delta_tof_s)
-    assert [p.done for p in seen] == [7, 14, 20]
-    assert here.truth.sound_speed_mps.shape == here.roi.shape == (32, 32)
-    assert here.water_speed_mps == 1400.0
+    scan = simulate(SMALL, seen.append)
+    assert [(p.done, p.total) for p in seen] == [(0, 2), (1, 2), (2, 2)]
+    assert scan.truth.sound_speed_mps.shape == scan.roi.shape == (32, 32)
+    assert scan.water_speed_mps == 1400.0
 
 
 def test_noise_has_the_size_asked_for():
-    quiet, loud = simulate(None, SMALL), simulate(None, replace(SMALL, noise_s=1e-7, seed=4))
+    quiet, loud = simulate(SMALL), simulate(replace(SMALL, noise_s=1e-7, seed=4))
     noise = (loud.delta_tof_s - quiet.delta_tof_s)[~np.eye(20, dtype=bool)]
     assert noise.std() == pytest.approx(1e-7, rel=0.15)
     assert (loud.sigma_s == 1e-7).all()
-    assert np.array_equal(simulate(None, replace(SMALL, noise_s=1e-7, seed=4)).delta_tof_s, loud.delta_tof_s)
+    assert np.array_equal(simulate(replace(SMALL, noise_s=1e-7, seed=4)).delta_tof_s, loud.delta_tof_s)
 
 
 def test_amplitudes_come_when_asked_for_and_leave_the_times_alone(tmp_path):
-    plain, full = simulate(None, SMALL), simulate(None, replace(SMALL, attenuation=True))
+    plain, full = simulate(SMALL), simulate(replace(SMALL, attenuation=True))
     assert plain.log_ratio_np is None
     assert np.array_equal(full.delta_tof_s, plain.delta_tof_s)
     write_dataset(tmp_path / "full.h5", full)
@@ -44,7 +44,7 @@ def test_amplitudes_come_when_asked_for_and_leave_the_times_alone(tmp_path):
 
 def test_noise_by_its_ratio_to_the_signal():
     settings = replace(SMALL, attenuation=True)
-    quiet, loud = simulate(None, settings), simulate(None, replace(settings, snr=10.0, seed=4))
+    quiet, loud = simulate(settings), simulate(replace(settings, snr=10.0, seed=4))
     pairs = ~np.eye(20, dtype=bool)
     for name in ("delta_tof_s", "log_ratio_np"):
         clean, noisy = getattr(quiet, name)[pairs], getattr(loud, name)[pairs]
@@ -55,7 +55,7 @@ def test_noise_by_its_ratio_to_the_signal():
 def test_default_reconstruction_grid_is_the_grid_of_the_truth():
     from bentray_kernels.tomography import Problem, Settings
 
-    dataset = simulate(None, SMALL)
+    dataset = simulate(SMALL)
     problem = Problem.of(dataset, Settings(nodes=32))
     assert problem.origin == pytest.approx(dataset.truth.origin_m)
     assert problem.spacing == pytest.approx(dataset.truth.spacing_m[0])

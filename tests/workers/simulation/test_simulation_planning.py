@@ -15,9 +15,9 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.cluster.capacities import MIB, Offer
 from bentray_workers.simulation import simulation_planning
 from bentray_workers.simulation.cost import task_bytes
+from bentray_workers.simulation.parts import parts_of
 from bentray_workers.simulation.request import AskedSimulation
 from bentray_workers.simulation.simulation_planning import plan_simulation
-from bentray_workers.simulation.tasks import parts_of
 
 PROGRAM = Path(__file__).with_name("simulation_memory.py")
 ROOT = Path(__file__).parents[3]

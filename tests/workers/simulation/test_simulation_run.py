@@ -1,4 +1,4 @@
-"""Simulated scans on a cluster: the bits of one process, gone on from, given up at once, mended."""
+"""Simulated scans as files: resumed, cancelled at once, damaged parts computed again."""
 
 import hashlib
 import threading
@@ -6,70 +6,43 @@ import time
 
 import pytest
 
+from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.wave import time_blocks
 from bentray_workers.cluster.attempts import ResultsLostError
 from bentray_workers.cluster.job_cancellation import Unwanted
-from bentray_workers.cluster.task_loop import Cancelled
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.files.dataset.record import record_of
-from bentray_workers.simulation import tasks
-from bentray_workers.simulation.plane import simulate
+from bentray_workers.simulation import parts
+from bentray_workers.simulation.parts import folder_of, make_part, parts_of
 from bentray_workers.simulation.request import AskedSimulation
-from bentray_workers.simulation.simulation_run import simulate_scan
-from bentray_workers.simulation.tasks import folder_of, make_part, parts_of
-from bentray_workers.simulation.volume import simulate_volume
-from bentray_workers.simulation.waves import simulate_waves
+from bentray_workers.simulation.simulation_run import simulate, simulate_to_file
 
 TIMES = AskedSimulation(nodes=16, elements=70, snr=10.0, attenuation=True)
-SPACE = {"phantom": "table7", "nodes": 16, "elements": 8, "slices": 2}
 WAVES = {"waveform": True, "nodes": 32, "elements": 16, "frequency_hz": 2e5, "side_m": 0.03, "emissions": 4}
-SCANS = {
-    "times": (TIMES, simulate),
-    "a moved ring": (AskedSimulation(**SPACE, noise_s=None), simulate_volume),
-    "rings in space": (
-        AskedSimulation(**SPACE, array="rings", three_d=True, refinement=2, snr=5.0),
-        simulate_volume,
-    ),
-    "waves": (AskedSimulation(**WAVES), simulate_waves),
-    "noisy waves": (AskedSimulation(**WAVES, snr=20.0, seed=3), simulate_waves),
-}
-
-
-def nothing(told=None):
-    """Told of something that does not matter here."""
-
-
-def never():
-    return False
 
 
 @pytest.fixture
 def run(cluster, tmp_path):
-    """Simulate into ``reconstruction.file_scan.h5``; ``stop`` as ``simulate_scan`` takes it."""
+    """Simulate into ``scan.h5``; ``stop`` as ``simulate_to_file`` takes it."""
 
-    def go(asked, told=nothing, stop=never):
+    def go(asked, on_progress=None, stop=None):
         work = tmp_path / "work"
         work.mkdir(exist_ok=True)
-        return simulate_scan(cluster.client, asked, tmp_path / "scan.h5", work, told, nothing, stop)
+        scan = tmp_path / "scan.h5"
+        return simulate_to_file(cluster.client, asked.chosen(), scan, work, on_progress, stop=stop)
 
     return go
 
 
-@pytest.mark.parametrize("name", SCANS)
-def test_the_file_is_that_of_one_process(run, tmp_path, name):
-    asked, here = SCANS[name]
-    told = []
-    found = run(asked, told.append)
-    expected = here(None, asked.chosen())
-    write_dataset(tmp_path / "here.h5", expected)
-    content = (tmp_path / "here.h5").read_bytes()
-    assert (tmp_path / "scan.h5").read_bytes() == content
-    assert found.pop("sha256") == hashlib.sha256(content).hexdigest()
-    assert found.pop("bytes") == len(content)
-    assert found == record_of(read_dataset(tmp_path / "scan.h5"))
-    total = len(parts_of(asked.chosen())) + 1
-    assert [one.done for one in told] == list(range(total + 1))
-    assert {one.total for one in told} == {total}
+def test_the_record_is_that_of_the_file(run, tmp_path):
+    seen = []
+    record = run(TIMES, seen.append)
+    content = (tmp_path / "scan.h5").read_bytes()
+    assert record.pop("sha256") == hashlib.sha256(content).hexdigest()
+    assert record.pop("bytes") == len(content)
+    assert record == record_of(read_dataset(tmp_path / "scan.h5"))
+    total = len(parts_of(TIMES.chosen())) + 1
+    assert [(one.done, one.total) for one in seen] == [(done, total) for done in range(total + 1)]
 
 
 def test_what_was_kept_is_not_made_again(run, tmp_path):
@@ -83,7 +56,7 @@ def test_what_was_kept_is_not_made_again(run, tmp_path):
     run(TIMES, again.append)
     assert again[0].done >= len(kept)
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
-    write_dataset(tmp_path / "here.h5", simulate(None, TIMES.chosen()))
+    write_dataset(tmp_path / "here.h5", simulate(TIMES.chosen()))
     assert (tmp_path / "scan.h5").read_bytes() == (tmp_path / "here.h5").read_bytes()
 
 
@@ -113,7 +86,7 @@ def test_a_stop_does_not_wait_for_the_emission_at_work_which_ends_with_the_folde
         finally:
             ended.set()
 
-    monkeypatch.setattr(tasks, "simulate_emission", endless)
+    monkeypatch.setattr(parts, "simulate_emission", endless)
     try:
         with pytest.raises(Cancelled):
             run(AskedSimulation(**WAVES), stop=begun.is_set)
@@ -134,7 +107,7 @@ def test_an_emission_asks_between_its_steps_whether_anybody_waits(tmp_path, monk
         if len(polled) == 3:
             raise Unwanted
 
-    monkeypatch.setattr(tasks, "check_wanted", gone)
+    monkeypatch.setattr(parts, "check_wanted", gone)
     make_part(settings, parts_of(settings)[0], tmp_path)
     assert polled == 3 * [tmp_path]
     assert not list(tmp_path.iterdir())
@@ -148,13 +121,13 @@ def test_a_task_whose_job_has_gone_ends_early_and_leaves_nothing(tmp_path, monke
     folder.mkdir()
     made = []
 
-    def once(asked, scan, emitters):
-        made.append(emitters)
+    def once(asked, number):
+        made.append(number)
         folder.rmdir()
-        return real(asked, scan, emitters)
+        return real(asked, number)
 
-    real = tasks.simulate_emitters
-    monkeypatch.setattr(tasks, "simulate_emitters", once)
+    real = parts._medium
+    monkeypatch.setattr(parts, "_medium", once)
     make_part(settings, parts_of(settings)[0], folder)
     assert len(made) == 1
     assert not list(tmp_path.iterdir())

@@ -1,4 +1,4 @@
-"""Simulated volume scans: their shapes, their file, the same on a cluster and here."""
+"""Simulated scans of the 3-D phantom: shapes, file, moved ring and rings, rejected settings."""
 
 from dataclasses import replace
 
@@ -7,7 +7,8 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import read_dataset, write_dataset
-from bentray_workers.simulation.volume import VolumeSimulationSettings, simulate_volume
+from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.volume import VolumeSimulationSettings
 
 SMALL = VolumeSimulationSettings(nodes=24, slices=3, elements=10, coupling_mps=1475.0, attenuation=True)
 IN_SPACE = replace(SMALL, three_d=True, refinement=2)
@@ -15,7 +16,7 @@ IN_SPACE = replace(SMALL, three_d=True, refinement=2)
 
 @pytest.fixture(scope="module")
 def moved():
-    return simulate_volume(None, SMALL)
+    return simulate(SMALL)
 
 
 def test_slices_come_back_from_a_file(moved, tmp_path):
@@ -41,17 +42,8 @@ def test_each_slice_is_the_scan_of_its_plane(moved):
     assert not np.allclose(moved.delta_tof_s[0], moved.delta_tof_s[2], atol=1e-8)
 
 
-def test_cluster_and_this_machine_agree(cluster, moved):
-    seen = []
-    there = simulate_volume(cluster.client, SMALL, seen.append)
-    assert np.array_equal(moved.delta_tof_s, there.delta_tof_s)
-    assert np.array_equal(moved.log_ratio_np, there.log_ratio_np)
-    assert [p.done for p in seen] == [5, 10, 15, 20, 25, 30]
-    assert {p.total for p in seen} == {30}
-
-
 def test_moved_ring_in_space_is_the_diagonal_of_all_rings_at_once(tmp_path):
-    one, all_at_once = (simulate_volume(None, replace(IN_SPACE, array=array)) for array in ("moved", "rings"))
+    one, all_at_once = (simulate(replace(IN_SPACE, array=array)) for array in ("moved", "rings"))
     assert all_at_once.element_position_m.shape == (30, 3)
     assert all_at_once.slice_z_m is None
     for k in range(3):
@@ -67,7 +59,7 @@ def test_moved_ring_in_space_is_the_diagonal_of_all_rings_at_once(tmp_path):
 
 
 def test_noise_has_the_ratio_asked_for(moved):
-    loud = simulate_volume(None, replace(SMALL, snr=10.0, seed=5))
+    loud = simulate(replace(SMALL, snr=10.0, seed=5))
     pairs = np.broadcast_to(~np.eye(10, dtype=bool), (3, 10, 10))
     for name in ("delta_tof_s", "log_ratio_np"):
         clean, noisy = getattr(moved, name)[pairs], getattr(loud, name)[pairs]
@@ -77,7 +69,7 @@ def test_noise_has_the_ratio_asked_for(moved):
 
 
 def test_amplitudes_are_left_out_unless_asked_for():
-    assert simulate_volume(None, replace(SMALL, attenuation=False, slices=2)).log_ratio_np is None
+    assert simulate(replace(SMALL, attenuation=False, slices=2)).log_ratio_np is None
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,9 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE7_SIDE_M
+from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.volume_waves import VolumeWaveSettings
-from bentray_workers.simulation.waves import BEFORE, SAMPLES_A_PERIOD, simulate_waves
+from bentray_workers.simulation.waves import BEFORE, SAMPLES_A_PERIOD
 
 
 class Narrow(VolumeWaveSettings):
@@ -20,7 +21,7 @@ SMALL = Narrow(frequency_hz=1e5, side_m=0.03, elements=8, emissions=1, nodes=32)
 
 @pytest.fixture(scope="module")
 def scan():
-    return simulate_waves(None, SMALL)
+    return simulate(SMALL)
 
 
 def test_the_pulse_in_water_comes_when_it_should_and_falls_with_the_distance(scan):

@@ -1,4 +1,4 @@
-"""Scans by waves: what arrives when, noise as asked for, the same everywhere, settings that are refused."""
+"""2-D wave simulation: arrivals, reciprocity, noise, dispersion, rejected settings."""
 
 from dataclasses import replace
 
@@ -7,15 +7,15 @@ import pytest
 
 from bentray_kernels.acquisition import pick
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.dataset import read_dataset, write_dataset
-from bentray_workers.simulation.waves import HIGHEST, Noise, WaveSimulationSettings, simulate_waves
+from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.waves import HIGHEST, Noise, WaveSimulationSettings
 
 SMALL = WaveSimulationSettings(frequency_hz=3e5, side_m=0.05, elements=24, emissions=6, nodes=32)
 
 
 @pytest.fixture(scope="module")
 def scan():
-    return simulate_waves(None, SMALL)
+    return simulate(SMALL)
 
 
 def test_the_pulse_in_water_comes_when_it_should(scan):
@@ -44,18 +44,8 @@ def test_the_object_is_picked_slower_than_water_through_fat(scan):
     assert np.isfinite(across).any()
 
 
-def test_a_cluster_gives_the_same_bits(cluster, scan, tmp_path):
-    other = simulate_waves(cluster.client, SMALL)
-    assert np.array_equal(other.waveform.object, scan.waveform.object)
-    assert np.array_equal(other.waveform.water, scan.waveform.water)
-    write_dataset(tmp_path / "scan.h5", other)
-    again = read_dataset(tmp_path / "scan.h5")
-    assert np.array_equal(again.waveform.object, scan.waveform.object)
-    assert np.array_equal(again.truth.sound_speed_mps, scan.truth.sound_speed_mps)
-
-
 def test_noise_has_the_size_that_was_asked_for(scan):
-    noisy = simulate_waves(None, replace(SMALL, snr=20.0))
+    noisy = simulate(replace(SMALL, snr=20.0))
     added = noisy.waveform.water - scan.waveform.water
     expected = np.median(np.abs(scan.waveform.water).max(axis=-1)) / 20.0
     assert added.std() == pytest.approx(expected, rel=0.02)

@@ -1,4 +1,4 @@
-"""Calls on a cluster that are tried again when their worker dies, unless they are what kills it."""
+"""Retries: tasks on a cluster are submitted again when a worker dies, unless they kill their workers."""
 
 from __future__ import annotations
 
@@ -9,87 +9,96 @@ from typing import Any, NamedTuple
 
 from distributed import Client, Future, KilledWorker
 
+from bentray_kernels.task_graph import Task
+
 from .memory_cache import leave_room
 from .resources import RECONSTRUCTION
 
-# How often a call may see its workers die while it runs.
-MOST_STRIKES = 2
+# Deaths of workers while a task runs, after which it fails.
+MOST_DEATHS = 2
 
 
 class ResultsLostError(ConnectionError):
-    """What a call needs has gone with its workers; whoever drives begins again from its checkpoint."""
+    """Results that a task needs are lost with their workers; the job resumes from its checkpoint."""
 
 
 class _Attempt(NamedTuple):
-    function: Callable[..., Any]
-    arguments: tuple[Any, ...]
-    strikes: int
+    task: Task
     priority: int
     marker: Path
+    deaths: int = 0
 
 
 class Attempts:
-    """Calls of one job.
+    """Tasks of one job on a cluster.
 
-    Dask blames every task of a dead worker, also those that only waited there. So a call leaves a file where
-    it runs, which stays when its process is killed: it tells which one was at work.
+    Dask blames every task of a dead worker, also those that only waited there. So a task leaves a file where
+    it runs, which remains when its process is killed and shows which task was running.
 
     Args:
         client: of the cluster.
-        folder: for these files; every worker can write there. It is made if needed.
-        resources: what each call asks of its worker; see ``resources``.
+        folder: for these files; every worker can write there. It is created if missing.
+        placement: where tasks may run; see ``task_pool.open_pool``.
     """
 
-    def __init__(self, client: Client, folder: Path, resources: Mapping[str, int] = RECONSTRUCTION) -> None:
+    def __init__(
+        self,
+        client: Client,
+        folder: Path,
+        placement: Callable[[], Mapping[str, Any]] = lambda: {"resources": RECONSTRUCTION},
+    ) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._client = client
-        self._resources = dict(resources)
-        self._markers = (folder / f"call-{number}" for number in count())
-        self._made: dict[Future, _Attempt] = {}
+        self._placement = placement
+        self._markers = (folder / f"task-{number}" for number in count())
+        self._attempts: dict[Future, _Attempt] = {}
 
-    def submit(self, function: Callable[..., Any], *arguments: Any, priority: int = 0) -> Future:
-        """Begin a call; its future is to be handed to ``ended`` once it has ended.
+    def submit(self, task: Task, priority: int = 0) -> Future:
+        """Submit a task; when its future has ended it is to be passed to ``result``.
 
         Args:
-            function, arguments: what to call.
-            priority: higher ones first, where calls wait for the same worker.
+            task: to run.
+            priority: higher ones first, where tasks wait for the same worker.
         """
-        return self._submit(_Attempt(function, arguments, 0, priority, next(self._markers)))
+        return self._submit(_Attempt(task, priority, next(self._markers)))
 
-    def ended(self, future: Future, *, keep: bool = False) -> tuple[Future | None, Any]:
-        """What a call gave; or the same call once more, where its workers died and it may not be the cause.
+    def result(self, future: Future) -> tuple[Future | None, Any]:
+        """The result of a task; or a new attempt, where its worker died and it may not be the cause.
 
-        A result may go with its worker after it was made. Dask then makes it again by itself, and may blame
+        A result may be lost with its worker after it was computed. Dask then computes it again, and may blame
         it for the next death.
 
         Args:
-            future: of a call that has ended.
-            keep: leave the result where it is, and give the future for it.
+            future: of a task that has ended.
 
         Returns:
-            The future of the new attempt, or None and what the call gave.
+            The future of the new attempt, or None and the result: the future itself with
+            ``task.keep_on_worker``.
 
         Raises:
-            KilledWorker: for a call that kills its workers.
-            ResultsLostError: where what it needs was lost with its workers and could not be made again.
+            KilledWorker: for a task that kills its workers.
+            ResultsLostError: where needed results were lost with their workers and not computed again.
         """
-        made = self._made.pop(future)
+        attempt = self._attempts.pop(future)
         try:
-            return None, future if keep and future.status == "finished" else future.result()
+            kept = attempt.task.keep_on_worker and future.status == "finished"
+            return None, future if kept else future.result()
         except KilledWorker as error:
-            strikes = made.strikes + made.marker.exists()
-            made.marker.unlink(missing_ok=True)
-            if strikes > MOST_STRIKES:
+            deaths = attempt.deaths + attempt.marker.exists()
+            attempt.marker.unlink(missing_ok=True)
+            if deaths > MOST_DEATHS:
                 raise
-            if any(needed.status == "error" for needed in _futures(made.arguments)):
-                raise ResultsLostError("what it needs was lost with its workers") from error
-            return self._submit(made._replace(strikes=strikes)), None
+            if any(needed.status == "error" for needed in _futures(attempt.task.arguments)):
+                raise ResultsLostError("results that a task needs were lost with their workers") from error
+            return self._submit(attempt._replace(deaths=deaths)), None
 
     def _submit(self, attempt: _Attempt) -> Future:
-        work = attempt.marker, attempt.function, *attempt.arguments
-        how = {"resources": self._resources, "priority": attempt.priority, "pure": False}
-        future = self._client.submit(watched, *work, **how)
-        self._made[future] = attempt
+        placement = self._placement()
+        # Cached scenes are what tasks that draw work with; other tasks are planned for an empty cache.
+        evict = "render" not in placement["resources"]
+        work = attempt.marker, evict, attempt.task.function, *attempt.task.arguments
+        future = self._client.submit(marked, *work, **placement, priority=attempt.priority, pure=False)
+        self._attempts[future] = attempt
         return future
 
 
@@ -102,9 +111,10 @@ def _futures(arguments: Iterable[Any]) -> Iterator[Future]:
             yield from _futures(argument)
 
 
-def watched(marker: Path, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Task: a call, with a file that is there as long as it runs."""
-    leave_room()
+def marked(marker: Path, evict: bool, function: Callable[..., Any], *arguments: Any) -> Any:
+    """Task: run a function, with a file that exists as long as it runs."""
+    if evict:
+        leave_room()
     marker.touch()
     try:
         return function(*arguments)

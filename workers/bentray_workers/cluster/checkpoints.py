@@ -1,4 +1,4 @@
-"""Checkpoints of one job: where each of its chains stands, in files that prove themselves."""
+"""Checkpoints of one job: the states of its task graphs in files with check sums."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from bentray_kernels.sources import digest
-from bentray_kernels.tomography.checkpoint import packed, unpacked
-from bentray_kernels.tomography.task_chains import Standing
+from bentray_kernels.task_graph import Checkpoint
+from bentray_kernels.tomography.checkpoint import pack, unpack
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
 from ..files.atomic import replacing
@@ -21,10 +21,10 @@ from ..files.npy_headers import PARSING
 
 log = logging.getLogger("bentray.checkpoints")
 
-# Within a pass a chain is kept this often, s; each finished pass is kept at once.
+# Within an iteration the state is saved this often, s; each finished iteration is saved at once.
 INTERVAL_S = 5.0
 
-# The newest file, and the one before it for the case that the newest is damaged.
+# Files of each graph: the newest, and the one before it in case the newest is damaged.
 KEPT = 2
 
 # What a damaged file, or one of another version, may raise.
@@ -34,12 +34,12 @@ UNREADABLE = (OSError, ValueError, KeyError, TypeError, IndexError, EOFError, zi
 class Checkpoints:
     """The files of one job in one folder, ``NAME-GENERATION.npz``.
 
-    Each is written aside, reaches the disk and then takes its name. A zip archive holds a check sum of every
-    part, so that a damaged file is told from a sound one without a second record. A file of other kernels
-    than the present ones is passed over: half a result of each would be a result of neither.
+    A file is written under another name, synchronised to the disk and then renamed. The zip format holds a
+    check sum of every part, so damaged files are detected. A checkpoint of another version of the kernels is
+    not used: the result would be of neither version.
 
     Args:
-        folder: is made if needed; belongs to this job alone.
+        folder: of this job alone; created if missing.
         on_saved: called after each file.
         clock: seconds.
     """
@@ -53,38 +53,38 @@ class Checkpoints:
         self._folder = folder
         self._on_saved = on_saved
         self._clock = clock
-        self._kept: dict[str, tuple[Standing, float]] = {}
+        self._saved: dict[str, tuple[Checkpoint, float]] = {}
         folder.mkdir(parents=True, exist_ok=True)
 
-    def keep(self, name: str, standing: Standing) -> None:
-        """Save where a chain stands, unless it has hardly moved since it was saved last.
+    def save(self, name: str, checkpoint: Checkpoint) -> None:
+        """Save the state of a graph, unless it has hardly changed since it was saved last.
 
         Raises:
             OSError: where the file cannot be written; the ones before it remain.
         """
-        if name in self._kept:
-            before, saved = self._kept[name]
-            # Rows that are being gathered move no state; a long pass of SART does.
-            moved = before.state is not standing.state and self._clock() - saved >= INTERVAL_S
-            if before.passed == standing.passed and not moved:
+        if name in self._saved:
+            before, when = self._saved[name]
+            # Rows of an unfinished iteration do not change the state; batches of a long SART iteration do.
+            changed = before.state is not checkpoint.state and self._clock() - when >= INTERVAL_S
+            if before.milestone == checkpoint.milestone and not changed:
                 return
-        self._save(name, standing)
-        self._kept[name] = standing, self._clock()
+        self._write(name, checkpoint)
+        self._saved[name] = checkpoint, self._clock()
         self._on_saved()
 
-    def last(self, name: str) -> Standing | None:
-        """Where the chain stood when it was saved last; None where it never was."""
+    def load(self, name: str) -> Checkpoint | None:
+        """The state that was saved last; None if there is none."""
         for path in reversed(list(self._files(name))):
             try:
                 return _read(path)
             except UNREADABLE as error:
-                log.warning("%s is passed over: %s", path.name, error)
+                log.warning("checkpoint %s is not used: %s", path.name, error)
         return None
 
-    def _save(self, name: str, standing: Standing) -> None:
+    def _write(self, name: str, checkpoint: Checkpoint) -> None:
         files = list(self._files(name))
         number = 1 + (int(files[-1].stem.rpartition("-")[2]) if files else 0)
-        tree, arrays = packed(standing)
+        tree, arrays = pack(checkpoint)
         text = json.dumps({"kernels": _kernels(), "state": tree}).encode()
         parts = {str(k): array for k, array in enumerate(arrays)}
         with replacing(self._folder / f"{name}-{number:06d}.npz") as partial, partial.open("wb") as file:
@@ -101,9 +101,9 @@ def _kernels() -> str:
     return digest("bentray_kernels.tomography") + digest("bentray_kernels.wave")
 
 
-def _read(path: Path) -> Standing:
+def _read(path: Path) -> Checkpoint:
     with PARSING, np.load(path, allow_pickle=False) as found:
         content = json.loads(bytes(found["json"]))
         if content["kernels"] != _kernels():
             raise ValueError("it is of another version of the kernels")
-        return unpacked(content["state"], [found[str(k)] for k in range(len(found.files) - 1)], TYPES)
+        return unpack(content["state"], [found[str(k)] for k in range(len(found.files) - 1)], TYPES)

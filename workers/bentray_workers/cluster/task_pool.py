@@ -1,73 +1,121 @@
-"""Tasks of the render lane: on the workers of a cluster, or in the threads of this process."""
+"""The pool of a job: workers of a cluster that tasks run on, with retries, or threads of this process."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
 
-from distributed import Client
+from distributed import Client, Future, wait
 
-from .fair_shares import Share
-from .resources import RENDER
-from .task_loop import POLL_S, finished
+from bentray_kernels.task_graph import POLL_S, Pool, Task, TaskGraph, ThreadPool, run
+from bentray_kernels.tomography.result import Progress
 
+from .attempts import Attempts
+from .fair_shares import Share, alone
+from .resources import RECONSTRUCTION
 
-class Tasks(Protocol):
-    """Where tasks are done; futures are those of Dask or of ``concurrent.futures``, which are alike here."""
-
-    def may_begin(self, in_flight: int, ready: int) -> bool:
-        """Whether to begin one more, with so many in flight and so many that could begin."""
-
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Begin a task; its future."""
-
-    def ended(self, running: list[Any]) -> list[Any]:
-        """The futures that have ended; waits for the first one, a moment at most."""
+# Where a task may run: keyword arguments ``resources`` and ``workers`` of ``Client.submit``.
+Placement = Mapping[str, Any]
 
 
-class ClusterTasks:
-    """On a cluster.
+class ClusterPool:
+    """Workers of a cluster; see ``task_graph.Pool``.
 
     Args:
-        client: of it.
-        priority: above or below that of other tasks.
+        attempts: of the job.
+        client: of the cluster.
         share: of the workers.
+        priority: above or below the tasks of other jobs.
     """
 
-    def __init__(self, client: Client, priority: int, share: Share) -> None:
-        self._client = client
-        self._priority = priority
-        self._share = share
-        self._next = priority
+    def __init__(self, attempts: Attempts, client: Client, share: Share, priority: int = 0) -> None:
+        self._attempts, self._client, self._share = attempts, client, share
+        self._priority = self._next_priority = priority
 
-    def may_begin(self, in_flight: int, ready: int) -> bool:
-        self._next = self._priority + self._share.priority(in_flight)
-        return self._share.may_begin(in_flight, ready)
+    def may_submit(self, running: int, ready: int) -> bool:
+        self._next_priority = self._priority + self._share.priority(running)
+        return self._share.may_begin(running, ready)
 
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        how = {"pure": False, "resources": RENDER, "priority": self._next}
-        return self._client.submit(function, *arguments, **how)
+    def submit(self, task: Task) -> Future:
+        return self._attempts.submit(task, self._next_priority)
 
-    def ended(self, running: list[Any]) -> list[Any]:
+    def finished(self, running: list[Future]) -> list[Future]:
         if not running:
             self._share.wait()
         return finished(self._client, running)
 
+    def result(self, handle: Future) -> tuple[Future | None, Any]:
+        return self._attempts.result(handle)
 
-class ThreadTasks:
-    """In threads of this process, one a core; compiled kernels let go of the GIL."""
+    def cancel(self, running: list[Future]) -> None:
+        for future in running:
+            future.cancel()
+        self._share.pause()
 
-    def __init__(self) -> None:
-        self._threads = len(os.sched_getaffinity(0))
-        self._pool = ThreadPoolExecutor(self._threads)
 
-    def may_begin(self, in_flight: int, ready: int) -> bool:
-        return ready > 0 and in_flight < self._threads
+def open_pool(
+    client: Client | None,
+    folder: Path,
+    share: Share | None = None,
+    *,
+    lane: str = "recon",
+    placement: Callable[[], Placement] = lambda: {"resources": RECONSTRUCTION},
+    priority: int = 0,
+    threads: int | None = None,
+) -> Pool:
+    """The pool of a job.
 
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        return self._pool.submit(function, *arguments)
+    Args:
+        client: of a cluster; None: threads of this process.
+        folder: of the job, which every worker can write.
+        share: of the workers; None: all of them.
+        lane: the resource that the share counts.
+        placement: where tasks may run; evaluated for each attempt, since workers come and go.
+        priority: see ``ClusterPool``.
+        threads: without a client; None: one for each core.
+    """
+    if client is None:
+        return ThreadPool(threads)
+    attempts = Attempts(client, folder, placement)
+    return ClusterPool(attempts, client, share or alone(client, lane), priority)
 
-    def ended(self, running: list[Any]) -> list[Any]:
-        return list(wait(running, timeout=POLL_S, return_when=FIRST_COMPLETED).done)
+
+def run_job(
+    graph: TaskGraph,
+    pool: Pool,
+    on_progress: Callable[[Progress], None] | None = None,
+    on_saved: Callable[[], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> None:
+    """Run a task graph whose finished tasks leave files, from which a later run resumes.
+
+    Args:
+        graph: to run.
+        pool: where tasks run.
+        on_progress: called at the start and after each task.
+        on_saved: called after each task.
+        stop: polled several times a second; true raises ``Cancelled``, without waiting for tasks on workers.
+    """
+
+    def report() -> None:
+        if on_progress is not None:
+            on_progress(Progress(graph.done, graph.total))
+
+    def save(_name: str) -> None:
+        if on_saved is not None:
+            on_saved()
+        report()
+
+    report()
+    run({"job": graph}, pool, save, stop)
+
+
+def finished(client: Client, running: list[Future]) -> list[Future]:
+    """Those that have ended; waits at most ``POLL_S`` for the first one."""
+    # Without a default client ``wait`` must be given one.
+    with client.as_current():
+        try:
+            return list(wait(running, timeout=POLL_S, return_when="FIRST_COMPLETED").done)
+        except TimeoutError:
+            return []

@@ -31,7 +31,6 @@ from bentray_kernels.splines import FILTERS
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.settings import DECOMPOSITIONS, PENALTIES
 
-from ..cluster.task_pool import ThreadTasks
 from ..files.dataset import read_dataset, write_dataset
 from ..files.mesh import StoredMesh, write_mesh
 from ..files.volume import Volume
@@ -42,10 +41,11 @@ from ..rendering.field_settings import FieldSettings
 from ..rendering.refraction import strip
 from ..rendering.refraction_view import RefractionView
 from ..rendering.scene_cache import build, filtered_of
-from ..simulation.plane import SimulationSettings, simulate
-from ..simulation.volume import VolumeSimulationSettings, simulate_volume
+from ..simulation.plane import SimulationSettings
+from ..simulation.simulation_run import simulate
+from ..simulation.volume import VolumeSimulationSettings
 from ..simulation.volume_waves import VolumeWaveSettings
-from ..simulation.waves import WaveSimulationSettings, simulate_emission, simulate_waves
+from ..simulation.waves import WaveSimulationSettings, simulate_emission
 from . import warmup
 from .cache_misses import compiled_kernels
 
@@ -102,9 +102,9 @@ def compile_rays(folder: Path) -> None:
     warmup.warm_up()
     for number, (scan, wanted) in enumerate(
         (
-            (simulate(None, TIMES), of_times()),
-            (simulate_volume(None, HEIGHTS), of_heights()),
-            (simulate_volume(None, SPACE), of_heights()),
+            (simulate(TIMES), of_times()),
+            (simulate(HEIGHTS), of_heights()),
+            (simulate(SPACE), of_heights()),
         )
     ):
         _reconstruct(folder / f"times-{number}.h5", scan, wanted)
@@ -117,7 +117,7 @@ def compile_pictures(folder: Path) -> None:
     _refraction()
     _field(folder)
     simulate_emission(WAVES_IN_SPACE, 0)
-    write_dataset(folder / WAVES_FILE, simulate_waves(None, WAVES))
+    write_dataset(folder / WAVES_FILE, simulate(WAVES))
 
 
 def compile_traces(folder: Path) -> None:
@@ -155,16 +155,7 @@ def _field(folder: Path) -> None:
     write_mesh(mesh, StoredMesh(bumpy_ball(320)))
     work.mkdir()
     settings = FieldSettings(samples=4, inner_samples=4, divisions=4, image_size=33)
-    geometry_field.build(
-        ThreadTasks(),
-        mesh,
-        settings,
-        folder / "field",
-        work,
-        on_progress=lambda progress: None,
-        on_saved=lambda: None,
-        stop=lambda: False,
-    )
+    geometry_field.build_field(None, mesh, settings, folder / "field", work)
 
 
 def compiled_in(part: Callable[[Path], None], folder: Path) -> int:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction
-from bentray_kernels.tomography.model_selection.selection import told
+from bentray_kernels.tomography.model_selection.selection import advice_of
 
 from .canvas import drawing, new_figure, to_png
 from .captions import LABELS, NAMES, facts, stage_names, which_slice
@@ -155,7 +155,7 @@ def _sheet(result: Reconstruction, k: int, own: int) -> tuple[Figure, Iterator[A
     rows, columns = next(grid for most, grid in GRIDS.items() if count <= most)
     figure = new_figure(PANEL_IN[0] * columns, PANEL_IN[1] * rows + 0.6)
     figure.suptitle(f"Sound speed{which_slice(result, k)}")
-    words = textwrap.wrap(told(result), int(CHARACTERS_AN_INCH * figure.get_figwidth()))
+    words = textwrap.wrap(advice_of(result), int(CHARACTERS_AN_INCH * figure.get_figwidth()))
     figure.supxlabel("\n".join([facts(result), *words]), fontsize=8, color="#666666")
     panels = figure.subplots(rows, columns).ravel()
     for blank in panels[count:]:

@@ -1,4 +1,4 @@
-"""What a reconstruction begins with: a scan examined, corrected and picked, a batch of emissions a call."""
+"""What a reconstruction begins with: a scan examined, corrected and picked, a batch of emissions a task."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from bentray_kernels.acquisition.quality.examination import times_judged
 from bentray_kernels.acquisition.quality.recording import Measured, judged
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Progress
 from bentray_kernels.tomography.guided_picking import predicted_delta
-from bentray_kernels.tomography.task_chains import Call
 
 from ..cluster.job_cancellation import check_wanted
 from ..files.dataset.traces import slice_opened, trace_samples
@@ -125,8 +125,8 @@ class Source(NamedTuple):
             yield apply(one, findings)
 
 
-class Arrivals:
-    """The calls that make ``Files``, in this process or on a cluster.
+class PickingGraph:
+    """Task graph of examination and picking; its result is ``Files``.
 
     Of a scan with times of its own these alone are examined, see ``Source.examines``; its traces are read
     where amplitudes are wanted from them.
@@ -163,43 +163,51 @@ class Arrivals:
             return Progress(examined, total, phase=EXAMINING)
         return Progress(picked, total, phase=PICKING)
 
-    def first(self) -> list[Call]:
-        """Calls to begin with."""
+    @property
+    def done(self) -> int:
+        return self.progress.done
+
+    @property
+    def total(self) -> int:
+        return self.progress.total
+
+    def first(self) -> list[Task]:
         if not self._parts:
-            return [Call(settle, (self._source, k, (), []), keep=True) for k in self._slices]
+            return [Task(settle, (self._source, k, (), []), keep_on_worker=True) for k in self._slices]
         if self._guide or not self._source.examine or self._source.dataset.picked:
             return [call for k in self._slices for call in self._reading(k)]
         return [
-            Call(measure, (self._source, k, part), keep=True) for k in self._slices for part in self._parts
+            Task(measure, (self._source, k, part), keep_on_worker=True)
+            for k in self._slices
+            for part in self._parts
         ]
 
-    def after(self, call: Call, given: Any) -> list[Call]:
-        """Calls that may follow one that has finished; see ``task_chains.Calls``."""
-        if call.function is join:
+    def after(self, task: Task, result: Any) -> list[Task]:
+        if task.function is join:
             return []
-        index = call.arguments[1]
-        if call.function is judge:
-            self._found[index] = given
+        index = task.arguments[1]
+        if task.function is judge:
+            self._found[index] = result
             return self._reading(index)
-        if call.function is settle:
+        if task.function is settle:
             settled_slices = self._given[settle, 0]
-            settled_slices[index] = given
+            settled_slices[index] = result
             if len(settled_slices) < len(self._slices):
                 return []
-            return [Call(join, (self._source, self._files, self._taken(settle, 0)))]
-        part: range = call.arguments[-1]
-        self._gone_through[call.function] += len(part)
-        self._given[call.function, index][part.start] = given
-        if len(self._given[call.function, index]) < len(self._parts):
+            return [Task(join, (self._source, self._files, self._taken(settle, 0)))]
+        part: range = task.arguments[-1]
+        self._gone_through[task.function] += len(part)
+        self._given[task.function, index][part.start] = result
+        if len(self._given[task.function, index]) < len(self._parts):
             return []
-        parts = self._taken(call.function, index)
-        if call.function is measure:
-            return [Call(judge, (self._source, index, parts), keep=True)]
-        return [Call(settle, (self._source, index, self._found[index], parts), keep=True)]
+        parts = self._taken(task.function, index)
+        if task.function is measure:
+            return [Task(judge, (self._source, index, parts), keep_on_worker=True)]
+        return [Task(settle, (self._source, index, self._found[index], parts), keep_on_worker=True)]
 
-    def _reading(self, index: int) -> list[Call]:
+    def _reading(self, index: int) -> list[Task]:
         how = self._source, index, self._found[index], self._guide
-        return [Call(read, (*how, part), keep=True) for part in self._parts]
+        return [Task(read, (*how, part), keep_on_worker=True) for part in self._parts]
 
     def _taken(self, function: Any, index: int) -> list[Any]:
         """What the calls of a kind gave, in order; it is let go of here."""
@@ -207,13 +215,13 @@ class Arrivals:
 
 
 def measure(source: Source, index: int, part: range) -> Measured:
-    """Call: the figures of the traces of some emissions."""
+    """Task: the figures of the traces of some emissions."""
     with source.slice(index) as one:
         return Measured.of(one, part)
 
 
 def judge(source: Source, index: int, parts: list[Measured]) -> tuple[Finding, ...]:
-    """Call: what the traces of a slice show; a scan that must not be used is refused."""
+    """Task: what the traces of a slice show; a scan that must not be used is refused."""
     with source.slice(index) as one:
         findings, _ = judged(one, Measured.joined(parts))
     return _accepted(source, index, findings)
@@ -222,7 +230,7 @@ def judge(source: Source, index: int, parts: list[Measured]) -> tuple[Finding, .
 def read(
     source: Source, index: int, findings: tuple[Finding, ...], guide: Guide | None, part: range
 ) -> Heard:
-    """Call: the times of some emissions with their deviations, and amplitudes where these are wanted."""
+    """Task: the times of some emissions with their deviations, and amplitudes where these are wanted."""
     with source.slice(index, findings) as one:
         if one.picked:
             delta = one.differential_tof()[part.start : part.stop]
@@ -240,7 +248,7 @@ def read(
 def settle(
     source: Source, index: int, findings: tuple[Finding, ...], parts: list[Heard]
 ) -> tuple[Dataset, tuple[Finding, ...]]:
-    """Call: one slice as it goes on, without traces, and all that was found in it."""
+    """Task: one slice as it goes on, without traces, and all that was found in it."""
     one = apply(source.dataset.slice(index), findings)
     if parts and not one.picked:
         delta, sigma = (np.concatenate(rows) for rows in zip(*(part[:2] for part in parts), strict=True))
@@ -257,7 +265,7 @@ def settle(
 
 
 def join(source: Source, files: Files, slices: list[tuple[Dataset, tuple[Finding, ...]]]) -> None:
-    """Call: write what goes on, unless it is what the file has anyway, and then all findings."""
+    """Task: write what goes on, unless it is what the file has anyway, and then all findings."""
     whole = source.dataset
     findings = tuple(replace(finding, slice=k) for k, (_, found) in enumerate(slices) for finding in found)
     changed = source.listens or not whole.picked or any(finding.action != "reported" for finding in findings)

@@ -23,7 +23,7 @@ from ..files.findings import read_findings
 
 
 class FileScan(NamedTuple):
-    """See ``tomography.task_chains.Scan``; ``stamp`` tells a rewritten file from the old one."""
+    """See ``tomography.stage_graphs.Scan``; ``stamp`` tells a rewritten file from the old one."""
 
     path: Path
     stamp: int
@@ -38,7 +38,7 @@ class FileScan(NamedTuple):
 
 
 class FileWaveScan(NamedTuple):
-    """See ``tomography.waveform.waveform_chain.WaveScan``; ``path`` is that of a file with traces.
+    """See ``tomography.waveform.refinement_graph.WaveScan``; ``path`` is that of a file with traces.
 
     Attributes:
         findings: the file of what was found in the scan; faults of its traces are corrected or left out. Once

@@ -11,7 +11,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import WIDTH_M
 from bentray_kernels.tomography.model_selection.selection import CANDIDATES
 from bentray_kernels.tomography.settings import LEAST_NODES, Settings
-from bentray_kernels.tomography.task_chains import BATCH
+from bentray_kernels.tomography.stage_graphs import BATCH
 
 from ..cluster.capacities import MIB, REAL, Lane, Offer, lane_of
 from ..cluster.checkpoints import KEPT
@@ -48,7 +48,7 @@ class Plan:
         lane: which workers take the tasks.
         tasks: about how many there will be.
         workers: how many are connected and can hold each of them.
-        call_bytes: of one call, by its name in ``tomography.task_chains``; working arrays, arguments and what
+        call_bytes: of one task, by its name; working arrays, arguments and what
             a process keeps of the dataset.
         field_bytes, rows_bytes, state_bytes: of a travel time while it is made; of all rows of an image; of
             what comes back between two calls.

@@ -1,9 +1,9 @@
-"""Reconstruction on a cluster: each slice, or the volume, is a chain of short tasks."""
+"""Reconstruction of a dataset file, on a cluster or in this process, by the same task graphs."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from itertools import count
@@ -12,24 +12,23 @@ from typing import NamedTuple
 
 from distributed import Client
 
+from bentray_kernels.task_graph import Pool, run, run_resumable
 from bentray_kernels.tomography import Progress, Reconstruction, Settings, Trial
 from bentray_kernels.tomography.guided_picking import same_picks
-from bentray_kernels.tomography.reconstruct import carried_out
-from bentray_kernels.tomography.task_chains import Calls, measured
+from bentray_kernels.tomography.reconstruct import run_reconstruction
+from bentray_kernels.tomography.reconstruction_graph import TomographyGraph, progress_of
 
-from ..cluster.attempts import Attempts
 from ..cluster.capacities import resources_for
 from ..cluster.checkpoints import Checkpoints
-from ..cluster.fair_shares import Share, alone
-from ..cluster.task_loop import Cancelled, Run, finished, run_here, run_on_cluster
+from ..cluster.fair_shares import Share
+from ..cluster.resources import RECONSTRUCTION
+from ..cluster.task_pool import open_pool
 from ..files.dataset import read_dataset
 from ..files.dataset.traces import trace_samples
 from ..files.findings import Found, read_findings
 from ..files.reconstruction import write_reconstruction
-from .arrivals import Arrivals, Files, Guide, Source
+from .arrivals import Files, Guide, PickingGraph, Source
 from .file_scan import FileScan, FileWaveScan
-
-__all__ = ["Cancelled", "finished", "reconstruct"]
 
 # The phase of a job's progress after those of ``arrivals``.
 RECONSTRUCTING = "reconstructing"
@@ -45,67 +44,66 @@ def reconstruct(
     on_saved: Callable[[], None] = lambda: None,
     share: Share | None = None,
 ) -> Reconstruction:
-    """Reconstruct a dataset file, on a cluster or in this process; both give the same bits.
+    """Reconstruct a dataset file.
 
-    Tasks get the file's path, never its arrays: a lost worker then costs one batch of emitters. The
-    state of each slice comes back after every batch, so that the loop can report, stop and go on.
+    Tasks get the path of the file, never its arrays: a lost worker then costs one batch of emitters. The
+    state of each slice comes back after every batch, so that the loop can report, stop and save it.
 
     Args:
-        client: of the cluster; None works in this process.
+        client: of a cluster; None: a thread of this process. The bits do not depend on it.
         dataset_path: a file in the upload format, readable by every worker.
         settings: see ``Settings``.
         on_progress: called after each batch.
-        stop: polled between batches; true ends with ``Cancelled``.
-        work_dir: where picked travel times and checkpoints are kept, readable by every worker; one that an
-            unfinished run of the same dataset and settings left is gone on from, to the same bits. None: a
+        stop: polled several times a second; true raises ``Cancelled``.
+        work_dir: a folder for picked travel times and checkpoints, which every worker can read and write; an
+            unfinished run of the same dataset and settings is resumed from it, to the same bits. None: a
             temporary folder of this machine.
         on_saved: called after each checkpoint.
-        share: of the workers; None: all of them. The bits do not depend on it.
+        share: of the workers; None: all of them.
 
     Raises:
-        Cancelled: when ``stop`` said so.
+        Cancelled: when ``stop`` returned true.
         InvalidInput: from the file or the settings, and for a device that no worker offers.
     """
     with _folder(work_dir) as folder:
-        if client is None:
-            run = run_here(stop)
-        else:
-            attempts = Attempts(client, folder, resources_for(client, settings))
-            run = run_on_cluster(client, attempts, share or alone(client, "recon"), stop)
-        job = _Job(run, dataset_path, folder, Checkpoints(folder / "checkpoints", on_saved), count())
-        rising = _Rising(on_progress)
-        path, found, chosen, trials = _guided(job, settings, rising)
-        result = _carried_out(job, path, chosen, rising)
+        resources = RECONSTRUCTION if client is None else resources_for(client, settings)
+        pool = open_pool(client, folder, share, placement=lambda: {"resources": resources}, threads=1)
+        checkpoints = Checkpoints(folder / "checkpoints", on_saved)
+        job = _Job(pool, stop, dataset_path, folder, checkpoints, count())
+        progress = _JobProgress(on_progress)
+        path, findings, chosen, trials = _pick_with_guides(job, settings, progress)
+        result = _reconstruct_picked(job, path, chosen, progress)
         result = replace(result, trials=trials or result.trials)
     if not settings.examine:
         return result
-    told = found.words(stacked=result.speed.ndim == 3)
-    return replace(result, provenance={**result.provenance, "quality": told})
+    quality = findings.words(stacked=result.speed.ndim == 3)
+    return replace(result, provenance={**result.provenance, "quality": quality})
 
 
 class _Job(NamedTuple):
-    """What a reconstruction works with; ``drives`` numbers what it runs."""
+    """What a reconstruction works with; ``runs`` numbers the groups of graphs that are run."""
 
-    run: Run
+    pool: Pool
+    stop: Callable[[], bool] | None
     scan: Path
     folder: Path
     checkpoints: Checkpoints
-    drives: Iterator[int]
+    runs: Iterator[int]
 
 
-def _guided(
-    job: _Job, settings: Settings, rising: _Rising
+def _pick_with_guides(
+    job: _Job, settings: Settings, progress: _JobProgress
 ) -> tuple[Path, Found, Settings, tuple[Trial, ...]]:
-    """A file with travel times, and what was found in the scan: picked, and again by what images predict.
+    """A file with travel times, and the findings in the scan: picked, and again guided by images.
 
-    Also how to go on: what ``auto`` chose for the first image holds for all, so that the settings of the
-    result make it again.
+    Also the settings to continue with: what ``auto`` chose for the first image holds for all, so that the
+    settings of the result reproduce it.
     """
     amplitudes = settings.amplitudes if settings.listens else "recorded"
     source = Source(
         job.scan, job.scan.stat().st_mtime_ns, job.folder, settings.picker, settings.examine, amplitudes
     )
-    path, found = _arrived(job, source, Files.of(job.folder), None, rising)
+    path, findings = _pick(job, source, Files.of(job.folder), None, progress)
     rounds = 0 if source.dataset.picked else settings.guided_rounds
     rays = replace(
         settings,
@@ -116,115 +114,91 @@ def _guided(
     )
     trials: tuple[Trial, ...] = ()
     for number in range(1, rounds + 1):
-        rising.more = 1 + rounds - number
+        progress.following = 1 + rounds - number
         image = job.folder / f"{number}-image.h5"
-        made = _carried_out(job, path, rays, rising)
-        write_reconstruction(image, made)
-        rising.step()
+        result = _reconstruct_picked(job, path, rays, progress)
+        write_reconstruction(image, result)
+        progress.next()
         if settings.method == "auto" and not trials:
-            rays, trials = made.settings, made.trials
-            asked = {name: getattr(settings, name) for name in ("attenuation", "resolution_check")}
-            settings = replace(rays, **asked, wave_minutes=settings.wave_minutes)
+            rays, trials = result.settings, result.trials
+            requested = {name: getattr(settings, name) for name in ("attenuation", "resolution_check")}
+            settings = replace(rays, **requested, wave_minutes=settings.wave_minutes)
         guide = Guide(image, Files.of(job.folder).findings)
-        again, found_again = _arrived(job, source, Files.of(job.folder, number), guide, rising)
+        again, findings_again = _pick(job, source, Files.of(job.folder, number), guide, progress)
         if same_picks(*(read_dataset(one, traces=False) for one in (path, again))):
             break
-        path, found = again, found_again
-    rising.more = 0
-    return path, found, settings, trials
+        path, findings = again, findings_again
+    progress.following = 0
+    return path, findings, settings, trials
 
 
-def _arrived(
-    job: _Job, source: Source, files: Files, guide: Guide | None, rising: _Rising
+def _pick(
+    job: _Job, source: Source, files: Files, guide: Guide | None, progress: _JobProgress
 ) -> tuple[Path, Found]:
-    """What goes on after a round of picking, and what it found."""
+    """The file to reconstruct after a round of picking, and its findings."""
     try:
-        found = read_findings(files.findings, files.picked)
+        findings = read_findings(files.findings, files.picked)
     except (OSError, ValueError, KeyError, TypeError):
-        # Absent, or damaged since: they are made, or made again.
-        arrivals = Arrivals(source, files, guide)
-        first = [("arrivals", call) for call in arrivals.first()]
-        rising.tell(arrivals.progress)
-        job.run(first, {"arrivals": arrivals}, lambda name: rising.tell(arrivals.progress))
-        found = read_findings(files.findings)
-    return files.picked if found.changed else job.scan, found
+        # Absent, or damaged since.
+        graph = PickingGraph(source, files, guide)
+        progress.show(graph.progress)
+        run({"picking": graph}, job.pool, lambda _name: progress.show(graph.progress), job.stop)
+        findings = read_findings(files.findings)
+    return files.picked if findings.changed else job.scan, findings
 
 
-def _carried_out(job: _Job, path: Path, settings: Settings, rising: _Rising) -> Reconstruction:
+def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _JobProgress) -> Reconstruction:
     stamp, recorded = path.stat().st_mtime_ns, job.scan.stat().st_mtime_ns
     faults = Files.of(job.folder).findings
 
-    def drive(chains: Sequence[Calls], before: int, after: int) -> None:
-        # What is driven first, as the trials of ``auto``, is restored as a whole and so decides as it did.
-        number = next(job.drives)
-        named = {f"{number}-{k:05d}": chain for k, chain in enumerate(chains)}
-        for name, chain in named.items():
-            standing = job.checkpoints.last(name)
-            if standing is not None:
-                chain.restore(standing)
-        _drive(job.run, named, before, after, job.checkpoints, rising)
+    def run_graphs(graphs: Sequence[TomographyGraph], before: int, after: int) -> None:
+        # A resumed job runs the same groups in the same order, so a number names the same graph again.
+        number = next(job.runs)
+        named = {f"{number}-{k:05d}": graph for k, graph in enumerate(graphs)}
 
-    return carried_out(
+        def report() -> None:
+            progress.show_reconstruction(progress_of(graphs, before, after))
+
+        run_resumable(named, job.pool, job.checkpoints, report, job.stop)
+        if not after:
+            report()
+
+    return run_reconstruction(
         read_dataset(path, traces=False),
         settings,
         lambda plan, part: FileScan(path, stamp, plan, part),
-        drive,
+        run_graphs,
         lambda plan, index: FileWaveScan(job.scan, recorded, plan, index, faults),
         trace_samples(job.scan),
     )
 
 
-class _Rising:
-    """The progress of reconstructions that follow each other, as of one.
+class _JobProgress:
+    """Progress of several reconstructions in a row as of one.
 
     Attributes:
-        more: how many may follow the present one.
+        following: how many may follow the present one.
     """
 
     def __init__(self, on_progress: Callable[[Progress], None] | None) -> None:
         self._on_progress = on_progress
-        self._over = self._total = self.more = 0
+        self._over = self._total = self.following = 0
 
-    def __call__(self, progress: Progress) -> None:
-        """Tell how far the present one is."""
+    def show_reconstruction(self, progress: Progress) -> None:
+        """Report the progress of the present reconstruction."""
         self._total = progress.total
-        if self._on_progress is not None:
-            total = self._over + progress.total * (1 + self.more)
-            done = self._over + progress.done
-            self._on_progress(replace(progress, done=done, total=total, phase=RECONSTRUCTING))
+        total = self._over + progress.total * (1 + self.following)
+        done = self._over + progress.done
+        self.show(replace(progress, done=done, total=total, phase=RECONSTRUCTING))
 
-    def tell(self, progress: Progress) -> None:
-        """Tell how far something else is, if there is anything to do."""
+    def show(self, progress: Progress) -> None:
+        """Report progress of a phase, if it has any work."""
         if self._on_progress is not None and progress.total:
             self._on_progress(progress)
 
-    def step(self) -> None:
-        """The present one is over."""
+    def next(self) -> None:
+        """The present reconstruction is over."""
         self._over += self._total
-
-
-def _drive(
-    run: Run,
-    chains: Mapping[str, Calls],
-    before: int,
-    after: int,
-    checkpoints: Checkpoints,
-    on_progress: Callable[[Progress], None],
-) -> None:
-    """Run chains, each with its name among the checkpoints, to their end."""
-    first = [(name, call) for name, chain in chains.items() for call in chain.first()]
-
-    def report() -> None:
-        on_progress(measured(list(chains.values()), before, after))
-
-    def moved(name: str) -> None:
-        checkpoints.keep(name, chains[name].standing)
-        report()
-
-    # Chains that are restored at their end are no news where others follow: progress would seem to go back.
-    if first or not after:
-        report()
-    run(first, chains, moved)
 
 
 def _folder(work_dir: Path | None) -> AbstractContextManager[Path]:
@@ -233,12 +207,12 @@ def _folder(work_dir: Path | None) -> AbstractContextManager[Path]:
 
 @contextmanager
 def _temporary_folder() -> Iterator[Path]:
-    """A folder that goes at the end, under the hands of calls that were told to stop and still run."""
+    """A folder that is removed at the end, also while tasks of a cancelled job still run."""
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as outer:
         folder = Path(outer) / "work"
         folder.mkdir()
         try:
             yield folder
         finally:
-            # What such a call still wants to write under the old name finds no folder.
+            # Such a task then finds no folder under the old name to write into.
             folder.rename(folder.with_name("ended"))

@@ -1,128 +1,140 @@
-"""Geometry fields made by tasks: laid out, filled in batches of rows, and kept as a folder of files."""
+"""Computation of a geometry field: layout, table rows in batches, accuracy, kept as a folder of files."""
 
 from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from distributed import Client
+
+from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Progress
 
-from ..cluster.task_loop import Cancelled
-from ..cluster.task_pool import Tasks
+from ..cluster.fair_shares import Share
+from ..cluster.resources import RENDER
+from ..cluster.task_pool import open_pool, run_job
 from ..files.geometry_field_folder import FieldFiles, read_json
 from .field_settings import FieldSettings
 from .field_tasks import TASK_RAYS, finish, inner_rows, lay_out, outer_rows
+from .turntable import PRIORITY
 
-Work = tuple[Callable[..., Any], tuple[Any, ...]]
+
+class GeometryFieldGraph:
+    """Task graph: the layout, rows of both tables, then borders and accuracy.
+
+    Args:
+        mesh_path: of a mesh file, readable by every worker.
+        settings: of the field.
+        work_dir: a folder which every worker can read and write. Layout and rows that an unfinished run of
+            the same mesh and settings left there are used.
+
+    Attributes:
+        folder: of the field while it is computed.
+    """
+
+    def __init__(self, mesh_path: Path, settings: FieldSettings, work_dir: Path) -> None:
+        self.folder, self._finished_batches = work_dir / "field", work_dir / "done"
+        for folder in (self.folder, self._finished_batches):
+            folder.mkdir(exist_ok=True)
+        self._mesh_path, self._settings = mesh_path, settings
+        self._files = FieldFiles(self.folder)
+        self.done = self.total = 0
+        self._first = self._remaining()
+
+    def first(self) -> list[Task]:
+        return self._first
+
+    def after(self, task: Task, result: Any) -> list[Task]:
+        if task.function is lay_out:
+            return self._remaining()
+        self.done += 1
+        return [self._finish()] if self.done == self.total - 1 else []
+
+    def _remaining(self) -> list[Task]:
+        """What can run now, by the files that exist."""
+        if not self._files.layout.exists():
+            return [Task(lay_out, (self._mesh_path, self._settings, self.folder))]
+        if self._files.figures.exists():
+            self.done = self.total = 1
+            return []
+        batches = self._batches()
+        missing = [task for task in batches if not task.arguments[-1].exists()]
+        # The layout comes before them, the last task after them.
+        self.done, self.total = 1 + len(batches) - len(missing), len(batches) + 2
+        return missing or [self._finish()]
+
+    def _finish(self) -> Task:
+        return Task(finish, (self.folder, self._settings, self._finished_batches))
+
+    def _batches(self) -> list[Task]:
+        """Rows of both tables; the last argument of each is the file that marks it as finished."""
+        outer, inner = self._settings.samples, self._settings.inner_samples
+        parts: tuple[tuple[Callable[..., None], str, int, int], ...] = (
+            (outer_rows, "outer", outer, 6 * outer**2),
+            (inner_rows, "inner", inner, read_json(self._files.layout)["points"]),
+        )
+        tasks = []
+        for function, name, n, rows in parts:
+            step = max(1, TASK_RAYS // (6 * n * n))
+            for first in range(0, rows, step):
+                mark = self._finished_batches / f"{name}-{first:05d}.json"
+                tasks.append(Task(function, (self.folder, n, first, min(first + step, rows), mark)))
+        return tasks
 
 
-def build(
-    tasks: Tasks,
+def build_field(
+    client: Client | None,
     mesh_path: Path,
     settings: FieldSettings,
     target: Path,
     work_dir: Path,
-    on_progress: Callable[[Progress], None],
-    on_saved: Callable[[], None],
-    stop: Callable[[], bool],
+    on_progress: Callable[[Progress], None] | None = None,
+    on_saved: Callable[[], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+    share: Share | None = None,
 ) -> dict[str, Any]:
-    """Make the field of a mesh; one that is there already is taken as it is.
+    """Compute the geometry field of a mesh; an existing one is used as it is.
 
     Args:
-        tasks: where the work is done.
+        client: of a cluster; None: the cores of this process.
         mesh_path: of a mesh file, readable by every worker.
-        settings: what to make.
+        settings: of the field.
         target: the folder of the field; it appears whole or not at all.
-        work_dir: a folder of the same file system, which every worker can read and write. Layout and rows
-            that an unfinished run of the same mesh and settings left there are not made again.
-        on_progress: called after each task.
-        on_saved: the same.
-        stop: polled between tasks; true ends with ``Cancelled``.
+        work_dir: a folder of the same file system, see ``GeometryFieldGraph``.
+        on_progress: called at the start and after each task; the total is 0 before the layout.
+        on_saved: called after each task.
+        stop: polled several times a second; true raises ``Cancelled``.
+        share: of the workers; None: all of them.
 
     Returns:
         The figures of the field: sizes, errors and seconds.
 
     Raises:
-        Cancelled: when ``stop`` said so.
+        Cancelled: when ``stop`` returned true.
         InvalidInput: from the mesh or the settings.
     """
-    if not target.exists():
-        folder, done = work_dir / "field", work_dir / "done"
-        for made in (folder, done):
-            made.mkdir(exist_ok=True)
-        files = FieldFiles(folder)
-        run = partial(_run, tasks, on_saved=on_saved, stop=stop)
-        if not files.layout.exists():
-            on_progress(Progress(0, 0))
-            run([(lay_out, (mesh_path, settings, folder))], told=lambda count: None)
-        if not files.figures.exists():
-            work = list(_batches(files, settings, done))
-            missing = [one for one in work if not one[1][-1].exists()]
-            # Laid out before, to be finished after.
-            total, before = len(work) + 2, 1 + len(work) - len(missing)
-            on_progress(Progress(before, total))
-            run(missing, told=lambda count: on_progress(Progress(before + count, total)))
-            run([(finish, (folder, settings, done))], told=lambda count: on_progress(Progress(total, total)))
-        _move(folder, target)
+    if target.exists():
+        if on_progress is not None:
+            on_progress(Progress(1, 1))
     else:
-        on_progress(Progress(1, 1))
+        graph = GeometryFieldGraph(mesh_path, settings, work_dir)
+        where = {"resources": RENDER}
+        pool = open_pool(client, work_dir, share, lane="render", placement=lambda: where, priority=PRIORITY)
+        run_job(graph, pool, on_progress, on_saved, stop)
+        _move(graph.folder, target)
     return read_json(FieldFiles(target).figures)
 
 
 def bytes_of(folder: Path) -> int:
-    """Of all files of a field."""
+    """Size of all files of a field."""
     return sum(path.stat().st_size for path in folder.iterdir())
 
 
-def _batches(files: FieldFiles, settings: FieldSettings, done: Path) -> Iterator[Work]:
-    """Rows of both tables, each batch with the file that says that it is done."""
-    outer, inner = settings.samples, settings.inner_samples
-    parts: tuple[tuple[Callable[..., Any], str, int, int], ...] = (
-        (outer_rows, "outer", outer, 6 * outer**2),
-        (inner_rows, "inner", inner, read_json(files.layout)["points"]),
-    )
-    for function, name, n, rows in parts:
-        step = max(1, TASK_RAYS // (6 * n * n))
-        for first in range(0, rows, step):
-            last = min(first + step, rows)
-            yield function, (files.folder, n, first, last, done / f"{name}-{first:05d}.json")
-
-
-def _run(
-    tasks: Tasks,
-    work: list[Work],
-    told: Callable[[int], None],
-    on_saved: Callable[[], None],
-    stop: Callable[[], bool],
-) -> None:
-    """Do all of the work, a few tasks at a time; ``told`` how many have ended after each."""
-    waiting, count = list(reversed(work)), 0
-    running: list[Any] = []
-    try:
-        while waiting or running:
-            while tasks.may_begin(len(running), len(waiting)):
-                function, arguments = waiting.pop()
-                running.append(tasks.submit(function, *arguments))
-            for future in tasks.ended(running):
-                running.remove(future)
-                future.result()
-                count += 1
-                on_saved()
-                told(count)
-            if stop():
-                raise Cancelled
-    finally:
-        for future in running:
-            future.cancel()
-        tasks.may_begin(0, 0)
-
-
 def _move(folder: Path, target: Path) -> None:
-    """Put a finished folder in its place; another job may have been there first, with the same content."""
+    """Rename a finished folder to its target; another job may have made the same one meanwhile."""
     try:
         folder.rename(target)
     except OSError as error:

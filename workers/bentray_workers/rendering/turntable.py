@@ -1,50 +1,51 @@
-"""Turntables: a volume as glass from all sides, a picture a task, packed into one file."""
+"""Turntables: refractive renderings of a volume from all sides, in one file."""
 
 from __future__ import annotations
 
 import zipfile
-from collections import deque
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
 
-from distributed import Client, Future
+from distributed import Client
 from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range
 from bentray_kernels.request_fields import asked
+from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Progress
 
 from ..cluster.capacities import offers_by_address
-from ..cluster.fair_shares import Share, alone
-from ..cluster.resources import RENDER
-from ..cluster.task_loop import Cancelled, finished
+from ..cluster.fair_shares import Share
+from ..cluster.task_pool import Placement, open_pool, run_job
 from ..files.atomic import replacing, write_bytes
+from ..images.png import Colours
 from .picture_cost import placed, refraction_bytes
-from .refraction import tasks_of
+from .refraction import strip_image
 from .refraction_view import RefractionView
 from .scene_cache import stored_shape
-from .tiles import submit
+from .tiles import joined_png, strips_of
 
 FORMATS = ("zip", "apng")
 MOST_FRAMES = 720
-# Of all frames; the packer of an APNG holds most of them at once.
+# Of all frames; writing an APNG holds most of them in memory.
 MOST_PIXELS = 2**27
-# Of a pixel that is not packed, and of what a picture and its entry in an archive say beside pixels.
+# Of an uncompressed pixel, and of the headers of a picture and of its entry in an archive.
 PIXEL_BYTES, PICTURE_BYTES = 4, 4096
-# Below a picture that somebody waits for.
+# Below interactive pictures.
 PRIORITY = 0
 
 FRAME_MS = 80
-# Zip files keep a date; a fixed one makes the same frames the same file.
+# Zip files store a date; a fixed one gives the same file for the same frames.
 DATE = (1980, 1, 1, 0, 0, 0)
 
 
 @dataclass(frozen=True)
 class Turntable(RefractionView):
-    """A view that goes round the volume.
+    """A camera path around a volume.
 
     Raises:
         InvalidInput: naming the first field that is wrong.
@@ -70,7 +71,7 @@ class Turntable(RefractionView):
 
     @property
     def largest_bytes(self) -> int:
-        """Of its pictures and of the file that is made of them, as if nothing could be packed."""
+        """Of its pictures and the file made of them, without compression."""
         return 2 * (self.frames * (PIXEL_BYTES * self.width + 1) * self.height + PICTURE_BYTES * self.frames)
 
     def frame(self, number: int) -> RefractionView:
@@ -80,86 +81,114 @@ class Turntable(RefractionView):
         return RefractionView(**view)
 
 
-def turn(
-    client: Client,
+class TurntableGraph:
+    """Task graph of a turntable: strips of each frame, the frame as PNG, then the file of all frames.
+
+    Args:
+        path: of a volume or reconstruction file, readable by every worker.
+        turntable: what to draw.
+        target: the file to write, whole or not at all.
+        folder: for the frames, which every worker can read and write; existing frames are not drawn again.
+    """
+
+    def __init__(self, path: Path, turntable: Turntable, target: Path, folder: Path) -> None:
+        self._path, self._turntable, self._target = path, turntable, target
+        self._frames = [folder / f"{number:04d}.png" for number in range(turntable.frames)]
+        self._missing = [number for number, frame in enumerate(self._frames) if not frame.exists()]
+        self._strips: dict[int, dict[int, Any]] = defaultdict(dict)
+        self.total = turntable.frames
+        self.done = self.total - len(self._missing)
+
+    def first(self) -> list[Task]:
+        return [
+            Task(draw_strip, (self._path, self._turntable, number, *rows), keep_on_worker=True)
+            for number in self._missing
+            for rows in strips_of(self._turntable)
+        ] or [self._pack()]
+
+    def after(self, task: Task, result: Any) -> list[Task]:
+        if task.function is draw_strip:
+            _, _, number, first, _ = task.arguments
+            strips = self._strips[number]
+            strips[first] = result
+            if len(strips) < len(strips_of(self._turntable)):
+                return []
+            parts = [strip for _, strip in sorted(self._strips.pop(number).items())]
+            return [Task(write_frame, (self._frames[number], parts))]
+        if task.function is not write_frame:
+            return []
+        self.done += 1
+        return [self._pack()] if self.done == self.total else []
+
+    def _pack(self) -> Task:
+        pack = {"zip": write_zip, "apng": write_apng}[self._turntable.format]
+        return Task(pack, (self._frames, self._target))
+
+
+def draw_turntable(
+    client: Client | None,
     path: Path,
     turntable: Turntable,
     target: Path,
     work_dir: Path,
-    on_progress: Callable[[Progress], None],
-    on_saved: Callable[[], None],
-    stop: Callable[[], bool],
+    on_progress: Callable[[Progress], None] | None = None,
+    on_saved: Callable[[], None] | None = None,
+    stop: Callable[[], bool] | None = None,
     share: Share | None = None,
 ) -> None:
-    """Draw all pictures on a cluster and write them to one file.
+    """Draw all frames and write them to one file.
 
     Args:
-        client: of the cluster.
+        client: of a cluster; None: the cores of this process.
         path: of a volume or reconstruction file, readable by every worker.
         turntable: what to draw.
         target: the file to write, by a worker, whole or not at all.
-        work_dir: a folder for the pictures, readable by every worker; those that an unfinished run of the
-            same turntable left there are not drawn again.
-        on_progress: called after each picture.
-        on_saved: the same.
-        stop: polled between pictures; true ends with ``Cancelled``.
+        work_dir: a folder for the frames, which every worker can read and write; frames of an unfinished run
+            of the same turntable are not drawn again.
+        on_progress: called at the start and after each task.
+        on_saved: called after each task.
+        stop: polled several times a second; true raises ``Cancelled``.
         share: of the workers; None: all of them.
 
     Raises:
-        Cancelled: when ``stop`` said so.
+        Cancelled: when ``stop`` returned true.
         InvalidInput: from the file or the view.
     """
-    frames = [work_dir / f"{number:04d}.png" for number in range(turntable.frames)]
-    waiting = deque((number, frame) for number, frame in enumerate(frames) if not frame.exists())
-    drawn = len(frames) - len(waiting)
-    running: dict[Future, Path] = {}
-    share = share or alone(client, "render")
-    where = placed(refraction_bytes(stored_shape(path), turntable), offers_by_address(client))
-    on_progress(Progress(drawn, len(frames)))
-    try:
-        while waiting or running:
-            while share.may_begin(len(running), len(waiting)):
-                number, frame = waiting.popleft()
-                priority = PRIORITY + share.priority(len(running))
-                running[submit(client, tasks_of(path, turntable.frame(number)), priority, where)] = frame
-            if not running:
-                share.wait()
-            for future in finished(client, list(running)):
-                write_bytes(running.pop(future), future.result())
-                drawn += 1
-                on_saved()
-                on_progress(Progress(drawn, len(frames)))
-            if stop():
-                raise Cancelled
-        pack = {"zip": write_zip, "apng": write_apng}[turntable.format]
-        packing = client.submit(pack, frames, target, pure=False, resources=RENDER, priority=PRIORITY)
-        running[packing] = target
-        while not finished(client, [packing]):
-            if stop():
-                raise Cancelled
-        packing.result()
-    finally:
-        for future in running:
-            future.cancel()
-        share.pause()
+    size = refraction_bytes(stored_shape(path), turntable)
+
+    def placement() -> Placement:
+        return placed(size, offers_by_address(client))
+
+    pool = open_pool(client, work_dir, share, lane="render", placement=placement, priority=PRIORITY)
+    run_job(TurntableGraph(path, turntable, target, work_dir), pool, on_progress, on_saved, stop)
+
+
+def draw_strip(path: Path, turntable: Turntable, number: int, first: int, last: int) -> Colours:
+    """Task: the rows ``first`` to ``last`` of a frame, the last one not included."""
+    return strip_image(path, turntable.frame(number), first, last)
+
+
+def write_frame(frame: Path, strips: Sequence[Colours]) -> None:
+    """Task: strips, one below the other, as PNG file."""
+    write_bytes(frame, joined_png(strips))
 
 
 def write_zip(frames: Sequence[Path], target: Path) -> None:
-    """Task: pictures side by side in a zip file; PNG is packed already."""
+    """Task: pictures in a zip file; PNG is compressed already."""
     with replacing(target) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_STORED) as archive:
         for frame in frames:
             archive.writestr(zipfile.ZipInfo(frame.name, DATE), frame.read_bytes())
 
 
 def write_apng(frames: Sequence[Path], target: Path) -> None:
-    """Task: pictures one after the other in an animated PNG that begins again at its end."""
+    """Task: pictures in an animated PNG that repeats."""
     with replacing(target) as partial, Image.open(frames[0]) as first:
         later = _Opened(frames[1:])
         first.save(partial, "PNG", save_all=True, append_images=later, duration=FRAME_MS, loop=0)
 
 
 class _Opened:
-    """Pictures that are opened one after the other, as often as they are asked for; Pillow asks twice."""
+    """Pictures opened one after the other, each time they are iterated over; Pillow does so twice."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self._paths = paths

@@ -1,4 +1,4 @@
-"""The last task of a simulated scan: its parts into one dataset file, as the command line writes it."""
+"""The last task of a simulated scan: the dataset file of all parts."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ..files.dataset.record import record_of
 from ..files.dataset.write import Piece, write_dataset
 from . import plane, volume, waves
 from .cost import Timed
+from .parts import parts_of, read_part
 from .request import Simulated
-from .tasks import parts_of, read_part
 from .waves import Noise, WaveSimulationSettings
 
 
-def finish(settings: Simulated, folder: Path, target: Path) -> dict[str, Any]:
+def write_scan(settings: Simulated, folder: Path, target: Path) -> dict[str, Any]:
     """Task: write the dataset of all parts.
 
     Args:
@@ -30,7 +30,7 @@ def finish(settings: Simulated, folder: Path, target: Path) -> dict[str, Any]:
         target: replaced whole or not touched.
 
     Returns:
-        What a service remembers of it: ``dataset.record.record_of``, bytes and SHA-256 of the file.
+        ``dataset.record.record_of``, and ``bytes`` and ``sha256`` of the file.
     """
     if isinstance(settings, WaveSimulationSettings):
         dataset = _write_waves(settings, folder, target)

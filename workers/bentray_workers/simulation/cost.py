@@ -51,27 +51,27 @@ def task_bytes(settings: Timed | WaveSimulationSettings) -> dict[str, int]:
     """Bytes that each kind of task takes beyond what a warm worker holds.
 
     Returns:
-        By name: ``make_part``, and ``finish``, which writes the file.
+        By function: ``make_part`` and ``write_scan``.
     """
     if isinstance(settings, WaveSimulationSettings):
         traces = settings.elements * settings.samples
         part = _grid_bytes(settings) + _trace_bytes(settings)
-        finish = 6 * REAL * traces + 8 * settings.emissions * settings.elements
+        written = 6 * REAL * traces + 8 * settings.emissions * settings.elements
         truth = PLANE_BYTES * settings.nodes**2
     else:
         in_space = isinstance(settings, VolumeSimulationSettings)
         marched = isinstance(settings, VolumeSimulationSettings) and settings.three_d
         part = (SPACE_BYTES if marched else PLANE_BYTES) * fine_nodes(settings)
         each = PAIR_BYTES + LOSS_BYTES * settings.attenuation + NOISE_BYTES * _noisy(settings)
-        finish = each * pairs(settings)
+        written = each * pairs(settings)
         heights = settings.slices if isinstance(settings, VolumeSimulationSettings) else 1
         truth = (SPACE_BYTES if in_space else PLANE_BYTES) * settings.nodes**2 * heights
-    return {"make_part": FLOOR_BYTES + part, "finish": FLOOR_BYTES + finish + truth}
+    return {"make_part": FLOOR_BYTES + part, "write_scan": FLOOR_BYTES + written + truth}
 
 
 def costly_setting(settings: Timed | WaveSimulationSettings, task: str) -> str:
     """The setting that the bytes of a task hang on most."""
-    if task == "finish":
+    if task == "write_scan":
         return "elements"
     if isinstance(settings, WaveSimulationSettings):
         return "elements" if _trace_bytes(settings) > _grid_bytes(settings) else "frequency_hz"

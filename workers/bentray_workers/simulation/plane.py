@@ -1,12 +1,10 @@
-"""A scan of the Table 6 phantom as a dataset, its emitters shared out over workers or cores."""
+"""A travel-time scan of the 2-D breast phantom (Li 2008, Table 6): settings and dataset."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from distributed import Client
 
 from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.acquisition.noise import with_noise
@@ -17,10 +15,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
-from bentray_kernels.tomography import Progress
 from bentray_kernels.tomography.problem import MARGIN_NODES
-
-from .emitter_batches import arrivals
 
 # More costs memory, which grows with its square, and gains nothing that noise would not hide.
 MOST_REFINEMENT = 64
@@ -77,48 +72,21 @@ class SimulationSettings:
         return self.elements
 
     def medium_number(self, scan: int) -> int:
-        """As ``Scans``: there is one scan and one medium."""
+        """Number of the medium of a scan: there is one of each."""
         return scan
 
     def medium(self, number: int) -> FineMedium:
-        """As ``Scans``."""
+        """The medium, sampled on the fine grid."""
         return self.scan().medium(attenuation=self.attenuation)
 
     def elements_in_medium(self, scan: int) -> Floats:
-        """As ``Scans``."""
+        """(elements, 2), m, in the coordinates of the medium."""
         return self.scan().elements()
 
 
 def ring_radius(side_m: float, nodes: int) -> float:
     """Radius, m, of a ring in a square of ``nodes`` with the margin that a reconstruction leaves."""
     return 0.5 * side_m * (1.0 - 2.0 * MARGIN_NODES / (nodes - 1))
-
-
-def simulate(
-    client: Client | None, settings: SimulationSettings, on_progress: Callable[[Progress], None] | None = None
-) -> Dataset:
-    """Simulate a scan.
-
-    Args:
-        client: of a cluster; None uses the cores of this machine.
-        settings: see ``SimulationSettings``.
-        on_progress: called after each batch, with emitters done of all.
-
-    Returns:
-        A dataset with ``delta_tof_s``, ``truth`` and the object's outline as ``roi``; with ``log_ratio_np``
-        where ``settings.attenuation`` asks for it.
-    """
-    delta = np.empty((settings.elements, settings.elements))
-    ratio = np.empty_like(delta) if settings.attenuation else None
-    done = 0
-    for (_, batch), (times, amplitudes) in arrivals(client, settings, 1, settings.elements):
-        delta[batch] = times
-        if ratio is not None:
-            ratio[batch] = amplitudes
-        done += len(batch)
-        if on_progress is not None:
-            on_progress(Progress(done, settings.elements))
-    return scan_of(settings, delta, ratio)
 
 
 def scan_of(settings: SimulationSettings, delta: Floats, ratio: Floats | None) -> Dataset:

@@ -12,8 +12,8 @@ from bentray_kernels.errors import InvalidInput
 from ..cluster.capacities import MIB, Offer
 from ..files.hdf5_reading import Limits
 from .cost import costly_setting, cpu_seconds, result_bytes, task_bytes
+from .parts import count_of
 from .request import AskedSimulation
-from .tasks import count_of
 
 # A file of its own for each part, and each read again: more than this no disk is glad of.
 MOST_TASKS = 200_000

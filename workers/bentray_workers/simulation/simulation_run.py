@@ -1,88 +1,76 @@
-"""A simulated scan on a cluster: parts as tasks, kept as files, gone on from after any death."""
+"""Simulation of a scan: on a cluster or in this process, by the same task graph and to the same bits."""
 
 from __future__ import annotations
 
-from collections import deque
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from distributed import Client, Future
+from distributed import Client
 
+from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Progress
 
-from ..cluster.attempts import Attempts
-from ..cluster.fair_shares import Share, alone
-from ..cluster.task_loop import Cancelled, finished
-from .assembly import finish
-from .request import AskedSimulation
-from .tasks import folder_of, make_part, missing, parts_of
+from ..cluster.fair_shares import Share
+from ..cluster.task_pool import open_pool, run_job
+from ..files.dataset import read_dataset
+from .parts import folder_of
+from .request import Simulated
+from .simulation_graph import SimulationGraph
 
 
-def simulate_scan(
-    client: Client,
-    asked: AskedSimulation,
-    target: Path,
-    work_dir: Path,
-    on_progress: Callable[[Progress], None],
-    on_saved: Callable[[], None],
-    stop: Callable[[], bool],
-    share: Share | None = None,
-) -> dict[str, Any]:
-    """Simulate a scan into a dataset file, to the bits that ``simulate`` gives in one process.
+def simulate(
+    settings: Simulated,
+    on_progress: Callable[[Progress], None] | None = None,
+    client: Client | None = None,
+) -> Dataset:
+    """Simulate a scan in memory.
 
     Args:
-        client: of the cluster.
-        asked: what to simulate.
-        target: the file to write, by a worker, whole or not at all.
+        settings: of a scan in a plane or a volume, by travel times or by waves.
+        on_progress: called after each task.
+        client: of a cluster on this machine; None: the cores of this process.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "scan.h5"
+        simulate_to_file(client, settings, target, Path(folder), on_progress)
+        return read_dataset(target)
+
+
+def simulate_to_file(
+    client: Client | None,
+    settings: Simulated,
+    target: Path,
+    work_dir: Path,
+    on_progress: Callable[[Progress], None] | None = None,
+    on_saved: Callable[[], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+    share: Share | None = None,
+) -> dict[str, Any]:
+    """Simulate a scan into a dataset file.
+
+    Args:
+        client: of a cluster; None: the cores of this process.
+        settings: of the scan.
+        target: the file to write, whole or not at all.
         work_dir: a folder that every worker can read and write; parts that an unfinished run of the same scan
-            left there are not made again.
+            left there are used.
         on_progress: called after each task.
         on_saved: the same.
-        stop: polled all the while; true ends with ``Cancelled``, whatever tasks are at work.
+        stop: polled several times a second; true raises ``Cancelled``, without waiting for running tasks.
         share: of the workers; None: all of them.
 
     Returns:
-        As ``simulation.assembly.finish``.
+        As ``assembly.write_scan``.
 
     Raises:
-        Cancelled: when ``stop`` said so.
+        Cancelled: when ``stop`` returned true.
         KilledWorker: for a task that kills its workers.
     """
-    settings = asked.chosen()
     folder = folder_of(work_dir)
     folder.mkdir(exist_ok=True)
-    parts = parts_of(settings)
-    waiting = deque(missing(parts, folder))
-    attempts, share = Attempts(client, work_dir), share or alone(client, "recon")
-    done, total = len(parts) - len(waiting), len(parts) + 1
-    on_progress(Progress(done, total))
-    running: set[Future] = set()
-    result: dict[str, Any] | None = None
-    try:
-        while result is None:
-            ending = done == len(parts) and not running
-            while share.may_begin(len(running), len(waiting) + ending):
-                call, *given = (finish, folder, target) if ending else (make_part, waiting.popleft(), folder)
-                priority = share.priority(len(running))
-                running.add(attempts.submit(call, settings, *given, priority=priority))
-                ending = False
-            if not running:
-                share.wait()
-            for future in finished(client, list(running)):
-                running.remove(future)
-                again, given = attempts.ended(future)
-                if again is not None:
-                    running.add(again)
-                    continue
-                done += 1
-                result = given
-                on_saved()
-                on_progress(Progress(done, total))
-            if result is None and stop():
-                raise Cancelled
-    finally:
-        for future in running:
-            future.cancel()
-        share.pause()
-    return result
+    graph = SimulationGraph(settings, folder, target)
+    run_job(graph, open_pool(client, work_dir, share), on_progress, on_saved, stop)
+    assert graph.result is not None
+    return graph.result

@@ -1,13 +1,11 @@
-"""A scan of the Table 7 phantom as a dataset: slices of a ring that moves along z, or rings at once."""
+"""A travel-time scan of the 3-D breast phantom (Li 2008, Table 7): settings and dataset."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from distributed import Client
 
 from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.acquisition.noise import with_noise
@@ -19,9 +17,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE7_FREQUENCY_HZ, TABLE7_GRIDS, TABLE7_SIDE_M, table7, table7_slices
 from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
-from bentray_kernels.tomography import Progress
 
-from .emitter_batches import arrivals
 from .plane import MOST_REFINEMENT, NODES, SNR, ring_radius
 
 # The coarsest voxels that the phantom's lesions are measured in; wider ones would join them.
@@ -88,17 +84,17 @@ class VolumeSimulationSettings:
         return self.slices * self.elements if self.array == "rings" else self.elements
 
     def medium_number(self, scan: int) -> int:
-        """As ``Scans``: a slice in two dimensions is a medium of its own."""
+        """Number of the medium of a scan: each 2-D slice is a medium of its own."""
         return 0 if self.three_d else scan
 
     def medium(self, number: int) -> FineMedium:
-        """As ``Scans``."""
+        """A medium by its number, sampled on the fine grid."""
         scan = self.scan()
         part = scan if self.three_d else scan.slice(number)
         return part.medium(attenuation=self.attenuation)
 
     def elements_in_medium(self, scan: int) -> Floats:
-        """As ``Scans``."""
+        """(n, ndim), m, in the coordinates of the medium."""
         whole = self.scan()
         if not self.three_d:
             return whole.slice(scan).elements()
@@ -106,37 +102,6 @@ class VolumeSimulationSettings:
         if self.array == "rings":
             return elements
         return elements[scan * self.elements : (scan + 1) * self.elements]
-
-
-def simulate_volume(
-    client: Client | None,
-    settings: VolumeSimulationSettings,
-    on_progress: Callable[[Progress], None] | None = None,
-) -> Dataset:
-    """Simulate a scan.
-
-    Args:
-        client: of a cluster; None uses the cores of this machine.
-        settings: see ``VolumeSimulationSettings``.
-        on_progress: called after each batch, with emitters done of all.
-
-    Returns:
-        For ``moved`` a dataset with ``slice_z_m`` and arrays (slices, elements, elements); for ``rings`` one
-        with positions (slices · elements, 3), ring by ring, and arrays over all pairs of them. Both have
-        ``truth`` and ``roi`` of shape (nodes, nodes, slices).
-    """
-    scans, count = settings.scans, settings.emitters
-    delta = np.empty((scans, count, count))
-    ratio = np.empty_like(delta) if settings.attenuation else None
-    done = 0
-    for (k, batch), (times, amplitudes) in arrivals(client, settings, scans, count):
-        delta[k, batch] = times
-        if ratio is not None:
-            ratio[k, batch] = amplitudes
-        done += len(batch)
-        if on_progress is not None:
-            on_progress(Progress(done, scans * count))
-    return scan_of(settings, delta, ratio)
 
 
 def scan_of(settings: VolumeSimulationSettings, delta: Floats, ratio: Floats | None) -> Dataset:

@@ -1,17 +1,14 @@
-"""A ring scan of a phantom by simulated waves, its emissions shared out over workers or cores."""
+"""A 2-D wave simulation of a ring scan: settings, one emission, and the dataset."""
 
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
+from threading import Lock
 from typing import ClassVar
 
 import numpy as np
-from distributed import Client, as_completed
 from distributed.system import MEMORY_LIMIT
 from numpy.typing import NDArray
 
@@ -23,14 +20,12 @@ from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE6_SIDE_M, EllipsePhantom, table6
 from bentray_kernels.phantoms.volume import PhantomSlice
 from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
-from bentray_kernels.tomography import Progress
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.points import REACH
 from bentray_kernels.wave.simulation import simulate
 from bentray_kernels.wave.stencil import longest_step, phase_error
 from bentray_kernels.wave.time_blocks import Poll, unheeded
 
-from ..cluster.resources import RECONSTRUCTION
 from .plane import NODES, SNR, ring_radius
 
 # The pulse is a sine under a Gaussian; at this many times its centre frequency it has 3 % of its height.
@@ -170,32 +165,6 @@ class WaveSimulationSettings:
         return np.arange(self.emissions) * self.elements // self.emissions
 
 
-def simulate_waves(
-    client: Client | None,
-    settings: WaveSimulationSettings,
-    on_progress: Callable[[Progress], None] | None = None,
-) -> Dataset:
-    """Simulate a scan: traces of object and water, without travel times.
-
-    Args:
-        client: of a cluster; None uses the cores of this machine.
-        settings: see ``WaveSimulationSettings``.
-        on_progress: called after each emission.
-    """
-    shape = (settings.emissions, settings.elements, settings.samples)
-    received, water = np.empty(shape, np.float32), np.empty(shape, np.float32)
-    for done, (k, both) in enumerate(_emissions(client, settings), 1):
-        received[k], water[k] = both
-        if on_progress is not None:
-            on_progress(Progress(done, settings.emissions))
-    if settings.snr is not None:
-        noise = Noise(settings, np.abs(water).max(axis=-1))
-        for traces in (received, water):
-            for emission in traces:
-                emission += noise.drawn()
-    return scan_of(settings, Waveform(received, water))
-
-
 class Noise:
     """Noise on traces, drawn an emission at a time: of the object all, then of the water.
 
@@ -249,28 +218,10 @@ def scan_of(settings: WaveSimulationSettings, waveform: Waveform) -> Dataset:
     )
 
 
-def _emissions(
-    client: Client | None, settings: WaveSimulationSettings
-) -> Iterator[tuple[int, tuple[NDArray[np.float32], NDArray[np.float32]]]]:
-    """Each emission's number with its traces of object and water, in no order that holds."""
-    every = range(settings.emissions)
-    if client is None:
-        # Made once, before the threads would each do it.
-        _media(settings)
-        with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-            yield from enumerate(pool.map(lambda k: simulate_emission(settings, k), every))
-        return
-    futures = {
-        client.submit(simulate_emission, settings, k, resources=RECONSTRUCTION, pure=False): k for k in every
-    }
-    for future, both in as_completed(futures, loop=client.loop, with_results=True):
-        yield futures[future], both
-
-
 def simulate_emission(
     settings: WaveSimulationSettings, emission: int, poll: Poll = unheeded
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Task: object and water traces of an emission, (elements, samples); on ``poll`` see ``time_blocks``."""
+    """Object and water traces of an emission, (elements, samples); on ``poll`` see ``time_blocks``."""
     places = settings.places_m()
     at = places[settings.senders()[emission]]
     time = settings.step_s * np.arange(settings.samples * settings.skip) - BEFORE / settings.frequency_hz
@@ -282,9 +233,18 @@ def simulate_emission(
     return received.astype(np.float32), water.astype(np.float32)
 
 
-@lru_cache(maxsize=1)
+# Threads of one process share the media.
+_MAKING = Lock()
+
+
 def _media(settings: WaveSimulationSettings) -> tuple[Medium, Medium]:
     """Of object and water."""
+    with _MAKING:
+        return _made(settings)
+
+
+@lru_cache(maxsize=1)
+def _made(settings: WaveSimulationSettings) -> tuple[Medium, Medium]:
     received, water = (
         Medium.of(
             speed,

@@ -1,24 +1,25 @@
-"""A chain on part of the pairs that ends with the misfit of those it was not shown."""
+"""Task graph of a candidate model: a reconstruction from the training pairs, and its held-out misfit."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from ...arrays import Floats
+from ...task_graph import Task
 from ..gauss_newton.gauss_newton_step import look
 from ..gauss_newton.linearisation import Rows
-from ..task_chains import Chain, Gathering, Scan, cut
+from ..reconstruction_graph import Evaluation, ReconstructionGraph
+from ..stage_graphs import Scan, batches_of
 
 
-class TrialChain(Chain):
-    """A chain on the pairs that are shown, which ends with the misfit of those held out.
+class CandidateGraph(ReconstructionGraph):
+    """A reconstruction from the training pairs that ends with the misfit of the held-out pairs.
 
     Args:
-        scan: of the shown pairs.
+        scan: of the training pairs.
         index: of the slice.
         held_out: of the held-out pairs.
     """
@@ -27,38 +28,38 @@ class TrialChain(Chain):
         self._held_out = held_out
         super().__init__(scan, index)
 
-    def _gatherings(self) -> list[Gathering]:
-        return [HeldOut(self._held_out, self._index)]
+    def _evaluated(self) -> list[Evaluation]:
+        return [HeldOutMisfit(self._held_out, self._index)]
 
     @property
     def held_out_rms_s(self) -> float:
-        """Root mean square misfit of the pairs that were held out, s."""
-        return float(self.found(misfit)[0])
+        """Root mean square misfit of the held-out pairs, s."""
+        return float(self.value_of(misfit)[0])
 
     @property
     def held_out_mean_s(self) -> float:
-        """Mean size of their misfit, s."""
-        return float(self.found(misfit)[1])
+        """Mean absolute misfit of the held-out pairs, s."""
+        return float(self.value_of(misfit)[1])
 
 
-class HeldOut(Gathering):
-    """The rays of the pairs that were held out."""
+class HeldOutMisfit(Evaluation):
+    """Evaluation of the misfit along the rays of the held-out pairs."""
 
     def __init__(self, scan: Scan, index: int) -> None:
         self._scan = scan
-        super().__init__(look_held_out, misfit, scan.problem(index).sounding)
+        super().__init__(trace_held_out_rays, misfit, scan.problem(index).sounding)
 
-    def first(self, scan: Scan, index: int, image: Floats) -> list[Any]:
+    def first(self, scan: Scan, index: int, image: Floats) -> list[Task]:
         return super().first(self._scan, index, image)
 
 
-def look_held_out(scan: Scan, index: int, slowness: Floats, part: int) -> Rows:
-    """Call: the rays of some held-out pairs through the finished image."""
+def trace_held_out_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:
+    """Task: rays of one batch of emitters of held-out pairs, through the finished image."""
     problem = scan.problem(index)
-    return look(problem, scan.stages()[-1], slowness, cut(problem.sounding)[part])
+    return look(problem, scan.stages()[-1], slowness, batches_of(problem.sounding)[batch])
 
 
 def misfit(_scan: Scan, _index: int, rows: Sequence[Rows]) -> Floats:
-    """Call: root mean square and mean size of the residuals, s."""
+    """Task: root mean square and mean absolute residual, s."""
     residual = np.concatenate([part.residual for part in rows])
     return np.array([math.sqrt(float((residual**2).mean())), float(np.abs(residual).mean())])

@@ -1,4 +1,4 @@
-"""Parts of the pairs of a scan: what trials are shown, and what is held out to judge them."""
+"""Training and held-out parts of the emitter-receiver pairs of a scan."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ VIEWS = ((0, 3), (1, 6), (2, 5))
 def part_of(dataset: Dataset, part: Part) -> Dataset:
     """The dataset with the pairs of one part only, the others invalid.
 
-    A pair and its reverse belong to the same part, in all slices. ``held-out`` are pairs here and there,
-    whose neighbours are shown, so that any smooth model does well on them; ``held-out-views`` are whole
-    views, of which only other views tell.
+    A pair and its reverse belong to the same part, in all slices. ``held-out`` are scattered pairs whose
+    neighbours are in the training part, so any smooth model predicts them well; ``held-out-views`` are whole
+    views, without neighbours in the training part.
     """
     if part == "all":
         return dataset
@@ -38,16 +38,16 @@ def part_of(dataset: Dataset, part: Part) -> Dataset:
 
 
 def _scattered(dataset: Dataset) -> Flags:
-    """(ntx, nrx): pairs held out here and there."""
+    """(ntx, nrx): scattered held-out pairs."""
     first = np.minimum(dataset.tx[:, None], dataset.rx[None, :]).astype(np.uint64)
     second = np.maximum(dataset.tx[:, None], dataset.rx[None, :]).astype(np.uint64)
-    # A mix of both numbers, so that no direction or ring is held out as a whole.
+    # A hash of both numbers, so that no direction or ring is held out as a whole.
     mixed = (first * np.uint64(0x9E3779B1) + second * np.uint64(0x85EBCA77)) >> np.uint64(11)
     return np.asarray((mixed % np.uint64(HELD_OUT)) == 0)
 
 
 def _views(dataset: Dataset) -> Flags:
-    """(ntx, nrx): pairs of the views that are held out."""
+    """(ntx, nrx): pairs of the held-out views."""
     sector = _sectors(dataset)
     first = np.minimum(sector[dataset.tx][:, None], sector[dataset.rx][None, :])
     second = np.maximum(sector[dataset.tx][:, None], sector[dataset.rx][None, :])
@@ -58,6 +58,6 @@ def _sectors(dataset: Dataset) -> Ints:
     """(elements,): the eighth of the turn about the array's middle that each lies in."""
     flat = dataset.element_position_m[:, :2]
     x, y = (flat - 0.5 * (flat.min(axis=0) + flat.max(axis=0))).T
-    # Half a millionth of a turn more, so that rounding does not part what lies on an edge.
+    # Shifted by half a millionth of a turn, so that rounding does not separate elements on an edge.
     turn = np.arctan2(y, x) / (2.0 * np.pi) + 5e-7
     return np.asarray(np.floor(turn % 1.0 * SECTORS), dtype=np.int64)

@@ -52,7 +52,7 @@ class BandEnd:
 
 @dataclass(frozen=True)
 class Entered:
-    """The band under way, as a chain knows it, which never makes a problem itself.
+    """The band under way, without its problem, which only tasks make.
 
     Attributes:
         state: where it stands.
@@ -75,8 +75,8 @@ class Entered:
 
 
 @dataclass(frozen=True)
-class WaveStanding:
-    """Where a chain stands; all that is needed to go on, to the bit.
+class RefinementCheckpoint:
+    """State of a ``RefinementGraph``; see ``task_graph.Checkpoint``.
 
     Attributes:
         ends: of the bands before.
@@ -92,6 +92,6 @@ class WaveStanding:
         return None if self.band is None else self.band.state
 
     @property
-    def passed(self) -> tuple[int, ...]:
-        """What differs as soon as an image or a band is done with."""
+    def milestone(self) -> tuple[int, ...]:
+        """As ``task_graph.Checkpoint``."""
         return len(self.ends), len(self.state.history) if self.state is not None else -1

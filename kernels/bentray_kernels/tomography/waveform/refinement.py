@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from ...acquisition import Dataset
 from .. import pairs
 from ..model_selection.selection import CLEARLY
+from ..reconstruction_graph import Run, progress_of
 from ..result import Reconstruction
 from ..settings import Settings
-from ..task_chains import Drive, measured
 from .automatic_settings import check_traces, wave_settings
 from .inversion_state import BandEnd, Image
+from .refinement_graph import RefinementGraph, WaveScan, resampled
 from .validation import Judge, judging, passes
-from .waveform_chain import WaveChain, WaveScan, resampled
 from .waveform_cost import core_seconds, worth
 from .waveform_settings import WaveSettings
 
@@ -52,12 +52,12 @@ class Following:
         self.minutes = slices * core_seconds(dataset, self._plan, samples) / 60.0
         self.total = slices * sum(band.looks(self._plan.held_out) for band in self._plan.bands)
 
-    def refined(self, rays: Reconstruction, drive: Drive, before: int) -> Reconstruction:
+    def refined(self, rays: Reconstruction, run_graphs: Run, before: int) -> Reconstruction:
         """The image of the rays, refined slice after slice: the emitters of one are enough for many workers.
 
         Args:
             rays: the reconstruction.
-            drive: runs chains to their end.
+            run_graphs: runs graphs to their end.
             before: emitter passes that were made.
         """
         images = _slices(rays, rays.speed)
@@ -65,8 +65,8 @@ class Following:
         history, chains = rays.history, []
         for index, image in enumerate(images):
             scan = self._scan_of(self._plan, index)
-            chains.append(WaveChain(scan, image, index, history, self._stage(rays)))
-            drive(chains[-1:], before + each * index, self.total - each * (index + 1))
+            chains.append(RefinementGraph(scan, image, index, history, self._stage(rays)))
+            run_graphs(chains[-1:], before + each * index, self.total - each * (index + 1))
             history = chains[-1].history
         if self._settings.method == "auto" and not preferred(chains):
             told = f"{_told(rays, self._plan, chains)}; not clearly better, so the image of the rays is given"
@@ -78,26 +78,26 @@ class Following:
         """Emitter passes of ``advised``."""
         return passes(self._plan)
 
-    def advised(self, rays: Reconstruction, noise_s: float, drive: Drive, before: int) -> Reconstruction:
+    def advised(self, rays: Reconstruction, noise_s: float, run_graphs: Run, before: int) -> Reconstruction:
         """The reconstruction with a sentence whether waves are advised, by what they miss through its image.
 
         Args:
             rays: the reconstruction, with its trials; of several slices the middle one is looked at.
             noise_s: standard deviation of the travel times, s.
-            drive: runs chains to their end.
+            run_graphs: runs graphs to their end.
             before: emitter passes that were made.
         """
         images = _slices(rays, rays.speed)
         index = len(images) // 2
         judge = Judge(self._scan_of(judging(self._plan), index), images[index], rays.history)
-        drive([judge], before, 0)
+        run_graphs([judge], before, 0)
         told = worth(judge.judgement, rays.trials[0], noise_s, self.minutes)
         return replace(rays, provenance={**rays.provenance, "waveform": told})
 
     def _stage(self, rays: Reconstruction) -> int:
         return 1 + max(sweep.stage for sweep in rays.history)
 
-    def _result(self, rays: Reconstruction, chains: Sequence[WaveChain]) -> Reconstruction:
+    def _result(self, rays: Reconstruction, chains: Sequence[RefinementGraph]) -> Reconstruction:
         """The result of finished chains, on the finest grid that one of them reached."""
         finest = min((chain.image for chain in chains), key=lambda image: image.spacing)
 
@@ -127,14 +127,14 @@ class Following:
             spacing_m=(finest.spacing, finest.spacing, *rays.spacing_m[2:]),
             origin_m=(*finest.origin, *rays.origin_m[2:]),
             settings=replace(self._settings, method="waveform"),
-            history=measured(chains[-1:]).history,
+            history=progress_of(chains[-1:]).history,
             # They are of the rays' image.
             residuals=None,
             provenance={**rays.provenance, "waveform": _told(rays, self._plan, chains)},
         )
 
 
-def preferred(chains: Sequence[WaveChain]) -> bool:
+def preferred(chains: Sequence[RefinementGraph]) -> bool:
     """Whether held-out emitters are predicted clearly better by what waves made, over all slices.
 
     A band begins with the image that the one before left, so that what bands of the speed gain multiplies.
@@ -162,7 +162,7 @@ def _slices(rays: Reconstruction, values: NDArray[np.float64]) -> list[Image]:
     return [Image(np.ascontiguousarray(image), rays.spacing_m[0], origin) for image in every]
 
 
-def _told(rays: Reconstruction, plan: WaveSettings, chains: Sequence[WaveChain]) -> str:
+def _told(rays: Reconstruction, plan: WaveSettings, chains: Sequence[RefinementGraph]) -> str:
     """What it began with and how each band predicted the emitters that were held out."""
     used = rays.settings
     text = f"begun from the image of {used.rays} rays ({used.method})"

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...task_graph import Task
 from ..result import Sweep
-from ..task_chains import Call
 from .band_inversion import Model, look
 from .inversion_state import Image
-from .waveform_chain import WaveScan, on_grid
+from .refinement_graph import WaveScan, on_grid
 from .waveform_settings import WaveSettings
 
 # The band of the continuation, from 1, that holds the middle of the pulse: there noise counts least.
@@ -38,18 +38,18 @@ class Judgement:
 
 
 @dataclass(frozen=True)
-class Judging:
-    """Where a ``Judge`` stands."""
+class ValidationCheckpoint:
+    """State of a ``Judge``; see ``task_graph.Checkpoint``."""
 
     state: Judgement | None
 
     @property
-    def passed(self) -> tuple[bool]:
+    def milestone(self) -> tuple[bool]:
         return (self.state is not None,)
 
 
 class Judge:
-    """The one call that judges an image; see ``tomography.task_chains.Calls``.
+    """The one task that judges an image; see ``task_graph.TaskGraph``.
 
     Args:
         scan: with the settings of ``judging``.
@@ -63,30 +63,30 @@ class Judge:
     def __init__(self, scan: WaveScan, image: Image, history: tuple[Sweep, ...]) -> None:
         self._scan, self._image = scan, image
         self.history = history
-        self.standing = Judging(None)
+        self.checkpoint = ValidationCheckpoint(None)
         self.total = passes(scan.settings())
 
     @property
     def done(self) -> int:
-        return 0 if self.standing.state is None else self.total
+        return 0 if self.checkpoint.state is None else self.total
 
     @property
     def judgement(self) -> Judgement:
         """What waves say, once the call has been made."""
-        assert self.standing.state is not None
-        return self.standing.state
+        assert self.checkpoint.state is not None
+        return self.checkpoint.state
 
-    def restore(self, standing: Judging) -> None:
-        """Go on from where a judge of the same image stood."""
-        self.standing = standing
+    def restore(self, checkpoint: ValidationCheckpoint) -> None:
+        """As ``task_graph.ResumableGraph``."""
+        self.checkpoint = checkpoint
 
-    def first(self) -> list[Call]:
+    def first(self) -> list[Task]:
         """The call, unless it has been made."""
-        return [Call(judge_by_waves, (self._scan, self._image))] if self.standing.state is None else []
+        return [Task(judge_by_waves, (self._scan, self._image))] if self.checkpoint.state is None else []
 
-    def after(self, _call: Call, given: Judgement) -> list[Call]:
+    def after(self, task: Task, result: Judgement) -> list[Task]:
         """Nothing follows it."""
-        self.standing = Judging(given)
+        self.checkpoint = ValidationCheckpoint(result)
         return []
 
 
@@ -102,7 +102,7 @@ def passes(settings: WaveSettings) -> int:
 
 
 def judge_by_waves(scan: WaveScan, image: Image) -> Judgement:
-    """Call: what waves say of an image."""
+    """Task: what waves say of an image."""
     settings, problem = scan.settings(), scan.problem(0)
     if problem.likeness < LEAST_LIKENESS or not problem.held.size:
         return Judgement()

@@ -7,9 +7,20 @@ from types import MappingProxyType
 
 from .. import checkpoint
 from .band_inversion import WaveIterate, WavePass
-from .inversion_state import BandEnd, Entered, Image, WaveStanding
-from .validation import Judgement, Judging
+from .inversion_state import BandEnd, Entered, Image, RefinementCheckpoint
+from .validation import Judgement, ValidationCheckpoint
 
-KINDS = (WaveStanding, BandEnd, Entered, Image, WaveIterate, WavePass, Judging, Judgement)
+RECORDS = (
+    RefinementCheckpoint,
+    BandEnd,
+    Entered,
+    Image,
+    WaveIterate,
+    WavePass,
+    ValidationCheckpoint,
+    Judgement,
+)
 
-TYPES: Mapping[str, type] = MappingProxyType({**checkpoint.TYPES, **{kind.__name__: kind for kind in KINDS}})
+TYPES: Mapping[str, type] = MappingProxyType(
+    {**checkpoint.TYPES, **{record.__name__: record for record in RECORDS}}
+)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bentray_kernels.acquisition.dataset import Dataset, Truth
 from bentray_kernels.acquisition.quality.finding import NOTHING_FOUND
 from bentray_kernels.tomography import Reconstruction
-from bentray_kernels.tomography.model_selection.selection import told
+from bentray_kernels.tomography.model_selection.selection import advice_of
 from bentray_workers.images.residuals import within
 from bentray_workers.images.truth_comparison import NotComparable, compare
 
@@ -49,7 +49,7 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         ),
         "history": [asdict(sweep) for sweep in result.history],
         "recovery_mean": _recovery_mean(result),
-        "reason": told(result),
+        "reason": advice_of(result),
         "trials": [asdict(trial) for trial in result.trials],
         "truth": None if dataset.truth is None else errors(result, dataset.truth, dataset.roi),
         "settings": result.settings.to_dict(),

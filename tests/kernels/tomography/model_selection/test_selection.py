@@ -11,17 +11,20 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings, Trial, reconstruct
 from bentray_kernels.tomography.gauss_newton.gauss_newton_step import look
-from bentray_kernels.tomography.model_selection.finite_frequency_candidates import choose_wide, wide
+from bentray_kernels.tomography.model_selection.finite_frequency_candidates import (
+    choose_finite_frequency,
+    finite_frequency_candidates,
+)
 from bentray_kernels.tomography.model_selection.held_out import part_of
 from bentray_kernels.tomography.model_selection.selection import (
     BANDED,
     CANDIDATES,
+    advice_of,
+    candidate_settings,
     choose,
-    reason,
-    told,
-    tried,
+    explain_trials,
 )
-from bentray_kernels.tomography.reconstruct import Here
+from bentray_kernels.tomography.reconstruct import MemoryScan
 from bentray_kernels.tomography.stopping import noise_of, stopped
 
 WATER = 1375.0
@@ -64,12 +67,12 @@ def test_eikonal_times_ask_for_bent_rays(scan):
     assert seen[-1].history == result.history
     assert result.settings.method in ("sart", "gauss-newton")
     assert len(result.trials) == len(CANDIDATES)
-    assert reason(result.trials).startswith("auto chose curved")
+    assert explain_trials(result.trials).startswith("auto chose curved")
     # What was chosen gives the same bits when asked for by itself.
     again = reconstruct(scan, result.settings)
     assert np.array_equal(again.speed, result.speed)
     assert again.trials == ()
-    assert reason(again.trials) == ""
+    assert explain_trials(again.trials) == ""
 
 
 @pytest.mark.parametrize(("count", "part"), [(1, "held-out"), (None, "shown")])
@@ -88,7 +91,7 @@ def test_straight_times_ask_for_straight_rays(scan):
     """Times integrated along straight lines, as a picker of late arrivals gives them."""
     straight = replace(PLAN, method="sart", rays="straight", sweeps=1)
 
-    problem = Here(scan, straight, "all").problem(0)
+    problem = MemoryScan(scan, straight, "all").problem(0)
     axis = np.arange(48) * problem.spacing
     x, y = np.meshgrid(axis - axis.mean(), axis - axis.mean(), indexing="ij")
     image = 1.0 / (WATER + 100.0 * (np.hypot(x, y) < 0.05) + 60.0 * (np.hypot(x - 0.02, y) < 0.01))
@@ -111,14 +114,14 @@ def test_exact_times_ask_for_thin_bent_rays_whatever_the_frequency(scan):
 
 
 def test_a_frequency_offers_rays_as_wide_as_its_waves(scan):
-    assert wide(scan, PLAN) == []
+    assert finite_frequency_candidates(scan, PLAN) == []
     told = replace(scan, center_frequency_hz=5e5)
-    assert wide(told, replace(PLAN, decomposition="volume")) == []
-    offered = wide(told, PLAN)
+    assert finite_frequency_candidates(told, replace(PLAN, decomposition="volume")) == []
+    offered = finite_frequency_candidates(told, PLAN)
     assert [one.get("ray_width_m", 0.0) for one in offered] == [WATER / 5e5, WATER / 5e5, 0.0]
     assert {one["rays"] for one in offered[:2]} == {"straight", "curved"}
     # As stiff on the coarser grid of a trial as on that of the image.
-    plans = tried(replace(PLAN, nodes=128), offered)
+    plans = candidate_settings(replace(PLAN, nodes=128), offered)
     assert [plan.penalty_strength for plan in plans] == pytest.approx([0.3, 0.3, 0.3])
     assert [one.get("penalty_strength", 0.3) for one in offered] == pytest.approx([0.6, 0.6, 0.3])
 
@@ -130,18 +133,18 @@ def test_of_wide_rays_those_that_predict_views_better_are_chosen_unless_thin_one
     straight = of(80e-9, rays="straight", ray_width_m=0.003)
     bent = of(75e-9, rays="curved", ray_width_m=0.003)
     thin = of(70e-9, rays="curved")
-    assert choose_wide([straight, bent, thin], 3e-7) is bent
+    assert choose_finite_frequency([straight, bent, thin], 3e-7) is bent
     worse = replace(bent, held_out_mean_s=85e-9)
-    assert choose_wide([straight, worse, thin], 3e-7) is straight
+    assert choose_finite_frequency([straight, worse, thin], 3e-7) is straight
     # Both explain the times.
-    assert choose_wide([straight, worse, thin], 1e-6) is worse
-    assert choose_wide([straight, replace(bent, held_out_mean_s=101e-9), thin], 2e-6) is straight
-    assert "straight ones must be 20 % better" in reason([worse, straight, thin])
+    assert choose_finite_frequency([straight, worse, thin], 1e-6) is worse
+    assert choose_finite_frequency([straight, replace(bent, held_out_mean_s=101e-9), thin], 2e-6) is straight
+    assert "straight rays must be 20 % better" in explain_trials([worse, straight, thin])
     exact = replace(thin, held_out_mean_s=20e-9)
-    assert choose_wide([straight, bent, exact], 3e-7) is None
-    assert reason([bent, straight, thin]) == (
-        "auto chose curved gauss-newton (ray_width_m 0.003) 75 ns (mean misfit of held-out views, for rays "
-        "as wide as waves); the others: straight gauss-newton (ray_width_m 0.003) 80 ns, "
+    assert choose_finite_frequency([straight, bent, exact], 3e-7) is None
+    assert explain_trials([bent, straight, thin]) == (
+        "auto chose curved gauss-newton (ray_width_m 0.003) 75 ns (mean misfit of held-out views, "
+        "finite-frequency rays); the others: straight gauss-newton (ray_width_m 0.003) 80 ns, "
         "curved gauss-newton 70 ns"
     )
 
@@ -198,28 +201,29 @@ def test_the_noise_is_told_or_estimated(scan):
 
 
 def test_trials_are_coarser_and_speed_alone():
-    for plan, changes in zip(tried(replace(PLAN, nodes=200)), CANDIDATES, strict=True):
+    for plan, changes in zip(candidate_settings(replace(PLAN, nodes=200)), CANDIDATES, strict=True):
         assert plan.nodes == 100
         assert not plan.attenuation
         assert plan.method == changes["method"]
-    assert {plan.nodes for plan in tried(PLAN)} == {48}
+    assert {plan.nodes for plan in candidate_settings(PLAN)} == {48}
 
 
 def test_what_is_told_of_a_result_are_rays_and_waves(scan):
     result = reconstruct(scan, replace(PLAN, method="sart", sweeps=1))
-    assert told(result) == ""
+    assert advice_of(result) == ""
     chosen = replace(result, trials=(trial("straight", 1e-7), trial("curved", 2e-7)))
-    assert told(chosen) == reason(chosen.trials)
+    assert advice_of(chosen) == explain_trials(chosen.trials)
     both = replace(chosen, provenance={**result.provenance, "waveform": "method waveform is advised"})
-    assert told(both) == f"{reason(chosen.trials)}; method waveform is advised"
+    assert advice_of(both) == f"{explain_trials(chosen.trials)}; method waveform is advised"
 
 
 def test_the_reason_names_what_differs():
     plain, more = trial("straight", 100e-9), trial("curved", 120e-9)
     smooth = replace(more, settings={**more.settings, "front_smoothing_nodes": 4.0})
     close = replace(more, held_out_rms_s=95e-9)
-    assert "100 ns (misfit of held-out pairs; bent rays must be 8 % better);" in reason([plain, close])
-    assert reason([plain, smooth]) == (
+    rule = "100 ns (misfit of held-out pairs; bent rays must be 8 % better);"
+    assert rule in explain_trials([plain, close])
+    assert explain_trials([plain, smooth]) == (
         "auto chose straight 100 ns (misfit of held-out pairs); "
         "the others: curved (front_smoothing_nodes 4) 120 ns"
     )

@@ -6,8 +6,10 @@ import numpy as np
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.waveform import Waveform
-from bentray_kernels.tomography.waveform.frequency_continuation import refine
+from bentray_kernels.task_graph import ThreadPool, run
 from bentray_kernels.tomography.waveform.inversion_state import Image
+from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
+from bentray_kernels.tomography.waveform.refinement_graph import RefinementGraph
 from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
@@ -94,7 +96,14 @@ def water(nodes=60):
     return Image(np.full((nodes, nodes), WATER), side / (nodes - 1), (-0.5 * side, -0.5 * side))
 
 
+def refine(dataset, settings, start, threads=1):
+    """The finished graph of a refinement in this process."""
+    graph = RefinementGraph(MemoryWaveScan(dataset, settings), start)
+    run({"refinement": graph}, ThreadPool(threads))
+    return graph
+
+
 @functools.cache
 def refined():
-    """What ``SETTINGS`` make of it in one thread."""
+    """The refinement by ``SETTINGS`` in one thread."""
     return refine(scan(), SETTINGS, water())

@@ -1,4 +1,4 @@
-"""Judging by waves: images are ranked as the truth ranks them, noise is told apart, a judge goes on."""
+"""Validation by waves: images are ranked as the truth ranks them, noise is told apart, a judge goes on."""
 
 from dataclasses import replace
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.checkpoint import packed, unpacked
+from bentray_kernels.tomography.checkpoint import pack, unpack
 from bentray_kernels.tomography.waveform.automatic_settings import wave_settings
-from bentray_kernels.tomography.waveform.frequency_continuation import Here
 from bentray_kernels.tomography.waveform.inversion_state import Image
+from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.validation import (
     LEAST_LIKENESS,
     SHOTS,
@@ -35,7 +35,7 @@ def images():
 @pytest.fixture(scope="module")
 def heard():
     data = scan()
-    return Here(data, judging(wave_settings(data, Settings(method="waveform"))))
+    return MemoryWaveScan(data, judging(wave_settings(data, Settings(method="waveform"))))
 
 
 def test_images_are_ranked_as_the_truth_ranks_them(heard):
@@ -49,7 +49,7 @@ def test_images_are_ranked_as_the_truth_ranks_them(heard):
 
 def test_noise_counts_as_it_does_in_water():
     data = scan(seed=1, noise=0.1)
-    noisy = Here(data, judging(wave_settings(data, Settings(method="waveform"))))
+    noisy = MemoryWaveScan(data, judging(wave_settings(data, Settings(method="waveform"))))
     found = judge_by_waves(noisy, images()[0])
     assert 0.5 * found.water < found.misfit < 2.0 * found.water
 
@@ -58,7 +58,7 @@ def test_nothing_is_said_where_water_shots_cannot_be_simulated():
     data = scan()
     random = np.random.default_rng(0).normal(size=data.waveform.water.shape).astype(np.float32)
     deaf = replace(data, waveform=replace(data.waveform, water=random))
-    here = Here(deaf, judging(wave_settings(deaf, Settings(method="waveform"))))
+    here = MemoryWaveScan(deaf, judging(wave_settings(deaf, Settings(method="waveform"))))
     assert here.problem(0).likeness < LEAST_LIKENESS
     assert judge_by_waves(here, images()[0]) == Judgement()
 
@@ -72,11 +72,11 @@ def test_few_emitters_are_read(heard):
 
 def test_a_judge_goes_on_from_its_checkpoint(heard):
     judge = Judge(heard, images()[1], ())
-    (call,) = judge.first()
-    assert (judge.done, judge.standing.passed) == (0, (False,))
-    assert judge.after(call, call.function(*call.arguments)) == []
+    (task,) = judge.first()
+    assert (judge.done, judge.checkpoint.milestone) == (0, (False,))
+    assert judge.after(task, task.function(*task.arguments)) == []
     assert judge.done == judge.total
     again = Judge(heard, images()[1], ())
-    again.restore(unpacked(*packed(judge.standing), TYPES))
+    again.restore(unpack(*pack(judge.checkpoint), TYPES))
     assert again.first() == []
     assert again.judgement == judge.judgement

@@ -8,39 +8,39 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.tomography.checkpoint import packed, unpacked
-from bentray_kernels.tomography.waveform.frequency_continuation import Here
-from bentray_kernels.tomography.waveform.waveform_chain import WaveChain
+from bentray_kernels.tomography.checkpoint import pack, unpack
+from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
+from bentray_kernels.tomography.waveform.refinement_graph import RefinementGraph
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
 from .scans import SETTINGS, refined, scan, water
 
 
 @functools.cache
-def here():
-    return Here(scan(), SETTINGS)
+def memory_scan():
+    return MemoryWaveScan(scan(), SETTINGS)
 
 
-def stored(chain):
+def stored(graph):
     """Where it stands, through what a file can hold."""
-    tree, arrays = packed(chain.standing)
-    return unpacked(json.loads(json.dumps(tree)), [array.copy() for array in arrays], TYPES)
+    tree, arrays = pack(graph.checkpoint)
+    return unpack(json.loads(json.dumps(tree)), [array.copy() for array in arrays], TYPES)
 
 
 def run(cuts=()):
-    """A chain to its end; before each call whose number is among ``cuts`` it is lost and made anew."""
-    chain = WaveChain(here(), water())
-    ready, done = chain.first(), 0
+    """A graph to its end; before each task whose number is among ``cuts`` it is lost and made anew."""
+    graph = RefinementGraph(memory_scan(), water())
+    ready, done = graph.first(), 0
     while ready:
         if done in cuts:
-            standing = stored(chain)
-            chain = WaveChain(here(), water())
-            chain.restore(standing)
-            ready = chain.first()
+            checkpoint = stored(graph)
+            graph = RefinementGraph(memory_scan(), water())
+            graph.restore(checkpoint)
+            ready = graph.first()
         done += 1
-        call = ready.pop(0)
-        ready += chain.after(call, call.function(*call.arguments))
-    return chain
+        task = ready.pop(0)
+        ready += graph.after(task, task.function(*task.arguments))
+    return graph
 
 
 @settings(max_examples=6, deadline=None)
@@ -52,13 +52,13 @@ def test_a_refinement_cut_off_anywhere_ends_with_the_same_bits(cuts):
     assert np.array_equal(resumed.image.speed, expected.image.speed)
     assert np.array_equal(resumed.image.attenuation, expected.image.attenuation)
     assert resumed.image.origin == expected.image.origin
-    for end, other in zip(resumed.ends, expected.bands, strict=True):
+    for end, other in zip(resumed.ends, expected.ends, strict=True):
         assert np.array_equal(end.image.speed, other.image.speed)
         assert (end.history, end.skipped) == (other.history, other.skipped)
 
 
 def test_its_records_are_not_those_of_rays():
-    chain = run()
-    tree, arrays = packed(chain.standing)
+    graph = run()
+    tree, arrays = pack(graph.checkpoint)
     with pytest.raises(KeyError):
-        unpacked(tree, arrays)
+        unpack(tree, arrays)

@@ -1,6 +1,6 @@
 """Peak memory of the calls that examine and pick a scan, in processes of their own; see ``call_memory``.
 
-Called as ``arrival_call_memory.py FOLDER PICKER ELEMENTS SAMPLES``; prints bytes by call as JSON, and those
+Called as ``arrival_call_memory.py FOLDER PICKER ELEMENTS SAMPLES``; prints bytes by task as JSON, and those
 of the traces. FOLDER is for the scan's file.
 """
 
@@ -17,7 +17,7 @@ from tests.workers.reconstruction.call_memory import held
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.reconstruction.arrivals import Arrivals, Files, Source
+from bentray_workers.reconstruction.arrivals import Files, PickingGraph, Source
 
 RATE_HZ, CENTRE_HZ, WATER_MPS, RADIUS_M = 8e6, 1e6, 1480.0, 0.05
 
@@ -45,16 +45,18 @@ def scan(elements: int, samples: int) -> Dataset:
 
 
 def bytes_of(path: Path, picker: str) -> dict[str, int]:
-    """The first call of each name, with its arguments, less a fork that does nothing."""
-    chain = Arrivals(Source(path, path.stat().st_mtime_ns, path.parent, picker, True), Files.of(path.parent))
-    waiting, found = chain.first(), {}
+    """The first task of each name, with its arguments, less a fork that does nothing."""
+    graph = PickingGraph(
+        Source(path, path.stat().st_mtime_ns, path.parent, picker, True), Files.of(path.parent)
+    )
+    waiting, found = graph.first(), {}
     while waiting:
-        call = waiting.pop(0)
-        name = call.function.__name__
+        task = waiting.pop(0)
+        name = task.function.__name__
         if name not in found:
-            taken = peak(lambda call=call: call.function(*call.arguments)) - peak(lambda: None)
-            found[name] = taken + held(*call.arguments)
-        waiting = chain.after(call, call.function(*call.arguments)) + waiting
+            taken = peak(lambda task=task: task.function(*task.arguments)) - peak(lambda: None)
+            found[name] = taken + held(*task.arguments)
+        waiting = graph.after(task, task.function(*task.arguments)) + waiting
     return found
 
 

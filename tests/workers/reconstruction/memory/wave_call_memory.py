@@ -24,8 +24,8 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.waveform import waveform_chain as waves
 from bentray_kernels.tomography.waveform.automatic_settings import wave_settings
 from bentray_kernels.tomography.waveform.band_inversion import WavePass
-from bentray_kernels.tomography.waveform.frequency_continuation import Here
 from bentray_kernels.tomography.waveform.inversion_state import Image
+from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.validation import judge_by_waves, judging
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
@@ -72,12 +72,12 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     number = len(plan.bands) - 1
     start = Image(np.full((32, 32), WATER), 2.2 * RADIUS_M / 31, (-1.1 * RADIUS_M, -1.1 * RADIUS_M))
     nothing = peak(lambda: None)
-    fresh = Here(dataset, plan)
+    fresh = MemoryWaveScan(dataset, plan)
     # Measured first, for what was read once stays.
     found = {"enter": peak(lambda: waves.enter(fresh, number, start)) - nothing}
-    judged = Here(dataset, judging(plan))
+    judged = MemoryWaveScan(dataset, judging(plan))
     found["judge_by_waves"] = peak(lambda: judge_by_waves(judged, start)) - nothing
-    here = Here(dataset, plan)
+    here = MemoryWaveScan(dataset, plan)
     entered = waves.enter(here, number, start)
     assert entered is not None
     # As ``held`` counts the problem, and the traces that it holds.

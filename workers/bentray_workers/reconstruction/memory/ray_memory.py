@@ -13,7 +13,7 @@ from bentray_kernels.rays.in_step import LONGEST
 from bentray_kernels.tomography.problem import MARGIN_NODES
 from bentray_kernels.tomography.settings import Settings
 from bentray_kernels.tomography.solver_choice import solver_of
-from bentray_kernels.tomography.task_chains import BATCH
+from bentray_kernels.tomography.stage_graphs import BATCH
 
 from ...cluster.capacities import MIB, REAL
 from ...files.dataset.counts import Summary
@@ -92,8 +92,8 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         settings: of one way; never ``method`` auto.
 
     Returns:
-        By the call's name in ``tomography.task_chains``, and in ``arrivals`` where traces must be picked:
-        working arrays, arguments and result, and what the process keeps of the dataset.
+        By the name of the task, in ``arrivals`` too where traces must be picked: working arrays, arguments
+        and result, and what the process keeps of the dataset.
     """
     shape, rays = shape_of(scan, settings), rays_of(scan, settings)
     image = REAL * math.prod(shape)
@@ -129,18 +129,18 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     elif scan.period and settings.examine:
         found["settle"] = settle_bytes(scan.pairs // scan.slices)
     if settings.method == "gauss-newton":
-        found["look"] = look(rays)
-        found["step"] = step(rays)
+        found["trace_rays"] = look(rays)
+        found["update_gauss_newton"] = step(rays)
     elif solver_of(settings, len(shape)).compiled:
-        found["advance"] = base + _pass_bytes(shape, scan.receivers)
+        found["update_sart"] = base + _pass_bytes(shape, scan.receivers)
     else:
-        found["advance"] = base + field + 8 * image
+        found["update_sart"] = base + field + 8 * image
     if settings.attenuation and scan.amplitudes:
-        found["look_losses"] = look(rays)
-        found["attenuate"] = step(rays)
+        found["trace_attenuation_rays"] = look(rays)
+        found["solve_attenuation"] = step(rays)
     if settings.resolution_check:
-        found["look_again"] = look(rays)
-        found["recover"] = step(rays)
+        found["trace_resolution_rays"] = look(rays)
+        found["check_resolution"] = step(rays)
     return found
 
 

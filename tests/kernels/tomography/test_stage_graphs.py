@@ -1,6 +1,6 @@
-"""The calls of a slice: batches of SART grow to the length of a task."""
+"""Stage graphs: batches of SART grow to the duration of a task."""
 
-from bentray_kernels.tomography.task_chains import next_batch
+from bentray_kernels.tomography.stage_graphs import next_batch
 
 
 def test_batches_aim_at_the_time_of_a_task():

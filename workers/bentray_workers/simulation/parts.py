@@ -1,16 +1,18 @@
-"""Parts of a simulated scan, a task each: cut, computed into files, and read back in order."""
+"""Parts of a simulated scan, one task each: emitters computed into a file, and read back."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bentray_kernels.acquisition.simulation.fine_medium import FineMedium
 from bentray_kernels.sources import digest
 from bentray_kernels.wave.time_blocks import Poll
 
@@ -19,12 +21,11 @@ from ..cluster.checkpoints import UNREADABLE
 from ..cluster.job_cancellation import Unwanted, check_wanted
 from ..files.atomic import replacing
 from ..files.npy_headers import PARSING
-from .cost import emitters_a_task
-from .emitter_batches import simulate_emitters
+from .cost import Timed, emitters_a_task
 from .request import Simulated
 from .waves import WaveSimulationSettings, simulate_emission
 
-# What the numbers of a part depend on.
+# Modules that determine the values of a part.
 MODULES = (
     "bentray_kernels.acquisition.simulation.fine_medium",
     "bentray_kernels.acquisition.simulation.ring_scan",
@@ -48,7 +49,7 @@ class Part:
 
 
 def parts_of(settings: Simulated) -> list[Part]:
-    """All of them, in order, each about a second of work where an emitter is no more than that."""
+    """All parts in order, each about a second of work, or one emitter that takes longer."""
     if isinstance(settings, WaveSimulationSettings):
         return [Part(0, k, k + 1) for k in range(settings.emissions)]
     step, count = emitters_a_task(settings), settings.emitters
@@ -60,20 +61,20 @@ def parts_of(settings: Simulated) -> list[Part]:
 
 
 def count_of(settings: Simulated) -> int:
-    """How many parts there are, without making any."""
+    """Number of parts, without making a list of them."""
     if isinstance(settings, WaveSimulationSettings):
         return settings.emissions
     return settings.scans * -(-settings.emitters // emitters_a_task(settings))
 
 
 def folder_of(work_dir: Path) -> Path:
-    """Where the parts of a job are; those of other kernels than the present ones are in another folder."""
+    """Folder of the parts of a job; parts of another version of the kernels are in another folder."""
     version = "".join(digest(module)[:6] for module in MODULES)
     return work_dir / f"parts-{version}"
 
 
 def make_part(settings: Simulated, part: Part, folder: Path) -> None:
-    """Task: compute a part into its file. It ends within a second, without one, once the folder has gone."""
+    """Task: compute a part into its file. Ends within a second once the folder is gone."""
     try:
         arrays = _computed(settings, part, partial(check_wanted, folder))
         with replacing(part.path(folder)) as unready, unready.open("wb") as file:
@@ -81,7 +82,7 @@ def make_part(settings: Simulated, part: Part, folder: Path) -> None:
     except Unwanted:
         return
     except FileNotFoundError:
-        # The job was cancelled, and nobody waits for this.
+        # The job was cancelled.
         if folder.exists():
             raise
 
@@ -93,16 +94,31 @@ def _computed(settings: Simulated, part: Part, poll: Poll) -> list[NDArray[Any]]
     rows: list[list[NDArray[Any]]] = []
     for emitter in range(part.first, part.last):
         poll()
-        received = simulate_emitters(settings, part.scan, np.array([emitter]))
+        medium = _medium(settings, settings.medium_number(part.scan))
+        received = medium.arrivals(settings.elements_in_medium(part.scan), np.array([emitter]))
         rows.append([array for array in received if array is not None])
     return [np.concatenate(arrays) for arrays in zip(*rows, strict=True)]
 
 
+# Threads of one process share a medium, which takes longer to sample than to use.
+_SAMPLING = Lock()
+
+
+def _medium(settings: Timed, number: int) -> FineMedium:
+    with _SAMPLING:
+        return _sampled(settings, number)
+
+
+@lru_cache(maxsize=2)
+def _sampled(settings: Timed, number: int) -> FineMedium:
+    return settings.medium(number)
+
+
 def read_part(part: Part, folder: Path) -> list[NDArray[Any]]:
-    """What ``make_part`` kept, checked against the sums in the file.
+    """The arrays of a part, checked against the check sums in the file.
 
     Raises:
-        ResultsLostError: for a damaged file, which is removed, so that the part is made again.
+        ResultsLostError: for a damaged file; it is removed, so that the part is computed again.
     """
     path = part.path(folder)
     try:
@@ -114,6 +130,6 @@ def read_part(part: Part, folder: Path) -> list[NDArray[Any]]:
 
 
 def missing(parts: list[Part], folder: Path) -> Iterator[Part]:
-    """Those without a file."""
+    """Parts without a file."""
     there = {path.name for path in folder.iterdir()}
     return (part for part in parts if part.path(folder).name not in there)

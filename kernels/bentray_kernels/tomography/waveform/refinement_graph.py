@@ -1,4 +1,4 @@
-"""A refinement through all its bands, as calls that may run anywhere; see ``tomography.task_chains``."""
+"""Task graph of a full-waveform refinement of one slice through all its bands."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from ...arrays import Floats
+from ...task_graph import Task
 from ..result import Sweep
-from ..task_chains import Call
 from . import band_inversion
 from .band_inversion import Look, Model, WaveIterate
-from .inversion_state import BandEnd, Entered, Image, WaveStanding
+from .inversion_state import BandEnd, Entered, Image, RefinementCheckpoint
 from .iterations import sweeps
 from .waveform_problem import WaveProblem
 from .waveform_settings import WaveSettings
@@ -34,8 +34,8 @@ class WaveScan(Protocol):
         """The problem of a band, from 0; made once in a process."""
 
 
-class WaveChain:
-    """The calls of all bands: looks of single emitters in any order, then one step, again and again.
+class RefinementGraph:
+    """Task graph of all bands: simulations of single emitters in any order, then one update, repeatedly.
 
     Args:
         scan: see ``WaveScan``.
@@ -116,54 +116,49 @@ class WaveChain:
         return self.ends[-1].image if self.ends else self._start
 
     @property
-    def standing(self) -> WaveStanding:
-        """Where it stands, to be kept, without looks that wait for others."""
-        return WaveStanding(self.ends, self._band)
+    def checkpoint(self) -> RefinementCheckpoint:
+        """The state, without looks of an iteration that is not finished."""
+        return RefinementCheckpoint(self.ends, self._band)
 
-    def restore(self, standing: WaveStanding) -> None:
-        """Go on from where a chain of the same scan stood; to be called before ``first``."""
-        self.ends, self._band = standing.ends, standing.band
+    def restore(self, checkpoint: RefinementCheckpoint) -> None:
+        """As ``task_graph.ResumableGraph``."""
+        self.ends, self._band = checkpoint.ends, checkpoint.band
 
-    def first(self) -> list[Call]:
-        """Calls to begin with, or to go on with after ``restore``."""
+    def first(self) -> list[Task]:
+        """As ``task_graph.TaskGraph``."""
         if self.over:
             return []
         if self._band is None:
-            return [Call(enter, (self._scan, self.number, self.image))]
+            return [Task(enter, (self._scan, self.number, self.image))]
         model = self._band.model
         return [
-            Call(look_at_waves, (self._scan, self.number, model, place), keep=True)
+            Task(look_at_waves, (self._scan, self.number, model, place), keep_on_worker=True)
             for place in range(self._band.emitters)
         ]
 
-    def after(self, call: Call, given: Any) -> list[Call]:
-        """Calls that may follow one that has finished.
-
-        Args:
-            call: the one that has finished.
-            given: what it gave, or its handle where ``call.keep``.
-        """
-        if call.function is enter:
-            self._band = given
-            if given is None:
+    def after(self, task: Task, result: Any) -> list[Task]:
+        """As ``task_graph.TaskGraph``."""
+        if task.function is enter:
+            self._band = result
+            if result is None:
                 self.ends = (*self.ends, BandEnd(self.image, skipped=False, history=()))
             return self.first()
         assert self._band is not None
-        if call.function is look_at_waves:
-            self._looks[call.arguments[-1]] = given
+        if task.function is look_at_waves:
+            self._looks[task.arguments[-1]] = result
             if len(self._looks) < self._band.emitters:
                 return []
             # In the order of the emitters, never in that of their coming.
             looks = [found for _, found in sorted(self._looks.items())]
-            return [Call(step_by_waves, (self._scan, self.number, self._band.state, looks))]
+            return [Task(step_by_waves, (self._scan, self.number, self._band.state, looks))]
         self._looks = {}
-        self._band = replace(self._band, state=given)
-        if given.done:
+        self._band = replace(self._band, state=result)
+        if result.done:
             spacing = self._scan.settings().bands[self.number].spacing_m
-            image = self._left(Image(given.image, spacing, self._band.origin))
+            image = self._left(Image(result.image, spacing, self._band.origin))
             # The band is over, so that pairs of changes are not kept any longer.
-            self.ends = (*self.ends, BandEnd(image, given.skipped, given.history))
-            if given.skipped:
+            self.ends = (*self.ends, BandEnd(image, result.skipped, result.history))
+            if result.skipped:
                 self._leave_out()
             self._band = None
         return self.first()
@@ -183,7 +178,7 @@ class WaveChain:
 
 
 def enter(scan: WaveScan, number: int, image: Image) -> Entered | None:
-    """Call: what a band begins with; None where it is passed over, see ``LEAST_LIKENESS``."""
+    """Task: what a band begins with; None where it is passed over, see ``LEAST_LIKENESS``."""
     problem = scan.problem(number)
     if problem.likeness < LEAST_LIKENESS:
         return None
@@ -194,7 +189,7 @@ def enter(scan: WaveScan, number: int, image: Image) -> Entered | None:
 
 
 def look_at_waves(scan: WaveScan, number: int, model: Model, place: int) -> Look:
-    """Call: one emitter's look at an image, by its place among the band's emitters."""
+    """Task: one emitter's look at an image, by its place among the band's emitters."""
     problem = scan.problem(number)
     return band_inversion.look(
         problem, scan.settings(), model, band_inversion.emitters(problem)[place : place + 1]
@@ -202,7 +197,7 @@ def look_at_waves(scan: WaveScan, number: int, model: Model, place: int) -> Look
 
 
 def step_by_waves(scan: WaveScan, number: int, state: WaveIterate, looks: list[Look]) -> WaveIterate:
-    """Call: the next image."""
+    """Task: the next image."""
     return band_inversion.step(scan.problem(number), scan.settings(), state, looks)
 
 

@@ -1,0 +1,220 @@
+"""Task graph of the reconstruction of one slice or volume."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from ..arrays import Floats, Ints
+from ..task_graph import ResumableGraph, Task
+from . import attenuation, resolution
+from .finite_frequency import nodes_wide
+from .gauss_newton.gauss_newton_step import Iterate
+from .gauss_newton.linearisation import Rows
+from .grid_schedule import start
+from .result import Progress, Sweep
+from .sart.sart_step import State
+from .stage_graphs import GaussNewtonStage, SartStage, Scan, Stage, batches_of
+
+
+class TomographyGraph(ResumableGraph, Protocol):
+    """A resumable graph with a history of iterations: a reconstruction, or a refinement of its image."""
+
+    @property
+    def history(self) -> tuple[Sweep, ...]: ...
+
+
+# Runs graphs to their end and reports progress. The numbers are the emitter passes made before, and those
+# that may come after.
+Run = Callable[[Sequence[TomographyGraph], int, int], None]
+
+
+@dataclass(frozen=True)
+class ReconstructionCheckpoint:
+    """State of a ``ReconstructionGraph``; see ``task_graph.Checkpoint``.
+
+    Attributes:
+        stage: number of the stage in progress, from 0.
+        passes_before: emitter passes of earlier stages.
+        history: of earlier stages.
+        state: of the stage in progress.
+        values: result of each evaluation after the last stage; None if there is none yet.
+    """
+
+    stage: int
+    passes_before: int
+    history: tuple[Sweep, ...]
+    state: State | Iterate
+    values: tuple[Floats | None, ...]
+
+    @property
+    def milestone(self) -> tuple[Any, ...]:
+        finished = tuple(value is not None for value in self.values)
+        return self.stage, self.state.sweep, self.state.done, finished
+
+
+class ReconstructionGraph:
+    """All stages of one slice, then its attenuation and resolution check where requested.
+
+    Attributes:
+        total: emitter passes, at most.
+    """
+
+    def __init__(self, scan: Scan, index: int) -> None:
+        self._scan, self._index = scan, index
+        self._plans = scan.stages()
+        self._history: tuple[Sweep, ...] = ()
+        self._passes_before = 0
+        self._stage = self._stage_of(0, start(scan.problem(index, 0), None))
+        self._evaluations = self._evaluated()
+        self.total = sum(
+            len(scan.problem(index, number).sounding) * plan.sweeps for number, plan in enumerate(self._plans)
+        )
+        self.total += sum(sum(one.sizes) for one in self._evaluations)
+
+    def _evaluated(self) -> list[Evaluation]:
+        """What is computed along the rays of the finished image."""
+        settings, problem = self._plans[-1], self._scan.problem(self._index)
+        evaluations = []
+        if settings.attenuation and problem.log_ratio is not None:
+            emitters = attenuation.heard(problem)
+            evaluations.append(Evaluation(trace_attenuation_rays, solve_attenuation, emitters))
+        if settings.resolution_check:
+            evaluations.append(Evaluation(trace_resolution_rays, check_resolution, problem.sounding))
+        return evaluations
+
+    @property
+    def done(self) -> int:
+        """Emitter passes that are made, or not needed after an early stop."""
+        return self._passes_before + self._stage.done + sum(one.done for one in self._evaluations)
+
+    @property
+    def state(self) -> State | Iterate:
+        """Of the stage in progress."""
+        return self._stage.state
+
+    def value_of(self, evaluate: Callable[..., Any]) -> Any:
+        """Result of a task after the last stage; None before it, and where it is not requested."""
+        return next((one.value for one in self._evaluations if one.evaluate is evaluate), None)
+
+    @property
+    def history(self) -> tuple[Sweep, ...]:
+        """Of all stages so far."""
+        return self._history + self._stage.history
+
+    @property
+    def checkpoint(self) -> ReconstructionCheckpoint:
+        """The state; without rows of an iteration that is not finished."""
+        values = tuple(one.value for one in self._evaluations)
+        return ReconstructionCheckpoint(
+            self._stage.number, self._passes_before, self._history, self._stage.state, values
+        )
+
+    def restore(self, checkpoint: ReconstructionCheckpoint) -> None:
+        """As ``task_graph.ResumableGraph``."""
+        self._history, self._passes_before = checkpoint.history, checkpoint.passes_before
+        self._stage = self._stage_of(checkpoint.stage, checkpoint.state.slowness)
+        self._stage.state = checkpoint.state
+        for one, value in zip(self._evaluations, checkpoint.values, strict=True):
+            one.value = value
+
+    def first(self) -> list[Task]:
+        """As ``task_graph.TaskGraph``."""
+        return self._next() if self._stage.state.done else self._stage.first()
+
+    def after(self, task: Task, result: Any) -> list[Task]:
+        """As ``task_graph.TaskGraph``."""
+        for one in self._evaluations:
+            if task.function in (one.trace, one.evaluate):
+                return one.after(task, result)
+        following = self._stage.after(task, result)
+        return following if following or not self._stage.state.done else self._next()
+
+    def _next(self) -> list[Task]:
+        """What follows a finished stage."""
+        image, number = self._stage.state.slowness, self._stage.number + 1
+        if number == len(self._plans):
+            pending = [one for one in self._evaluations if one.value is None]
+            return [task for one in pending for task in one.first(self._scan, self._index, image)]
+        self._history = self.history
+        self._passes_before += self._stage.total
+        earlier, problem = (self._scan.problem(self._index, k) for k in (number - 1, number))
+        self._stage = self._stage_of(number, start(problem, image, earlier))
+        return self._stage.first()
+
+    def _stage_of(self, number: int, image: Floats) -> Stage:
+        kind = GaussNewtonStage if self._plans[number].method == "gauss-newton" else SartStage
+        return kind(self._scan, self._index, number, image)
+
+
+class Evaluation:
+    """Rays of all emitters through the finished image, then one task that uses all of them.
+
+    Attributes:
+        trace, evaluate: the functions of the two kinds of task.
+        sizes: emitters of each batch.
+        value: result of ``evaluate``.
+    """
+
+    def __init__(self, trace: Callable[..., Rows], evaluate: Callable[..., Any], emitters: Ints) -> None:
+        self.trace, self.evaluate = trace, evaluate
+        self.sizes = [len(batch) for batch in batches_of(emitters)]
+        self.value: Any = None
+        self._rows: dict[int, Any] = {}
+
+    @property
+    def done(self) -> int:
+        """Emitters whose rays are traced."""
+        return sum(self.sizes) if self.value is not None else sum(self.sizes[batch] for batch in self._rows)
+
+    def first(self, scan: Scan, index: int, image: Floats) -> list[Task]:
+        """Tasks to start with; without emitters the one that uses their rows, which are none."""
+        if not self.sizes:
+            return [Task(self.evaluate, (scan, index, []))]
+        return [
+            Task(self.trace, (scan, index, image, batch), keep_on_worker=True)
+            for batch in range(len(self.sizes))
+        ]
+
+    def after(self, task: Task, result: Any) -> list[Task]:
+        """Keep the rows of one batch; with the last batch, the task that uses all of them."""
+        if task.function is self.evaluate:
+            self.value, self._rows = result, {}
+            return []
+        scan, index, _, batch = task.arguments
+        self._rows[batch] = result
+        if len(self._rows) < len(self.sizes):
+            return []
+        return [Task(self.evaluate, (scan, index, [rows for _, rows in sorted(self._rows.items())]))]
+
+
+def trace_attenuation_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:
+    """Task: rays of one batch of emitters with amplitudes, through the finished image."""
+    problem = scan.problem(index)
+    emitters = batches_of(attenuation.heard(problem))[batch]
+    return attenuation.look(problem, scan.stages()[-1], slowness, emitters)
+
+
+def solve_attenuation(scan: Scan, index: int, rows: list[Rows]) -> Floats:
+    """Task: the attenuation image."""
+    return attenuation.attenuation(scan.problem(index), scan.stages()[-1], rows)
+
+
+def trace_resolution_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:
+    """Task: rays of one batch of emitters through the finished image."""
+    problem = scan.problem(index)
+    return resolution.look(problem, scan.stages()[-1], slowness, batches_of(problem.sounding)[batch])
+
+
+def check_resolution(scan: Scan, index: int, rows: list[Rows]) -> Floats:
+    """Task: how much of a checkerboard the rays recover."""
+    problem = scan.problem(index)
+    return resolution.recovery(problem, rows, nodes_wide(problem, scan.stages()[-1]))
+
+
+def progress_of(graphs: Sequence[TomographyGraph], before: int = 0, after: int = 0) -> Progress:
+    """Progress over all graphs and the emitter passes before and after them."""
+    history = sorted((s for g in graphs for s in g.history), key=lambda s: (s.stage, s.sweep, s.slice))
+    done, total = (before + sum(getattr(g, name) for g in graphs) for name in ("done", "total"))
+    return Progress(done, total + after, tuple(history))

@@ -1,0 +1,157 @@
+"""Task graphs of one stage of a reconstruction: SART or Gauss-Newton on one grid."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from dataclasses import replace
+from typing import Any, Protocol
+
+from ..arrays import Floats, Ints
+from ..task_graph import Task
+from .gauss_newton import gauss_newton_step
+from .gauss_newton.linearisation import Rows
+from .problem import Problem
+from .result import Sweep
+from .sart import sart_step
+from .settings import Settings
+
+# Long enough that scheduling costs nothing, short enough to show progress and to stop soon.
+TASK_S = 0.5
+# Nodes that the wave fronts of a first batch pass, in about a tenth of a second; later batches are timed.
+FIRST_NODES = 2_000_000
+
+# Emitters whose rays are traced in one task of Gauss-Newton, and after the last image.
+BATCH = 16
+
+
+class Scan(Protocol):
+    """Where tasks find their data; it is sent with them, so it holds a path or the dataset itself."""
+
+    def stages(self) -> tuple[Settings, ...]:
+        """Settings of each stage, see ``grid_schedule``."""
+
+    def problem(self, index: int, stage: int = -1) -> Problem:
+        """The problem of one slice at a stage, the last by default; made once in a process."""
+
+
+class Stage(ABC):
+    """Task graph of one stage.
+
+    Attributes:
+        number: from 0.
+        state: of the iteration.
+        total: emitter passes, at most.
+    """
+
+    state: sart_step.State | gauss_newton_step.Iterate
+
+    def __init__(self, scan: Scan, index: int, number: int) -> None:
+        self._at = scan, index, number
+        self.number = number
+        self._emitters = len(scan.problem(index, number).sounding)
+        self.total = self._emitters * scan.stages()[number].sweeps
+
+    @property
+    def done(self) -> int:
+        """Emitter passes that are made, or not needed after an early stop."""
+        if self.state.done:
+            return self.total
+        return self._emitters * self.state.sweep + self.state.emitter
+
+    @property
+    def history(self) -> tuple[Sweep, ...]:
+        """Of this stage."""
+        return tuple(replace(sweep, stage=self.number) for sweep in self.state.history)
+
+    @abstractmethod
+    def first(self) -> list[Task]: ...
+
+    @abstractmethod
+    def after(self, task: Task, result: Any) -> list[Task]: ...
+
+
+class SartStage(Stage):
+    """SART: batches of emitters, each updating the image of the batch before."""
+
+    def __init__(self, scan: Scan, index: int, number: int, image: Floats) -> None:
+        super().__init__(scan, index, number)
+        self.state: sart_step.State = sart_step.begin(image)
+        self._batch = max(1, FIRST_NODES // image.size)
+
+    def first(self) -> list[Task]:
+        return [Task(update_sart, (*self._at, self.state, self._batch))]
+
+    def after(self, task: Task, result: Any) -> list[Task]:
+        before = self.state.emitter
+        self.state, seconds = result
+        self._batch = next_batch(self._batch, self.state.emitter - before, seconds)
+        return [] if self.state.done else self.first()
+
+
+class GaussNewtonStage(Stage):
+    """Gauss-Newton: rays of all emitters in any order, then one update from all of them, repeatedly."""
+
+    def __init__(self, scan: Scan, index: int, number: int, image: Floats) -> None:
+        super().__init__(scan, index, number)
+        self.state: gauss_newton_step.Iterate = gauss_newton_step.begin(image)
+        self._sizes = [len(batch) for batch in batches_of(scan.problem(index, number).sounding)]
+        self._rows: dict[int, Any] = {}
+
+    @property
+    def done(self) -> int:
+        return super().done + (0 if self.state.done else sum(self._sizes[batch] for batch in self._rows))
+
+    def first(self) -> list[Task]:
+        # The image alone: tracing needs nothing else of the state.
+        image = self.state.slowness
+        return [
+            Task(trace_rays, (*self._at, image, batch), keep_on_worker=True)
+            for batch in range(len(self._sizes))
+        ]
+
+    def after(self, task: Task, result: Any) -> list[Task]:
+        if task.function is trace_rays:
+            self._rows[task.arguments[-1]] = result
+            if len(self._rows) < len(self._sizes):
+                return []
+            # In the order of the emitters, not of completion: floating-point sums depend on it.
+            rows = [rows for _, rows in sorted(self._rows.items())]
+            return [Task(update_gauss_newton, (*self._at, self.state, rows))]
+        self.state, self._rows = result, {}
+        return [] if self.state.done else self.first()
+
+
+def update_sart(
+    scan: Scan, index: int, stage: int, state: sart_step.State, emitters: int
+) -> tuple[sart_step.State, float]:
+    """Task: update one slice with some more emitters; returns the new state and the seconds it took."""
+    started = time.perf_counter()
+    state = sart_step.advance(scan.problem(index, stage), scan.stages()[stage], state, emitters, index)
+    return state, time.perf_counter() - started
+
+
+def trace_rays(scan: Scan, index: int, stage: int, slowness: Floats, batch: int) -> Rows:
+    """Task: the rays of one batch of emitters through an image."""
+    problem = scan.problem(index, stage)
+    emitters = batches_of(problem.sounding)[batch]
+    return gauss_newton_step.look(problem, scan.stages()[stage], slowness, emitters)
+
+
+def update_gauss_newton(
+    scan: Scan, index: int, stage: int, state: gauss_newton_step.Iterate, rows: list[Rows]
+) -> gauss_newton_step.Iterate:
+    """Task: the next image."""
+    return gauss_newton_step.step(scan.problem(index, stage), scan.stages()[stage], state, rows, index)
+
+
+def next_batch(batch: int, used: int, seconds: float) -> int:
+    """Emitters that take about ``TASK_S``; unchanged after a batch cut short by the end of its sweep."""
+    if used != batch or seconds <= 0.0:
+        return batch
+    return max(1, min(4 * batch, int(batch * TASK_S / seconds)))
+
+
+def batches_of(emitters: Ints) -> list[Ints]:
+    """``BATCH`` emitters at a time."""
+    return [emitters[k : k + BATCH] for k in range(0, len(emitters), BATCH)]
