@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from bentray_kernels.tomography import Settings, reconstruct
-from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.reconstruction import read_reconstruction
 from bentray_workers.simulation.request import AskedSimulation
-from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.simulation_run import simulate_to_file
 
 from ..effort import effort
 from .conftest import ELEMENTS
@@ -92,7 +91,7 @@ def test_a_simulation_goes_on_from_the_emissions_it_has(machine, tmp_path):
     done = machine.ended(job)
     assert done["state"] == "succeeded", done["error"]
     assert attempts_of(machine, job) == 2
-    write_dataset(tmp_path / "scan.h5", simulate(AskedSimulation(**asked).chosen()))
+    simulate_to_file(None, AskedSimulation(**asked).chosen(), tmp_path / "scan.h5")
     found = machine.files / "datasets" / f"{done['dataset']}.h5"
     assert found.read_bytes() == (tmp_path / "scan.h5").read_bytes()
     datasets = machine.http.get("/v1/datasets").json()["datasets"]

@@ -95,9 +95,9 @@ def simulate(
     """
     path = output_file(output, force=force)
 
-    from bentray_workers.files.dataset import write_dataset
+    from bentray_workers.files.dataset import read_dataset
     from bentray_workers.simulation.plane import SimulationSettings
-    from bentray_workers.simulation.simulation_run import simulate as simulate_scan
+    from bentray_workers.simulation.simulation_run import simulate_to_file
     from bentray_workers.simulation.volume import VolumeSimulationSettings
 
     own_of_waves = {"--frequency": frequency, "--emissions": emissions, "--side": side}
@@ -140,9 +140,9 @@ def simulate(
                 "--phantom is table7", {"--slices": slices, "--array": array, "--three-d": three_d or None}
             )
             settings = SimulationSettings(**both, noise_s=(noise_ns or 0.0) * 1e-9)
-        dataset = simulate_scan(settings, lambda now: step(now.done, now.total, "tasks"))
+        simulate_to_file(None, settings, path, on_progress=lambda now: step(now.done, now.total, "tasks"))
     seconds = time.perf_counter() - started
-    write_dataset(path, dataset)
+    dataset = read_dataset(path, traces=False)
     if as_json:
         print_json({"output": str(path), "seconds": round(seconds, 3), "settings": asdict(settings)})
         return

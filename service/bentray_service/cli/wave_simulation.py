@@ -19,17 +19,17 @@ def simulate_to(path: Path, asked: dict[str, Any], *, in_space: bool, as_json: b
         in_space: the phantom of Table 7, else that of Table 6 in a plane.
         as_json: for machines.
     """
-    from bentray_workers.files.dataset import write_dataset
-    from bentray_workers.simulation.simulation_run import simulate
+    from bentray_workers.files.dataset import read_dataset
+    from bentray_workers.simulation.simulation_run import simulate_to_file
     from bentray_workers.simulation.volume_waves import VolumeWaveSettings
     from bentray_workers.simulation.waves import WaveSimulationSettings
 
     settings = VolumeWaveSettings(**asked) if in_space else WaveSimulationSettings(**asked)
     started = time.perf_counter()
     with progress_bar("Simulating") as step:
-        dataset = simulate(settings, lambda now: step(now.done, now.total, "tasks"))
+        simulate_to_file(None, settings, path, on_progress=lambda now: step(now.done, now.total, "tasks"))
     seconds = time.perf_counter() - started
-    write_dataset(path, dataset)
+    dataset = read_dataset(path, traces=False)
     centre, highest = settings.dispersion
     if as_json:
         found = {"output": str(path), "seconds": round(seconds, 3), "settings": asdict(settings)}

@@ -10,12 +10,12 @@ from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.wave import time_blocks
 from bentray_workers.cluster.attempts import ResultsLostError
 from bentray_workers.cluster.job_cancellation import Unwanted
-from bentray_workers.files.dataset import read_dataset, write_dataset
+from bentray_workers.files.dataset import read_dataset
 from bentray_workers.files.dataset.record import record_of
 from bentray_workers.simulation import parts
 from bentray_workers.simulation.parts import folder_of, make_part, parts_of
 from bentray_workers.simulation.request import AskedSimulation
-from bentray_workers.simulation.simulation_run import simulate, simulate_to_file
+from bentray_workers.simulation.simulation_run import simulate_to_file
 
 TIMES = AskedSimulation(nodes=16, elements=70, snr=10.0, attenuation=True)
 WAVES = {"waveform": True, "nodes": 32, "elements": 16, "frequency_hz": 2e5, "side_m": 0.03, "emissions": 4}
@@ -56,7 +56,7 @@ def test_what_was_kept_is_not_made_again(run, tmp_path):
     run(TIMES, again.append)
     assert again[0].done >= len(kept)
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
-    write_dataset(tmp_path / "here.h5", simulate(TIMES.chosen()))
+    simulate_to_file(None, TIMES.chosen(), tmp_path / "here.h5")
     assert (tmp_path / "scan.h5").read_bytes() == (tmp_path / "here.h5").read_bytes()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ def simulate(
     """
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "scan.h5"
-        simulate_to_file(client, settings, target, Path(folder), on_progress)
+        simulate_to_file(client, settings, target, on_progress=on_progress)
         return read_dataset(target)
 
 
@@ -42,7 +43,7 @@ def simulate_to_file(
     client: Client | None,
     settings: Simulated,
     target: Path,
-    work_dir: Path,
+    work_dir: Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
     on_saved: Callable[[], None] | None = None,
     stop: Callable[[], bool] | None = None,
@@ -55,7 +56,7 @@ def simulate_to_file(
         settings: of the scan.
         target: the file to write, whole or not at all.
         work_dir: a folder that every worker can read and write; parts that an unfinished run of the same scan
-            left there are used.
+            left there are used. None: a temporary folder of this machine.
         on_progress: called after each task.
         on_saved: the same.
         stop: polled several times a second; true raises ``Cancelled``, without waiting for running tasks.
@@ -68,9 +69,10 @@ def simulate_to_file(
         Cancelled: when ``stop`` returned true.
         KilledWorker: for a task that kills its workers.
     """
-    folder = folder_of(work_dir)
-    folder.mkdir(exist_ok=True)
-    graph = SimulationGraph(settings, folder, target)
-    run_job(graph, open_pool(client, work_dir, share), on_progress, on_saved, stop)
+    with nullcontext(work_dir) if work_dir else tempfile.TemporaryDirectory() as work:
+        folder = folder_of(Path(work))
+        folder.mkdir(exist_ok=True)
+        graph = SimulationGraph(settings, folder, target)
+        run_job(graph, open_pool(client, Path(work), share), on_progress, on_saved, stop)
     assert graph.result is not None
     return graph.result
