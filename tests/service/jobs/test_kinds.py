@@ -103,7 +103,7 @@ def test_three_pictures(serving, until, form, media):
 
 def test_without_settings_the_middle_of_the_range(serving, until, monkeypatch):
     asked = []
-    monkeypatch.setattr(kinds, "turn", lambda *given: asked.append(given) or given[3].write_bytes(b""))
+    monkeypatch.setattr(kinds, "draw_turntable", lambda *given: asked.append(given) or given[3].write_bytes(b""))
     with serving() as http:
         volume = put(http)
         job = http.post("/v1/jobs", json={"kind": "refraction", "volume": volume}).json()
@@ -133,7 +133,7 @@ def test_a_stopped_job_runs_again_at_the_next_start(serving, until, monkeypatch)
             pass
         raise Cancelled
 
-    monkeypatch.setattr(kinds, "turn", hold)
+    monkeypatch.setattr(kinds, "draw_turntable", hold)
     with serving() as http:
         job = ask(http, put(http)).json()
         until(http, job["id"], "running")
@@ -148,7 +148,7 @@ def test_what_the_worker_refuses_fails_in_words(serving, until, monkeypatch):
     def refuse(*given):
         raise InvalidInput("iso", "0.5", "what the filter leaves")
 
-    monkeypatch.setattr(kinds, "turn", refuse)
+    monkeypatch.setattr(kinds, "draw_turntable", refuse)
     with serving() as http:
         done = until(http, ask(http, put(http)).json()["id"])
     assert (done["state"], done["error"]["field"]) == ("failed", "iso")
@@ -216,11 +216,11 @@ def ask_field(http, mesh, **settings):
 
 def test_a_torn_field_is_gone_on_from_at_the_next_start(serving, until, monkeypatch):
     monkeypatch.setattr(geometry_field, "TASK_RAYS", 32 * 216)
-    plain, calls, torn = geometry_field.build, [], threading.Event()
+    plain, calls, torn = geometry_field.build_field, [], threading.Event()
 
     def held(*given):
         """As a service that leaves once three tasks have ended: the rest is still to do."""
-        *others, on_saved, stop = given
+        *others, on_saved, stop, share = given
         told = []
         calls.append(told)
 
@@ -237,9 +237,9 @@ def test_a_torn_field_is_gone_on_from_at_the_next_start(serving, until, monkeypa
                 time.sleep(0.01)
             return True
 
-        return plain(*others, saved, leave)
+        return plain(*others, saved, leave, share)
 
-    monkeypatch.setattr(geometry_field, "build", held)
+    monkeypatch.setattr(geometry_field, "build_field", held)
     with serving() as http:
         job = ask_field(http, put_mesh(http)).json()
         files = http.app.state.parts.files.of(LOCAL)
@@ -266,11 +266,11 @@ def wait_until_empty(folder):
 
 def test_a_cancelled_field_leaves_nothing(serving, until, monkeypatch):
     def hold(*given):
-        while not given[-1]():
+        while not given[-2]():
             pass
         raise Cancelled
 
-    monkeypatch.setattr(geometry_field, "build", hold)
+    monkeypatch.setattr(geometry_field, "build_field", hold)
     with serving() as http:
         job = ask_field(http, put_mesh(http)).json()
         until(http, job["id"], "running")

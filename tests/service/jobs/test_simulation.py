@@ -16,7 +16,7 @@ from bentray_service.rows.keys import Keys
 from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
-from bentray_workers.simulation import tasks
+from bentray_workers.simulation import parts
 
 from ..conftest import PATIENCE_S
 
@@ -51,7 +51,7 @@ def ask(http, **settings):
 def held(monkeypatch):
     """Emissions after the first wait until this event is set."""
     go_on, begun = threading.Event(), []
-    real = tasks.simulate_emission
+    real = parts.simulate_emission
 
     def slow(settings, emission, poll):
         begun.append(emission)
@@ -59,7 +59,7 @@ def held(monkeypatch):
             go_on.wait()
         return real(settings, emission, poll)
 
-    monkeypatch.setattr(tasks, "simulate_emission", slow)
+    monkeypatch.setattr(parts, "simulate_emission", slow)
     go_on.begun = begun
     yield go_on
     go_on.set()
