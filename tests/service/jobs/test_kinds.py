@@ -103,7 +103,8 @@ def test_three_pictures(serving, until, form, media):
 
 def test_without_settings_the_middle_of_the_range(serving, until, monkeypatch):
     asked = []
-    monkeypatch.setattr(kinds, "draw_turntable", lambda *given: asked.append(given) or given[3].write_bytes(b""))
+    draw = lambda *given: asked.append(given) or given[3].write_bytes(b"")  # noqa: E731
+    monkeypatch.setattr(kinds, "draw_turntable", draw)
     with serving() as http:
         volume = put(http)
         job = http.post("/v1/jobs", json={"kind": "refraction", "volume": volume}).json()
