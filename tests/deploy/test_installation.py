@@ -56,9 +56,9 @@ def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_scan_is_uploaded_and_reconstructed(installation: Installation, scan: Path, tmp_path: Path) -> None:
     with Client(installation.url, key=installation.key) as client:
-        job = client.submit(client.upload(scan)["id"], QUICK.to_dict())
-        job = client.wait(job["id"])
-        client.download(job["volume"], "hdf5", tmp_path / "result.h5")
+        job = client.submit(client.upload(scan).id, QUICK.to_dict())
+        job = client.wait(job.id)
+        client.download(job.volume, "hdf5", tmp_path / "result.h5")
     here = reconstruct(None, scan, QUICK)
     np.testing.assert_array_equal(read_reconstruction(tmp_path / "result.h5").speed, here.speed)
 
@@ -84,9 +84,9 @@ def test_no_page_of_dask_is_shown(installation: Installation, part: str) -> None
 )
 def test_it_works_again_after_a_part_was_killed(installation: Installation, scan: Path, part: str) -> None:
     with Client(installation.url, key=installation.key) as client:
-        job = client.submit(client.upload(scan)["id"], LONG.to_dict())
-        wait_until(lambda: client.job(job["id"])["progress"]["done"] > 0)
-        assert client.job(job["id"])["state"] == "running", "it must be in the middle of it"
+        job = client.submit(client.upload(scan).id, LONG.to_dict())
+        wait_until(lambda: client.job(job.id).progress.done > 0)
+        assert client.job(job.id).state == "running", "it must be in the middle of it"
     installation.kill(part)
     assert not installation.healthy(part)
     installation.start(part)
@@ -94,9 +94,9 @@ def test_it_works_again_after_a_part_was_killed(installation: Installation, scan
         installation.wait_for(each)
     with Client(installation.url, key=installation.key) as client:
         # What was under way when the part died is finished too.
-        assert client.wait(job["id"])["state"] == "succeeded", installation.log("service")
-        again = client.submit(client.upload(scan)["id"], QUICK.to_dict())
-        assert client.wait(again["id"])["state"] == "succeeded"
+        assert client.wait(job.id).state == "succeeded", installation.log("service")
+        again = client.submit(client.upload(scan).id, QUICK.to_dict())
+        assert client.wait(again.id).state == "succeeded"
 
 
 def test_with_certificates_the_parts_speak_tls_alone(tmp_path: Path, scan: Path) -> None:
@@ -109,8 +109,8 @@ def test_with_certificates_the_parts_speak_tls_alone(tmp_path: Path, scan: Path)
         address = f"127.0.0.1:{secured.ports['scheduler']}"
         assert check_scheduler(f"tcp://{address}") is not None, "nobody is answered without TLS"
         with Client(secured.url, key=secured.key) as client:
-            job = client.submit(client.upload(scan)["id"], QUICK.to_dict())
-            assert client.wait(job["id"])["state"] == "succeeded", secured.log("service")
+            job = client.submit(client.upload(scan).id, QUICK.to_dict())
+            assert client.wait(job.id).state == "succeeded", secured.log("service")
     finally:
         secured.close()
 

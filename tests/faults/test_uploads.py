@@ -122,7 +122,7 @@ def test_an_upload_survives_the_service(tmp_path):
         service.start()
         with Client(service.url) as client:
             dataset = client.upload(scan, resume=place.rpartition("/")[2])
-        assert dataset["sha256"] == hashlib.sha256(content).hexdigest()
+        assert dataset.sha256 == hashlib.sha256(content).hexdigest()
         assert not stored.exists()
         assert not list(incoming.iterdir())
     finally:

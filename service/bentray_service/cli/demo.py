@@ -69,7 +69,7 @@ def demo(
         results, seconds = {}, {}
         for name, asked in JOBS.items():
             results[name], seconds[name] = _reconstruct(
-                client, sent["id"], name, {**asked, "nodes": nodes}, folder
+                client, sent.id, name, {**asked, "nodes": nodes}, folder
             )
     assert dataset.truth is not None
     found = {name: figures(result, dataset, seconds[name]) for name, result in results.items()}
@@ -87,9 +87,9 @@ def _reconstruct(
     from bentray_workers.files.reconstruction import read_reconstruction
 
     with progress_bar(f"Reconstructing, {name} rays") as step:
-        job = client.wait(client.submit(dataset, asked)["id"], lambda record: show_job(record, step))
-    path = client.download(job["volume"], "hdf5", folder / f"{name}.h5")
-    return read_reconstruction(path), job["seconds"]
+        job = client.wait(client.submit(dataset, asked).id, lambda record: show_job(record, step))
+    path = client.download(job.volume or "", "hdf5", folder / f"{name}.h5")
+    return read_reconstruction(path), job.seconds or 0.0
 
 
 def _show(found: dict[str, dict[str, Any]], picture: Path, seconds: float, as_json: bool) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,6 +18,8 @@ from .worker import Tls
 
 if TYPE_CHECKING:
     from bentray_kernels.tomography import Settings
+
+    from ..routes.models.records import JobRecord
 
 
 @with_settings_options
@@ -115,35 +117,35 @@ def _submit(
     with service_answers(), Client(url, on_wait=remark) as client:
         with progress_bar("Uploading") as step:
             dataset = client.upload(source, step)
-        job = client.submit(dataset["id"], settings.to_dict())
-        if job.get("plan"):
-            remark(job["plan"]["why"])
+        job = client.submit(dataset.id, settings.to_dict())
+        if job.plan is not None:
+            remark(job.plan.why)
         if wait:
             with progress_bar("Reconstructing") as step:
-                job = client.wait(job["id"], lambda record: show_job(record, step))
+                job = client.wait(job.id, lambda record: show_job(record, step))
         if folder is not None:
-            volume = client.download(job["volume"], "hdf5", folder / "reconstruction.h5")
+            volume = client.download(job.volume or "", "hdf5", folder / "reconstruction.h5")
     if folder is not None:
         _report(source, folder, volume, job, as_json)
     elif as_json:
-        print_json(job)
+        print_json(job.model_dump(mode="json"))
     else:
-        print_lines([f"{job['id']} {job['state']}", f"{url.rstrip('/')}{job['links']['self']}"])
+        print_lines([f"{job.id} {job.state}", f"{client.url}{job.links['self']}"])
 
 
-def show_job(record: dict[str, Any], step: Step) -> None:
+def show_job(record: JobRecord, step: Step) -> None:
     """One record of a job on a progress bar."""
-    progress, history = record["progress"], record["history"]
-    note = residual_note(history[-1]["residual_rms_s"] if history else None)
-    step(progress["done"], progress["total"], note or progress["phase"] or record["state"])
+    progress, history = record.progress, record.history
+    note = residual_note(history[-1].residual_rms_s if history else None)
+    step(progress.done, progress.total, note or progress.phase or record.state)
 
 
-def _report(source: Path, folder: Path, volume: Path, job: dict[str, Any], as_json: bool) -> None:
+def _report(source: Path, folder: Path, volume: Path, job: JobRecord, as_json: bool) -> None:
     from bentray_workers.files.dataset import read_dataset
     from bentray_workers.files.reconstruction import read_reconstruction
 
     # The truth, where there is one, is in the file that was sent; the service keeps only the scan.
     dataset = read_dataset(source, traces=False)
     result = read_reconstruction(volume)
-    found = write_results(folder, result, dataset, job["seconds"], file=str(source), job=job["id"])
+    found = write_results(folder, result, dataset, job.seconds or 0.0, file=str(source), job=job.id)
     show_results(f"Reconstruction of {source.name}", found, as_json=as_json)

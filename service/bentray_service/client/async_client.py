@@ -2,53 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable, Generator, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager
-from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 import anyio
 import httpx
 
 from . import flows
+from .connection import Connection, document
 from .errors import ClientError, from_response, no_answer
-from .flows import Format, Record
-from .patience import PATIENCE_S, Patience
-from .results import Result
 from .saving import saving
-from .steps import CHUNK_BYTES, Ask, Fetch, Listen, Pause, Step, settings_of
-from .uploading import Kind, OnBytes, upload
-from .waiting import wait
+from .steps import CHUNK_BYTES, Ask, Fetch, Flow, Listen, Pause, Step
 
+P = ParamSpec("P")
 T = TypeVar("T")
 
 
-class AsyncClient:
-    """As :class:`Client`; use it with ``async with``.
+def _method(
+    flow: Callable[Concatenate[Connection, P], Flow[T]],
+) -> Callable[Concatenate[AsyncClient, P], Coroutine[Any, Any, T]]:
+    async def method(client: AsyncClient, /, *given: P.args, **named: P.kwargs) -> T:
+        return await client._run(flow(client, *given, **named))
 
-    Args:
-        url, key, timeout_s, poll_s, patience_s, on_wait: as of ``Client``.
+    document(method, flow)
+    return method
 
-    Raises:
-        InvalidInput: for a ``url`` that is no web address.
-    """
 
-    def __init__(
-        self,
-        url: str,
-        *,
-        key: str | None = None,
-        timeout_s: float = 300.0,
-        poll_s: float = 0.3,
-        patience_s: float = PATIENCE_S,
-        on_wait: Callable[[str], None] | None = None,
-    ) -> None:
-        settings = settings_of(url, key, timeout_s)
-        self.url: str = settings["base_url"]
-        self._poll_s = poll_s
-        self._patience = Patience(patience_s, on_wait)
-        self._http = httpx.AsyncClient(**settings, transport=httpx.AsyncHTTPTransport(retries=2))
+class AsyncClient(Connection):
+    """As :class:`Client`; use it with ``async with``, and await its methods."""
+
+    def __init__(self, url: str, **options: Any) -> None:
+        super().__init__(url, **options)
+        self._http = httpx.AsyncClient(**self._options, transport=httpx.AsyncHTTPTransport(retries=2))
 
     async def __aenter__(self) -> Self:
         return self
@@ -62,70 +49,20 @@ class AsyncClient:
         """Close the connections."""
         await self._http.aclose()
 
-    async def upload(
-        self,
-        path: Path | str,
-        on_progress: OnBytes | None = None,
-        *,
-        kind: Kind = "dataset",
-        resume: str | None = None,
-        **said: str,
-    ) -> Record:
-        """See ``Client.upload``."""
-        return await self._run(upload(Path(path), on_progress, kind, resume, said))
+    upload = _method(flows.upload)
+    submit = _method(flows.submit)
+    simulate = _method(flows.simulate)
+    job = _method(flows.job)
+    cancel = _method(flows.cancel)
+    wait = _method(flows.wait)
+    volume = _method(flows.volume)
+    slice_png = _method(flows.slice_png)
+    download = _method(flows.download)
+    download_dataset = _method(flows.download_dataset)
+    result = _method(flows.result)
+    delete = _method(flows.delete)
 
-    async def submit(self, dataset_id: str, settings: Mapping[str, Any] | None = None) -> Record:
-        """See ``Client.submit``."""
-        return await self._run(flows.submit(dataset_id, settings))
-
-    async def simulate(self, settings: Mapping[str, Any] | None = None) -> Record:
-        """See ``Client.simulate``."""
-        return await self._run(flows.simulate(settings))
-
-    async def job(self, job_id: str) -> Record:
-        """See ``Client.job``."""
-        return await self._run(flows.record("GET", f"/v1/jobs/{job_id}"))
-
-    async def cancel(self, job_id: str) -> Record:
-        """See ``Client.cancel``."""
-        return await self._run(flows.record("POST", f"/v1/jobs/{job_id}/cancel"))
-
-    async def wait(
-        self,
-        job_id: str,
-        on_progress: Callable[[Record], None] | None = None,
-        timeout_s: float | None = None,
-    ) -> Record:
-        """See ``Client.wait``."""
-        return await self._run(wait(job_id, on_progress, timeout_s, self._poll_s))
-
-    async def volume(self, volume_id: str) -> Record:
-        """See ``Client.volume``."""
-        return await self._run(flows.record("GET", f"/v1/volumes/{volume_id}"))
-
-    async def slice_png(self, volume_id: str, **how: str | float) -> bytes:
-        """See ``Client.slice_png``."""
-        return await self._run(flows.picture(f"/v1/volumes/{volume_id}/slice.png", how))
-
-    async def download(self, volume_id: str, format: Format, path: Path | str) -> Path:  # noqa: A002
-        """See ``Client.download``."""
-        return await self._run(flows.download(volume_id, format, Path(path)))
-
-    async def download_dataset(
-        self, dataset_id: str, path: Path | str, on_progress: OnBytes | None = None
-    ) -> Path:
-        """See ``Client.download_dataset``."""
-        return await self._run(flows.download_dataset(dataset_id, Path(path), on_progress))
-
-    async def result(self, volume_id: str) -> Result:
-        """See ``Client.result``."""
-        return await self._run(flows.result(volume_id))
-
-    async def delete(self, stored_id: str) -> None:
-        """See ``Client.delete``."""
-        await self._run(flows.delete(stored_id))
-
-    async def _run(self, flow: Generator[Step, Any, T]) -> T:
+    async def _run(self, flow: Flow[T]) -> T:
         flow = self._patience.through(flow)
         answer: Any = None
         error: ClientError | None = None

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import httpx
+
+from ..web.problem import Problem
 
 
 class ClientError(Exception):
@@ -13,20 +13,18 @@ class ClientError(Exception):
     Attributes:
         status: the HTTP status, or None when there was no answer.
         field, found, accepted: from the problem, or None.
-        problem: the whole problem, empty when there was none.
+        problem: the whole problem, or None.
         upload: the id of the upload that was broken off; ``upload(…, resume=…)`` goes on with it.
         retry_after_s: how long the service asks to wait before the next attempt, s, or None.
     """
 
-    def __init__(
-        self, message: str, status: int | None = None, problem: dict[str, Any] | None = None
-    ) -> None:
+    def __init__(self, message: str, status: int | None = None, problem: Problem | None = None) -> None:
         super().__init__(message)
         self.status = status
-        self.problem = problem or {}
-        self.field: str | None = self.problem.get("field")
-        self.found: str | None = self.problem.get("found")
-        self.accepted: str | None = self.problem.get("accepted")
+        self.problem = problem
+        self.field = problem and problem.field
+        self.found = problem and problem.found
+        self.accepted = problem and problem.accepted
         self.upload: str | None = None
         self.retry_after_s: float | None = None
 
@@ -49,16 +47,18 @@ def no_answer(url: str, error: httpx.TransportError) -> NoAnswer:
     return NoAnswer(f"no answer from {url}: {error}", sent=not refused)
 
 
-def from_problem(problem: dict[str, Any], status: int | None = None) -> ClientError:
+def from_problem(problem: Problem | None) -> ClientError:
     """The error that a problem+json describes."""
-    title, detail = problem.get("title", "The service refused"), problem.get("detail", "")
-    return ClientError(f"{title}: {detail}" if detail else title, status or problem.get("status"), problem)
+    if problem is None:
+        return ClientError("The service refused without a reason")
+    detail = f": {problem.detail}" if problem.detail else ""
+    return ClientError(problem.title + detail, problem.status, problem)
 
 
 def from_response(response: httpx.Response) -> ClientError:
     """The error of an answer that is not a success."""
     if response.headers.get("content-type", "").startswith("application/problem+json"):
-        error = from_problem(response.json(), response.status_code)
+        error = from_problem(Problem.model_validate_json(response.content))
     else:
         words = f"{response.url} answered {response.status_code}, and not as Bentray does"
         error = ClientError(words, response.status_code)

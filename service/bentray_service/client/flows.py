@@ -1,67 +1,145 @@
-"""What a client can be asked for, as flows: requests in order, and what they give."""
+"""What the clients can do, each a flow: requests in order, and the result."""
 
 from __future__ import annotations
 
 import tempfile
 import uuid
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias, TypeVar
 
+from pydantic import BaseModel
+
+from ..routes.models.records import DatasetRecord, JobRecord, VolumeRecord
+from ..routes.models.surface_records import MeshRecord
+from .connection import Connection
 from .errors import ClientError
 from .results import Result, read_result
-from .steps import Ask, Fetch, Step
-from .uploading import PLACES, OnBytes
+from .steps import Ask, Fetch, Flow
+from .uploading import PLACES, Kind, OnBytes, send_file
+from .waiting import wait_for
 
-Record = dict[str, Any]
 Format = Literal["hdf5", "h5", "nifti", "metaimage", "mat", "npy"]
+Record = TypeVar("Record", bound=BaseModel)
 
+Uploaded: TypeAlias = DatasetRecord | VolumeRecord | MeshRecord
+
+RECORDS: dict[str, type[Uploaded]] = {"dataset": DatasetRecord, "volume": VolumeRecord, "mesh": MeshRecord}
 PREFIXES = {"ds": "dataset", "vol": "volume", "mesh": "mesh"}
 
 
-def record(method: str, path: str, **options: Any) -> Generator[Step, Any, Record]:
-    """The JSON that one request gives."""
-    return dict((yield Ask(method, path, options, repeatable=method == "GET")).json())
+def upload(
+    connection: Connection,
+    /,
+    path: Path | str,
+    on_progress: OnBytes | None = None,
+    *,
+    kind: Kind = "dataset",
+    resume: str | None = None,
+    **metadata: str,
+) -> Flow[Uploaded]:
+    """Upload a file, a large one in pieces, which go on after the connection broke.
+
+    Args:
+        path: of the file.
+        on_progress: called with ``(sent, total)``, bytes.
+        kind: what it is.
+        resume: the id of an upload to go on with: ``ClientError.upload`` of the one that was broken off.
+        metadata: of a volume or a mesh its ``title``, of a volume ``spacing_m``, ``shape`` and ``dtype`` too.
+
+    Returns:
+        The record of the dataset, the volume or the mesh.
+    """
+    answer = yield from send_file(Path(path), on_progress, kind, resume, metadata)
+    return RECORDS[kind].model_validate_json(answer.content)
 
 
-def submit(dataset_id: str, settings: Mapping[str, Any] | None) -> Generator[Step, Any, Record]:
-    asked = {"kind": "reconstruction", "dataset": dataset_id, "settings": dict(settings or {})}
-    return (yield from _job(asked))
+def submit(
+    connection: Connection, dataset_id: str, settings: Mapping[str, Any] | None = None
+) -> Flow[JobRecord]:
+    """Start a reconstruction; settings left out take their defaults."""
+    return (
+        yield from _start({"kind": "reconstruction", "dataset": dataset_id, "settings": dict(settings or {})})
+    )
 
 
-def simulate(settings: Mapping[str, Any] | None) -> Generator[Step, Any, Record]:
-    return (yield from _job({"kind": "simulation", "settings": dict(settings or {})}))
+def simulate(connection: Connection, settings: Mapping[str, Any] | None = None) -> Flow[JobRecord]:
+    """Start the simulation of a scan; the job's ``dataset`` is its id once the job has succeeded."""
+    return (yield from _start({"kind": "simulation", "settings": dict(settings or {})}))
 
 
-def _job(asked: Record) -> Generator[Step, Any, Record]:
-    """Start a job; its key makes sure that it is one, however often the request has to be sent."""
-    options = {"json": asked, "headers": {"Idempotency-Key": str(uuid.uuid4())}}
-    return dict((yield Ask("POST", "/v1/jobs", options, repeatable=True)).json())
+def job(connection: Connection, job_id: str) -> Flow[JobRecord]:
+    """The job record as it is now."""
+    return (yield from _record(JobRecord, "GET", f"/v1/jobs/{job_id}"))
 
 
-def picture(path: str, how: Mapping[str, str | float]) -> Generator[Step, Any, bytes]:
-    return bytes((yield Ask("GET", path, {"params": dict(how)}, repeatable=True)).content)
+def cancel(connection: Connection, job_id: str) -> Flow[JobRecord]:
+    """Cancel a job."""
+    return (yield from _record(JobRecord, "POST", f"/v1/jobs/{job_id}/cancel"))
 
 
-def download(volume_id: str, kind: Format, target: Path) -> Generator[Step, Any, Path]:
-    yield Fetch(f"/v1/volumes/{volume_id}/data", {"params": {"format": kind}}, target)
-    return target
+def wait(
+    connection: Connection,
+    job_id: str,
+    on_progress: Callable[[JobRecord], None] | None = None,
+    timeout_s: float | None = None,
+) -> Flow[JobRecord]:
+    """Wait until a job has succeeded and return its record; ``on_progress`` gets every record before.
+
+    Raises:
+        ClientError: when the job failed (with its problem), was cancelled, or exceeds ``timeout_s``.
+    """
+    return (yield from wait_for(job_id, on_progress, timeout_s, connection.poll_s))
 
 
-def download_dataset(dataset_id: str, target: Path, told: OnBytes | None) -> Generator[Step, Any, Path]:
-    yield Fetch(f"/v1/datasets/{dataset_id}/file", {}, target, told)
-    return target
+def volume(connection: Connection, volume_id: str) -> Flow[VolumeRecord]:
+    """The metadata of a result."""
+    return (yield from _record(VolumeRecord, "GET", f"/v1/volumes/{volume_id}"))
 
 
-def result(volume_id: str) -> Generator[Step, Any, Result]:
-    about = yield from record("GET", f"/v1/volumes/{volume_id}")
+def slice_png(connection: Connection, /, volume_id: str, **how: str | float) -> Flow[bytes]:
+    """One slice as PNG; ``how``: index, quantity, low, high, colormap."""
+    path = f"/v1/volumes/{volume_id}/slice.png"
+    return bytes((yield Ask("GET", path, {"params": how}, repeatable=True)).content)
+
+
+def download(connection: Connection, volume_id: str, format: Format, path: Path | str) -> Flow[Path]:  # noqa: A002
+    """Fetch a result into ``path``; the file is there whole or not at all."""
+    yield Fetch(f"/v1/volumes/{volume_id}/data", {"params": {"format": format}}, Path(path))
+    return Path(path)
+
+
+def download_dataset(
+    connection: Connection, dataset_id: str, path: Path | str, on_progress: OnBytes | None = None
+) -> Flow[Path]:
+    """Fetch a scan, uploaded or simulated, into ``path``; ``on_progress`` as of ``upload``."""
+    yield Fetch(f"/v1/datasets/{dataset_id}/file", {}, Path(path), on_progress)
+    return Path(path)
+
+
+def result(connection: Connection, volume_id: str) -> Flow[Result]:
+    """A volume as arrays with coordinates; ``.to_xarray()`` makes a dataset of xarray of it."""
+    about = yield from volume(connection, volume_id)
     with tempfile.TemporaryDirectory() as folder:
-        path = yield from download(volume_id, "hdf5", Path(folder) / "volume.h5")
+        path = yield from download(connection, volume_id, "hdf5", Path(folder) / "volume.h5")
         return read_result(path, about)
 
 
-def delete(stored_id: str) -> Generator[Step, Any, None]:
+def delete(connection: Connection, stored_id: str) -> Flow[None]:
+    """Delete a dataset, a volume or a mesh with all that was made of it."""
     kind = PREFIXES.get(stored_id.partition("-")[0])
     if kind is None:
         raise ClientError(f"{stored_id!r} is not the id of a dataset, a volume or a mesh")
     yield Ask("DELETE", f"{PLACES[kind]}/{stored_id}")
+
+
+def _record(model: type[Record], method: str, path: str) -> Flow[Record]:
+    answer = yield Ask(method, path, repeatable=method == "GET")
+    return model.model_validate_json(answer.content)
+
+
+def _start(request: dict[str, Any]) -> Flow[JobRecord]:
+    """Start a job; its key makes sure that it is one, however often the request has to be sent."""
+    options = {"json": request, "headers": {"Idempotency-Key": str(uuid.uuid4())}}
+    answer = yield Ask("POST", "/v1/jobs", options, repeatable=True)
+    return JobRecord.model_validate_json(answer.content)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 from .errors import ClientError, NoAnswer
-from .steps import Ask, Fetch, Pause, Step
+from .steps import Ask, Fetch, Flow, Pause, Step
 
 T = TypeVar("T")
 
@@ -42,7 +42,7 @@ class Patience:
         self._told = told
         self._answered = False
 
-    def through(self, flow: Generator[Step, Any, T]) -> Generator[Step, Any, T]:
+    def through(self, flow: Flow[T]) -> Flow[T]:
         """The same flow, each of its steps repeated where that is safe and worth while."""
         answer: Any = None
         error: ClientError | None = None
@@ -57,7 +57,7 @@ class Patience:
             except ClientError as failure:
                 answer, error = None, failure
 
-    def _done(self, step: Step) -> Generator[Step, Any, Any]:
+    def _done(self, step: Step) -> Flow[Any]:
         begun, pause, errors, waits = time.monotonic(), FIRST_PAUSE_S, 0, False
         last = begun + self._seconds
         if isinstance(step, Ask) and step.until is not None:

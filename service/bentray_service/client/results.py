@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..routes.models.records import VolumeRecord
 from .errors import ClientError
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class Result:
 UNITS = {"speed": "m/s", "coverage": "m", "attenuation": "Np/m", "recovery": "1"}
 
 
-def read_result(path: Path, record: Mapping[str, Any]) -> Result:
+def read_result(path: Path, record: VolumeRecord) -> Result:
     """Read a volume's HDF5 file.
 
     Args:
@@ -70,12 +71,13 @@ def read_result(path: Path, record: Mapping[str, Any]) -> Result:
     from bentray_workers.files.reconstruction import read_reconstruction
     from bentray_workers.files.volume import read_volume
 
-    told = {name: record[name] for name in ("id", "title", "job", "dataset", "sha256") if record.get(name)}
+    named = ("id", "title", "job", "dataset", "sha256")
+    told = {name: str(value) for name in named if (value := getattr(record, name))}
     spacing: tuple[float, ...]
     origin: tuple[float, ...]
-    if record["source"] == "upload":
+    if record.source == "upload":
         volume = read_volume(path)
-        values, units = {"value": volume.values}, {"value": record["unit"]}
+        values, units = {"value": volume.values}, {"value": record.unit}
         spacing, origin = volume.spacing_m, volume.origin_m
     else:
         found = read_reconstruction(path)
@@ -84,7 +86,7 @@ def read_result(path: Path, record: Mapping[str, Any]) -> Result:
         spacing, origin = found.spacing_m, found.origin_m
         told |= {**found.provenance, "settings": str(found.settings.to_dict())}
     shape = next(iter(values.values())).shape
-    axes = tuple(record["axes"].split(","))
+    axes = tuple(record.axes.split(","))
     coordinates = {
         axis: start + step * np.arange(n)
         for axis, n, start, step in zip(axes, shape, origin, spacing, strict=True)

@@ -6,18 +6,14 @@ A flow yields steps and is sent their answers; a step that fails is thrown into 
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias, TypeVar
 
-import httpx
-
-from bentray_kernels.errors import InvalidInput
+T = TypeVar("T")
 
 CHUNK_BYTES = 1024 * 1024
-CONNECT_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -79,24 +75,4 @@ class Pause:
 
 
 Step = Ask | Fetch | Listen | Pause
-
-
-def settings_of(url: str, key: str | None, timeout_s: float) -> dict[str, Any]:
-    """What both kinds of ``httpx`` clients are made with; without a key ``BENTRAY_KEY`` is taken, if set.
-
-    Raises:
-        InvalidInput: for a ``url`` that is no web address.
-    """
-    try:
-        parsed = httpx.URL(url)
-    except httpx.InvalidURL:
-        parsed = httpx.URL()
-    if parsed.scheme not in ("http", "https") or not parsed.host:
-        raise InvalidInput("url", repr(url), "a web address, such as http://127.0.0.1:8000")
-    key = key or os.environ.get("BENTRAY_KEY")
-    return {
-        "base_url": url.rstrip("/"),
-        "headers": {"Authorization": f"Bearer {key}"} if key else {},
-        # The answer to an upload comes after the service has read the whole file.
-        "timeout": httpx.Timeout(timeout_s, connect=CONNECT_S),
-    }
+Flow: TypeAlias = Generator[Step, Any, T]

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import httpx
 
 from bentray_kernels.errors import InvalidInput
 
+from ..routes.models.upload_records import UploadRecord
 from .errors import ClientError, NoAnswer, from_problem
-from .steps import CHUNK_BYTES, Ask, Pause, Step
+from .steps import CHUNK_BYTES, Ask, Flow, Pause
 
 Kind = Literal["dataset", "volume", "mesh"]
-Record = dict[str, Any]
 OnBytes = Callable[[int, int], None]
 
 # Where each kind is found.
@@ -31,10 +31,10 @@ TUS = {"Tus-Resumable": "1.0.0"}
 PIECE = {"Content-Type": "application/offset+octet-stream"}
 
 
-def upload(
+def send_file(
     path: Path, on_progress: OnBytes | None, kind: Kind, resume: str | None, said: Mapping[str, str]
-) -> Generator[Step, Any, Record]:
-    """Upload a file; its value is the record of what it became."""
+) -> Flow[httpx.Response]:
+    """Upload a file; the result is the answer with the record of what it became."""
     if kind not in PLACES:
         raise InvalidInput("kind", repr(kind), " or ".join(PLACES))
     try:
@@ -53,7 +53,7 @@ def upload(
     return (yield from _read(place))
 
 
-def _begin(total: int, said: Mapping[str, str]) -> Generator[Step, Any, str]:
+def _begin(total: int, said: Mapping[str, str]) -> Flow[str]:
     metadata = ",".join(f"{name} {base64.b64encode(text.encode()).decode()}" for name, text in said.items())
     headers = {**TUS, "Upload-Length": str(total), "Upload-Metadata": metadata}
     # One that is begun twice is forgotten, and ends by itself.
@@ -61,7 +61,7 @@ def _begin(total: int, said: Mapping[str, str]) -> Generator[Step, Any, str]:
     return httpx.URL(answer.headers["Location"]).path
 
 
-def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Generator[Step, Any, None]:
+def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Flow[None]:
     """Send what is missing, as often as it takes."""
     failures, reached, pause = 0, -1, FIRST_PAUSE_S
     while True:
@@ -88,15 +88,16 @@ def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Ge
         pause = min(2.0 * pause, LONGEST_PAUSE_S)
 
 
-def _read(place: str) -> Generator[Step, Any, Record]:
+def _read(place: str) -> Flow[httpx.Response]:
     """Wait until the service has read the upload."""
     pause = FIRST_LOOK_S
     while True:
-        record = (yield Ask("GET", place, repeatable=True)).json()
-        if record["state"] == "done":
-            return dict((yield Ask("GET", record["links"]["result"], repeatable=True)).json())
-        if record["state"] == "refused":
-            raise from_problem(record["problem"])
+        record = UploadRecord.model_validate_json((yield Ask("GET", place, repeatable=True)).content)
+        if record.state == "done":
+            result: httpx.Response = yield Ask("GET", record.links["result"], repeatable=True)
+            return result
+        if record.state == "refused":
+            raise from_problem(record.problem)
         yield Pause(pause)
         pause = min(1.5 * pause, LONGEST_LOOK_S)
 

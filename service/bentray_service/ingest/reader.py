@@ -27,7 +27,8 @@ from ..rows.records import UploadRow
 from ..rows.stored_tables import UploadedTable
 from ..rows.tenants import Tenant
 from ..rows.uploads import Uploads
-from ..web.errors import INTERNAL, Problem, from_exception, make
+from ..web.errors import INTERNAL, from_exception, make
+from ..web.problem import Problem
 from .append import discard_unverified, size_of
 from .canonical import Limits, make_canonical
 from .fair_queue import FairQueue

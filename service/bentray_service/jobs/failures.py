@@ -10,7 +10,8 @@ from distributed import KilledWorker
 
 from bentray_kernels.errors import InvalidInput
 
-from ..web.errors import FAILED, INTERNAL, Problem, from_exception, make
+from ..web.errors import FAILED, INTERNAL, from_exception, make
+from ..web.problem import Problem
 
 log = logging.getLogger("bentray.jobs")
 

@@ -10,7 +10,8 @@ from ..wiring import CallerTenant, Service
 from . import quality
 from .bodies import Limit, only
 from .downloads import download, download_of
-from .models.records import DatasetList, DatasetRecord, dataset_record
+from .models.records import DatasetList, DatasetRecord
+from .records import dataset_record
 from .uploads import body_of, take_in
 
 HDF5 = "application/x-hdf5"

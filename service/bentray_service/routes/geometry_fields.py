@@ -10,8 +10,9 @@ from ..rows.tenants import Tenant
 from ..web.errors import described
 from ..wiring import CallerTenant, Parts, Service
 from .bodies import Limit
-from .models.surface_records import FieldList, FieldRecord, field_record
+from .models.surface_records import FieldList, FieldRecord
 from .pictures import PICTURE, picture
+from .records import field_record
 
 router = APIRouter(prefix="/v1/geometry-fields", tags=["geometry-fields"])
 

@@ -14,7 +14,8 @@ from ..web.errors import described
 from ..wiring import CallerTenant, Service
 from .bodies import Limit, SmallBody, only
 from .downloads import download, download_of
-from .models.records import JobList, JobRecord, State, job_record
+from .models.records import JobList, JobRecord, State
+from .records import job_record
 
 log = logging.getLogger("bentray.jobs")
 

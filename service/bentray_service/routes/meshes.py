@@ -20,8 +20,9 @@ from ..rows.records import MeshRow
 from ..web.errors import described
 from ..wiring import Asking, CallerTenant, Service
 from .bodies import Limit, only
-from .models.surface_records import MeshList, MeshRecord, mesh_record
+from .models.surface_records import MeshList, MeshRecord
 from .pictures import while_connected
+from .records import mesh_record
 from .uploads import body_of, take_in
 
 MEDIA_TYPES = (

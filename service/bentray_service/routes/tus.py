@@ -23,7 +23,8 @@ from ..web.errors import described
 from ..web.tus_headers import PLACE, VERSION
 from ..wiring import CallerTenant, Parts, Service
 from .bodies import only
-from .models.upload_records import UploadRecord, result_link, upload_record
+from .models.upload_records import UploadRecord
+from .records import result_link, upload_record
 from .upload_metadata import METADATA, read_metadata
 
 MEDIA_TYPE = "application/offset+octet-stream"

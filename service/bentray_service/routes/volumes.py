@@ -13,7 +13,8 @@ from ..web.errors import described
 from ..wiring import CallerTenant, Service
 from . import slices, volume_data
 from .bodies import Limit, only
-from .models.records import VolumeList, VolumeRecord, volume_record
+from .models.records import VolumeList, VolumeRecord
+from .records import volume_record
 from .upload_metadata import SHAPE, SPACING, volume_given
 from .uploads import body_of, take_in
 

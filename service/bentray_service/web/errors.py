@@ -15,7 +15,6 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
-from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.routing import Match, Mount
@@ -24,6 +23,7 @@ from bentray_kernels.errors import InvalidInput
 
 from .. import refusals
 from .headers import HEADERS as SECURITY
+from .problem import Fault, Problem
 from .request_id import REQUEST_ID
 
 log = logging.getLogger("bentray.errors")
@@ -33,46 +33,6 @@ LONGEST_FOUND = 120
 # Seconds after which it is worth another try, where workers or the queue are full, or the storage is away.
 RETRY_AFTER = "10"
 METHODS = ("DELETE", "GET", "HEAD", "OPTIONS", "PATCH", "POST", "PUT")
-
-
-class Fault(BaseModel):
-    """One wrong value."""
-
-    field: str = Field(description="The name of what is wrong.")
-    found: str = Field(description="What was there.")
-    accepted: str = Field(description="What would have been taken.")
-
-
-class Problem(BaseModel):
-    """An error in the form of RFC 9457."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "type": "/problems/invalid-input",
-                    "title": "A value cannot be used",
-                    "status": 422,
-                    "detail": "index: found 99; accepted: 0 to 29",
-                    "instance": "/v1/volumes/vol-0123456789abcdef0123/slice.png",
-                    "field": "index",
-                    "found": "99",
-                    "accepted": "0 to 29",
-                }
-            ]
-        }
-    )
-
-    type: str = Field(description="Relative address that names the kind of problem.")
-    title: str
-    status: int
-    detail: str = Field(description="What went wrong, in words.")
-    instance: str | None = Field(None, description="The path that was asked for.")
-    field: str | None = None
-    found: str | None = None
-    accepted: str | None = None
-    errors: list[Fault] | None = Field(None, description="Every wrong value, where there may be several.")
-    correlation_id: str | None = Field(None, description="Quote it to find the error in the log.")
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import pytest
@@ -12,6 +13,8 @@ from typer.testing import Result
 
 from bentray_kernels.tomography import Settings
 from bentray_service.client import ClientError
+from bentray_service.routes.models.records import JobRecord
+from bentray_service.web.problem import Problem
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction import reconstruction_run
 
@@ -23,6 +26,7 @@ class StandIn:
     scan: ClassVar[Path]
 
     def __init__(self, url: str, on_wait: Callable[[str], None]) -> None:
+        self.url = url.rstrip("/")
         self.asked.append(url)
 
     def __enter__(self) -> StandIn:
@@ -31,16 +35,16 @@ class StandIn:
     def __exit__(self, *ending: object) -> None:
         self.asked.append("closed")
 
-    def upload(self, path: Path, on_progress: Callable[[int, int], None]) -> dict[str, Any]:
+    def upload(self, path: Path, on_progress: Callable[[int, int], None]) -> SimpleNamespace:
         on_progress(1, 2)
         StandIn.scan = path
-        return {"id": "dataset-1"}
+        return SimpleNamespace(id="dataset-1")
 
-    def submit(self, dataset: str, settings: dict[str, Any]) -> dict[str, Any]:
+    def submit(self, dataset: str, settings: dict[str, Any]) -> JobRecord:
         self.asked.append((dataset, settings))
         return self.record("queued")
 
-    def wait(self, job: str, on_progress: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
+    def wait(self, job: str, on_progress: Callable[[JobRecord], None]) -> JobRecord:
         for state in ("queued", "running", "succeeded"):
             on_progress(self.record(state))
         return self.record("succeeded")
@@ -52,17 +56,28 @@ class StandIn:
         )
         return path
 
-    def record(self, state: str) -> dict[str, Any]:
-        done = 24 if state == "succeeded" else 0
-        return {
+    def record(self, state: str) -> JobRecord:
+        done = state == "succeeded"
+        sweep = {"slice": 0, "sweep": 1, "residual_rms_s": 1e-7, "emitters": 24}
+        given = {
             "id": "job-1",
+            "kind": "reconstruction",
             "state": state,
-            "progress": {"done": done, "total": 24, "phase": "picking"},
-            "history": [{"residual_rms_s": 1e-7}] if done else [],
+            "settings": {},
+            "progress": {"done": 24 * done, "total": 24, "phase": "picking"},
+            "history": [sweep] if done else [],
             "volume": "volume-1" if done else None,
             "seconds": 1.5,
+            "created": 0.0,
             "links": {"self": "/v1/jobs/job-1"},
         }
+        return JobRecord.model_validate({**dict.fromkeys(JobRecord.model_fields), **given})
+
+
+PROBLEM = Problem(
+    type="", title="t", status=422, detail="", field="acquisition/tx", found="999", accepted="0 to 255"
+)
+REFUSED = ClientError("t", 422, PROBLEM)
 
 
 @pytest.fixture
@@ -102,7 +117,7 @@ def test_without_a_folder_it_prints_the_job_and_its_address(
     ("error", "code", "line"),
     [
         (
-            ClientError("t", 422, {"field": "acquisition/tx", "found": "999", "accepted": "0 to 255"}),
+            REFUSED,
             2,
             "bentray: acquisition/tx: found 999; accepted: 0 to 255\n",
         ),

@@ -21,21 +21,21 @@ def test_whole_path(serve, work, scan, tmp_path):
 
     async def call(client):
         dataset = await client.upload(scan(), lambda done, total: sent.append((done, total)))
-        job = await client.submit(dataset["id"], {"nodes": 16, "sweeps": 2})
-        done = await client.wait(job["id"], seen.append)
-        assert (await client.job(job["id"]))["state"] == "succeeded"
-        assert (await client.volume(done["volume"]))["shape"] == [16, 16]
-        assert (await client.slice_png(done["volume"])).startswith(b"\x89PNG")
-        await client.download(done["volume"], "npy", tmp_path / "speed.npy")
-        result = await client.result(done["volume"])
-        await client.delete(dataset["id"])
+        job = await client.submit(dataset.id, {"nodes": 16, "sweeps": 2})
+        done = await client.wait(job.id, seen.append)
+        assert (await client.job(job.id)).state == "succeeded"
+        assert (await client.volume(done.volume)).shape == [16, 16]
+        assert (await client.slice_png(done.volume)).startswith(b"\x89PNG")
+        await client.download(done.volume, "npy", tmp_path / "speed.npy")
+        result = await client.result(done.volume)
+        await client.delete(dataset.id)
         with pytest.raises(ClientError) as gone:
-            await client.volume(done["volume"])
+            await client.volume(done.volume)
         assert gone.value.status == 404
         return dataset, done, result
 
     dataset, done, result = run(serve, call)
-    assert sent[-1] == (dataset["bytes"], dataset["bytes"])
+    assert sent[-1] == (dataset.bytes, dataset.bytes)
     assert seen[-1] == done
     assert result.values["speed"].shape == (16, 16)
     assert (tmp_path / "speed.npy").stat().st_size > 0
@@ -45,15 +45,15 @@ def test_refusals_and_ends(serve, work, scan, tmp_path):
     work.hold.clear()
 
     async def call(client):
-        dataset = (await client.upload(scan()))["id"]
+        dataset = (await client.upload(scan())).id
         with pytest.raises(ClientError, match="magic"):
             await client.submit(dataset, {"eikonal": "magic"})
         job = await client.submit(dataset, {"nodes": 16})
         with pytest.raises(ClientError, match=r"after 0\.1 s"):
-            await client.wait(job["id"], timeout_s=0.1)
-        await client.cancel(job["id"])
+            await client.wait(job.id, timeout_s=0.1)
+        await client.cancel(job.id)
         with pytest.raises(ClientError, match="was cancelled"):
-            await client.wait(job["id"])
+            await client.wait(job.id)
         with pytest.raises(ClientError, match="cannot be read"):
             await client.upload(tmp_path / "none.h5")
         with pytest.raises(ClientError, match="not the id"):

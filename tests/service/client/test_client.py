@@ -18,26 +18,26 @@ def client(serve, work):
 
 @pytest.fixture
 def dataset(client, scan):
-    return client.upload(scan())["id"]
+    return client.upload(scan()).id
 
 
 def test_whole_path(client, scan, tmp_path):
     sent = []
     dataset = client.upload(scan(), lambda done, total: sent.append((done, total)))
-    assert sent[-1] == (dataset["bytes"], dataset["bytes"])
-    job = client.submit(dataset["id"], {"nodes": 16, "sweeps": 2})
+    assert sent[-1] == (dataset.bytes, dataset.bytes)
+    job = client.submit(dataset.id, {"nodes": 16, "sweeps": 2})
     seen = []
-    done = client.wait(job["id"], seen.append)
+    done = client.wait(job.id, seen.append)
     assert seen[-1] == done
-    assert client.volume(done["volume"])["shape"] == [16, 16]
-    assert client.slice_png(done["volume"], quantity="coverage").startswith(b"\x89PNG")
-    assert np.load(client.download(done["volume"], "npy", tmp_path / "speed.npy")).shape == (16, 16)
-    assert client.download(done["volume"], "hdf5", tmp_path / "r.h5").stat().st_size > 0
+    assert client.volume(done.volume).shape == [16, 16]
+    assert client.slice_png(done.volume, quantity="coverage").startswith(b"\x89PNG")
+    assert np.load(client.download(done.volume, "npy", tmp_path / "speed.npy")).shape == (16, 16)
+    assert client.download(done.volume, "hdf5", tmp_path / "r.h5").stat().st_size > 0
     assert not list(tmp_path.glob("*.partial"))
 
 
 def test_a_scan_is_fetched(client, scan, tmp_path):
-    dataset, told = client.upload(scan())["id"], []
+    dataset, told = client.upload(scan()).id, []
     path = client.download_dataset(dataset, tmp_path / "back.h5", lambda *step: told.append(step))
     size = path.stat().st_size
     assert told[-1] == (size, size)
@@ -55,22 +55,22 @@ def test_refusal_carries_the_fields(client, dataset):
 def test_failed_job_raises_its_problem(client, dataset, work):
     work.error = InvalidInput("traveltime", "every pair missing", "at least one pair")
     with pytest.raises(ClientError, match="every pair missing") as caught:
-        client.wait(client.submit(dataset, {"nodes": 16})["id"])
+        client.wait(client.submit(dataset, {"nodes": 16}).id)
     assert caught.value.field == "traveltime"
 
 
 def test_cancelled_job_raises(client, dataset, work):
     work.hold.clear()
     job = client.submit(dataset, {"nodes": 16})
-    client.cancel(job["id"])
+    client.cancel(job.id)
     with pytest.raises(ClientError, match="was cancelled"):
-        client.wait(job["id"])
+        client.wait(job.id)
 
 
 def test_wait_has_an_end(client, dataset, work):
     work.hold.clear()
     with pytest.raises(ClientError, match=r"after 0\.1 s"):
-        client.wait(client.submit(dataset, {"nodes": 16})["id"], timeout_s=0.1)
+        client.wait(client.submit(dataset, {"nodes": 16}).id, timeout_s=0.1)
 
 
 def test_unknown_job(client):
@@ -131,8 +131,8 @@ def test_a_key_is_given_or_in_the_environment(serve, tmp_path, monkeypatch):
 
 def test_a_simulation_is_asked_for_with_its_settings(client):
     job = client.simulate({"nodes": 16, "elements": 16, "snr": 20.0})
-    assert (job["kind"], job["settings"]["elements"], job["settings"]["snr"]) == ("simulation", 16, 20.0)
-    assert job["plan"]["result_bytes"] == 2 * 8 * 16 * 16
-    assert client.simulate()["settings"]["nodes"] == 128
+    assert (job.kind, job.settings["elements"], job.settings["snr"]) == ("simulation", 16, 20.0)
+    assert job.plan.result_bytes == 2 * 8 * 16 * 16
+    assert client.simulate().settings["nodes"] == 128
     with pytest.raises(ClientError, match="nothing, unless waveform is true"):
         client.simulate({"side_m": 0.1})

@@ -18,6 +18,7 @@ import uvicorn
 
 from bentray_service.app import create_app
 from bentray_service.client import AsyncClient, Client, ClientError, flows, patience, uploading
+from bentray_service.client.connection import Connection
 from bentray_service.client.errors import NoAnswer
 from bentray_service.client.patience import Patience
 from bentray_service.client.steps import Ask, Fetch, Pause
@@ -28,6 +29,8 @@ from .cutting_proxy import cutting
 LOOK = Ask("GET", "/v1/jobs/job-1", repeatable=True)
 CANCEL = Ask("POST", "/v1/jobs/job-1/cancel")
 GONE, REFUSED = NoAnswer("gone"), NoAnswer("refused", sent=False)
+
+HERE = Connection("http://localhost:8000")
 
 
 def answered(status: int, retry_after_s: float | None = None) -> ClientError:
@@ -100,7 +103,7 @@ def test_a_wait_with_an_end_of_its_own_ends_there(walk: Walk) -> None:
 
 def test_a_service_that_never_answered_is_given_up_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[str] = []
-    flow = Patience(300.0, told.append).through(flows.record("GET", "/v1/jobs/job-1"))
+    flow = Patience(300.0, told.append).through(flows.job(HERE, "job-1"))
     assert isinstance(next(flow), Ask)
     with pytest.raises(NoAnswer, match="refused"):
         flow.throw(REFUSED)
@@ -128,10 +131,10 @@ def test_a_download_begins_again(walk: Walk, tmp_path: Path) -> None:
 
 
 def test_a_job_has_one_key_however_often_it_is_sent() -> None:
-    step = next(flows.submit("ds-1", None))
+    step = next(flows.submit(HERE, "ds-1"))
     assert isinstance(step, Ask)
     assert step.repeatable
-    other = next(flows.submit("ds-1", None))
+    other = next(flows.submit(HERE, "ds-1"))
     assert isinstance(other, Ask)
     assert step.options["headers"]["Idempotency-Key"] != other.options["headers"]["Idempotency-Key"]
 
@@ -147,18 +150,18 @@ def test_a_job_whose_answer_was_lost_is_started_once(
     """The service gets the request; the connection breaks before the answer."""
     url = serve()
     with Client(url) as client:
-        dataset = client.upload(scan())["id"]
+        dataset = client.upload(scan()).id
     cuts = [1_000]
     told: list[str] = []
     with cutting(url, cuts) as proxy, Client(proxy.url, on_wait=told.append) as client:
         with pytest.raises(ClientError, match="nothing with this id"):
             client.job("job-" + 20 * "0")
         # As long as it takes to pass the cut.
-        jobs = [client.submit(dataset, {"nodes": 16, "sweeps": 1})["id"] for _ in range(4)]
+        jobs = [client.submit(dataset, {"nodes": 16, "sweeps": 1}).id for _ in range(4)]
     assert cuts == []
     assert told[1:] == ["The service answers again."]
     with Client(url) as client:
-        listed = {client.wait(job)["id"] for job in jobs}
+        listed = {client.wait(job).id for job in jobs}
     assert len(listed) == 4
     with Client(url) as client:
         answer = client._http.get("/v1/jobs").json()
@@ -178,7 +181,7 @@ def test_an_upload_is_stored_once_wherever_the_line_breaks(
             client.job("job-" + 20 * "0")
         record = client.upload(source)
     assert cuts == []
-    assert record["bytes"] == size
+    assert record.bytes == size
     with Client(url) as client:
         assert len(client._http.get("/v1/datasets").json()["datasets"]) == 1
 
@@ -188,8 +191,8 @@ def test_so_it_is_asynchronously(serve: Callable[..., str], scan: Callable[..., 
         async with AsyncClient(url, on_wait=told.append) as client:
             with pytest.raises(ClientError, match="nothing with this id"):
                 await client.job("job-" + 20 * "0")
-            dataset = (await client.upload(scan()))["id"]
-            return str((await client.submit(dataset))["id"])
+            dataset = (await client.upload(scan())).id
+            return str((await client.submit(dataset)).id)
 
     url, told = serve(), list[str]()
     cuts = [scan().stat().st_size + 1_000]
@@ -224,7 +227,7 @@ def test_a_job_is_waited_for_while_its_service_is_started_again(
         work.hold.clear()
         with service(tmp_path / "data", 0, cluster) as port:
             client = Client(f"http://127.0.0.1:{port}", poll_s=0.05, on_wait=told.append)
-            job = client.submit(client.upload(scan())["id"], {"nodes": 16, "sweeps": 1})["id"]
+            job = client.submit(client.upload(scan()).id, {"nodes": 16, "sweeps": 1}).id
             done = pool.submit(client.wait, job)
             while not work.calls:
                 time.sleep(0.02)
@@ -233,8 +236,8 @@ def test_a_job_is_waited_for_while_its_service_is_started_again(
         work.hold.set()
         with service(tmp_path / "data", port, cluster), client:
             record = done.result(timeout=60.0)
-            assert client.download(record["volume"], "h5", tmp_path / "image.h5").stat().st_size > 0
-    assert (record["id"], record["state"], len(work.calls)) == (job, "succeeded", 2)
+            assert client.download(record.volume, "h5", tmp_path / "image.h5").stat().st_size > 0
+    assert (record.id, record.state, len(work.calls)) == (job, "succeeded", 2)
     assert told[0].endswith("trying again for up to 300 s.")
     assert told[-1] == "The service answers again."
 
@@ -249,6 +252,6 @@ def test_no_patience_gives_up_at_once(serve: Callable[..., str], soon: None) -> 
 
 def test_h5_is_hdf5(serve: Callable[..., str], scan: Callable[..., Path], work: Any, tmp_path: Path) -> None:
     with Client(serve()) as client:
-        job = client.wait(client.submit(client.upload(scan())["id"], {"nodes": 16, "sweeps": 1})["id"])
-        one, other = (client.download(job["volume"], name, tmp_path / name) for name in ("hdf5", "h5"))
+        job = client.wait(client.submit(client.upload(scan()).id, {"nodes": 16, "sweeps": 1}).id)
+        one, other = (client.download(job.volume, name, tmp_path / name) for name in ("hdf5", "h5"))
     assert np.array_equal(np.fromfile(one, np.uint8), np.fromfile(other, np.uint8))

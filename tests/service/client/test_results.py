@@ -12,8 +12,8 @@ from bentray_service.client.results import Result
 @pytest.fixture
 def result(serve, work, scan):
     with Client(serve(), poll_s=0.02) as client:
-        job = client.submit(client.upload(scan())["id"], {"nodes": 16})
-        return client.result(client.wait(job["id"])["volume"])
+        job = client.submit(client.upload(scan()).id, {"nodes": 16})
+        return client.result(client.wait(job.id).volume)
 
 
 def test_a_reconstruction_has_places_units_and_provenance(result):

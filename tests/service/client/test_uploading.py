@@ -41,8 +41,8 @@ def test_a_large_file_arrives_whole_over_any_line(serve, large, cuts):
     sent, planned = [], len(cuts)
     with cutting(serve(), cuts) as proxy, Client(proxy.url) as client:
         dataset = client.upload(large, lambda done, total: sent.append((done, total)))
-    assert (dataset["bytes"], dataset["sha256"]) == (large.stat().st_size, digest(large))
-    assert sent[-1] == (dataset["bytes"], dataset["bytes"])
+    assert (dataset.bytes, dataset.sha256) == (large.stat().st_size, digest(large))
+    assert sent[-1] == (dataset.bytes, dataset.bytes)
     assert cuts == []
     assert proxy.made > planned
 
@@ -54,7 +54,7 @@ def test_so_it_does_asynchronously(serve, large):
 
     cuts = [MIB, 3 * MIB]
     with cutting(serve(), cuts) as proxy:
-        assert asyncio.run(call(proxy.url))["sha256"] == digest(large)
+        assert asyncio.run(call(proxy.url)).sha256 == digest(large)
     assert cuts == []
 
 
@@ -69,7 +69,7 @@ def test_a_client_that_gave_up_goes_on_later(serve, large, monkeypatch):
     begun = []
     with Client(url) as client:
         dataset = client.upload(large, lambda done, total: begun.append(done), resume=broken.value.upload)
-    assert dataset["sha256"] == digest(large)
+    assert dataset.sha256 == digest(large)
     # What had come was not sent again.
     assert begun[0] > 3 * MIB
 
@@ -112,8 +112,8 @@ def test_volumes_too(serve, tmp_path):
     with Client(serve()) as client:
         for name in ("small.npy", "large.npy"):
             volume = client.upload(tmp_path / name, kind="volume", title="A head", spacing_m="0.002")
-            assert (volume["title"], volume["spacing_m"]) == ("A head", [0.002] * 3)
-            result = client.result(volume["id"])
+            assert (volume.title, volume.spacing_m) == ("A head", [0.002] * 3)
+            result = client.result(volume.id)
             np.testing.assert_array_equal(result.values["value"], np.load(tmp_path / name))
             np.testing.assert_allclose(result.coordinates["y"][:3], [0.0, 0.002, 0.004])
         with pytest.raises(InvalidInput, match="kind"):
@@ -139,7 +139,7 @@ def test_tuspy_interoperates_also_over_a_broken_line(serve, large):
     again.upload()
     assert again.offset == large.stat().st_size
     with Client(url) as client:
-        assert client.upload(large, resume=place.rpartition("/")[2])["sha256"] == digest(large)
+        assert client.upload(large, resume=place.rpartition("/")[2]).sha256 == digest(large)
 
 
 def test_an_empty_file_is_refused(serve, tmp_path):

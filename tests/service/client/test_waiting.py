@@ -1,23 +1,34 @@
 """Waiting: by events while they come, by looking where they do not."""
 
+import json
+
 import pytest
 
 from bentray_service.client.errors import ClientError, NoAnswer
 from bentray_service.client.steps import Ask, Listen, Pause
-from bentray_service.client.waiting import STREAMS, wait
+from bentray_service.client.waiting import STREAMS, wait_for
+from bentray_service.routes.models.records import JobRecord
+
+JOB = {
+    **dict.fromkeys(JobRecord.model_fields),
+    "id": "job-1",
+    "kind": "reconstruction",
+    "settings": {},
+    "progress": {"done": 0, "total": 0, "phase": ""},
+    "history": [],
+    "created": 0.0,
+    "links": {},
+}
 
 
 class Answer:
     def __init__(self, **record):
-        self.record = {"state": "running", "error": None, **record}
-
-    def json(self):
-        return self.record
+        self.content = json.dumps({**JOB, "state": "running", **record})
 
 
 def walk(answers, timeout_s=None):
     """The kinds of steps of a flow that gets these answers, and its value."""
-    flow, steps, answer = wait("job-1", None, timeout_s, 0.01), [], None
+    flow, steps, answer = wait_for("job-1", None, timeout_s, 0.01), [], None
     answers = iter(answers)
     try:
         while True:
@@ -42,7 +53,7 @@ def test_events_make_it_look():
         ]
     )
     assert steps == [Ask, Listen, Listen, Ask, Listen, Listen, Listen, Ask]
-    assert job["state"] == "succeeded"
+    assert job.state == "succeeded"
 
 
 def test_the_end_of_the_stream_makes_it_look():
@@ -62,7 +73,7 @@ def test_a_service_that_is_gone_is_told():
 
 
 def test_ends():
-    problem = {"title": "No", "detail": "nothing there", "field": "x"}
+    problem = {"type": "/problems/x", "status": 422, "title": "No", "detail": "nothing there", "field": "x"}
     with pytest.raises(ClientError, match="nothing there") as failed:
         walk([Answer(state="failed", error=problem)])
     assert failed.value.field == "x"

@@ -2,27 +2,16 @@
 
 from __future__ import annotations
 
-import time
-from contextlib import suppress
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from bentray_kernels.errors import InvalidInput
-from bentray_workers.rendering.refraction_view import check_even
-
-from ...jobs.kinds import KINDS
-from ...rows.records import DatasetRow, JobRow, VolumeRow
-from ...web.errors import Problem
+from ...web.problem import Problem
 
 State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
 # A list in the description, and no tuple: some generators of clients know none.
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
-
-# What jobs read, and where it is found.
-READ = ("dataset", "volume", "mesh")
-LISTED = {"dataset": "datasets", "volume": "volumes", "mesh": "meshes"}
 
 
 class DatasetRecord(BaseModel):
@@ -173,42 +162,3 @@ class VolumeList(BaseModel):
     """Volumes, newest first."""
 
     volumes: list[VolumeRecord]
-
-
-def dataset_record(row: DatasetRow) -> DatasetRecord:
-    here, job = f"/v1/datasets/{row['id']}", row["job_id"]
-    links = {"self": here, "file": f"{here}/file"}
-    if job is not None:
-        links["job"] = f"/v1/jobs/{job}"
-    return DatasetRecord.model_validate({**row, "job": job, "links": links})
-
-
-def job_record(row: JobRow) -> JobRecord:
-    here = f"/v1/jobs/{row['id']}"
-    reads = {what: row[f"{what}_id"] for what in READ}  # type: ignore[literal-required]
-    links = {"self": here} | {what: f"/v1/{LISTED[what]}/{name}" for what, name in reads.items() if name}
-    made: dict[str, str] = {}
-    if row["state"] == "succeeded":
-        made, more = KINDS[row["kind"]].results(row)
-        links |= more
-    if row["state"] in ("queued", "running"):
-        links["cancel"] = f"{here}/cancel"
-    started, progress = row["started"], {**row, "phase": row["phase"] or ""}
-    seconds = None if started is None else (row["finished"] or time.time()) - started
-    found = {**row, **reads, "field": None, **made, "progress": progress, "seconds": seconds, "links": links}
-    return JobRecord.model_validate(found)
-
-
-def volume_record(row: VolumeRow) -> VolumeRecord:
-    here = f"/v1/volumes/{row['id']}"
-    links = {"self": here, "image": f"{here}/slice.png", "data": f"{here}/data"}
-    with suppress(InvalidInput):
-        check_even(tuple(row["shape"]), tuple(row["spacing_m"]))
-        links["refraction"] = f"{here}/refraction.png"
-    job = row.get("job_id")
-    if job is not None:
-        links["job"] = f"/v1/jobs/{job}"
-    absent = dict.fromkeys(("speed_range_mps", "water_speed_mps", "sha256"))
-    source = "upload" if job is None else "reconstruction"
-    more = {"source": source, "job": job, "dataset": row.get("dataset_id"), "links": links}
-    return VolumeRecord.model_validate({**absent, "provenance": {}, **row, **more})

@@ -7,9 +7,6 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
-from ...jobs.kinds import field_links
-from ...rows.records import FieldRow, MeshRow
-
 
 class Repairs(BaseModel):
     """What was done to make one sound surface of a mesh."""
@@ -108,22 +105,3 @@ class FieldList(BaseModel):
     """Geometry fields, newest first."""
 
     geometry_fields: list[FieldRecord]
-
-
-def mesh_record(row: MeshRow) -> MeshRecord:
-    links = {"self": f"/v1/meshes/{row['id']}"}
-    if row["volume_id"] is not None:
-        links["volume"] = f"/v1/volumes/{row['volume_id']}"
-    more = {"volume": row["volume_id"], "closed": row["holes"] == 0, "links": links}
-    return MeshRecord.model_validate({**row, **more})
-
-
-def field_record(row: FieldRow) -> FieldRecord:
-    links, figures = field_links(row["id"]), row["figures"]
-    seconds = {name: figures[f"{name}_seconds"] for name in FieldSeconds.model_fields}
-    links["self"] = links.pop("field")
-    links |= {"mesh": f"/v1/meshes/{row['mesh_id']}", "job": f"/v1/jobs/{row['job_id']}"}
-    more = {"mesh": row["mesh_id"], "job": row["job_id"], "links": links}
-    return FieldRecord.model_validate(
-        {**row, **more, "sizes": figures, "errors": figures, "seconds": seconds}
-    )

@@ -7,11 +7,7 @@ from typing import Literal
 
 from pydantic import BaseModel, Field
 
-from ...rows.records import UploadRow
-from ...web.errors import Problem
-
-# Where each kind is listed.
-PLACES = {"dataset": "/v1/datasets", "volume": "/v1/volumes", "mesh": "/v1/meshes"}
+from ...web.problem import Problem
 
 
 class UploadRecord(BaseModel):
@@ -27,18 +23,3 @@ class UploadRecord(BaseModel):
     created: datetime
     expires: datetime = Field(description="When it goes, unless something comes; what it became stays.")
     links: dict[str, str]
-
-
-def upload_record(row: UploadRow, offset: int) -> UploadRecord:
-    links = {"self": f"/v1/uploads/{row['id']}"}
-    done = row["state"] == "done"
-    if done:
-        links["result"] = result_link(row)
-    result = row["result_id"] if done else None
-    more = {"kind": row["what"], "offset": offset, "result": result, "links": links}
-    return UploadRecord.model_validate({**row, **more})
-
-
-def result_link(row: UploadRow) -> str:
-    """The address of what an upload became."""
-    return f"{PLACES[row['what']]}/{row['result_id']}"

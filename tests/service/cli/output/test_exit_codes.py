@@ -13,6 +13,8 @@ from typer.testing import CliRunner, Result
 from bentray_kernels.errors import InvalidInput
 from bentray_service.cli.output.exit_codes import Commands, WorkFailed, service_answers
 from bentray_service.client import ClientError
+from bentray_service.client.errors import from_problem
+from bentray_service.web.problem import Problem
 
 
 def ending(raised: BaseException | None) -> Result:
@@ -53,17 +55,21 @@ def test_a_fault_of_the_program_keeps_its_traceback() -> None:
     assert isinstance(ending(ZeroDivisionError()).exception, ZeroDivisionError)
 
 
+def refused(status: int, title: str, **fault: str) -> ClientError:
+    return from_problem(Problem(type="", title=title, status=status, detail="", **fault))
+
+
 @pytest.mark.parametrize(
     ("error", "becomes", "words"),
     [
         (
-            ClientError("t", 422, {"field": "tx", "found": "9", "accepted": "0 to 3"}),
+            refused(422, "t", field="tx", found="9", accepted="0 to 3"),
             InvalidInput,
             "tx: found 9",
         ),
-        (ClientError("busy", 503, {"field": "workers", "found": "0", "accepted": "1"}), WorkFailed, "busy"),
+        (refused(503, "busy", field="workers", found="0", accepted="1"), WorkFailed, "busy"),
         (ClientError("no answer from there"), WorkFailed, "no answer from there"),
-        (ClientError("gone", 404, {"title": "gone"}), WorkFailed, "gone"),
+        (refused(404, "gone"), WorkFailed, "gone"),
     ],
 )
 def test_answers_of_the_service_end_a_command_as_they_should(

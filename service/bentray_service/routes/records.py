@@ -1,0 +1,92 @@
+"""From the rows of the database to the records of the REST interface."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.rendering.refraction_view import check_even
+
+from ..jobs.kinds import KINDS, field_links
+from ..rows.records import DatasetRow, FieldRow, JobRow, MeshRow, UploadRow, VolumeRow
+from .models.records import DatasetRecord, JobRecord, VolumeRecord
+from .models.surface_records import FieldRecord, FieldSeconds, MeshRecord
+from .models.upload_records import UploadRecord
+
+# What jobs read, and where it is found.
+READ = ("dataset", "volume", "mesh")
+LISTED = {"dataset": "datasets", "volume": "volumes", "mesh": "meshes"}
+
+
+def dataset_record(row: DatasetRow) -> DatasetRecord:
+    here, job = f"/v1/datasets/{row['id']}", row["job_id"]
+    links = {"self": here, "file": f"{here}/file"}
+    if job is not None:
+        links["job"] = f"/v1/jobs/{job}"
+    return DatasetRecord.model_validate({**row, "job": job, "links": links})
+
+
+def job_record(row: JobRow) -> JobRecord:
+    here = f"/v1/jobs/{row['id']}"
+    reads = {what: row[f"{what}_id"] for what in READ}  # type: ignore[literal-required]
+    links = {"self": here} | {what: f"/v1/{LISTED[what]}/{name}" for what, name in reads.items() if name}
+    made: dict[str, str] = {}
+    if row["state"] == "succeeded":
+        made, more = KINDS[row["kind"]].results(row)
+        links |= more
+    if row["state"] in ("queued", "running"):
+        links["cancel"] = f"{here}/cancel"
+    started, progress = row["started"], {**row, "phase": row["phase"] or ""}
+    seconds = None if started is None else (row["finished"] or time.time()) - started
+    found = {**row, **reads, "field": None, **made, "progress": progress, "seconds": seconds, "links": links}
+    return JobRecord.model_validate(found)
+
+
+def volume_record(row: VolumeRow) -> VolumeRecord:
+    here = f"/v1/volumes/{row['id']}"
+    links = {"self": here, "image": f"{here}/slice.png", "data": f"{here}/data"}
+    with suppress(InvalidInput):
+        check_even(tuple(row["shape"]), tuple(row["spacing_m"]))
+        links["refraction"] = f"{here}/refraction.png"
+    job = row.get("job_id")
+    if job is not None:
+        links["job"] = f"/v1/jobs/{job}"
+    absent = dict.fromkeys(("speed_range_mps", "water_speed_mps", "sha256"))
+    source = "upload" if job is None else "reconstruction"
+    more = {"source": source, "job": job, "dataset": row.get("dataset_id"), "links": links}
+    return VolumeRecord.model_validate({**absent, "provenance": {}, **row, **more})
+
+
+def mesh_record(row: MeshRow) -> MeshRecord:
+    links = {"self": f"/v1/meshes/{row['id']}"}
+    if row["volume_id"] is not None:
+        links["volume"] = f"/v1/volumes/{row['volume_id']}"
+    more = {"volume": row["volume_id"], "closed": row["holes"] == 0, "links": links}
+    return MeshRecord.model_validate({**row, **more})
+
+
+def field_record(row: FieldRow) -> FieldRecord:
+    links, figures = field_links(row["id"]), row["figures"]
+    seconds = {name: figures[f"{name}_seconds"] for name in FieldSeconds.model_fields}
+    links["self"] = links.pop("field")
+    links |= {"mesh": f"/v1/meshes/{row['mesh_id']}", "job": f"/v1/jobs/{row['job_id']}"}
+    more = {"mesh": row["mesh_id"], "job": row["job_id"], "links": links}
+    return FieldRecord.model_validate(
+        {**row, **more, "sizes": figures, "errors": figures, "seconds": seconds}
+    )
+
+
+def upload_record(row: UploadRow, offset: int) -> UploadRecord:
+    links = {"self": f"/v1/uploads/{row['id']}"}
+    done = row["state"] == "done"
+    if done:
+        links["result"] = result_link(row)
+    result = row["result_id"] if done else None
+    more = {"kind": row["what"], "offset": offset, "result": result, "links": links}
+    return UploadRecord.model_validate({**row, **more})
+
+
+def result_link(row: UploadRow) -> str:
+    """The address of what an upload became."""
+    return f"/v1/{LISTED[row['what']]}/{row['result_id']}"
