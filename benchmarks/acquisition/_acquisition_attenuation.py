@@ -59,7 +59,7 @@ def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
 
 def by_waves(dataset: Dataset, quick: bool, progress: Step) -> tuple[Reconstruction, float]:
     """The speed first, then the attenuation; and seconds of one core."""
-    settings = Settings(method="waveform", nodes=48 if quick else 128, wave_bands=3)
+    settings = Settings.of(method="waveform", nodes=48 if quick else 128, bands=3)
     picked = replace(pick(dataset), waveform=dataset.waveform)
     begun = time.process_time()
     result = reconstruct(picked, settings, lambda now: progress(now.done, now.total, "waveforms"))
@@ -70,9 +70,9 @@ def by_rays(dataset: Dataset, nodes: int, progress: Step) -> dict[str, Reconstru
     """Along straight and bent rays: log ratios, these with the focusing of ray tubes off, and by spectra."""
     picked = replace(pick(dataset), waveform=dataset.waveform)
     ways = {
-        "ratios": Settings(nodes=nodes, amplitudes="ratio"),
-        "ratios, focusing taken off": Settings(nodes=nodes, amplitudes="ratio", focusing=True),
-        "spectra": Settings(nodes=nodes, amplitudes="spectrum"),
+        "ratios": Settings.of(nodes=nodes, amplitudes="ratio"),
+        "ratios, focusing taken off": Settings.of(nodes=nodes, amplitudes="ratio", focusing=True),
+        "spectra": Settings.of(nodes=nodes, amplitudes="spectrum"),
     }
     found: dict[str, Reconstruction] = {}
     for rays in ("straight", "curved"):

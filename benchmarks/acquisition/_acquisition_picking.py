@@ -84,7 +84,7 @@ def told(label: str, found: np.ndarray, true: np.ndarray, dataset: Dataset) -> I
 
 def guided(name: str, dataset: Dataset, true: np.ndarray) -> Iterable[Row]:
     """In noise: rms of picks about the arrivals that the image predicts, over that of picks without it."""
-    settings = Settings(method="gauss-newton", rays="straight", attenuation=False, nodes=64)
+    settings = Settings.of(method="gauss-newton", rays="straight", attenuation=False, nodes=64)
     noisy = with_trace_noise(dataset, HARD_SNR)
     errors = [1e9 * (one.delta_tof_s - true) for one in (pick(noisy), alternate(noisy, settings)[0])]
     rms = [float(np.sqrt(np.nanmean(error**2))) for error in errors]

@@ -13,7 +13,7 @@ import numpy as np
 from distributed.protocol.pickle import dumps
 
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.reconstruct import run_reconstruction
+from bentray_kernels.tomography.reconstruction import run_reconstruction
 from bentray_kernels.tomography.reconstruction_graph import TomographyGraph
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.reconstruction.file_scan import FileScan, FileWaveScan
@@ -60,9 +60,9 @@ def of_a_slice(nodes: int, elements: int, sweeps: int) -> Work:
         path = Path(folder) / "slice.h5"
         write_dataset(path, simulate(SimulationSettings(nodes=nodes, elements=elements)))
         stamp = path.stat().st_mtime_ns
-        settings = Settings(nodes=nodes, sweeps=sweeps)
+        settings = Settings(nodes=nodes, iterations=sweeps)
         # A few nodes, to compile and read.
-        for asked in (replace(settings, nodes=16, sweeps=1), settings):
+        for asked in (replace(settings, nodes=16, iterations=1), settings):
             seconds.clear(), sent.clear(), returned.clear()
             run_reconstruction(
                 read_dataset(path),

@@ -60,8 +60,8 @@ def measured(quick: bool, progress: Step) -> Iterable[Row]:
 def scaling(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
     """Seconds on one worker over those on two, of slices and of one slice's emitters; R5's volume by SART."""
     nodes, elements = (64, 64) if quick else (128, 256)
-    sart = Settings(nodes=nodes, sweeps=2 if quick else 3)
-    newton = Settings(nodes=nodes, sweeps=4, method="gauss-newton")
+    sart = Settings(nodes=nodes, iterations=2 if quick else 3)
+    newton = Settings(nodes=nodes, iterations=4, method="gauss-newton")
     ways = {
         "SART slices": (8 if quick else 40, sart),
         "Gauss-Newton slices": (2 if quick else 8, newton),
@@ -113,10 +113,10 @@ def rendering(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Ro
     nodes, elements, slices = (64, 64, 8) if quick else (128, 256, 16)
     path = made_up_scan(folder / "beside.h5", elements, slices)
     picture = folder / "picture.h5"
-    write_reconstruction(picture, reconstruct(cluster.client, path, Settings(nodes=nodes, sweeps=1)))
+    write_reconstruction(picture, reconstruct(cluster.client, path, Settings(nodes=nodes, iterations=1)))
     compute = Compute(cluster, lambda path: path)
     stop, taken = threading.Event(), []
-    settings = Settings(nodes=nodes, sweeps=1000)
+    settings = Settings(nodes=nodes, iterations=1000)
 
     def work() -> None:
         try:
@@ -146,7 +146,7 @@ def resuming(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Row
     """Seconds of a run whose driver was torn away half-way and begun anew, over those of a whole one."""
     nodes = 64 if quick else 128
     path = made_up_scan(folder / "torn.h5", 64 if quick else 256, 8 if quick else 16)
-    settings = Settings(nodes=nodes, sweeps=3 if quick else 6)
+    settings = Settings(nodes=nodes, iterations=3 if quick else 6)
     progress(0, 1, "resuming")
     whole = seconds(lambda: reconstruct(cluster.client, path, settings, work_dir=folder / "whole"))
 

@@ -68,8 +68,8 @@ def volume(nodes: int, slices: int, elements: int, distinct: int, progress: Step
         dataset, truth, inside = scan(nodes, slices, elements, distinct, cluster, progress)
         seconds, error = {}, {}
         for rays in ("straight", "curved"):
-            settings = Settings(
-                rays=rays, nodes=nodes, side_m=TABLE7_SIDE_M, sweeps=SWEEPS, attenuation=False
+            settings = Settings.of(
+                rays=rays, nodes=nodes, side_m=TABLE7_SIDE_M, iterations=SWEEPS, attenuation=False
             )
             seconds[rays], speed = timed(cluster, dataset, settings, progress, f"{nodes}², {rays} rays")
             error[rays] = rmse(speed, truth, inside) / float(np.ptp(truth[inside]))
@@ -117,7 +117,7 @@ def timed(
         write_dataset(
             tiny, replace(dataset, delta_tof_s=dataset.delta_tof_s[:2], slice_z_m=dataset.slice_z_m[:2])
         )
-        reconstruct(cluster.client, tiny, replace(settings, sweeps=1), work_dir=Path(folder))
+        reconstruct(cluster.client, tiny, replace(settings, iterations=1), work_dir=Path(folder))
         started = time.perf_counter()
         result = reconstruct(
             cluster.client,
@@ -163,7 +163,7 @@ def sweep(nodes: int, elements: int) -> tuple[float, int]:
     everyone = np.arange(elements)
     random = np.random.default_rng(0).normal(0.0, 2e-7, (elements, elements))
     dataset = Dataset(ring.positions(), everyone, everyone, COUPLING_MPS, delta_tof_s=random + random.T)
-    settings = Settings(nodes=nodes, side_m=TABLE7_SIDE_M, sweeps=2)
+    settings = Settings(nodes=nodes, side_m=TABLE7_SIDE_M, iterations=2)
     problem = Problem.of(dataset, settings)
     state = advance(problem, settings, begin(start(problem, None)), elements)
     started = time.perf_counter()

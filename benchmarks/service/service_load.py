@@ -67,10 +67,10 @@ def beside_work(url: str, folder: Path, seconds: float, quick: bool) -> Iterator
     nodes, elements, slices = (64, 64, 4) if quick else (128, 256, 16)
     with Client(url) as client:
         small = client.upload(made_up_scan(folder / "small.h5", elements, 1)).id
-        done = client.wait(client.submit(small, {"nodes": nodes, "sweeps": 1}).id)
+        done = client.wait(client.submit(small, {"nodes": nodes, "iterations": 1}).id)
         picture = f"/v1/volumes/{done['volume']}/slice.png"
         several = client.upload(made_up_scan(folder / "several.h5", elements, slices)).id
-        job = client.submit(several, {"nodes": nodes, "sweeps": 1000, "method": "sart"}).id
+        job = client.submit(several, {"nodes": nodes, "iterations": 1000, "method": "sart"}).id
         content = made_up_scan(folder / "sent.h5", 64, 1).read_bytes()
 
         def upload(connection: http.client.HTTPConnection, number: int) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 
 from .command_line import commands
 from .dispersion import dispersion
+from .reconstruction_settings import reconstruction_settings
 from .rest import records, routes
 from .scan_limits import scan_limits
 from .service_settings import settings_table
@@ -20,6 +21,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "dispersion": dispersion,
     "scan limits": scan_limits,
     "service settings": settings_table,
+    "reconstruction settings": reconstruction_settings,
 }
 # Docstrings write absolute values between bars, which reStructuredText reads as substitutions.
 BARS = re.compile(r"``[^`]*``|\|")

@@ -1,10 +1,11 @@
-"""Fields of what is asked for: described once for every door, and held against choices and limits."""
+"""Fields of a request: description, range and choices, declared once and checked in every interface."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
-from typing import Any
+from dataclasses import field, fields
+from functools import cache
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range, check_ranges, ranged
@@ -15,33 +16,58 @@ MOST_RAYS = MOST_PIXELS**2
 
 
 def asked(
-    default: Any, description: str, within: Range | None = None, schema: Mapping[str, Any] | None = None
+    default: Any,
+    description: str,
+    within: Range | None = None,
+    schema: Mapping[str, Any] | None = None,
+    *,
+    unset: str = "",
 ) -> Any:
-    """A field; its description is what OpenAPI and the options of the command say.
+    """A field of a dataclass with the metadata that OpenAPI, the command line and the documentation show.
 
     Args:
         default: of the field.
         description: of the field.
         within: the range of its numbers, checked by ``check``.
-        schema: where there is no such range, what JSON Schema can say of what the field may be beside its
-            type; the class itself checks it.
+        schema: without a range, what JSON Schema states beside the type; the class itself checks it.
+        unset: what holds where the value is None.
     """
+    more = {"description": description, "unset": unset}
     if within is None:
-        return field(default=default, metadata={"description": description, "json_schema_extra": schema})
-    return ranged(default, within, description=description)
+        return field(default=default, metadata={**more, "json_schema_extra": schema})
+    return ranged(default, within, **more)
 
 
-def check(given: Any, choices: Mapping[str, Sequence[str]]) -> None:
-    """Hold fields against what they may be.
+@cache
+def choices_of(kind: type) -> Mapping[str, tuple[str, ...]]:
+    """The accepted words by field: those of its ``Literal`` type, or ``enum`` of its schema."""
+    hints = get_type_hints(kind)
+    found = {}
+    for one in fields(kind):
+        parts = [hints[one.name], *get_args(hints[one.name])]
+        words = next((get_args(part) for part in parts if get_origin(part) is Literal), ())
+        words = words or (one.metadata.get("json_schema_extra") or {}).get("enum", ())
+        if words:
+            found[one.name] = tuple(words)
+    return found
+
+
+def check(given: Any, choices: Mapping[str, Sequence[str]] | None = None, place: str = "") -> None:
+    """Check the fields of a request against their choices and ranges.
 
     Args:
-        given: has the fields.
-        choices: the words that a field may be.
+        given: a dataclass.
+        choices: accepted words by field; None: those of ``choices_of``, and None where it is the default.
+        place: the name of the record in the one that holds it, for the error.
 
     Raises:
         InvalidInput: naming the first field that is wrong.
     """
-    for name, words in choices.items():
-        if getattr(given, name) not in words:
-            raise InvalidInput(name, repr(getattr(given, name)), "one of " + ", ".join(words))
-    check_ranges(given)
+    before = f"{place}." if place else ""
+    kind: Any = type(given)
+    optional = {one.name for one in fields(given) if one.default is None} if choices is None else set()
+    for name, words in (choices_of(kind) if choices is None else choices).items():
+        value = getattr(given, name)
+        if value not in words and not (value is None and name in optional):
+            raise InvalidInput(before + name, repr(value), "one of " + ", ".join(words))
+    check_ranges(given, before)

@@ -1,34 +1,65 @@
-"""Settings as people write them: every name known, every value of its kind."""
+"""Settings of a request: every name known, every value of its type, errors with the name of the setting."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography.settings import Settings
+from bentray_kernels.tomography.settings import NUMERICAL, PLACES, Settings
+from bentray_kernels.tomography.stored_settings import REMOVED, RENAMED
 
 ADAPTER: TypeAdapter[Settings] = TypeAdapter(Settings)
 
 
-def known_only(given: Any, of: type[Any] = Settings) -> Any:
-    """``given`` if it names no field that the dataclass ``of`` has not; what is no mapping is left to others.
+def known_only(given: Any, of: type[Any] = Settings, place: str = "") -> Any:
+    """``given`` if all its names are fields of the dataclass ``of``; other types than a mapping pass.
+
+    Args:
+        given: the JSON value.
+        of: the dataclass; its fields may be dataclasses.
+        place: before the names in the error.
 
     Raises:
-        InvalidInput: with the list of those that exist.
+        InvalidInput: naming the first unknown field, and what to use instead.
     """
-    known = [field.name for field in fields(of)]
-    for name in given if isinstance(given, Mapping) else ():
-        if name not in known:
-            raise InvalidInput(name, repr(given[name])[:80], "a known setting: " + ", ".join(known))
+    known = {field.name: field.default for field in fields(of)}
+    for name, value in given.items() if isinstance(given, Mapping) else ():
+        inner = is_dataclass(known.get(name))
+        if name not in known or (inner and isinstance(value, bool)):
+            instead = _instead(name) if of is Settings else ""
+            accepted = instead or "a known setting: " + ", ".join(known)
+            raise InvalidInput(place + str(name), repr(value)[:80], accepted)
+        if inner:
+            known_only(value, type(known[name]), f"{place}{name}.")
     return given
 
 
+def _instead(name: str) -> str:
+    """What replaces a setting of the flat record of earlier versions; empty for a name that it had not."""
+    if name in REMOVED:
+        return "sart.speed_range_mps alone" if name == "speed_update" else "no such setting: it was removed"
+    new = RENAMED.get(name, name)
+    if new in NUMERICAL:
+        budget = ", from minutes" if new in ("bands", "emitters") else ""
+        return f"no such setting: it is decided automatically{budget}"
+    return f"{PLACES[new]}, which replaces it" if new in PLACES else ""
+
+
+def nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by the names of ``PLACES`` as the nested record has them."""
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        record, _, leaf = PLACES[name].rpartition(".")
+        (found.setdefault(record, {}) if record else found)[leaf] = value
+    return found
+
+
 def settings_of(given: Mapping[str, Any]) -> Settings:
-    """The settings by name, numbers and words as JSON has them; what is left out takes its default.
+    """The settings of a nested record of numbers and words as JSON has them; the rest takes its default.
 
     Raises:
         InvalidInput: naming the first setting that is unknown or wrong, its value and what is accepted.

@@ -202,7 +202,7 @@ class HostileTraffic:
         if dataset.status_code != 201:
             return
         # A job that is deleted with its dataset.
-        settings = {"nodes": 32, "method": "sart", "sweeps": 500, "attenuation": False}
+        settings = {"nodes": 32, "method": "sart", "iterations": 500, "attenuation": {"enabled": False}}
         asked = {"kind": "reconstruction", "dataset": dataset.json()["id"], "settings": settings}
         answer = self._ask("POST", "/v1/jobs", json=asked)
         if answer.status_code != 202:

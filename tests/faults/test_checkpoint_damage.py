@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.tomography import reconstruct
+from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_workers.files.reconstruction import read_reconstruction
 
 from .machine import wait_until
 
 pytestmark = pytest.mark.slow
 
-PLAN = {"nodes": 64, "attenuation": False, "method": "sart", "sweeps": 200}
+PLAN = {"nodes": 64, "attenuation": {"enabled": False}, "method": "sart", "iterations": 200}
 
 
 def test_the_newest_checkpoint_is_flipped_while_the_service_is_dead(machine, scan, scan_file):
@@ -26,6 +27,6 @@ def test_the_newest_checkpoint_is_flipped_while_the_service_is_dead(machine, sca
     assert machine.ended(job)["state"] == "succeeded"
     assert f"{newest.name} is passed over" in (machine.data.parent / "service.log").read_text()
     found = read_reconstruction(machine.files / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
-    assert np.array_equal(found.speed, reconstruct(scan, Settings(**PLAN)).speed)
+    assert np.array_equal(found.speed, reconstruct(scan, from_stored(PLAN)).speed)
     assert older.parent == folder
     wait_until(lambda: not folder.exists())

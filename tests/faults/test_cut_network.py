@@ -8,14 +8,15 @@ import time
 import numpy as np
 import pytest
 
-from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.tomography import reconstruct
+from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_workers.files.reconstruction import read_reconstruction
 
 from .machine import Machine, wait_until
 
 pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
-PLAN = {"nodes": 64, "attenuation": False, "method": "sart", "sweeps": 150}
+PLAN = {"nodes": 64, "attenuation": {"enabled": False}, "method": "sart", "iterations": 150}
 CUT_S = 20.0
 
 
@@ -74,6 +75,6 @@ def test_a_cable_that_is_cut_for_a_while(tmp_path, away, scan, scan_file):
         ip("link", "set", cable, "up")
         assert machine.ended(job)["state"] == "succeeded"
         found = read_reconstruction(machine.files / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
-        assert np.array_equal(found.speed, reconstruct(scan, Settings(**PLAN)).speed)
+        assert np.array_equal(found.speed, reconstruct(scan, from_stored(PLAN)).speed)
     finally:
         machine.close()

@@ -5,7 +5,8 @@ import sqlite3
 import numpy as np
 import pytest
 
-from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.tomography import reconstruct
+from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_workers.files.reconstruction import read_reconstruction
 
 from ..small_disk import MIB, fill
@@ -13,7 +14,7 @@ from .machine import Machine, wait_until
 
 pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
-PLAN = {"nodes": 64, "attenuation": False, "method": "sart", "sweeps": 300}
+PLAN = {"nodes": 64, "attenuation": {"enabled": False}, "method": "sart", "iterations": 300}
 
 
 def test_a_job_waits_for_room(tmp_path, small_disk, scan, scan_file):
@@ -32,7 +33,7 @@ def test_a_job_waits_for_room(tmp_path, small_disk, scan, scan_file):
         found = read_reconstruction(
             small_disk / "tenants/local/volumes" / f"vol-{job.removeprefix('job-')}.h5"
         )
-        assert np.array_equal(found.speed, reconstruct(scan, Settings(**PLAN)).speed)
+        assert np.array_equal(found.speed, reconstruct(scan, from_stored(PLAN)).speed)
         with sqlite3.connect(small_disk / "bentray.sqlite") as database:
             notes = [note for (note,) in database.execute("SELECT note FROM events ORDER BY number")]
         assert "the disk is full; it goes on once there is room" in notes

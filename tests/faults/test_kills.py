@@ -7,7 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.tomography import reconstruct
+from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_workers.files.reconstruction import read_reconstruction
 from bentray_workers.simulation.request import AskedSimulation
 from bentray_workers.simulation.simulation_run import simulate_to_file
@@ -18,12 +19,12 @@ from .machine import wait_until
 
 pytestmark = pytest.mark.slow
 
-PLAN = {"nodes": 64, "attenuation": False}
+PLAN = {"nodes": 64, "attenuation": {"enabled": False}}
 PLANS = [
-    {**PLAN, "method": "sart", "sweeps": 100},
-    {**PLAN, "method": "gauss-newton", "sweeps": 30, "penalty_strength": 0.003, "coarser_grids": 1},
-    {**PLAN, "method": "sart", "sweeps": 60, "resolution_check": True},
-    {**PLAN, "method": "auto", "sweeps": 24},
+    {**PLAN, "method": "sart", "iterations": 100},
+    {**PLAN, "method": "gauss-newton", "iterations": 30, "gauss_newton": {"penalty_strength": 0.003}},
+    {**PLAN, "method": "sart", "iterations": 60, "resolution_check": True},
+    {**PLAN, "method": "auto", "iterations": 24},
 ]
 
 EMISSIONS = 24
@@ -59,7 +60,7 @@ def test_whatever_is_killed_nothing_is_lost(machine, scan, scan_file):
     for job, plan in jobs.items():
         assert machine.ended(job)["state"] == "succeeded"
         found = read_reconstruction(machine.files / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
-        expected = reconstruct(scan, Settings(**plan))
+        expected = reconstruct(scan, from_stored(plan))
         assert np.array_equal(found.speed, expected.speed)
         assert found.history == expected.history
     volumes = machine.http.get("/v1/volumes").json()["volumes"]

@@ -20,7 +20,7 @@ from bentray_workers.reconstruction import reconstruction_run
 
 pytestmark = pytest.mark.slow
 
-PLAN = Settings(nodes=48, attenuation=False, method="gauss-newton", sweeps=20, penalty_strength=0.003)
+PLAN = Settings.of(nodes=48, attenuation=False, method="gauss-newton", iterations=20, penalty_strength=0.003)
 
 
 def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):

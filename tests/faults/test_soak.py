@@ -17,7 +17,8 @@ import pytest
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.phantoms import ONE_HOLE, TABLE6_SIDE_M, sampled, table6
-from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.tomography import reconstruct
+from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_workers.files.dataset import write_dataset
 
 from ..service.ingest.hostile_volumes import npy
@@ -162,7 +163,7 @@ def parties(
 ) -> tuple[list[HonestTenant], HostileTraffic]:
     """Those who ask."""
     write_dataset(folder / "scan.h5", scan)
-    speed = reconstruct(scan, Settings(**PLAN)).speed
+    speed = reconstruct(scan, from_stored(PLAN)).speed
     ball = npy(sampled(ONE_HOLE, 12))
     honest = [
         HonestTenant(ledger, service.url, who, service.keys[who], folder / "scan.h5", ball, folder, speed)

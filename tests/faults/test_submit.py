@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 def test_it_outlives_its_service(machine: Machine, scan: Dataset, scan_file: Path, tmp_path: Path) -> None:
     before = {job["id"] for job in machine.http.get("/v1/jobs").json()["jobs"]}
     words = ["submit", str(scan_file), "--url", str(machine.http.base_url), "-o", str(tmp_path), "--json"]
-    settings = ["--method", "sart", "--nodes", "64", "--sweeps", "120"]
+    settings = ["--method", "sart", "--nodes", "64", "--iterations", "120"]
     with subprocess.Popen(
         [sys.executable, "-m", "bentray_service.cli", *words, *settings],
         stdout=subprocess.PIPE,
@@ -44,5 +44,5 @@ def test_it_outlives_its_service(machine: Machine, scan: Dataset, scan_file: Pat
     assert [job["id"] for job in jobs if job["id"] not in before] == [json.loads(stdout)["job"]]
     found = read_reconstruction(tmp_path / "reconstruction.h5")
     np.testing.assert_array_equal(
-        found.speed, reconstruct(scan, Settings(method="sart", nodes=64, sweeps=120)).speed
+        found.speed, reconstruct(scan, Settings(method="sart", nodes=64, iterations=120)).speed
     )

@@ -126,7 +126,7 @@ class FakeWork:
         self.calls.append((path, settings))
         assert work_dir.is_dir()
         history: tuple[Sweep, ...] = ()
-        passes = [(stage, n) for stage in range(self.stages) for n in range(1, settings.sweeps + 1)]
+        passes = [(stage, n) for stage in range(self.stages) for n in range(1, settings.iterations + 1)]
         on_progress(Progress(0, 8 * len(passes)))
         for stage, sweep in passes:
             while True:
@@ -231,7 +231,7 @@ def submitted() -> Callable[..., dict[str, Any]]:
         asked = {
             "kind": "reconstruction",
             "dataset": dataset,
-            "settings": {"nodes": 16, "sweeps": 3, **settings},
+            "settings": {"nodes": 16, "iterations": 3, **settings},
         }
         answer = http.post("/v1/jobs", json=asked)
         assert answer.status_code == 202, answer.text

@@ -35,8 +35,7 @@ SETTINGS = {
     # Pixels of all pictures together.
     "frames",
     # Settings of a reconstruction that need or exclude another; the lower speed comes first.
-    *("coarser_grids", "decomposition", "focusing", "guided_rounds", "ray_width_m", "rays"),
-    *("speed_bounds_mps", "speed_range_mps", "speed_update"),
+    *("attenuation.focusing", "decomposition", "sart.speed_range_mps", "speed_bounds_mps"),
     # Settings that only some simulations have, or have in a narrower range; what is too large in all.
     *OWN,
     *("coupling_mps", "elements", "nodes", "snr"),

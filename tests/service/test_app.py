@@ -45,7 +45,7 @@ def test_whole_path_with_the_real_kernels(tmp_path, uploaded, submitted, until):
     with open_cluster(workers=1, processes=False) as cluster:
         app = create_app(ServiceSettings(data_dir=tmp_path / "data"), cluster)
         with TestClient(app, base_url="http://localhost") as http:
-            job = submitted(http, uploaded(http), rays="straight", nodes=24, sweeps=3)
+            job = submitted(http, uploaded(http), rays="straight", nodes=24, iterations=3)
             done = until(http, job["id"])
             assert done["state"] == "succeeded", done["error"]
             residuals = [sweep["residual_rms_s"] for sweep in done["history"]]
@@ -119,7 +119,7 @@ def test_two_services_cannot_share_a_folder(start):
 def a_reconstruction(http, scan):
     content = scan().read_bytes()
     dataset = http.post("/v1/datasets", content=content, headers={"Content-Type": "application/x-hdf5"})
-    settings = {"rays": "straight", "nodes": 512, "sweeps": 40}
+    settings = {"rays": "straight", "nodes": 512, "iterations": 40}
     return {"kind": "reconstruction", "dataset": dataset.json()["id"], "settings": settings}
 
 

@@ -25,7 +25,7 @@ KINDS = {
 }
 # Numbers whose range depends on another one, and lists of them.
 OTHERS = {
-    "reconstruction": ("speed_bounds_mps", "speed_range_mps"),
+    "reconstruction": ("speed_bounds_mps", "sart.speed_range_mps"),
     "refraction": ("iso", "index", "surroundings"),
 }
 
@@ -44,7 +44,13 @@ def volume(http):
 
 def numbers_of(kind):
     ranged = [name for name, one in KINDS[kind].__dataclass_fields__.items() if RANGE in one.metadata]
-    return [*ranged, *OTHERS.get(kind, ())]
+    inner = [
+        f"{record}.{name}"
+        for record, outer in KINDS[kind].__dataclass_fields__.items()
+        for name, one in getattr(outer.default, "__dataclass_fields__", {}).items()
+        if RANGE in one.metadata
+    ]
+    return [*ranged, *inner, *OTHERS.get(kind, ())]
 
 
 def refused_by_name(answer, name):
@@ -61,12 +67,14 @@ def test_an_extreme_setting_of_a_job_is_refused_or_taken(http, uploaded, volume,
     refused = 0
     for name in numbers_of(kind):
         for value in (*EXTREMES, list(EXTREMES[:2]), "1e999", "9" * 400):
-            asked = {"kind": kind, "settings": {name: value}, **named.get(kind, {})}
+            record, _, leaf = name.rpartition(".")
+            settings = {record: {leaf: value}} if record else {name: value}
+            asked = {"kind": kind, "settings": settings, **named.get(kind, {})}
             if kind == "geometry-field":
                 asked["mesh"] = "mesh-0123456789abcdef0123"
             answer = http.post("/v1/jobs", content=json.dumps(asked), headers=JSON)
             if answer.status_code == 422:
-                refused_by_name(answer, name.split("_")[0])
+                refused_by_name(answer, leaf.split("_")[0])
                 refused += 1
             else:
                 # There is no such mesh; what was asked of it was right.

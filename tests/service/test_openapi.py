@@ -92,4 +92,4 @@ def test_every_json_body_has_examples_that_are_taken():
 
 def test_settings_of_a_job_are_described():
     settings = json.loads(description())["components"]["schemas"]["Settings"]["properties"]
-    assert {"rays", "eikonal", "nodes", "sweeps"} <= set(settings)
+    assert {"rays", "eikonal", "nodes", "iterations"} <= set(settings)

@@ -1,16 +1,47 @@
 """Sound speed and attenuation from travel times, along straight or bent rays."""
 
-from .errors_against_truth import mean_absolute_error, rmse
-from .problem import Problem
-from .reconstruct import reconstruct
-from .result import RESIDUAL_EDGES_S, Progress, Reconstruction, Sweep, Trial
-from .settings import Settings
+from typing import TYPE_CHECKING
+
+from .settings import (
+    AttenuationSettings,
+    GaussNewtonSettings,
+    PickingSettings,
+    SartSettings,
+    Settings,
+)
+
+if TYPE_CHECKING:
+    from .errors_against_truth import mean_absolute_error, rmse
+    from .problem import Problem
+    from .reconstruction import reconstruct
+    from .result import RESIDUAL_EDGES_S, Progress, Reconstruction, Sweep, Trial
+else:
+    MODULES = {
+        "errors_against_truth": ("mean_absolute_error", "rmse"),
+        "problem": ("Problem",),
+        "reconstruction": ("reconstruct",),
+        "result": ("RESIDUAL_EDGES_S", "Progress", "Reconstruction", "Sweep", "Trial"),
+    }
+
+    def __getattr__(name: str) -> object:
+        """Compiled modules take seconds to load; the command line needs the settings alone for its help."""
+        from importlib import import_module
+
+        for module, names in MODULES.items():
+            if name in names:
+                return getattr(import_module(f".{module}", __name__), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 __all__ = [
     "RESIDUAL_EDGES_S",
+    "AttenuationSettings",
+    "GaussNewtonSettings",
+    "PickingSettings",
     "Problem",
     "Progress",
     "Reconstruction",
+    "SartSettings",
     "Settings",
     "Sweep",
     "Trial",

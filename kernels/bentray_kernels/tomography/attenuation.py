@@ -17,7 +17,7 @@ from .gauss_newton.linear_problem import Linearised, smoothing
 from .gauss_newton.linearisation import Rows, linearise_losses
 from .gauss_newton.ray_matrix import back_project, project
 from .problem import Problem
-from .settings import Settings
+from .settings import GaussNewtonSettings, Settings
 
 # Solutions, each with the outliers, and the total variation, that the misfit of the one before asks for: more
 # with total variation, none of whose solutions is carried to its end.
@@ -43,20 +43,20 @@ def heard(problem: Problem) -> Ints:
 def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
     """Rows of some emitters along the rays of the finished image; any split gives the same.
 
-    With ``settings.focusing`` the amplitudes lose what refraction did to them, and pairs whose ray has passed
-    a caustic are left out.
+    With ``settings.attenuation.focusing`` the amplitudes are corrected for focusing by refraction, and pairs
+    whose ray has passed a caustic are left out.
 
     Raises:
         InvalidInput: for ``focusing`` without a frequency.
     """
-    if settings.focusing:
+    if settings.attenuation.focusing:
         problem = _unfocused(problem, settings, slowness, emitters)
     return linearise_losses(
         problem,
         seen(problem, settings, slowness),
         emitters,
         rays=settings.rays,
-        eikonal=settings.front,
+        eikonal=settings.ray_eikonal,
         front=bending(problem, settings),
     )
 
@@ -76,7 +76,7 @@ def _unfocused(problem: Problem, settings: Settings, slowness: Floats, emitters:
             problem.receivers[ring],
             wavelength_m=wavelength,
             longest_m=problem.longest_m,
-            eikonal=settings.front,
+            eikonal=settings.ray_eikonal,
         )
     return replace(problem, log_ratio=ratio)
 
@@ -104,10 +104,10 @@ def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> 
     image, dual = water, np.zeros((len(shape), *shape))
     # Rays through a blurred speed image are all somewhat off, and none is an outlier: on Table 6 after SART
     # the limit made the error larger, after Gauss–Newton a third smaller.
-    spreads = settings.huber_spreads if settings.method == "gauss-newton" else 0.0
+    spreads = settings.numerics.huber_scale if settings.method == "gauss-newton" else 0.0
     smooth = None
-    if settings.listens:
-        spreads, smooth = settings.huber_spreads / TRACES_STRICTER, _smoothing(problem, settings)
+    if settings.reads_amplitudes:
+        spreads, smooth = settings.numerics.huber_scale / TRACES_STRICTER, _smoothing(problem, settings)
     for _ in range(ROBUST_PASSES if spreads and smooth is None else PASSES):
         left = [
             Rows(p.pointers, p.columns, p.lengths, p.residual - _along(p, image - water), p.emitters)
@@ -123,7 +123,7 @@ def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> 
             density,
             problem.region,
             bounds,
-            settings.penalty_strength * misfit if smooth is None else smooth,
+            settings.gauss_newton.penalty_strength * misfit if smooth is None else smooth,
             "total-variation" if smooth is None else "laplacian",
             huber=limit,
         ).solve(dual)
@@ -133,9 +133,9 @@ def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> 
 def _smoothing(problem: Problem, settings: Settings) -> float:
     """Strength of the penalty of what is read from traces."""
     finest_m = ZONES * math.sqrt(
-        _wavelength(problem, f"amplitudes {settings.amplitudes}") * problem.longest_m
+        _wavelength(problem, f"amplitudes {settings.attenuation.amplitudes}") * problem.longest_m
     )
-    usual = settings.penalty_strength / Settings.penalty_strength
+    usual = settings.gauss_newton.penalty_strength / GaussNewtonSettings.penalty_strength
     return usual * smoothing(2.0 * math.pi * problem.spacing / finest_m)
 
 

@@ -19,7 +19,7 @@ BENDS_WIDER = 2.0
 
 def nodes_wide(problem: Problem, settings: Settings) -> float:
     """Standard deviation of the Gaussian across a ray, nodes; 0 for thin rays."""
-    return settings.ray_width_m / problem.spacing
+    return settings.numerics.ray_width_m / problem.spacing
 
 
 def seen(problem: Problem, settings: Settings, slowness: Floats) -> Floats:
@@ -50,6 +50,6 @@ def bending(problem: Problem, settings: Settings) -> float:
 
     As the user has it; else what is missing to ``BENDS_WIDER`` widths.
     """
-    if settings.front_smoothing_nodes > 0.0:
-        return settings.front_smoothing_nodes
+    if settings.numerics.front_smoothing_nodes > 0.0:
+        return settings.numerics.front_smoothing_nodes
     return nodes_wide(problem, settings) * math.sqrt(BENDS_WIDER**2 - 1.0)

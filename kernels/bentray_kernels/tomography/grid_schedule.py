@@ -19,12 +19,13 @@ def stages(dataset: Dataset, settings: Settings) -> tuple[Settings, ...]:
     All grids have the same side, and every coarser one half as many nodes. Straight rays come first, on the
     coarsest grid.
     """
-    last = replace(settings, coarser_grids=0, straight_sweeps=0)
-    if settings.coarser_grids and settings.side_m is None:
+    coarser, straight = settings.numerics.coarser_grids, settings.numerics.straight_iterations
+    last = settings.changed(coarser_grids=0, straight_iterations=0)
+    if coarser and settings.side_m is None:
         last = replace(last, side_m=image_side(dataset, settings.nodes))
-    found = [replace(last, nodes=-(-settings.nodes // 2**k)) for k in range(settings.coarser_grids, -1, -1)]
-    if settings.straight_sweeps and settings.rays != "straight":
-        found.insert(0, replace(found[0], rays="straight", sweeps=settings.straight_sweeps))
+    found = [replace(last, nodes=-(-settings.nodes // 2**k)) for k in range(coarser, -1, -1)]
+    if straight and settings.rays != "straight":
+        found.insert(0, replace(found[0], rays="straight", iterations=straight))
     return tuple(found)
 
 

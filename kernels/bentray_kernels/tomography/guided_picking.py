@@ -13,7 +13,7 @@ from ..arrays import Floats
 from ..errors import InvalidInput
 from .gauss_newton.gauss_newton_step import look
 from .problem import Problem
-from .reconstruct import reconstruct
+from .reconstruction import reconstruct
 from .result import Progress, Reconstruction
 from .settings import Settings
 
@@ -49,11 +49,11 @@ def alternate(
     """
     if rounds < 0:
         raise InvalidInput("rounds", rounds, "a number >= 0")
-    picked = _listened(dataset, pick(dataset, settings.picker), settings)
+    picked = _listened(dataset, pick(dataset, settings.picking.picker), settings)
     result = reconstruct(_with_traces(picked, dataset, settings), settings, progress)
     for _ in range(rounds):
         expected = predicted_delta(picked, result)
-        again = pick(dataset, settings.picker, predicted_s=expected, reach_s=reach_s)
+        again = pick(dataset, settings.picking.picker, predicted_s=expected, reach_s=reach_s)
         again = _listened(dataset, again, settings)
         settled = same_picks(picked, again)
         picked = again
@@ -65,15 +65,15 @@ def alternate(
 
 def _listened(dataset: Dataset, picked: Dataset, settings: Settings) -> Dataset:
     """What was picked, with the amplitudes that the settings want from the traces."""
-    if not settings.listens:
+    if not settings.reads_amplitudes:
         return picked
-    heard = with_log_ratios(replace(picked, waveform=dataset.waveform), settings.amplitudes)
+    heard = with_log_ratios(replace(picked, waveform=dataset.waveform), settings.attenuation.amplitudes)
     return replace(heard, waveform=None)
 
 
 def _with_traces(picked: Dataset, dataset: Dataset, settings: Settings) -> Dataset:
     """What was picked, with the traces by which trials are judged."""
-    return replace(picked, waveform=dataset.waveform) if settings.tries else picked
+    return replace(picked, waveform=dataset.waveform) if settings.selects_model else picked
 
 
 def predicted_delta(dataset: Dataset, result: Reconstruction) -> Floats:
@@ -106,7 +106,7 @@ def predicted_delta(dataset: Dataset, result: Reconstruction) -> Floats:
     )
     found = np.full((dataset.slices, *shape), np.nan)
     for index in range(dataset.slices):
-        problem = Problem.of(asked, replace(settings, reciprocity=False), index)
+        problem = Problem.of(asked, settings.changed(reciprocity=False), index)
         speed = result.speed if result.speed.ndim == 2 else result.speed[:, :, index]
         rows = look(problem, settings, 1.0 / speed, np.arange(len(dataset.tx)))
         found[index][~level] = -rows.residual

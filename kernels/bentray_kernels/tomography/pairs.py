@@ -136,7 +136,7 @@ def _made(dataset: Dataset, settings: Settings, tx: Ints, rx: Ints, members: Int
         delta = delta[np.ix_(sent, received)]
         ratio = None if ratio is None else ratio[np.ix_(sent, received)]
     emitters, receivers = tx, rx
-    if settings.reciprocity and tx.size and rx.size:
+    if settings.numerics.reciprocity and tx.size and rx.size:
         if ratio is not None:
             _, _, ratio = _with_reverses(tx, rx, ratio)
         emitters, receivers, delta = _with_reverses(tx, rx, delta)

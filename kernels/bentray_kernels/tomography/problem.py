@@ -117,7 +117,7 @@ class Problem:
             log_ratio=found.log_ratio,
             water_attenuation=dataset.water_attenuation_np_m or 0.0,
             wavelength_m=None if frequency is None else dataset.water_speed_mps / frequency,
-            axial_room=settings.axial_room_nodes,
+            axial_room=settings.numerics.axial_margin_nodes,
         )
 
     @property

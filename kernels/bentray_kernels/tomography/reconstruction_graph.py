@@ -69,7 +69,8 @@ class ReconstructionGraph:
         self._stage = self._stage_of(0, start(scan.problem(index, 0), None))
         self._evaluations = self._evaluated()
         self.total = sum(
-            len(scan.problem(index, number).sounding) * plan.sweeps for number, plan in enumerate(self._plans)
+            len(scan.problem(index, number).sounding) * plan.iterations
+            for number, plan in enumerate(self._plans)
         )
         self.total += sum(sum(one.sizes) for one in self._evaluations)
 
@@ -77,7 +78,7 @@ class ReconstructionGraph:
         """What is computed along the rays of the finished image."""
         settings, problem = self._plans[-1], self._scan.problem(self._index)
         evaluations = []
-        if settings.attenuation and problem.log_ratio is not None:
+        if settings.attenuation.enabled and problem.log_ratio is not None:
             emitters = attenuation.heard(problem)
             evaluations.append(Evaluation(trace_attenuation_rays, solve_attenuation, emitters))
         if settings.resolution_check:

@@ -32,11 +32,11 @@ def solver_of(settings: Settings, dimensions: int) -> Solver:
     known = straight or settings.eikonal == DEVIATION
     if settings.method == "sart" and dimensions == 2 and known:
         return Solver(True, None if straight else DEVIATION)
-    return Solver(False, None if straight else settings.front)
+    return Solver(False, None if straight else settings.ray_eikonal)
 
 
 def needs_device(settings: Settings) -> bool:
     """Whether a call of the reconstruction tracks wave fronts on an OpenCL device."""
     # Methods that are tried bend rays whatever was asked for.
-    straight = settings.rays == "straight" and not settings.tries
-    return not straight and METHODS[settings.front].on_device
+    straight = settings.rays == "straight" and not settings.selects_model
+    return not straight and METHODS[settings.ray_eikonal].on_device

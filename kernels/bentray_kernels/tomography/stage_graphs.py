@@ -50,7 +50,7 @@ class Stage(ABC):
         self._at = scan, index, number
         self.number = number
         self._emitters = len(scan.problem(index, number).sounding)
-        self.total = self._emitters * scan.stages()[number].sweeps
+        self.total = self._emitters * scan.stages()[number].iterations
 
     @property
     def done(self) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -18,8 +17,8 @@ EXPLAINED = 1.1
 
 def stopped(settings: Settings, chosen: Trial, noise_s: float) -> Settings:
     """The settings with the misfit to stop at, unless the chosen trial shows that there is less noise."""
-    if settings.stop_rms_s == 0.0 and noise_s <= EXPLAINED * chosen.held_out_rms_s:
-        return replace(settings, stop_rms_s=EXPLAINED * noise_s)
+    if settings.numerics.stop_rms_s is None and noise_s <= EXPLAINED * chosen.held_out_rms_s:
+        return settings.changed(stop_rms_s=EXPLAINED * noise_s)
     return settings
 
 

@@ -37,7 +37,7 @@ def reconstruct(
 ) -> None:
     """Reconstruct a scan into OUTPUT/reconstruction.h5, .png and .json.
 
-    Example:  bentray reconstruct scan.h5 -o result --rays curved --sweeps 6
+    Example:  bentray reconstruct scan.h5 -o result --rays curved --iterations 6
     """
     source, folder = input_file(file), output_folder(output)
     settings = settings_from(asked)
@@ -85,4 +85,4 @@ def useful_workers(dataset: Dataset, settings: Settings) -> int:
 
     problems, cores = count(dataset, settings), len(os.sched_getaffinity(0))
     volume = settings.decomposition == "volume" and settings.method == "gauss-newton"
-    return cores if volume or settings.tries else min(problems, cores)
+    return cores if volume or settings.selects_model else min(problems, cores)

@@ -36,7 +36,7 @@ def reproduce(
 
     Example:  bentray reproduce result/reconstruction.h5 scan.h5
     """
-    from bentray_kernels.tomography.reconstruct import provenance
+    from bentray_kernels.tomography.reconstruction import provenance
     from bentray_workers.files.dataset import read_dataset
     from bentray_workers.files.reconstruction import read_reconstruction
 

@@ -17,6 +17,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.model_selection.selection import advice_of
 from bentray_kernels.tomography.result import Reconstruction
 from bentray_kernels.tomography.settings import Settings
+from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction import reconstruction_run
 from bentray_workers.rendering import geometry_field
@@ -57,7 +58,7 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
         "value": {
             "kind": "reconstruction",
             "dataset": "ds-0123456789abcdef0123",
-            "settings": {"nodes": 128, "sweeps": 8, "rays": "curved"},
+            "settings": {"nodes": 128, "iterations": 8, "rays": "curved"},
         },
     }
 
@@ -74,7 +75,8 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
         return files.volume(volume_of(job["id"]))
 
     def run(self, task: Task) -> Plain | None:
-        settings = self.settings.validate_python(task.settings)
+        # A job may have been stored by an earlier version.
+        settings = from_stored(task.settings)
         progress = task.on_progress, task.stop, task.work_dir, task.on_saved
         result = reconstruction_run.reconstruct(
             task.client, task.source, settings, *progress, share=task.share

@@ -137,7 +137,9 @@ def fault_of(error: Mapping[str, Any], job_kinds: Sequence[str] = ()) -> Fault:
         return Fault(field=field, found=found, accepted=" or ".join(map(repr, job_kinds)))
     cause = context.get("error")
     if isinstance(cause, InvalidInput):
-        return Fault(field=".".join([*where, cause.field]), found=cause.value, accepted=cause.accepted)
+        # A nested record names itself in its errors.
+        inner = where[:-1] if where and cause.field.startswith(f"{where[-1]}.") else where
+        return Fault(field=".".join([*inner, cause.field]), found=cause.value, accepted=cause.accepted)
     if error["type"] == "json_invalid":
         return Fault(field="body", found=f"no JSON ({cause})", accepted="a JSON object")
     if error["type"] in ("model_attributes_type", "dataclass_type"):

@@ -1,7 +1,6 @@
 """Task graphs interrupted anywhere and resumed from a checkpoint give the same bits."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.checkpoint import pack, unpack
 from bentray_kernels.tomography.model_selection.candidates import CandidateGraph
-from bentray_kernels.tomography.reconstruct import MemoryScan
+from bentray_kernels.tomography.reconstruction import MemoryScan
 from bentray_kernels.tomography.reconstruction_graph import (
     ReconstructionGraph,
     check_resolution,
@@ -22,9 +21,14 @@ from bentray_kernels.tomography.reconstruction_graph import (
 )
 
 PLANS = {
-    "sart": Settings(nodes=32, side_m=TABLE6_SIDE_M, sweeps=2, resolution_check=True),
-    "gauss-newton": Settings(
-        method="gauss-newton", nodes=32, side_m=TABLE6_SIDE_M, sweeps=3, coarser_grids=1, straight_sweeps=1
+    "sart": Settings(nodes=32, side_m=TABLE6_SIDE_M, iterations=2, resolution_check=True),
+    "gauss-newton": Settings.of(
+        method="gauss-newton",
+        nodes=32,
+        side_m=TABLE6_SIDE_M,
+        iterations=3,
+        coarser_grids=1,
+        straight_iterations=1,
     ),
 }
 
@@ -81,7 +85,7 @@ def test_a_graph_interrupted_anywhere_gives_the_same_bits(dataset, name, cuts):
 
 
 def test_the_graph_of_a_candidate_keeps_its_misfit(dataset):
-    plan = replace(PLANS["sart"], attenuation=False, resolution_check=False)
+    plan = PLANS["sart"].changed(attenuation=False, resolution_check=False)
 
     def make():
         return CandidateGraph(MemoryScan(dataset, plan, "shown"), 0, MemoryScan(dataset, plan, "held-out"))

@@ -17,7 +17,7 @@ from bentray_kernels.tomography.gauss_newton import gauss_newton_step
 WATER = 1500.0
 RING = Ring(32, 0.08)
 WIDTH = 0.009
-PLAN = Settings(method="gauss-newton", nodes=40, ray_width_m=WIDTH)
+PLAN = Settings.of(method="gauss-newton", nodes=40, ray_width_m=WIDTH)
 
 
 def scan(delta=None):
@@ -41,7 +41,7 @@ def test_thin_rays_see_the_image_itself_and_water_stays_water():
     image = np.full(problem.region.shape, 1.0 / WATER)
     assert np.array_equal(seen(problem, PLAN, image), image)
     image[20, 20] *= 1.1
-    assert seen(problem, replace(PLAN, ray_width_m=0.0), image) is image
+    assert seen(problem, PLAN.changed(ray_width_m=0.0), image) is image
     wide = seen(problem, PLAN, image)
     assert 1.0 / WATER < wide[20, 20] < image[20, 20]
     assert (wide - 1.0 / WATER).sum() == pytest.approx((image - 1.0 / WATER).sum(), rel=1e-3)
@@ -52,8 +52,8 @@ def test_rays_bend_in_what_twice_the_width_leaves_unless_told_otherwise():
     width = nodes_wide(problem, PLAN)
     assert width == pytest.approx(WIDTH / problem.spacing)
     assert np.hypot(width, bending(problem, PLAN)) == pytest.approx(BENDS_WIDER * width)
-    assert bending(problem, replace(PLAN, front_smoothing_nodes=3.0)) == 3.0
-    assert bending(problem, replace(PLAN, ray_width_m=0.0)) == 0.0
+    assert bending(problem, PLAN.changed(front_smoothing_nodes=3.0)) == 3.0
+    assert bending(problem, PLAN.changed(ray_width_m=0.0)) == 0.0
 
 
 def test_wide_times_ask_for_wide_rays():
@@ -67,7 +67,7 @@ def test_wide_times_ask_for_wide_rays():
     delta = np.full(problem.delta_tof.shape, np.nan)
     delta[np.isfinite(problem.delta_tof)] = -rows.residual
     wide = reconstruct(scan(delta), plan)
-    thin = reconstruct(scan(delta), replace(plan, ray_width_m=0.0))
+    thin = reconstruct(scan(delta), plan.changed(ray_width_m=0.0))
     errors = [rmse(one.speed, true, problem.region) for one in (wide, thin)]
     assert errors[0] < 0.75 * errors[1]
 
@@ -75,4 +75,4 @@ def test_wide_times_ask_for_wide_rays():
 @pytest.mark.parametrize("method", ["sart", "auto", "waveform"])
 def test_other_methods_refuse_a_width(method):
     with pytest.raises(InvalidInput, match="ray_width_m"):
-        Settings(method=method, ray_width_m=1e-3)
+        Settings.of(method=method, ray_width_m=1e-3)

@@ -13,7 +13,7 @@ from bentray_kernels.tomography.grid_schedule import stages, start
 
 WATER = 1375.0
 RING = Ring(32, 0.09)
-PLAN = Settings(nodes=48, sweeps=2)
+PLAN = Settings(nodes=48, iterations=2)
 
 
 @pytest.fixture(scope="module")
@@ -28,8 +28,8 @@ def test_without_wishes_there_is_one_stage(scan):
 
 
 def test_coarse_before_fine_and_straight_before_bent(scan):
-    found = stages(scan, replace(PLAN, coarser_grids=1, straight_sweeps=3))
-    assert [(plan.nodes, plan.rays, plan.sweeps) for plan in found] == [
+    found = stages(scan, PLAN.changed(coarser_grids=1, straight_iterations=3))
+    assert [(plan.nodes, plan.rays, plan.iterations) for plan in found] == [
         (24, "straight", 3),
         (24, "curved", 2),
         (48, "curved", 2),
@@ -39,7 +39,7 @@ def test_coarse_before_fine_and_straight_before_bent(scan):
 
 @pytest.mark.parametrize("method", ["sart", "gauss-newton"])
 def test_each_stage_is_in_the_history_and_better_than_water(scan, method):
-    plan = replace(PLAN, method=method, coarser_grids=1, straight_sweeps=1)
+    plan = PLAN.changed(method=method, coarser_grids=1, straight_iterations=1)
     seen = []
     result = reconstruct(scan, plan, seen.append)
     assert [(s.stage, s.sweep) for s in result.history] == [(0, 1), (1, 1), (1, 2), (2, 1), (2, 2)]

@@ -15,8 +15,8 @@ from bentray_kernels.tomography.guided_picking import alternate, predicted_delta
 from ..acquisition.traces import RADIUS_M, blob_delay, scan
 
 ELEMENTS = 24
-SETTINGS = Settings(
-    method="gauss-newton", rays="straight", nodes=32, sweeps=2, attenuation=False, penalty="laplacian"
+SETTINGS = Settings.of(
+    method="gauss-newton", rays="straight", nodes=32, iterations=2, attenuation=False, penalty="laplacian"
 )
 
 

@@ -14,7 +14,7 @@ from bentray_kernels.tomography.problem import MARGIN_NODES
 
 NODES, WATER = 24, 1500.0
 RING, HEIGHTS = Ring(16, 0.04), np.array([-0.012, -0.004, 0.004, 0.012])
-PLAN = Settings(nodes=NODES, decomposition="volume", sweeps=4, relaxation=0.3)
+PLAN = Settings.of(nodes=NODES, decomposition="volume", iterations=4, relaxation=0.3)
 
 
 def problem_of(dataset, plan=PLAN):
@@ -88,7 +88,7 @@ def test_between_slices_the_volume_knows_more(scan):
 
 def test_a_slab_around_the_ring_is_as_good_where_rays_stay_in_it(scan):
     dataset, _ = scan
-    problem, near = problem_of(dataset), problem_of(dataset, replace(PLAN, axial_room_nodes=5))
+    problem, near = problem_of(dataset), problem_of(dataset, PLAN.changed(axial_margin_nodes=5))
     nodes = problem.region.shape[2]
     assert problem.slab(0) == slice(0, nodes)
     if len(problem.receivers) == 1:
@@ -97,7 +97,7 @@ def test_a_slab_around_the_ring_is_as_good_where_rays_stay_in_it(scan):
         return
     assert near.slab(0) == slice(0, MARGIN_NODES + 5 + 1)
     assert near.slab(len(near.emitters) - 1).stop == nodes
-    whole, cut = (reconstruct(dataset, replace(PLAN, axial_room_nodes=n)).speed for n in (None, 5))
+    whole, cut = (reconstruct(dataset, PLAN.changed(axial_margin_nodes=n)).speed for n in (None, 5))
     assert np.abs(whole - cut).max() < 1.0
 
 
@@ -107,10 +107,10 @@ def test_a_region_of_interest_keeps_the_rest_water(scan):
     roi = np.abs(speed - WATER) > 1.0
     truth = Truth(speed, (problem.spacing,) * 3, problem.origin, axes="x,y,z")
     known = replace(dataset, roi=roi, truth=truth)
-    result = reconstruct(known, replace(PLAN, sweeps=1, roi=True))
+    result = reconstruct(known, replace(PLAN, iterations=1, roi=True))
     assert np.allclose(result.speed[~roi], WATER)
     assert not np.allclose(result.speed[roi], WATER)
-    slices = reconstruct(known, replace(PLAN, sweeps=1, roi=True, decomposition="slices"))
+    slices = reconstruct(known, replace(PLAN, iterations=1, roi=True, decomposition="slices"))
     assert (np.abs(slices.speed - WATER) > 1e-6).any()
     with pytest.raises(InvalidInput) as refusal:
         reconstruct(dataset, replace(PLAN, roi=True))

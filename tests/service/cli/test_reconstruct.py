@@ -19,7 +19,7 @@ from bentray_kernels.tomography import Settings
 from bentray_service.cli.reconstruct import useful_workers
 from bentray_workers.files.reconstruction import read_reconstruction
 
-QUICK = ("--nodes", 32, "--sweeps", 2)
+QUICK = ("--nodes", 32, "--iterations", 2)
 
 
 def test_it_writes_volume_picture_and_figures(

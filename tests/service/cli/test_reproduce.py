@@ -17,12 +17,18 @@ from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.files.reconstruction import read_reconstruction, write_reconstruction
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
+WAYS = {
+    "gauss-newton": {"method": "gauss-newton"},
+    "auto": {"method": "auto"},
+    "fixed numerical parameters": {"subset": 4, "coarser_grids": 0, "relaxation_decay": 0.5},
+}
 
-@pytest.fixture(params=["gauss-newton", "auto"])
+
+@pytest.fixture(params=WAYS.values(), ids=list(WAYS))
 def made(request: pytest.FixtureRequest, scan_file: Path, tmp_path: Path) -> Path:
     """A result of each way to choose what is done."""
     path = tmp_path / "reconstruction.h5"
-    settings = Settings(nodes=24, sweeps=2, method=request.param, seed=7)
+    settings = Settings.of(nodes=24, iterations=2, seed=7, **request.param)
     write_reconstruction(path, reconstruct(None, scan_file, settings))
     return path
 

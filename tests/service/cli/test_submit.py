@@ -52,7 +52,7 @@ class StandIn:
     def download(self, volume: str, format: str, path: Path) -> Path:  # noqa: A002
         assert (volume, format) == ("volume-1", "hdf5")
         write_reconstruction(
-            path, reconstruction_run.reconstruct(None, StandIn.scan, Settings(nodes=24, sweeps=1))
+            path, reconstruction_run.reconstruct(None, StandIn.scan, Settings(nodes=24, iterations=1))
         )
         return path
 
@@ -90,11 +90,13 @@ def client(monkeypatch: pytest.MonkeyPatch) -> type[StandIn]:
 def test_it_sends_the_scan_and_fetches_three_files(
     bentray: Callable[..., Result], client: type[StandIn], scan_file: Path, tmp_path: Path
 ) -> None:
-    result = bentray("submit", scan_file, "--url", "http://lab:8000", "-o", tmp_path, "--sweeps", 1, "--json")
+    result = bentray(
+        "submit", scan_file, "--url", "http://lab:8000", "-o", tmp_path, "--iterations", 1, "--json"
+    )
     assert result.exit_code == 0
     url, (dataset, settings), closed = client.asked
     assert (url, dataset, closed) == ("http://lab:8000", "dataset-1", "closed")
-    assert settings == Settings(sweeps=1).to_dict()
+    assert settings == Settings(iterations=1).to_dict()
     said = json.loads(result.stdout)
     assert said["job"] == "job-1"
     assert said["seconds"] == 1.5

@@ -21,7 +21,7 @@ def test_whole_path(serve, work, scan, tmp_path):
 
     async def call(client):
         dataset = await client.upload(scan(), lambda done, total: sent.append((done, total)))
-        job = await client.submit(dataset.id, {"nodes": 16, "sweeps": 2})
+        job = await client.submit(dataset.id, {"nodes": 16, "iterations": 2})
         done = await client.wait(job.id, seen.append)
         assert (await client.job(job.id)).state == "succeeded"
         assert (await client.volume(done.volume)).shape == [16, 16]

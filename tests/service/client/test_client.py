@@ -25,7 +25,7 @@ def test_whole_path(client, scan, tmp_path):
     sent = []
     dataset = client.upload(scan(), lambda done, total: sent.append((done, total)))
     assert sent[-1] == (dataset.bytes, dataset.bytes)
-    job = client.submit(dataset.id, {"nodes": 16, "sweeps": 2})
+    job = client.submit(dataset.id, {"nodes": 16, "iterations": 2})
     seen = []
     done = client.wait(job.id, seen.append)
     assert seen[-1] == done

@@ -157,7 +157,7 @@ def test_a_job_whose_answer_was_lost_is_started_once(
         with pytest.raises(ClientError, match="nothing with this id"):
             client.job("job-" + 20 * "0")
         # As long as it takes to pass the cut.
-        jobs = [client.submit(dataset, {"nodes": 16, "sweeps": 1}).id for _ in range(4)]
+        jobs = [client.submit(dataset, {"nodes": 16, "iterations": 1}).id for _ in range(4)]
     assert cuts == []
     assert told[1:] == ["The service answers again."]
     with Client(url) as client:
@@ -227,7 +227,7 @@ def test_a_job_is_waited_for_while_its_service_is_started_again(
         work.hold.clear()
         with service(tmp_path / "data", 0, cluster) as port:
             client = Client(f"http://127.0.0.1:{port}", poll_s=0.05, on_wait=told.append)
-            job = client.submit(client.upload(scan()).id, {"nodes": 16, "sweeps": 1}).id
+            job = client.submit(client.upload(scan()).id, {"nodes": 16, "iterations": 1}).id
             done = pool.submit(client.wait, job)
             while not work.calls:
                 time.sleep(0.02)
@@ -252,6 +252,6 @@ def test_no_patience_gives_up_at_once(serve: Callable[..., str], soon: None) -> 
 
 def test_h5_is_hdf5(serve: Callable[..., str], scan: Callable[..., Path], work: Any, tmp_path: Path) -> None:
     with Client(serve()) as client:
-        job = client.wait(client.submit(client.upload(scan()).id, {"nodes": 16, "sweeps": 1}).id)
+        job = client.wait(client.submit(client.upload(scan()).id, {"nodes": 16, "iterations": 1}).id)
         one, other = (client.download(job.volume, name, tmp_path / name) for name in ("hdf5", "h5"))
     assert np.array_equal(np.fromfile(one, np.uint8), np.fromfile(other, np.uint8))

@@ -115,7 +115,7 @@ def test_from_settings_to_an_image(serving, until, tmp_path):
             "links": again["links"],
         }
         # And it is reconstructed as any scan.
-        settings = {"nodes": 16, "sweeps": 1, "attenuation": False}
+        settings = {"nodes": 16, "iterations": 1, "attenuation": {"enabled": False}}
         asked = {"kind": "reconstruction", "dataset": made["id"], "settings": settings}
         image = until(http, http.post("/v1/jobs", json=asked).json()["id"])
         assert (image["state"], image["dataset"]) == ("succeeded", made["id"]), image["error"]

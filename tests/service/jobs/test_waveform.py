@@ -24,7 +24,7 @@ from ...kernels.tomography.waveform.scans import scan
 from ..conftest import ENDED, HDF5
 
 PATIENCE_S = 300.0
-ASKED = {"method": "waveform", "nodes": 24, "sweeps": 1, "wave_bands": 2, "wave_emitters": 4}
+ASKED = {"method": "waveform", "nodes": 24, "iterations": 1, "minutes": 0.01}
 
 
 @pytest.fixture
@@ -78,7 +78,7 @@ def test_a_torn_job_gives_the_image_of_one_process(http, torn, tmp_path):
     events = http.app.state.parts.jobs.events(LOCAL, job["id"])
     assert "the workers were away; it goes on when they are back" in {event["note"] for event in events}
 
-    expected = reconstruct(replace(pick(scan()), waveform=scan().waveform), Settings(**ASKED))
+    expected = reconstruct(replace(pick(scan()), waveform=scan().waveform), Settings.of(**ASKED))
     answer = http.get(f"/v1/volumes/{job['volume']}/data", params={"format": "npy"})
     np.testing.assert_array_equal(np.load(io.BytesIO(answer.content)).squeeze(), expected.speed)
     record = http.get(f"/v1/volumes/{job['volume']}").json()

@@ -123,10 +123,13 @@ def test_unknown_setting_lists_the_known_ones(http, dataset):
         ({"nodes": 1}, "settings.nodes"),
         ({"nodes": "many"}, "settings.nodes"),
         ({"rays": "wavy"}, "settings.rays"),
-        ({"relaxation": 2}, "settings.relaxation"),
+        ({"sart": {"relaxation": 2}}, "settings.sart.relaxation"),
+        ({"sart": {"relaxed": 2}}, "settings.sart.relaxed"),
+        ({"sart": 2}, "settings.sart"),
+        ({"gauss_newton": {"penalty_strength": "much"}}, "settings.gauss_newton.penalty_strength"),
         ({"speed_bounds_mps": [-1, 1500]}, "settings.speed_bounds_mps"),
         ({"speed_bounds_mps": [0, 1500]}, "settings.speed_bounds_mps"),
-        ({"speed_update": "data-driven"}, "settings.speed_range_mps"),
+        ({"method": "auto", "sart": {"speed_range_mps": [1400, 1600]}}, "settings.sart.speed_range_mps"),
         ([], "settings"),
     ],
 )
@@ -137,6 +140,28 @@ def test_wrong_settings(http, dataset, settings, field):
     assert body["status"] == 422
     assert body["field"].startswith(field)
     assert body["errors"][0]["accepted"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "accepted"),
+    [
+        ("sweeps", 3, "iterations, which replaces it"),
+        ("relaxation", 0.1, "sart.relaxation, which replaces it"),
+        ("attenuation", False, "attenuation.enabled, which replaces it"),
+        ("picker", "aic", "picking.picker, which replaces it"),
+        ("coarser_grids", 1, "no such setting: it is decided automatically"),
+        ("wave_bands", 1, "no such setting: it is decided automatically, from minutes"),
+        ("wave_misfit", "correlation", "no such setting: it was removed"),
+        ("speed_update", "fixed", "sart.speed_range_mps alone"),
+        ("numerics", {}, "a known setting: "),
+    ],
+)
+def test_a_setting_of_the_earlier_flat_record_is_refused_with_what_to_use_instead(
+    http, dataset, name, value, accepted
+):
+    body = problem(ask(http, dataset, {name: value}))
+    assert (body["status"], body["field"]) == (422, f"settings.{name}")
+    assert body["accepted"].startswith(accepted)
 
 
 def test_every_wrong_value_is_listed(http, dataset):

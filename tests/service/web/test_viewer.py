@@ -49,7 +49,7 @@ def test_without_jobs_it_says_what_to_do(page, serve):
     page.get_by_text("Nothing has run yet").wait_for()
     page.get_by_text("ready, 1 worker").wait_for()
     assert page.get_by_role("button", name="Start").is_disabled()
-    expect(page.get_by_label("Iterations")).to_have_value(str(Settings().sweeps))
+    expect(page.get_by_label("Iterations")).to_have_value(str(Settings().iterations))
 
 
 def test_upload_start_watch(page, serve, scan, work):

@@ -11,7 +11,7 @@ from bentray_workers.cluster.resources import OPENCL
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction import reconstruction_run
 
-WITH_DEVICE = Settings(nodes=16, sweeps=1, eikonal="fim-opencl")
+WITH_DEVICE = Settings(nodes=16, iterations=1, eikonal="fim-opencl")
 
 
 @pytest.fixture

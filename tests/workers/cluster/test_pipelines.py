@@ -23,7 +23,7 @@ from bentray_workers.rendering.turntable import Turntable, draw_turntable
 from bentray_workers.simulation.request import AskedSimulation
 from bentray_workers.simulation.simulation_run import simulate_to_file
 
-PLAN = Settings(nodes=32, sweeps=6, method="gauss-newton", resolution_check=True)
+PLAN = Settings(nodes=32, iterations=6, method="gauss-newton", resolution_check=True)
 SCAN = AskedSimulation(
     waveform=True, nodes=32, elements=16, frequency_hz=2e5, side_m=0.03, emissions=8, snr=20.0
 )

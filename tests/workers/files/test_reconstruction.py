@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography import Sweep
+from bentray_kernels.tomography import Settings, Sweep
+from bentray_kernels.tomography.numerics import recorded
 from bentray_workers.files.reconstruction import read_reconstruction, write_reconstruction
 
 from .reconstructions import made
@@ -43,6 +44,13 @@ def test_bands_of_a_refinement_come_back(tmp_path):
         del file["history/misfit"]
     with pytest.raises(InvalidInput, match="history/misfit"):
         read_reconstruction(tmp_path / "r.h5")
+
+
+def test_numerical_parameters_come_back(tmp_path):
+    settings = Settings.of(nodes=24, subset=4, bands=2)
+    result = replace(made(), settings=settings, provenance=recorded(settings.numerics))
+    write_reconstruction(tmp_path / "r.h5", result)
+    assert read_reconstruction(tmp_path / "r.h5").settings == settings
 
 
 def test_a_result_without_history_comes_back(tmp_path):
@@ -90,7 +98,7 @@ def attr(name, value):
         ("@settings", attr("settings", "not JSON")),
         ("@settings", attr("settings", "[1]")),
         ("@settings", attr("settings", '{"from": "the future"}')),
-        ("@settings", attr("settings", '{"sweeps": "many"}')),
+        ("@settings", attr("settings", '{"iterations": "many"}')),
         ("rays", attr("settings", '{"rays": "wavy"}')),
         ("@provenance", attr("provenance", "")),
         ("history/sweep", lambda f: f["history"].pop("sweep")),

@@ -18,10 +18,10 @@ from ..files.reconstructions import made
 @pytest.mark.parametrize(
     "settings",
     [
-        Settings(nodes=100, coarser_grids=2),
-        Settings(nodes=99, coarser_grids=2, straight_sweeps=3),
-        Settings(nodes=64, straight_sweeps=1),
-        Settings(nodes=64, coarser_grids=1, straight_sweeps=1, rays="straight"),
+        Settings.of(nodes=100, coarser_grids=2),
+        Settings.of(nodes=99, coarser_grids=2, straight_iterations=3),
+        Settings.of(nodes=64, straight_iterations=1),
+        Settings.of(nodes=64, coarser_grids=1, straight_iterations=1, rays="straight"),
     ],
 )
 def test_the_names_are_those_of_the_stages_that_are_made(settings):

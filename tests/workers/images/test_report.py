@@ -69,7 +69,7 @@ def test_each_image_has_its_own_limits_and_the_resolution_check_those_from_0_to_
 
 def test_the_stages_are_named_and_the_choice_of_auto_is_told(drawn):
     history = (*(Sweep(0, n, 1e-7, 4, 0) for n in (1, 2)), Sweep(0, 1, 9e-8, 4, 1))
-    plan = replace(made().settings, nodes=64, coarser_grids=1)
+    plan = made().settings.changed(nodes=64, coarser_grids=1)
     trials = (
         Trial({"rays": "curved", "method": "sart"}, 4e-8, 3e-8),
         Trial({"rays": "straight", "method": "sart"}, 9e-8, 8e-8),

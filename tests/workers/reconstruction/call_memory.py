@@ -19,7 +19,7 @@ from benchmarks.shared._peak_memory import peak
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.reconstruct import MemoryScan
+from bentray_kernels.tomography.reconstruction import MemoryScan
 from bentray_kernels.tomography.reconstruction_graph import ReconstructionGraph
 
 
@@ -71,9 +71,9 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
 
 
 def main(settings: dict[str, Any], elements: int, heights: int) -> None:
-    asked = Settings(**settings)
+    asked = Settings.of(**settings)
     # Loading compiled code takes memory too, here and not in the forks.
-    small = Settings(**{**settings, "nodes": 16})
+    small = Settings.of(**{**settings, "nodes": 16})
     for _ in range(2):
         bytes_of(scan(8, heights and 2), small)
     sys.stdout.write(json.dumps(bytes_of(scan(elements, heights), asked)) + "\n")

@@ -19,7 +19,7 @@ from bentray_workers.reconstruction.memory import arrival_memory
 from ...kernels.acquisition.traces import FREQUENCY_HZ, RATE_HZ, absorbed, blob_delay, scan
 
 ELEMENTS = 16
-PLAN = Settings(nodes=24, sweeps=1, rays="straight", examine=False)
+PLAN = Settings.of(nodes=24, iterations=1, rays="straight", examine=False)
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def lossy():
 
 def test_jobs_read_what_is_read_in_memory_whoever_picked(lossy, tmp_path, monkeypatch):
     monkeypatch.setattr(arrival_memory, "CALL_SAMPLES", 30_000)
-    plan = replace(PLAN, amplitudes="spectrum")
+    plan = PLAN.changed(amplitudes="spectrum")
     picked = replace(pick(lossy), waveform=lossy.waveform)
     expected = reconstruct_here(picked, plan)
     middle = expected.attenuation[12, 12]
@@ -53,8 +53,8 @@ def test_jobs_read_what_is_read_in_memory_whoever_picked(lossy, tmp_path, monkey
 def test_a_scan_without_traces_and_focusing_of_spectra_are_refused(lossy, tmp_path):
     write_dataset(tmp_path / "scan.h5", pick(lossy))
     with pytest.raises(InvalidInput, match="waveform/object"):
-        reconstruction_run.reconstruct(None, tmp_path / "scan.h5", replace(PLAN, amplitudes="ratio"))
+        reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN.changed(amplitudes="ratio"))
     with pytest.raises(InvalidInput, match="focusing"):
-        Settings(amplitudes="spectrum", focusing=True)
+        Settings.of(amplitudes="spectrum", focusing=True)
     with pytest.raises(InvalidInput, match="amplitudes"):
-        Settings(amplitudes="height")
+        Settings.of(amplitudes="height")

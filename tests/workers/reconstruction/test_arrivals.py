@@ -26,7 +26,7 @@ from ...kernels.tomography.waveform.scans import SETTINGS
 from ...kernels.tomography.waveform.scans import scan as wave_scan
 
 ELEMENTS = 16
-PLAN = Settings(nodes=24, sweeps=1)
+PLAN = Settings(nodes=24, iterations=1)
 
 
 @cache
@@ -113,7 +113,7 @@ def test_a_clean_scan_gives_the_image_that_it_gave_unexamined(tmp_path):
     result = reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN)
     np.testing.assert_array_equal(result.speed, expected.speed)
     assert result.provenance == {**expected.provenance, "quality": "nothing found"}
-    plain = reconstruction_run.reconstruct(None, tmp_path / "scan.h5", replace(PLAN, examine=False))
+    plain = reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN.changed(examine=False))
     np.testing.assert_array_equal(plain.speed, expected.speed)
     assert plain.provenance == expected.provenance
 
@@ -156,7 +156,7 @@ def test_channels_put_back_give_the_image_of_the_clean_scan(tmp_path):
     result = reconstruction_run.reconstruct(None, path, PLAN)
     np.testing.assert_array_equal(result.speed, right)
     assert "swapped channels" in result.provenance["quality"]
-    taken = reconstruction_run.reconstruct(None, path, replace(PLAN, examine=False))
+    taken = reconstruction_run.reconstruct(None, path, PLAN.changed(examine=False))
     assert not np.array_equal(taken.speed, right)
     assert "quality" not in taken.provenance
 

@@ -20,10 +20,10 @@ from ...kernels.acquisition.traces import blob_delay, scan
 from ..cluster.tearing import torn_runs
 
 ELEMENTS = 16
-ALONE = Settings(
-    method="gauss-newton", rays="straight", nodes=24, sweeps=2, penalty="laplacian", examine=False
+ALONE = Settings.of(
+    method="gauss-newton", rays="straight", nodes=24, iterations=2, penalty="laplacian", examine=False
 )
-PLAN = replace(ALONE, guided_rounds=2)
+PLAN = ALONE.changed(guided_rounds=2)
 
 
 @cache
@@ -77,7 +77,7 @@ def test_slices_are_guided_by_their_own_images_and_faults_stay_corrected(path, t
         traces[1, :, 3] *= -1.0
     stacked = replace(noisy(), waveform=Waveform(*both), slice_z_m=np.array([0.0, 0.01]))
     write_dataset(tmp_path / "two.h5", stacked)
-    plan = replace(PLAN, guided_rounds=1, examine=True)
+    plan = PLAN.changed(guided_rounds=1, examine=True)
     one, two = (reconstruction_run.reconstruct(None, file, plan) for file in (path, tmp_path / "two.h5"))
     for k in range(2):
         np.testing.assert_array_equal(two.speed[..., k], one.speed)
@@ -85,7 +85,7 @@ def test_slices_are_guided_by_their_own_images_and_faults_stay_corrected(path, t
 
 
 def test_the_settings_of_a_guided_result_make_it_again(path):
-    plan = replace(PLAN, method="auto", rays="curved", guided_rounds=1)
+    plan = PLAN.changed(method="auto", rays="curved", guided_rounds=1)
     first = reconstruction_run.reconstruct(None, path, plan)
     assert first.settings.method != "auto"
     assert first.settings.guided_rounds == 1
@@ -106,4 +106,4 @@ def test_times_that_came_with_the_scan_are_not_sought_again(tmp_path):
 @pytest.mark.parametrize(("rounds", "decomposition"), [(-1, "slices"), (11, "slices"), (1, "volume")])
 def test_what_cannot_be_guided_is_refused(rounds, decomposition):
     with pytest.raises(InvalidInput, match="guided_rounds"):
-        Settings(guided_rounds=rounds, decomposition=decomposition)
+        Settings.of(guided_rounds=rounds, decomposition=decomposition)

@@ -53,7 +53,7 @@ def ring(elements, heights):
     ids=["sart 64", "sart 96", "gauss-newton 64", "gauss-newton 96", "gauss-newton volume", "sart volume"],
 )
 def test_calls_take_what_the_plan_says(asked, elements, heights):
-    settings = {**asked, "sweeps": 2}
+    settings = {**asked, "iterations": 2}
     # Freed arrays go back at once, so that a fork's peak is that of its own.
     environment = {
         **os.environ,
@@ -64,7 +64,7 @@ def test_calls_take_what_the_plan_says(asked, elements, heights):
     command = [sys.executable, str(PROGRAM), json.dumps(settings), str(elements), str(heights)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     measured = json.loads(done.stdout)
-    told = plan(ring(elements, heights), Settings(**settings), []).call_bytes
+    told = plan(ring(elements, heights), Settings.of(**settings), []).call_bytes
     assert set(told) == set(measured)
     # Of the smallest calls a few pages more or less that a fork happens to touch are a third.
     wrong = {
@@ -117,7 +117,7 @@ def test_a_device_lane_needs_a_worker_that_offers_it():
 )
 def test_the_choice_is_told_in_a_sentence(changes, decomposition, words):
     scan = replace(RING, slices=40, pairs=40 * 256**2, height_m=0.05)
-    found = plan(scan, Settings(**changes), [Offer(0, BOTH)])
+    found = plan(scan, Settings.of(**changes), [Offer(0, BOTH)])
     assert found.decomposition == decomposition
     assert words in found.why
     assert found.why.endswith(".")
@@ -133,10 +133,10 @@ def test_traces_are_planned_for():
     assert found.tasks > plan(RING, Settings(nodes=64), []).tasks + 2 * 64
     # No call holds more than an emission of what is 3 GiB.
     assert found.largest[1] < scan.traces_bytes / 8
-    unseen = plan(scan, Settings(nodes=64, examine=False), [])
+    unseen = plan(scan, Settings.of(nodes=64, examine=False), [])
     assert "measure" not in unseen.call_bytes
     assert "settle" in plan(replace(RING, period=True), Settings(), []).call_bytes
-    assert "settle" not in plan(replace(RING, period=True), Settings(examine=False), []).call_bytes
+    assert "settle" not in plan(replace(RING, period=True), Settings.of(examine=False), []).call_bytes
 
 
 def test_waves_are_planned_for():
@@ -149,7 +149,7 @@ def test_waves_are_planned_for():
     assert found.tasks > plan(heard, replace(asked, method="auto"), [LARGE]).tasks
     with pytest.raises(InvalidInput) as refusal:
         plan(heard, replace(asked, nodes=32), [Offer(160 * MIB, BOTH)])
-    assert refusal.value.field == "wave_bands"
+    assert refusal.value.field == "minutes"
     # ``auto`` judges by waves; in space by times alone.
     tried = replace(asked, method="auto", nodes=32)
     with pytest.raises(InvalidInput) as refusal:

@@ -36,7 +36,7 @@ from ..files.datasets import datasets
 WAYS = [
     {},
     {"method": "gauss-newton", "resolution_check": True},
-    {"method": "auto", "wave_minutes": 100.0},
+    {"method": "auto", "minutes": 100.0},
     {"method": "waveform"},
     {"decomposition": "volume"},
     {"guided_rounds": 3, "amplitudes": "ratio"},
@@ -91,7 +91,7 @@ def steps(work):
 
 @pytest.mark.parametrize("way", WAYS, ids=str)
 def test_the_largest_dataset_is_planned_in_as_many_steps_as_a_small_one(way):
-    settings = Settings(**way)
+    settings = Settings.of(**way)
     few, _ = steps(lambda: planned(SMALL, settings))
     many, taken = steps(lambda: planned(LARGEST, settings))
     assert many <= 1.5 * few
@@ -101,7 +101,7 @@ def test_the_largest_dataset_is_planned_in_as_many_steps_as_a_small_one(way):
 
 @pytest.mark.parametrize("way", WAYS, ids=str)
 def test_what_the_largest_dataset_takes_is_refused_in_as_few(way):
-    settings = Settings(**way)
+    settings = Settings.of(**way)
     little = [Offer(2048 * MIB, ("recon", "render"))]
 
     def refused():
@@ -137,7 +137,7 @@ numbers = {
     way=st.sampled_from(WAYS),
 )
 def test_every_dataset_within_the_limits_has_a_plan(way, **counts):
-    settings, known = Settings(**way), DatasetCounts(**counts)
+    settings, known = Settings.of(**way), DatasetCounts(**counts)
     if settings.method == "waveform" and known.summary(settings).traces is None:
         with pytest.raises(InvalidInput, match="traces of object and water"):
             planned(known, settings)
@@ -152,7 +152,7 @@ def test_every_dataset_within_the_limits_has_a_plan(way, **counts):
 def test_an_array_of_no_width_that_was_taken_in_before_has_no_plan(width_m):
     for way in WAYS:
         with pytest.raises(InvalidInput, match="element_position_m"):
-            planned(replace(SMALL, width_m=width_m), Settings(**way))
+            planned(replace(SMALL, width_m=width_m), Settings.of(**way))
 
 
 @given(dataset=datasets())

@@ -19,12 +19,12 @@ from bentray_workers.reconstruction import arrivals, reconstruction_run
 
 from ..cluster.tearing import torn_runs
 
-PLAN = Settings(nodes=32, sweeps=2)
-METHODS = [PLAN, replace(PLAN, method="gauss-newton", sweeps=3)]
+PLAN = Settings(nodes=32, iterations=2)
+METHODS = [PLAN, replace(PLAN, method="gauss-newton", iterations=3)]
 OTHERS = {
     "auto": replace(PLAN, method="auto"),
-    "stages": replace(PLAN, coarser_grids=1, straight_sweeps=1, resolution_check=True),
-    "volume": replace(PLAN, nodes=20, decomposition="volume", method="gauss-newton", axial_room_nodes=2),
+    "stages": PLAN.changed(coarser_grids=1, straight_iterations=1, resolution_check=True),
+    "volume": PLAN.changed(nodes=20, decomposition="volume", method="gauss-newton", axial_margin_nodes=2),
 }
 
 
@@ -46,8 +46,8 @@ def test_amplitudes_give_the_attenuation_of_the_kernels(cluster, scan, tmp_path,
     seen = []
     result = reconstruction_run.reconstruct(cluster.client, path, plan, seen.append)
     assert np.array_equal(result.attenuation, expected.attenuation)
-    assert seen[-1].done == seen[-1].total == 3 * (plan.sweeps + 1) * 24
-    assert reconstruction_run.reconstruct(None, path, replace(plan, attenuation=False)).attenuation is None
+    assert seen[-1].done == seen[-1].total == 3 * (plan.iterations + 1) * 24
+    assert reconstruction_run.reconstruct(None, path, plan.changed(attenuation=False)).attenuation is None
 
 
 @pytest.mark.parametrize("plan", METHODS, ids=lambda plan: plan.method)
@@ -56,7 +56,7 @@ def test_progress_rises_to_the_end(cluster, path, plan):
     reconstruction_run.reconstruct(cluster.client, path, plan, seen.append)
     done = [p.done for p in seen]
     assert done == sorted(done)
-    assert done[-1] == seen[-1].total == 3 * plan.sweeps * 24
+    assert done[-1] == seen[-1].total == 3 * plan.iterations * 24
     assert len(done) > 6
 
 
@@ -71,7 +71,7 @@ def test_stop_ends_within_a_task(cluster, path, embedded, plan):
 
     with pytest.raises(Cancelled):
         reconstruction_run.reconstruct(
-            cluster.client if embedded else None, path, replace(plan, sweeps=500), stop=stop
+            cluster.client if embedded else None, path, replace(plan, iterations=500), stop=stop
         )
     assert len(calls) == 3
 
@@ -154,7 +154,7 @@ def test_a_torn_run_is_gone_on_from_to_the_same_bits(cluster, scan, path, tmp_pa
 def test_a_small_job_of_another_tenant_runs_beside_a_large_one_to_the_same_bits(cluster, scan, path):
     """The large one has been there first and fills every worker; it goes on meanwhile and ends as alone."""
     shares, seen = Shares(), []
-    large = replace(PLAN, sweeps=60)
+    large = replace(PLAN, iterations=60)
 
     def work():
         with shares.of("busy", "recon", cluster.client) as share:

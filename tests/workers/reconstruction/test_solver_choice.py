@@ -36,7 +36,7 @@ def scans():
 def test_what_runs_is_what_was_chosen(scans, monkeypatch, rays, cut, eikonal):
     if eikonal in ON_DEVICE:
         pytest.skip("its fallback on the CPU is tested with the device")
-    settings = Settings(nodes=16, sweeps=1, rays=rays, decomposition=cut, eikonal=eikonal)
+    settings = Settings(nodes=16, iterations=1, rays=rays, decomposition=cut, eikonal=eikonal)
     problem = Problem.of(scans[cut], settings, 0)
     chosen = solver_of(settings, problem.region.ndim)
     solved, passed = [], []

@@ -17,7 +17,7 @@ from bentray_workers.reconstruction import reconstruction_run
 from ...kernels.tomography.waveform.scans import error, scan, water
 from ..cluster.tearing import torn_runs
 
-PLAN = Settings(method="waveform", nodes=32, sweeps=2, wave_bands=3, wave_emitters=5)
+PLAN = Settings.of(method="waveform", nodes=32, iterations=2, bands=3, emitters=5)
 HEIGHTS = np.array([0.0, 0.002])
 
 

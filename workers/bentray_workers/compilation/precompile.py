@@ -29,7 +29,7 @@ from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.sources import ROOT, digest
 from bentray_kernels.splines import FILTERS
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.settings import DECOMPOSITIONS, PENALTIES
+from bentray_kernels.tomography.gauss_newton.penalties import PENALTIES
 
 from ..files.dataset import read_dataset, write_dataset
 from ..files.mesh import StoredMesh, write_mesh
@@ -64,7 +64,7 @@ def of_times() -> Iterator[dict[str, Any]]:
     """The settings of reconstructions from travel times and amplitudes."""
     yield {"resolution_check": True}
     yield {"rays": "straight", "reciprocity": False}
-    yield {"eikonal": "accurate", "speed_update": "data-driven", "speed_range_mps": (1300.0, 1600.0)}
+    yield {"eikonal": "accurate", "speed_range_mps": (1300.0, 1600.0)}
     yield {"method": "auto"}
     for rays, penalty in product(("curved", "straight"), PENALTIES):
         yield {"method": "gauss-newton", "rays": rays, "penalty": penalty}
@@ -73,7 +73,7 @@ def of_times() -> Iterator[dict[str, Any]]:
 
 def of_heights() -> Iterator[dict[str, Any]]:
     """The same of several slices."""
-    for method, decomposition in product(("sart", "gauss-newton"), DECOMPOSITIONS):
+    for method, decomposition in product(("sart", "gauss-newton"), ("slices", "volume")):
         yield {"method": method, "decomposition": decomposition, "attenuation": False}
 
 
@@ -83,7 +83,7 @@ def of_traces() -> Iterator[dict[str, Any]]:
         yield {"picker": picker, "attenuation": False}
     yield {"guided_rounds": 1, "amplitudes": "ratio", "focusing": True}
     yield {"amplitudes": "spectrum"}
-    yield {"method": "waveform", "wave_bands": 1, "wave_emitters": 4}
+    yield {"method": "waveform", "bands": 1, "emitters": 4}
 
 
 def digitised(scan: Dataset) -> Dataset:
@@ -131,7 +131,7 @@ def _reconstruct(path: Path, scan: Dataset, wanted: Iterator[dict[str, Any]]) ->
     write_dataset(path, scan)
     quality.quality_report(path, "aic")
     for settings in wanted:
-        reconstruct(None, path, Settings(nodes=NODES, sweeps=1, **settings))
+        reconstruct(None, path, Settings.of(nodes=NODES, iterations=1, **settings))
 
 
 def _refraction() -> None:

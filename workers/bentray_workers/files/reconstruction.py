@@ -97,6 +97,7 @@ def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstr
         water = reader.number("", "water_speed_mps", "m/s")
         if water is None:
             raise InvalidInput("@water_speed_mps", "nothing", "a speed in m/s")
+        provenance = {str(k): str(v) for k, v in _json(reader, "provenance").items()}
         return Reconstruction(
             speed=speed,
             coverage=coverage,
@@ -104,11 +105,11 @@ def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstr
             spacing_m=_per_axis(reader, "spacing_m", speed.ndim),
             origin_m=_per_axis(reader, "origin_m", speed.ndim),
             water_speed_mps=water,
-            settings=_settings(_json(reader, "settings")),
+            settings=_settings(_json(reader, "settings"), provenance),
             history=_history(reader),
             residuals=_residuals(reader),
             trials=_trials(reader),
-            provenance={str(k): str(v) for k, v in _json(reader, "provenance").items()},
+            provenance=provenance,
         )
 
 
@@ -215,9 +216,10 @@ def _json(reader: Reader, name: str) -> dict[str, Any]:
     return found
 
 
-def _settings(values: dict[str, Any]) -> Settings:
+def _settings(values: dict[str, Any], provenance: dict[str, str]) -> Settings:
     try:
-        return from_stored(values)
-    except TypeError as error:
+        # Files of earlier versions hold no numerical parameters of their own.
+        return from_stored(values, json.loads(provenance.get("numerics", "{}")))
+    except (TypeError, json.JSONDecodeError, RecursionError) as error:
         accepted = "the settings of a reconstruction by this version"
         raise InvalidInput("@settings", str(error), accepted) from None

@@ -60,9 +60,9 @@ def _of_rays(result: Reconstruction) -> Settings:
 def stage_names(result: Reconstruction) -> tuple[str, ...]:
     """What tells the stages apart: those of ``tomography.grid_schedule``, bands; nothing for one."""
     settings = _of_rays(result)
-    grids = [-(-settings.nodes // 2**k) for k in range(settings.coarser_grids, -1, -1)]
+    grids = [-(-settings.nodes // 2**k) for k in range(settings.numerics.coarser_grids, -1, -1)]
     names = [f"{nodes} nodes" for nodes in grids]
-    if settings.straight_sweeps and settings.rays != "straight":
+    if settings.numerics.straight_iterations and settings.rays != "straight":
         names.insert(0, "straight")
     bands = {
         sweep.stage: "attenuation" if sweep.of_attenuation else f"{1e-3 * sweep.band_hz[1]:.0f} kHz"

@@ -11,7 +11,7 @@ from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.tomography import Problem, Settings
 from bentray_kernels.tomography.grid_schedule import stages
 from bentray_kernels.tomography.model_selection.held_out import Part, part_of
-from bentray_kernels.tomography.reconstruct import problem_of
+from bentray_kernels.tomography.reconstruction import problem_of
 from bentray_kernels.tomography.waveform.preparation import prepare
 from bentray_kernels.tomography.waveform.waveform_problem import WaveProblem
 from bentray_kernels.tomography.waveform.waveform_settings import WaveSettings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
@@ -98,20 +98,20 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[Offer]) -> Plan:
             "eikonal", f"{settings.eikonal!r}, which no connected worker offers", "a method without a device"
         )
     ways = [settings]
-    if settings.tries:
-        ways = [replace(settings, **changes) for changes in CANDIDATES]
+    if settings.selects_model:
+        ways = [settings.changed(**changes) for changes in CANDIDATES]
     calls: dict[str, int] = {}
     for way in ways:
         for name, size in call_bytes(scan, way).items():
             calls[name] = max(size, calls.get(name, 0))
     # Trials of elements in space are judged by times alone.
     heard = None if scan.in_space and settings.method == "auto" else scan.traces
-    waves = wave_call_bytes(heard, scan.width_m, settings)
+    waves = wave_call_bytes(heard, scan.width_m, scan.slices, settings)
     calls |= waves
     room = max((offer.task_bytes for offer in fitting), default=math.inf)
     name, size = max(calls.items(), key=lambda item: item[1])
     if size > room:
-        field: str = "nodes" if name not in waves else "method" if name == "judge_by_waves" else "wave_bands"
+        field: str = "nodes" if name not in waves else "method" if name == "judge_by_waves" else "minutes"
         found = getattr(settings, field)
         raise InvalidInput(
             field,
@@ -121,16 +121,19 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[Offer]) -> Plan:
     able = [offer for offer in fitting if offer.task_bytes >= size]
     shape = shape_of(scan, settings)
     decomposition = _decomposition(settings)
-    tasks = sum(_tasks(scan, way, shape) for way in ways) + scan.slices * wave_tasks(heard, settings)
+    tasks = sum(_tasks(scan, way, shape) for way in ways)
+    tasks += scan.slices * wave_tasks(heard, scan.width_m, scan.slices, settings)
     if scan.traces_bytes:
-        tasks = tasks * (1 + settings.guided_rounds) + arrival_tasks(scan.traces, scan.slices, settings)
+        tasks = tasks * (1 + settings.numerics.guided_rounds) + arrival_tasks(
+            scan.traces, scan.slices, settings
+        )
     return Plan(
         decomposition,
         lane,
         tasks,
         len(able),
         calls,
-        max(field_bytes(shape, way.front) for way in ways),
+        max(field_bytes(shape, way.ray_eikonal) for way in ways),
         max(rows_bytes(scan, way, rays_of(scan, way)) for way in ways),
         state_bytes(shape, settings),
         _stored_bytes(scan, settings, shape),
@@ -181,14 +184,14 @@ def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
     problems = 1 if settings.decomposition == "volume" else scan.slices
     emitters = sounding_of(scan, settings)
     parts = -(-emitters // BATCH)
-    passes = settings.sweeps * (settings.coarser_grids + 1)
-    passes += settings.straight_sweeps if settings.rays != "straight" else 0
+    passes = settings.iterations * (settings.numerics.coarser_grids + 1)
+    passes += settings.numerics.straight_iterations if settings.rays != "straight" else 0
     if settings.method == "gauss-newton":
         each = passes * (parts + 1)
     else:
         batch = max(1.0, NODES_IN_A_TASK / (math.prod(shape) * 2.0 + scan.receivers * settings.nodes))
         each = passes * math.ceil(emitters / batch)
-    each += (parts + 1) * (bool(settings.attenuation and scan.amplitudes) + settings.resolution_check)
+    each += (parts + 1) * (bool(settings.attenuation.enabled and scan.amplitudes) + settings.resolution_check)
     return problems * each + 1
 
 
@@ -204,9 +207,9 @@ def _advice(scan: Summary, settings: Settings, room: float) -> str:
     """The largest grid that fits, in words; empty where none does."""
 
     def fits(nodes: int) -> bool:
-        return max(call_bytes(scan, replace(settings, nodes=nodes, coarser_grids=0)).values()) <= room
+        return max(call_bytes(scan, settings.changed(nodes=nodes, coarser_grids=0)).values()) <= room
 
-    if settings.tries or not fits(LEAST_NODES):
+    if settings.selects_model or not fits(LEAST_NODES):
         return ""
     low, high = LEAST_NODES, settings.nodes
     while high - low > 1:

@@ -15,7 +15,7 @@ from distributed import Client
 from bentray_kernels.task_graph import Pool, run, run_resumable
 from bentray_kernels.tomography import Progress, Reconstruction, Settings, Trial
 from bentray_kernels.tomography.guided_picking import same_picks
-from bentray_kernels.tomography.reconstruct import run_reconstruction
+from bentray_kernels.tomography.reconstruction import run_reconstruction
 from bentray_kernels.tomography.reconstruction_graph import TomographyGraph, progress_of
 
 from ..cluster.capacities import resources_for
@@ -74,7 +74,7 @@ def reconstruct(
         path, findings, chosen, trials = _pick_with_guides(job, settings, progress)
         result = _reconstruct_picked(job, path, chosen, progress)
         result = replace(result, trials=trials or result.trials)
-    if not settings.examine:
+    if not settings.picking.examine:
         return result
     quality = findings.words(stacked=result.speed.ndim == 3)
     return replace(result, provenance={**result.provenance, "quality": quality})
@@ -99,18 +99,22 @@ def _pick_with_guides(
     Also the settings to continue with: what ``auto`` chose for the first image holds for all, so that the
     settings of the result reproduce it.
     """
-    amplitudes = settings.amplitudes if settings.listens else "recorded"
+    amplitudes = settings.attenuation.amplitudes if settings.reads_amplitudes else "recorded"
     source = Source(
-        job.scan, job.scan.stat().st_mtime_ns, job.folder, settings.picker, settings.examine, amplitudes
+        job.scan,
+        job.scan.stat().st_mtime_ns,
+        job.folder,
+        settings.picking.picker,
+        settings.picking.examine,
+        amplitudes,
     )
     path, findings = _pick(job, source, Files.of(job.folder), None, progress)
-    rounds = 0 if source.dataset.picked else settings.guided_rounds
-    rays = replace(
-        settings,
+    rounds = 0 if source.dataset.picked else settings.numerics.guided_rounds
+    rays = settings.changed(
         method="auto" if settings.method == "waveform" else settings.method,
         attenuation=False,
         resolution_check=False,
-        wave_minutes=0.0,
+        minutes=None,
     )
     trials: tuple[Trial, ...] = ()
     for number in range(1, rounds + 1):
@@ -121,8 +125,10 @@ def _pick_with_guides(
         progress.next()
         if settings.method == "auto" and not trials:
             rays, trials = result.settings, result.trials
-            requested = {name: getattr(settings, name) for name in ("attenuation", "resolution_check")}
-            settings = replace(rays, **requested, wave_minutes=settings.wave_minutes)
+            requested = {
+                name: getattr(settings, name) for name in ("attenuation", "resolution_check", "minutes")
+            }
+            settings = rays.changed(**requested)
         guide = Guide(image, Files.of(job.folder).findings)
         again, findings_again = _pick(job, source, Files.of(job.folder, number), guide, progress)
         if same_picks(*(read_dataset(one, traces=False) for one in (path, again))):

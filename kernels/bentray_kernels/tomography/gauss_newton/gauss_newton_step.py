@@ -112,7 +112,7 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
         seen(problem, settings, slowness),
         emitters,
         rays=rays,
-        eikonal=settings.front,
+        eikonal=settings.ray_eikonal,
         front=bending(problem, settings),
     )
 
@@ -124,8 +124,8 @@ def step(
 
     Of two that miss about as much the last measured is given, which has met the penalty more nearly.
 
-    ``settings.sweeps`` passes make one image less, for the last one measures; a single pass makes one too,
-    which nothing measures.
+    ``settings.iterations`` passes make one image less, for the last one measures; a single pass makes one
+    too, which nothing measures.
 
     The strength of the total variation follows the misfit: strong while rays are still wrong, so that their
     errors do not become structure, and in the end as weak as the data are exact.
@@ -135,7 +135,7 @@ def step(
     number = len(state.history) + 1
     record = Sweep(slice_index, number, rms, len(problem.sounding), given=False)
     history = (*state.history, record)
-    best, limit = state.best, huber.limit(residual, settings.huber_spreads)
+    best, limit = state.best, huber.limit(residual, settings.numerics.huber_scale)
     against = huber.loss(residual, best.limit)
     here = Measured(state.slowness, number, limit, huber.loss(residual, limit), residual_counts(residual))
     if against < best.loss:
@@ -147,8 +147,8 @@ def step(
     idle = state.idle + (not grown) if against > LEAST_GAIN * state.best.loss else 0
     stuck = lost or idle == PATIENCE
     # The last pass only measures what the one before gave.
-    last = number == settings.sweeps
-    if number > 1 and (stuck or last or rms <= settings.stop_rms_s):
+    last = number == settings.iterations
+    if number > 1 and (stuck or last or settings.numerics.explained(rms)):
         best = here if against < state.best.loss / LEAST_GAIN else best
         history = tuple(replace(sweep, given=sweep.sweep == best.sweep) for sweep in history)
         return replace(state, slowness=best.slowness, best=best, history=history, done=True)
@@ -158,18 +158,18 @@ def step(
     lowest, highest = settings.speed_bounds_mps
     coverage = _coverage(problem, parts)
     # Total variation is told the misfit, s; quadratic penalties are weighed against the data themselves.
-    unit = huber.clipped_rms(residual, limit) if settings.penalty == "total-variation" else 1.0
+    unit = huber.clipped_rms(residual, limit) if settings.gauss_newton.penalty == "total-variation" else 1.0
     image, dual = Linearised(
         parts,
         state.slowness * problem.spacing,
         problem.density(coverage) / problem.spacing,
         problem.region,
         (problem.spacing / highest, problem.spacing / lowest),
-        settings.penalty_strength * unit,
-        settings.penalty,
+        settings.gauss_newton.penalty_strength * unit,
+        settings.gauss_newton.penalty,
         limit,
         state.begun * problem.spacing,
-        problem.spacing * settings.edge_mps / problem.water_speed**2 or math.inf,
+        problem.spacing * settings.gauss_newton.edge_mps / problem.water_speed**2 or math.inf,
         nodes_wide(problem, settings),
     ).solve(state.dual)
     return replace(
@@ -180,7 +180,7 @@ def step(
         best=best,
         halvings=0,
         idle=idle,
-        done=settings.sweeps == 1,
+        done=settings.iterations == 1,
         history=history,
     )
 

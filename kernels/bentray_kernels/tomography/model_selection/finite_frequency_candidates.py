@@ -43,7 +43,7 @@ def finite_frequency_candidates(dataset: Dataset, settings: Settings) -> list[di
         return []
     more = {
         "ray_width_m": WIDTH_WAVES * dataset.water_speed_mps / dataset.center_frequency_hz,
-        "penalty_strength": STIFFER * settings.penalty_strength,
+        "penalty_strength": STIFFER * settings.gauss_newton.penalty_strength,
     }
     return [*({**changes, **more} for changes in WIDE), THIN]
 

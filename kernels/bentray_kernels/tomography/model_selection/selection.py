@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 from ...acquisition import Dataset
@@ -62,14 +61,12 @@ def candidate_settings(
     coarser = nodes / settings.nodes
     plans = []
     for changes in candidates:
-        plan = replace(settings, **changes, attenuation=False, resolution_check=False)
-        front = plan.front_smoothing_nodes * coarser
+        plan = settings.changed(**changes, attenuation=False, resolution_check=False)
+        front = plan.numerics.front_smoothing_nodes * coarser
         # An image of half the nodes has half the edge nodes for the same rays.
-        strength = plan.penalty_strength * (coarser if plan.ray_width_m > 0.0 else 1.0)
+        strength = plan.gauss_newton.penalty_strength * (coarser if plan.numerics.ray_width_m > 0.0 else 1.0)
         plans.append(
-            replace(
-                plan, nodes=nodes, coarser_grids=0, front_smoothing_nodes=front, penalty_strength=strength
-            )
+            plan.changed(nodes=nodes, coarser_grids=0, front_smoothing_nodes=front, penalty_strength=strength)
         )
     return plans
 
@@ -122,7 +119,7 @@ def select_model(
         trials, before = _trials(thin, graphs), before + sum(graph.total for graph in graphs)
         chosen = choose(trials)
     others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
-    selected = replace(settings, **chosen.settings)
+    selected = settings.changed(**chosen.settings)
     return stopped(selected, chosen, noise_of(dataset)), (chosen, *others), before
 
 
@@ -148,9 +145,9 @@ def _trials(candidates: Sequence[dict[str, Any]], graphs: Sequence[CandidateGrap
 def passes_to_come(dataset: Dataset, settings: Settings) -> int:
     """Emitter passes that a reconstruction takes at most, whichever candidate is chosen."""
     every = (*CANDIDATES, *finite_frequency_candidates(dataset, settings))
-    plans = [stages(dataset, replace(settings, **changes)) for changes in every]
-    each = max(sum(plan.sweeps for plan in grids) for grids in plans)
-    each += settings.attenuation and dataset.log_ratio_np is not None
+    plans = [stages(dataset, settings.changed(**changes)) for changes in every]
+    each = max(sum(plan.iterations for plan in grids) for grids in plans)
+    each += settings.attenuation.enabled and dataset.log_ratio_np is not None
     each += settings.resolution_check
     problems = range(pairs.count(dataset, settings))
     return each * sum(len(pairs.of(dataset, settings, index).emitters) for index in problems)

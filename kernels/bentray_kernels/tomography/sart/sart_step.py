@@ -50,8 +50,8 @@ def advance(problem: Problem, settings: Settings, state: State, emitters: int, s
 
     For each emitter in random order: the travel time through the current image, the rays down it, the
     slowness integral along each, and one simultaneous update of all nodes from the residuals of
-    ``settings.subset`` emitters (of one in chapter 6). How the work is cut into calls does not change a bit
-    of the result.
+    ``settings.numerics.subset`` emitters (of one in chapter 6). How the work is cut into calls does not
+    change a bit of the result.
 
     Args:
         problem: the slice or volume.
@@ -69,11 +69,11 @@ def advance(problem: Problem, settings: Settings, state: State, emitters: int, s
     fresh = state.emitter == 0
     slowness = np.array(state.slowness, dtype=np.float64, order="C")
     coverage = np.zeros_like(slowness) if fresh else state.coverage.copy()
-    end = min(state.emitter + -(-emitters // settings.subset) * settings.subset, len(order))
+    end = min(state.emitter + -(-emitters // settings.numerics.subset) * settings.numerics.subset, len(order))
     squares, left = state.squares, []
     use = update_of(problem, settings)
-    for first in range(state.emitter, end, settings.subset):
-        subset = order[first : min(first + settings.subset, end)]
+    for first in range(state.emitter, end, settings.numerics.subset):
+        subset = order[first : min(first + settings.numerics.subset, end)]
         left.append(use(problem, settings, slowness, coverage, subset, state.sweep))
         squares += float((left[-1] * left[-1]).sum())
     counts = residual_counts(np.concatenate(left))
@@ -103,6 +103,6 @@ def _close_sweep(state: State, settings: Settings, slice_index: int, emitters: i
         emitter=0,
         squares=0.0,
         count=0,
-        done=sweep >= settings.sweeps or rms <= settings.stop_rms_s,
+        done=sweep >= settings.iterations or settings.numerics.explained(rms),
         history=(*state.history, Sweep(slice_index, sweep, rms, emitters)),
     )

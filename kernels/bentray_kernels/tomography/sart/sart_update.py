@@ -29,14 +29,14 @@ def update_of(problem: Problem, settings: Settings) -> Use:
 def propagation_speed(slowness: Floats, region: Flags, settings: Settings, *, warm: bool) -> Floats:
     """The speed F that the wave front runs in (chapter 6, equations 5 and 6, with k = 1).
 
-    ``fixed`` is the image itself. ``data-driven`` stretches the image's own range to the range that the
-    object is known to have, so that shapes bend the rays in full before the values have grown; until one
-    pass has made a shape (``warm``) there is nothing to stretch.
+    Without ``settings.sart.speed_range_mps`` it is the image itself. With it the image's own range is
+    stretched to this range of the object (data-driven speed), so that shapes bend the rays in full before the
+    values have grown; until one pass has made a shape (``warm``) there is nothing to stretch.
     """
-    speed = smoothed(1.0 / slowness, settings.front_smoothing_nodes)
-    if settings.speed_update == "fixed" or settings.speed_range_mps is None or not warm:
+    speed = smoothed(1.0 / slowness, settings.numerics.front_smoothing_nodes)
+    if settings.sart.speed_range_mps is None or not warm:
         return speed
-    low, high = settings.speed_range_mps
+    low, high = settings.sart.speed_range_mps
     inside = speed[region]
     if not inside.size:
         return speed
@@ -74,7 +74,7 @@ def _compiled(problem: Problem) -> Use:
             front = None
             if settings.rays == "curved":
                 front = slowness
-                if settings.speed_update != "fixed" or settings.front_smoothing_nodes > 0.0:
+                if settings.sart.speed_range_mps is not None or settings.numerics.front_smoothing_nodes > 0.0:
                     front = 1.0 / propagation_speed(slowness, problem.region, settings, warm=sweep > 0)
             left.append(work.look(slowness, front, problem.spacing, source, receivers, measured))
         work.update(
@@ -83,7 +83,7 @@ def _compiled(problem: Problem) -> Use:
             problem.region,
             problem.spacing,
             _relaxation(settings, sweep),
-            settings.smoothing_nodes,
+            settings.sart.smoothing_nodes,
             _bounds(settings),
         )
         return np.concatenate(left)
@@ -103,7 +103,7 @@ def _traced(
         tof = inside  # only the shape counts: straight rays need no travel time
         if settings.rays != "straight":
             speed = propagation_speed(inside, problem.region[..., slab], settings, warm=sweep > 0)
-            tof = solve(speed, problem.spacing, source, settings.front)
+            tof = solve(speed, problem.spacing, source, settings.ray_eikonal)
         fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays)
         more, passed, residual = _back_project(fan, inside.ravel() * problem.spacing, measured)
         corrections[..., slab] += more.reshape(inside.shape)
@@ -113,8 +113,8 @@ def _traced(
     update = np.zeros_like(slowness)
     update[seen] = corrections[seen] / (weights[seen] * problem.spacing)
     update[~problem.region] = 0.0
-    if settings.smoothing_nodes > 0.0:
-        update = gaussian_filter(update, settings.smoothing_nodes, mode="nearest")
+    if settings.sart.smoothing_nodes > 0.0:
+        update = gaussian_filter(update, settings.sart.smoothing_nodes, mode="nearest")
     moved = slowness + _relaxation(settings, sweep) * update
     slowness[problem.region] = np.clip(moved, *_bounds(settings))[problem.region]
     coverage += weights * problem.spacing
@@ -137,7 +137,7 @@ def _heard(problem: Problem, emitter: int) -> tuple[Floats, Floats, Floats, slic
 
 
 def _relaxation(settings: Settings, sweep: int) -> float:
-    return settings.relaxation * settings.relaxation_decay**sweep
+    return settings.sart.relaxation * settings.numerics.relaxation_decay**sweep
 
 
 def _bounds(settings: Settings) -> tuple[float, float]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ...acquisition import Dataset
 from ...errors import InvalidInput
+from ..numerics import BANDS
 from ..settings import Settings
+from .waveform_cost import core_seconds
 from .waveform_settings import Band, WaveSettings, bands, loss_band
 
 # Parts of the time that a wave takes across the array, and periods of the pulse, before and after the arrival
@@ -19,16 +22,67 @@ BEFORE, AFTER, PERIODS = 0.4, 0.25, 4.0
 NEAREST = 0.16
 
 
-def wave_settings(dataset: Dataset, settings: Settings) -> WaveSettings:
-    """How to refine a scan.
+# No band has fewer emitters for the sake of the time budget.
+LEAST_EMITTERS = 8
+
+
+class WaveScale(NamedTuple):
+    """What the cost of a refinement depends on.
+
+    Attributes:
+        centre_hz: centre frequency of the pulse, Hz.
+        water_mps: speed of the water, m/s.
+        width_m: of the array, m.
+        record_s: from the first sample of a trace to the last, s.
+        slices: how many.
+    """
+
+    centre_hz: float
+    water_mps: float
+    width_m: float
+    record_s: float
+    slices: int
+
+    def minutes(self, settings: Settings) -> float:
+        """About how long one core works on the refinement."""
+        plan = bands_of(self.centre_hz, self.water_mps, settings)
+        fastest = settings.speed_bounds_mps[1]
+        return self.slices * core_seconds(plan, self.width_m, self.record_s, fastest) / 60.0
+
+
+def budgeted(settings: Settings, scale: WaveScale) -> Settings:
+    """The settings with the bands and emitters that the time budget allows.
+
+    As many bands as it allows, at least one, and if one takes too long fewer emitters, at least
+    ``LEAST_EMITTERS``. Bands and emitters that are fixed stay; without a budget all bands are used.
+    """
+    given, most = settings.numerics, settings.minutes
+    if most is None or given.bands is not None:
+        return settings
+    for count in range(BANDS, 0, -1):
+        found = settings.changed(bands=count)
+        if scale.minutes(found) <= most:
+            return found
+    emitters = min(band.emitters for band in bands(scale.centre_hz, scale.water_mps))
+    while given.emitters is None and scale.minutes(found) > most and emitters > LEAST_EMITTERS:
+        emitters //= 2
+        found = found.changed(emitters=emitters)
+    return found
+
+
+def scale_of(dataset: Dataset, settings: Settings, samples: int, slices: int) -> WaveScale:
+    """The cost factors of a scan that can be refined.
 
     Args:
         dataset: its traces may still lie in its file.
-        settings: with ``method`` waveform.
+        settings: as requested.
+        samples: of each trace of object and water; 0: there are none of one or both.
+        slices: how many.
 
     Raises:
-        InvalidInput: for a scan in space or without a centre frequency.
+        InvalidInput: for a scan without traces or a centre frequency, or in space.
     """
+    check_traces(samples)
     if dataset.element_position_m.shape[1] != 2:
         raise InvalidInput(
             "method", "'waveform' for elements in space", "sart, gauss-newton or auto, or slices of a ring"
@@ -39,25 +93,32 @@ def wave_settings(dataset: Dataset, settings: Settings) -> WaveSettings:
         raise InvalidInput(
             "acquisition@center_frequency_hz", "nothing", "the centre frequency of the pulse, Hz"
         )
+    assert dataset.sampling_rate_hz is not None
     width = float(np.ptp(dataset.element_position_m, axis=0).max())
-    across, pulse = width / dataset.water_speed_mps, PERIODS / dataset.center_frequency_hz
+    record_s = (samples - 1) / dataset.sampling_rate_hz
+    return WaveScale(dataset.center_frequency_hz, dataset.water_speed_mps, width, record_s, slices)
+
+
+def wave_settings(scale: WaveScale, settings: Settings) -> WaveSettings:
+    """How to refine a scan."""
+    across, pulse = scale.width_m / scale.water_mps, PERIODS / scale.centre_hz
     return WaveSettings(
-        plan_of(dataset.center_frequency_hz, dataset.water_speed_mps, settings),
+        bands_of(scale.centre_hz, scale.water_mps, settings),
         window_s=(BEFORE * across + pulse, AFTER * across + pulse),
-        nearest_m=NEAREST * width,
+        nearest_m=NEAREST * scale.width_m,
         speed_bounds_mps=settings.speed_bounds_mps,
         seed=settings.seed,
         roi=settings.roi,
     )
 
 
-def plan_of(centre_hz: float, water_mps: float, settings: Settings) -> tuple[Band, ...]:
+def bands_of(centre_hz: float, water_mps: float, settings: Settings) -> tuple[Band, ...]:
     """The bands that are gone through; that of the attenuation comes last."""
-    found = bands(centre_hz, water_mps)[: settings.wave_bands]
-    if settings.attenuation:
+    found = bands(centre_hz, water_mps)[: settings.numerics.bands]
+    if settings.attenuation.enabled:
         found = (*found, loss_band(centre_hz, water_mps))
-    if settings.wave_emitters:
-        found = tuple(replace(band, emitters=settings.wave_emitters) for band in found)
+    if settings.numerics.emitters is not None:
+        found = tuple(replace(band, emitters=settings.numerics.emitters) for band in found)
     return found
 
 

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from ...acquisition import Dataset
 from .. import pairs
 from ..model_selection.selection import CLEARLY
+from ..numerics import recorded
 from ..reconstruction_graph import Run, progress_of
 from ..result import Reconstruction
 from ..settings import Settings
-from .automatic_settings import check_traces, wave_settings
+from .automatic_settings import budgeted, scale_of, wave_settings
 from .inversion_state import BandEnd, Image
 from .refinement_graph import RefinementGraph, WaveScan, resampled
 from .validation import Judge, judging, passes
-from .waveform_cost import core_seconds, worth
+from .waveform_cost import worth
 from .waveform_settings import WaveSettings
 
 # Makes what tells the calls of one slice their data.
@@ -37,19 +38,23 @@ class Following:
 
     Attributes:
         total: emitter passes that it takes at most.
-        minutes: about how long a core works on it.
+        within_budget: whether there is a time budget that allows it.
 
     Raises:
         InvalidInput: for a scan that lacks what waves need.
     """
 
     def __init__(self, dataset: Dataset, settings: Settings, samples: int, scan_of: WaveScanOf) -> None:
-        check_traces(samples)
-        self._settings, self._scan_of = settings, scan_of
+        self._scan_of = scan_of
         self._water_np_m = dataset.water_attenuation_np_m or 0.0
-        self._plan = wave_settings(dataset, settings)
         slices = pairs.count(dataset, settings)
-        self.minutes = slices * core_seconds(dataset, self._plan, samples) / 60.0
+        scale = scale_of(dataset, settings, samples, slices)
+        self._settings = budgeted(settings, scale)
+        self._plan = wave_settings(scale, self._settings)
+        # What ``advised`` states is the time without a budget.
+        self._whole_minutes = scale.minutes(settings)
+        budget = -1.0 if settings.minutes is None else settings.minutes
+        self.within_budget = scale.minutes(self._settings) <= budget
         self.total = slices * sum(band.looks(self._plan.held_out) for band in self._plan.bands)
 
     def refined(self, rays: Reconstruction, run_graphs: Run, before: int) -> Reconstruction:
@@ -91,7 +96,7 @@ class Following:
         index = len(images) // 2
         judge = Judge(self._scan_of(judging(self._plan), index), images[index], rays.history)
         run_graphs([judge], before, 0)
-        told = worth(judge.judgement, rays.trials[0], noise_s, self.minutes)
+        told = worth(judge.judgement, rays.trials[0], noise_s, self._whole_minutes)
         return replace(rays, provenance={**rays.provenance, "waveform": told})
 
     def _stage(self, rays: Reconstruction) -> int:
@@ -130,7 +135,12 @@ class Following:
             history=progress_of(chains[-1:]).history,
             # They are of the rays' image.
             residuals=None,
-            provenance={**rays.provenance, "waveform": _told(rays, self._plan, chains)},
+            provenance={
+                **rays.provenance,
+                "ray_numerics": rays.provenance["numerics"],
+                **recorded(self._settings.numerics),
+                "waveform": _told(rays, self._plan, chains),
+            },
         )
 
 

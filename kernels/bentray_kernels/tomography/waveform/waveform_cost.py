@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
-from ...acquisition import Dataset
 from ..result import Trial
 from .band_grid import Extent
 from .validation import Judgement
-from .waveform_settings import WaveSettings
+from .waveform_settings import Band, WaveSettings
 
 # Seconds a node and time step of a look, there and back, with all that belongs to it; a core of 2020.
 NODE_STEP_S = 4e-9
@@ -21,21 +20,19 @@ MUCH = 3.0
 MUCH_OF_NOISE = 1.5
 
 
-def core_seconds(dataset: Dataset, plan: WaveSettings, samples: int) -> float:
+def core_seconds(plan: Sequence[Band], width_m: float, record_s: float, fastest_mps: float) -> float:
     """About how long a core works on one slice, s.
 
     Args:
-        dataset: its traces may still lie in its file.
-        plan: how it is refined.
-        samples: of each trace.
+        plan: the bands.
+        width_m: of the array, m.
+        record_s: from the first sample of a trace to the last, s.
+        fastest_mps: speed that a node may take at most, m/s.
     """
-    assert dataset.sampling_rate_hz is not None
-    reach = 0.5 * float(np.ptp(dataset.element_position_m, axis=0).max())
-    record_s = (samples - 1) / dataset.sampling_rate_hz
     found = 0.0
-    for band in plan.bands:
-        extent = Extent.of(band, reach, record_s, plan.speed_bounds_mps[1])
-        found += NODE_STEP_S * extent.padded**2 * extent.steps * band.looks(plan.held_out)
+    for band in plan:
+        extent = Extent.of(band, 0.5 * width_m, record_s, fastest_mps)
+        found += NODE_STEP_S * extent.padded**2 * extent.steps * band.looks(WaveSettings.held_out)
     return found
 
 

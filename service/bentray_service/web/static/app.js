@@ -90,7 +90,7 @@ async function start(event) {
   event.preventDefault();
   say("run-error", null);
   const form = new FormData(event.target);
-  const settings = { method: form.get("method"), nodes: Number(form.get("nodes")), sweeps: Number(form.get("sweeps")) };
+  const settings = { method: form.get("method"), nodes: Number(form.get("nodes")), iterations: Number(form.get("iterations")) };
   // With auto the rays are tried, not asked for.
   if (form.has("rays")) settings.rays = form.get("rays");
   const body = JSON.stringify({ kind: "reconstruction", dataset: at("dataset").value, settings });

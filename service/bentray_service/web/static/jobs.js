@@ -133,8 +133,8 @@ function asked({ kind, settings }) {
     const of = settings.phantom === "table7" ? "3-D breast phantom" : "2-D breast phantom";
     return ["Simulated scan", `${of}, ${settings.waveform ? "traces" : "travel times"}, ${settings.elements} elements`];
   }
-  const { method, rays, nodes, sweeps } = settings;
-  return [method === "auto" ? "Automatic" : RAYS[rays], `${METHODS[method]}, ${nodes} × ${nodes} nodes, ${sweeps} iterations`];
+  const { method, rays, nodes, iterations = settings.sweeps } = settings; // sweeps: of earlier versions
+  return [method === "auto" ? "Automatic" : RAYS[rays], `${METHODS[method]}, ${nodes} × ${nodes} nodes, ${iterations} iterations`];
 }
 
 // In a few words, and in full when asked for.

@@ -14,7 +14,7 @@ from bentray_kernels.tomography.gauss_newton.linearisation import Rows
 from bentray_kernels.tomography.grid_schedule import start
 
 WATER = 1500.0
-PLAN = Settings(method="gauss-newton", nodes=24, sweeps=9)
+PLAN = Settings(method="gauss-newton", nodes=24, iterations=9)
 
 
 def problem(delta, tx=None, rx=None):
@@ -23,7 +23,7 @@ def problem(delta, tx=None, rx=None):
     rx = np.arange(count) if rx is None else rx
     ring = Ring(max(tx.max(), rx.max()) + 1, 0.08)
     dataset = Dataset(ring.positions(), tx, rx, WATER, delta_tof_s=delta)
-    return Problem.of(dataset, replace(PLAN, reciprocity=False))
+    return Problem.of(dataset, PLAN.changed(reciprocity=False))
 
 
 def test_each_pair_is_kept_once():
@@ -83,7 +83,7 @@ def test_a_halved_step_that_helps_goes_on():
 
 def test_the_last_pass_measures_and_the_best_image_is_given():
     of = problem(np.zeros((8, 8)))
-    plan = replace(PLAN, sweeps=3)
+    plan = replace(PLAN, iterations=3)
     states = [gauss_newton_step.begin(start(of, None))]
     for misfit in (4e-7, 2e-7, 1e-7):
         states.append(gauss_newton_step.step(of, plan, states[-1], [rows(misfit)]))
@@ -93,7 +93,7 @@ def test_the_last_pass_measures_and_the_best_image_is_given():
     assert [sweep.given for sweep in states[2].history] == [False, False]
     assert [sweep.given for sweep in states[-1].history] == [False, False, True]
     assert states[-1].best.loss == pytest.approx(1e-7)
-    once = gauss_newton_step.step(of, replace(PLAN, sweeps=1), states[0], [rows(4e-7)])
+    once = gauss_newton_step.step(of, replace(PLAN, iterations=1), states[0], [rows(4e-7)])
     assert once.done
     assert not np.array_equal(once.slowness, states[0].slowness)
 
@@ -103,7 +103,7 @@ def test_of_images_that_miss_alike_the_last_is_given(misfit, given):
     of = problem(np.zeros((8, 8)))
     state = gauss_newton_step.begin(start(of, None))
     for missed in (4e-7, 2e-7, misfit):
-        before, state = state, gauss_newton_step.step(of, replace(PLAN, sweeps=3), state, [rows(missed)])
+        before, state = state, gauss_newton_step.step(of, replace(PLAN, iterations=3), state, [rows(missed)])
     assert [sweep.sweep for sweep in state.history if sweep.given] == [given]
     assert np.array_equal(state.slowness, before.slowness) == (given == 3)
 
@@ -145,8 +145,8 @@ def test_flat_parts_come_back_sharper_when_edges_are_cheap():
     delta = TravelTimeScan(phantom, ring, side, nodes=48).delta_tof(everyone)
     scan = Dataset(ring.positions(), everyone, everyone, 1375.0, delta_tof_s=delta)
     truth, inside = phantom.speed(48, side), phantom.inside(48, side)
-    plan = replace(PLAN, nodes=48, side_m=side, sweeps=8)
+    plan = replace(PLAN, nodes=48, side_m=side, iterations=8)
     plain, sharp = (
-        rmse(reconstruct(scan, replace(plan, edge_mps=edge)).speed, truth, inside) for edge in (0.0, 7.0)
+        rmse(reconstruct(scan, plan.changed(edge_mps=edge)).speed, truth, inside) for edge in (0.0, 7.0)
     )
     assert sharp < 0.9 * plain

@@ -1,7 +1,5 @@
 """Huber's loss: its value, and the limit that the residuals' own spread gives."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -50,10 +48,10 @@ def test_a_small_object_in_exact_times_is_found():
     delta[np.abs(delta) < 1e-12] = 0.0
     assert np.median(np.abs(delta)) == 0.0
     dataset = Dataset(ring.positions(), emitters, emitters, WATER_MPS, delta_tof_s=delta)
-    plan = Settings(method="gauss-newton", nodes=32, side_m=TABLE6_SIDE_M, sweeps=6)
+    plan = Settings(method="gauss-newton", nodes=32, side_m=TABLE6_SIDE_M, iterations=6)
     truth, inside = disc.speed(32, TABLE6_SIDE_M), disc.inside(32, TABLE6_SIDE_M)
     robust, plain = (
-        rmse(reconstruct(dataset, replace(plan, huber_spreads=spreads)).speed, truth, inside)
+        rmse(reconstruct(dataset, plan.changed(huber_scale=spreads)).speed, truth, inside)
         for spreads in (3.0, 0.0)
     )
     assert robust < 3.0 * plain < 15.0

@@ -25,7 +25,7 @@ def scan():
 
 
 def plan(**changes):
-    return Settings(nodes=NODES, side_m=SIDE, **changes)
+    return Settings.of(nodes=NODES, side_m=SIDE, **changes)
 
 
 @given(cuts=st.lists(st.integers(1, 40), min_size=1, max_size=8))
@@ -36,7 +36,7 @@ def test_cutting_the_work_changes_no_bit(cuts):
     everyone = np.arange(16)
     delta = rng.normal(0.0, 2e-7, (16, 16))
     dataset = Dataset(ring.positions(), everyone, everyone, WATER, delta_tof_s=delta)
-    wanted = Settings(nodes=24, sweeps=2)
+    wanted = Settings(nodes=24, iterations=2)
     problem = Problem.of(dataset, wanted)
     whole = begin(start(problem, None))
     while not whole.done:
@@ -51,8 +51,8 @@ def test_cutting_the_work_changes_no_bit(cuts):
 
 
 def test_same_seed_same_bits_other_seed_other_order(scan):
-    a, b = reconstruct(scan, plan(sweeps=1)), reconstruct(scan, plan(sweeps=1))
-    c = reconstruct(scan, plan(sweeps=1, seed=1))
+    a, b = reconstruct(scan, plan(iterations=1)), reconstruct(scan, plan(iterations=1))
+    c = reconstruct(scan, plan(iterations=1, seed=1))
     assert np.array_equal(a.speed, b.speed)
     assert not np.array_equal(a.speed, c.speed)
 

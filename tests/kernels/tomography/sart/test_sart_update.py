@@ -26,14 +26,14 @@ def scan():
 
 
 def plan(**changes):
-    return Settings(nodes=NODES, side_m=TABLE6_SIDE_M, **{"sweeps": 2, **changes})
+    return Settings.of(nodes=NODES, side_m=TABLE6_SIDE_M, **{"iterations": 2, **changes})
 
 
 def test_data_driven_update_stretches_the_range():
     region = np.ones((4, 4), bool)
     region[0] = False
     slowness = 1.0 / np.linspace(1480.0, 1520.0, 16).reshape(4, 4)
-    wanted = Settings(speed_update="data-driven", speed_range_mps=(1375.0, 1560.0))
+    wanted = Settings.of(speed_range_mps=(1375.0, 1560.0))
     stretched = propagation_speed(slowness, region, wanted, warm=True)
     assert stretched[region].min() == pytest.approx(1375.0)
     assert stretched[region].max() == pytest.approx(1560.0)
@@ -48,7 +48,7 @@ def test_data_driven_update_stretches_the_range():
     [
         {},
         {"subset": 4, "relaxation": 0.4},
-        {"speed_update": "data-driven", "speed_range_mps": (1375.0, 1560.0), "relaxation_decay": 0.5},
+        {"speed_range_mps": (1375.0, 1560.0), "relaxation_decay": 0.5},
         {"front_smoothing_nodes": 1.5, "smoothing_nodes": 1.5},
     ],
     ids=lambda changes: "-".join(changes) or "plain",
@@ -84,16 +84,16 @@ def test_cuts_of_the_compiled_pass_change_no_bit(scan, changes):
 
 def test_a_subset_is_one_update(scan):
     """With all emitters in one subset, nothing of the first hides from the last: seeds give the same."""
-    one, other = (reconstruct(scan, plan(subset=64, seed=seed, sweeps=1)).speed for seed in (0, 1))
+    one, other = (reconstruct(scan, plan(subset=64, seed=seed, iterations=1)).speed for seed in (0, 1))
     assert np.allclose(one, other, atol=1e-2)
-    alone = [reconstruct(scan, plan(seed=seed, sweeps=1)).speed for seed in (0, 1)]
+    alone = [reconstruct(scan, plan(seed=seed, iterations=1)).speed for seed in (0, 1)]
     assert np.abs(alone[0] - alone[1]).max() > 0.5
 
 
 def test_relaxation_decays(scan):
     """A decay that leaves nothing makes the second sweep change nothing."""
-    first = reconstruct(scan, plan(sweeps=1)).speed
-    second = reconstruct(scan, plan(sweeps=2, relaxation_decay=1e-9)).speed
+    first = reconstruct(scan, plan(iterations=1)).speed
+    second = reconstruct(scan, plan(iterations=2, relaxation_decay=1e-9)).speed
     assert np.allclose(first, second, atol=1e-4)
 
 
@@ -103,9 +103,9 @@ def test_huber_makes_wrong_picks_count_less(scan):
     wrong = random.random(scan.delta_tof_s.shape) < 0.05
     spoiled = np.where(wrong, scan.delta_tof_s + random.normal(0.0, 4e-6, wrong.shape), scan.delta_tof_s)
     bad = replace(scan, delta_tof_s=spoiled)
-    gauss_newton = plan(method="gauss-newton", sweeps=4)
+    gauss_newton = plan(method="gauss-newton", iterations=4)
     plain, robust = (
-        rmse(reconstruct(bad, replace(gauss_newton, huber_spreads=spreads)).speed, truth, inside)
+        rmse(reconstruct(bad, gauss_newton.changed(huber_scale=spreads)).speed, truth, inside)
         for spreads in (0.0, 3.0)
     )
     assert robust < 0.9 * plain

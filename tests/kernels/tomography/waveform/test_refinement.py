@@ -17,7 +17,7 @@ from bentray_kernels.tomography.waveform.waveform_cost import worth
 
 from .scans import error, scan
 
-PLAN = Settings(method="auto", nodes=32, sweeps=2, wave_bands=3, wave_emitters=6, wave_minutes=60.0)
+PLAN = Settings.of(method="auto", nodes=32, iterations=2, bands=3, emitters=6, minutes=60.0)
 
 
 def heard(noise=0.0):
@@ -31,7 +31,7 @@ def error_of(result):
 
 @pytest.fixture(scope="module")
 def rays():
-    return reconstruct(heard(), replace(PLAN, wave_minutes=0.0))
+    return reconstruct(heard(), replace(PLAN, minutes=0.0))
 
 
 def test_auto_goes_on_with_waves_where_it_may_and_they_predict_better(rays):
@@ -56,7 +56,7 @@ def test_without_leave_it_only_says_so(rays):
     assert rays.provenance["waveform"].startswith("method waveform ")
     assert rays.provenance["waveform"].endswith("it takes about a minute of a core")
     # A second is too little.
-    hurried = reconstruct(heard(), replace(PLAN, wave_minutes=1.0 / 60.0))
+    hurried = reconstruct(heard(), replace(PLAN, minutes=1.0 / 60.0))
     assert np.array_equal(hurried.speed, rays.speed)
     assert hurried.provenance == rays.provenance
 
@@ -65,7 +65,7 @@ def test_waves_are_advised_where_the_image_explains_less_than_water_does(rays):
     """The image of rays leaves four times what is left in water; beside noise that is nothing."""
     advised = rays.provenance["waveform"]
     assert advised.startswith("method waveform is advised, for waves through the image of rays miss")
-    noisy = reconstruct(heard(0.05), replace(PLAN, wave_minutes=0.0))
+    noisy = reconstruct(heard(0.05), replace(PLAN, minutes=0.0))
     assert noisy.provenance["waveform"].startswith("method waveform would gain little, for waves through")
 
 
@@ -84,8 +84,8 @@ def test_held_out_emitters_decide_against_it():
     """Noise as high as the signal: what waves make of it predicts nothing."""
     loud = heard(0.3)
     found = reconstruct(loud, PLAN)
-    rays = reconstruct(loud, replace(PLAN, wave_minutes=0.0))
-    assert found.settings == replace(rays.settings, wave_minutes=60.0)
+    rays = reconstruct(loud, replace(PLAN, minutes=0.0))
+    assert found.settings == replace(rays.settings, minutes=60.0)
     assert np.array_equal(found.speed, rays.speed)
     assert found.provenance["waveform"].endswith("not clearly better, so the image of the rays is given")
     assert any(sweep.band_hz for sweep in found.history)

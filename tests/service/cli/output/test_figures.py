@@ -14,6 +14,7 @@ from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.acquisition.quality.finding import words
 from bentray_kernels.tomography import Reconstruction, Settings, Sweep, Trial
 from bentray_kernels.tomography.result import residual_counts
+from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_service.cli.output.figures import errors, figures, summary
 from bentray_workers.images.comparison import comparison_png
 from bentray_workers.images.report import report_png
@@ -106,7 +107,7 @@ def test_the_residual_is_that_of_the_last_sweep_over_all_slices() -> None:
     assert found["truth"] is None
     assert found["seconds"] == 1.25
     assert found["speed_range_mps"] == [1450.0, 1550.0]
-    assert Settings(**found["settings"]) == Settings(nodes=16)
+    assert from_stored(found["settings"]) == Settings(nodes=16)
 
 
 def test_the_summary_tells_the_errors_and_their_region_only_with_a_truth() -> None:

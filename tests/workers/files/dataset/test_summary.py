@@ -17,7 +17,7 @@ from ..datasets import small
 def test_it_counts_what_a_problem_has(tmp_path, reciprocity):
     dataset, path = small(), tmp_path / "scan.h5"
     write_dataset(path, dataset)
-    asked = Settings(reciprocity=reciprocity)
+    asked = Settings.of(reciprocity=reciprocity)
     found, pairs = summary_of(path, asked), of(dataset, asked, 0)
     assert (found.emitters, found.receivers) == pairs.delta_tof.shape
     assert (found.pairs, found.slices, found.in_space, found.height_m) == (12 * 24, 1, False, 0.0)

@@ -30,9 +30,9 @@ SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
     ("asked", "elements", "samples"),
     # Each has its largest band last.
     [
-        ({"wave_bands": 2, "wave_emitters": 16, "attenuation": False}, 64, 260),
+        ({"bands": 2, "emitters": 16, "attenuation": False}, 64, 260),
         ({"attenuation": False}, 128, 300),
-        ({"wave_bands": 1}, 96, 300),
+        ({"bands": 1}, 96, 300),
     ],
 )
 def test_calls_take_what_the_plan_says(asked, elements, samples):
@@ -47,7 +47,7 @@ def test_calls_take_what_the_plan_says(asked, elements, samples):
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     measured = json.loads(done.stdout)
     traces = replace(SCAN, emissions=elements, receivers=elements, samples=samples)
-    told = wave_call_bytes(traces, 0.1, Settings(method="waveform", **asked))
+    told = wave_call_bytes(traces, 0.1, 1, Settings.of(method="waveform", **asked))
     assert set(told) == set(measured)
     wrong = {
         name: (told[name], taken)
@@ -65,32 +65,32 @@ def test_calls_take_what_the_plan_says(asked, elements, samples):
 )
 def test_more_of_anything_never_takes_less(bands, emissions, samples, width):
     traces = replace(SCAN, emissions=emissions, samples=samples)
-    settings = Settings(method="waveform", wave_bands=bands)
-    found = wave_call_bytes(traces, width, settings)
+    settings = Settings.of(method="waveform", bands=bands)
+    found = wave_call_bytes(traces, width, 1, settings)
     # Beyond those that a band uses emissions do not count, but where they are read in blocks.
-    many = wave_call_bytes(replace(traces, emissions=emissions + 64), width, settings)
+    many = wave_call_bytes(replace(traces, emissions=emissions + 64), width, 1, settings)
     assert all(many[name] >= size for name, size in found.items())
     assert emissions < 64 or many["look_at_waves"] == found["look_at_waves"]
     for other in (
-        wave_call_bytes(replace(traces, receivers=traces.receivers + 64), width, settings),
-        wave_call_bytes(replace(traces, samples=samples + 300), width, settings),
-        wave_call_bytes(traces, width + 0.05, settings),
+        wave_call_bytes(replace(traces, receivers=traces.receivers + 64), width, 1, settings),
+        wave_call_bytes(replace(traces, samples=samples + 300), width, 1, settings),
+        wave_call_bytes(traces, width + 0.05, 1, settings),
     ):
         assert all(other[name] > size for name, size in found.items())
-    more = wave_call_bytes(traces, width, replace(settings, wave_bands=bands + 1))
+    more = wave_call_bytes(traces, width, 1, settings.changed(bands=bands + 1))
     assert all(more[name] >= size for name, size in found.items())
 
 
 def test_what_auto_may_do_is_planned():
     """It judges by waves where there are traces, and refines where it is given minutes."""
     auto = Settings(method="auto")
-    judged = wave_call_bytes(SCAN, 0.1, auto)
+    judged = wave_call_bytes(SCAN, 0.1, 1, auto)
     assert list(judged) == ["judge_by_waves"]
-    assert wave_call_bytes(SCAN, 0.1, replace(auto, wave_minutes=1.0)) == wave_call_bytes(
+    assert wave_call_bytes(SCAN, 0.1, 1, replace(auto, minutes=1e4)) == wave_call_bytes(
         SCAN, 0.1, replace(auto, method="waveform")
     )
-    assert wave_tasks(SCAN, auto) == 0 < wave_tasks(SCAN, replace(auto, wave_minutes=1.0))
-    assert wave_call_bytes(None, 0.1, auto) == wave_call_bytes(SCAN, 0.1, Settings()) == {}
+    assert wave_tasks(SCAN, 0.1, 1, auto) == 0 < wave_tasks(SCAN, 0.1, 1, replace(auto, minutes=1e4))
+    assert wave_call_bytes(None, 0.1, 1, auto) == wave_call_bytes(SCAN, 0.1, 1, Settings()) == {}
 
 
 def test_traces_are_summed_up_where_there_are_both(tmp_path):

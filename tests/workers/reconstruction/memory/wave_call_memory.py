@@ -22,7 +22,7 @@ from bentray_kernels.acquisition.emissions import Emissions
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.waveform import waveform_chain as waves
-from bentray_kernels.tomography.waveform.automatic_settings import wave_settings
+from bentray_kernels.tomography.waveform.automatic_settings import scale_of, wave_settings
 from bentray_kernels.tomography.waveform.band_inversion import WavePass
 from bentray_kernels.tomography.waveform.inversion_state import Image
 from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
@@ -68,7 +68,8 @@ def scan(elements: int, samples: int) -> Dataset:
 
 def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     """Of each call in the last band; of a step with all pairs of changes that it may have."""
-    plan = wave_settings(dataset, settings)
+    samples = dataset.waveform.object.shape[-1]
+    plan = wave_settings(scale_of(dataset, settings, samples, 1), settings)
     number = len(plan.bands) - 1
     start = Image(np.full((32, 32), WATER), 2.2 * RADIUS_M / 31, (-1.1 * RADIUS_M, -1.1 * RADIUS_M))
     nothing = peak(lambda: None)
@@ -110,8 +111,8 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
 
 def main(settings: dict[str, Any], elements: int, samples: int) -> None:
     # Loading compiled code takes memory too, here and not in the forks.
-    bytes_of(scan(16, 260), Settings(method="waveform", wave_bands=2))
-    asked = Settings(method="waveform", **settings)
+    bytes_of(scan(16, 260), Settings.of(method="waveform", bands=2))
+    asked = Settings.of(method="waveform", **settings)
     sys.stdout.write(json.dumps(bytes_of(scan(elements, samples), asked)) + "\n")
 
 

@@ -138,7 +138,7 @@ class DatasetCounts:
                 amplitudes are read from traces.
         """
         both = (self.elements, self.elements)
-        emitters, receivers = both if settings.reciprocity else (self.emissions, self.receivers)
+        emitters, receivers = both if settings.numerics.reciprocity else (self.emissions, self.receivers)
         return Summary(
             emitters=emitters,
             receivers=receivers,
@@ -147,8 +147,8 @@ class DatasetCounts:
             in_space=self.in_space,
             height_m=self.height_m,
             width_m=self.width_m,
-            traces_bytes=0 if self.times and not settings.listens else self.traces_bytes,
-            amplitudes=self.amplitudes or settings.listens,
+            traces_bytes=0 if self.times and not settings.reads_amplitudes else self.traces_bytes,
+            amplitudes=self.amplitudes or settings.reads_amplitudes,
             traces=self._traces(),
             period=self.frequency_hz is not None,
         )

@@ -52,8 +52,8 @@ def arrival_tasks(traces: Traces | None, slices: int, settings: Settings) -> int
     if traces is None:
         return 0
     parts = -(-traces.emissions // emissions_a_call(traces.receivers * traces.samples))
-    examined = slices * (parts + 1) if settings.examine else 0
-    return examined + (slices * (parts + 1) + 1) * (1 + settings.guided_rounds)
+    examined = slices * (parts + 1) if settings.picking.examine else 0
+    return examined + (slices * (parts + 1) + 1) * (1 + settings.numerics.guided_rounds)
 
 
 def arrival_call_bytes(traces: Traces | None, pairs: int, settings: Settings) -> dict[str, int]:
@@ -70,15 +70,15 @@ def arrival_call_bytes(traces: Traces | None, pairs: int, settings: Settings) ->
     of_slice = traces.emissions * traces.receivers
     samples = traces.receivers * traces.samples
     reading = READING_BYTES + 2 * samples * traces.sample_bytes
-    filtered = FILTER_BYTES if PICKERS[settings.picker].filtered else 0
+    filtered = FILTER_BYTES if PICKERS[settings.picking.picker].filtered else 0
     found["read"] = reading + (READ_BYTES + filtered) * samples + 8 * of_slice
-    if settings.listens:
+    if settings.reads_amplitudes:
         pulse = math.ceil((BEFORE + AFTER) * traces.rate_hz / traces.frequency_hz) + 1
         # The pulse is the median of those of several emissions.
         found["read"] += traces.receivers * pulse * (GATE_BYTES + PULSE_COPIES * EMISSIONS)
         found["read"] += traces.receivers * FREQUENCIES * POWER_BYTES + 8 * of_slice
     found["settle"] = settle_bytes(of_slice)
-    if settings.examine:
+    if settings.picking.examine:
         pulse = PULSE_COPIES * (2 * math.ceil(traces.rate_hz / traces.frequency_hz) + 1)
         found["measure"] = reading + MEASURE_BYTES * samples
         found["judge"] = reading + READ_BYTES * samples + (pulse + FIGURE_BYTES) * of_slice

@@ -64,7 +64,7 @@ def sounding_of(scan: Summary, settings: Settings) -> int:
 def rays_of(scan: Summary, settings: Settings) -> int:
     """Rays of one problem that are rows at a time."""
     rays = sounding_of(scan, settings) * scan.receivers
-    return -(-rays // 2) if settings.method == "gauss-newton" and settings.reciprocity else rays
+    return -(-rays // 2) if settings.method == "gauss-newton" and settings.numerics.reciprocity else rays
 
 
 def _entries(settings: Settings, in_space: bool) -> float:
@@ -101,11 +101,11 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     # A process keeps the dataset's times and losses, and those of problems that it was asked for last.
     kept = 3 * REAL * scan.pairs + 3 * REAL * sounding_of(scan, settings) * scan.receivers
     tracked = shape
-    if settings.axial_room_nodes is not None and len(shape) == 3:
-        tracked = (*shape[:2], min(shape[2], 2 * settings.axial_room_nodes + 2))
+    if settings.numerics.axial_margin_nodes is not None and len(shape) == 3:
+        tracked = (*shape[:2], min(shape[2], 2 * settings.numerics.axial_margin_nodes + 2))
     field = 2 * REAL * math.prod(tracked)
     if settings.rays != "straight":
-        field = field_bytes(tracked, settings.front)
+        field = field_bytes(tracked, settings.ray_eikonal)
     base = FLOOR_BYTES + kept + state
 
     def look(rows: int) -> int:
@@ -121,12 +121,12 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     found: dict[str, int] = {}
     if scan.traces_bytes:
         found |= arrival_call_bytes(scan.traces, scan.pairs, settings)
-        if settings.guided_rounds and scan.traces is not None:
+        if settings.numerics.guided_rounds and scan.traces is not None:
             # The rays of each of its emissions through the image that guides it.
             part = emissions_a_call(scan.traces.receivers * scan.traces.samples)
             part = min(part, scan.traces.emissions)
             found["read"] += field + 2 * image + 2 * rows_bytes(scan, settings, part * scan.traces.receivers)
-    elif scan.period and settings.examine:
+    elif scan.period and settings.picking.examine:
         found["settle"] = settle_bytes(scan.pairs // scan.slices)
     if settings.method == "gauss-newton":
         found["trace_rays"] = look(rays)
@@ -135,7 +135,7 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         found["update_sart"] = base + _pass_bytes(shape, scan.receivers)
     else:
         found["update_sart"] = base + field + 8 * image
-    if settings.attenuation and scan.amplitudes:
+    if settings.attenuation.enabled and scan.amplitudes:
         found["trace_attenuation_rays"] = look(rays)
         found["solve_attenuation"] = step(rays)
     if settings.resolution_check:

@@ -6,8 +6,12 @@
 from __future__ import annotations
 
 from bentray_kernels.tomography.settings import Settings
-from bentray_kernels.tomography.waveform import automatic_settings
-from bentray_kernels.tomography.waveform.automatic_settings import check_traces
+from bentray_kernels.tomography.waveform.automatic_settings import (
+    WaveScale,
+    bands_of,
+    budgeted,
+    check_traces,
+)
 from bentray_kernels.tomography.waveform.band_grid import Extent
 from bentray_kernels.tomography.waveform.source_calibration import SHOTS
 from bentray_kernels.tomography.waveform.validation import judging
@@ -26,32 +30,35 @@ SHOT_BYTES, LOOK_BYTES, SAMPLER_BYTES = 140, 96, 64
 MEDIUM_BYTES, STEP_BYTES = 72, 280
 
 
-def plan_of(traces: Traces, settings: Settings) -> tuple[Band, ...]:
-    """The bands that are gone through."""
-    return automatic_settings.plan_of(traces.frequency_hz, traces.water_mps, settings)
+def plan_of(traces: Traces, width_m: float, slices: int, settings: Settings) -> tuple[Band, ...]:
+    """The bands of a refinement within the time budget."""
+    record_s = (traces.samples - 1) / traces.rate_hz
+    scale = WaveScale(traces.frequency_hz, traces.water_mps, width_m, record_s, slices)
+    return bands_of(scale.centre_hz, scale.water_mps, budgeted(settings, scale))
 
 
 def refines(settings: Settings) -> bool:
     """Whether an image may be refined by waves; ``auto`` does so where it is given the minutes."""
-    return settings.method == "waveform" or (settings.method == "auto" and settings.wave_minutes > 0.0)
+    return settings.method == "waveform" or (settings.method == "auto" and bool(settings.minutes))
 
 
-def wave_tasks(traces: Traces | None, settings: Settings) -> int:
-    """Calls of one slice: looks of single emitters and steps, unless some are shortened; 0 without waves."""
+def wave_tasks(traces: Traces | None, width_m: float, slices: int, settings: Settings) -> int:
+    """Calls of each slice: looks of single emitters and steps, unless some are shortened; 0 without waves."""
     if not refines(settings) or traces is None:
         return 0
-    plan = plan_of(traces, settings)
+    plan = plan_of(traces, width_m, slices, settings)
     held_out = WaveSettings(plan).held_out
     return sum(band.looks(held_out) + band.iterations + 2 for band in plan)
 
 
-def wave_call_bytes(traces: Traces | None, width_m: float, settings: Settings) -> dict[str, int]:
+def wave_call_bytes(traces: Traces | None, width_m: float, slices: int, settings: Settings) -> dict[str, int]:
     """Bytes of each kind of call, over all bands, and of the call by which trials are judged.
 
     Args:
         traces: of the dataset.
         width_m: of the array.
-        settings: as asked for.
+        slices: of the scan.
+        settings: as requested.
 
     Returns:
         By the call's name in ``waveform_chain`` and ``validation``; nothing where no waves are simulated.
@@ -61,9 +68,9 @@ def wave_call_bytes(traces: Traces | None, width_m: float, settings: Settings) -
     """
     if settings.method == "waveform":
         check_traces(0 if traces is None else traces.samples)
-    if traces is None or not settings.tries:
+    if traces is None or not settings.selects_model:
         return {}
-    plan = plan_of(traces, settings)
+    plan = plan_of(traces, width_m, slices, settings)
     (judge,) = judging(WaveSettings(plan)).bands
     found = {"judge_by_waves": _band_bytes(traces, width_m, settings, judge)["enter"]}
     for band in plan if refines(settings) else ():

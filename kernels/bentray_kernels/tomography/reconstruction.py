@@ -18,6 +18,7 @@ from . import pairs
 from .grid_schedule import stages
 from .model_selection.held_out import Part, part_of
 from .model_selection.selection import select_model
+from .numerics import recorded
 from .problem import Problem
 from .reconstruction_graph import (
     ReconstructionGraph,
@@ -54,8 +55,8 @@ def reconstruct(
     Raises:
         InvalidInput: from the dataset or a setting that does not fit it.
     """
-    if settings.listens and dataset.waveform is not None:
-        dataset = with_log_ratios(dataset, settings.amplitudes)
+    if settings.reads_amplitudes and dataset.waveform is not None:
+        dataset = with_log_ratios(dataset, settings.attenuation.amplitudes)
 
     def run_graphs(graphs: Sequence[TomographyGraph], before: int, after: int) -> None:
         def report(_name: str) -> None:
@@ -105,10 +106,10 @@ def run_reconstruction(
     trials: tuple[Trial, ...] = ()
     before = 0
     waves = _refinement(dataset, settings, samples, wave_scan_of)
-    allowed = waves is not None and (settings.method == "waveform" or waves.minutes <= settings.wave_minutes)
+    allowed = waves is not None and (settings.method == "waveform" or waves.within_budget)
     refinement = waves if allowed else None
     after = refinement.total if refinement is not None else waves.passes if waves is not None else 0
-    if settings.tries:
+    if settings.selects_model:
         settings, trials, before = select_model(dataset, settings, count // 2, scan_of, run_graphs, after)
     scan = scan_of(settings, "all")
     graphs = [ReconstructionGraph(scan, index) for index in range(count)]
@@ -160,7 +161,7 @@ def problem_of(dataset: Dataset, settings: Settings, index: int) -> Problem:
         InvalidInput: as ``Problem.of``.
     """
     problem = Problem.of(dataset, settings, index)
-    once = settings.method == "gauss-newton" and settings.reciprocity
+    once = settings.method == "gauss-newton" and settings.numerics.reciprocity
     return problem.each_pair_once() if once else problem
 
 
@@ -201,7 +202,7 @@ def _assembled(
         recovery=evaluated(check_resolution),
         residuals=np.sum([graph.state.residuals for graph in graphs], axis=0),
         trials=trials,
-        provenance=provenance(),
+        provenance={**provenance(), **recorded(settings.numerics)},
     )
 
 

@@ -1,0 +1,53 @@
+"""The time budget decides bands and emitters of a refinement, and never more than it allows."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography.numerics import BANDS
+from bentray_kernels.tomography.waveform.automatic_settings import (
+    LEAST_EMITTERS,
+    WaveScale,
+    bands_of,
+    budgeted,
+)
+
+SCALE = WaveScale(centre_hz=4e5, water_mps=1500.0, width_m=0.2, record_s=2e-4, slices=2)
+WAVEFORM = Settings(method="waveform")
+
+
+def within(minutes, **fixed):
+    return budgeted(WAVEFORM.changed(minutes=minutes, **fixed), SCALE)
+
+
+def test_without_a_budget_all_bands_are_used():
+    assert within(None) == WAVEFORM
+    assert len(bands_of(SCALE.centre_hz, SCALE.water_mps, WAVEFORM)) == BANDS + 1
+
+
+@given(st.floats(0.0, 1e4))
+def test_what_is_chosen_fits_or_is_the_least(minutes):
+    found = within(minutes)
+    least = (1, LEAST_EMITTERS)
+    assert SCALE.minutes(found) <= minutes or (found.numerics.bands, found.numerics.emitters) == least
+    # A larger budget never gives less.
+    assert SCALE.minutes(within(2.0 * minutes)) >= SCALE.minutes(found)
+
+
+def test_bands_go_before_emitters():
+    whole = SCALE.minutes(WAVEFORM)
+    assert within(whole).numerics.bands == BANDS
+    assert within(0.99 * whole).numerics.bands < BANDS
+    one = SCALE.minutes(WAVEFORM.changed(bands=1))
+    assert (within(one).numerics.bands, within(one).numerics.emitters) == (1, None)
+    assert within(0.99 * one).numerics.emitters == 16
+
+
+@pytest.mark.parametrize("fixed", [{"bands": 3}, {"bands": 3, "emitters": 5}])
+def test_fixed_bands_and_emitters_stay(fixed):
+    assert within(1e-3, **fixed) == WAVEFORM.changed(minutes=1e-3, **fixed)
+
+
+def test_fixed_emitters_stay_where_bands_are_chosen():
+    assert within(1e-3, emitters=20).numerics.emitters == 20
