@@ -88,13 +88,13 @@ def judged(name: str, dataset: Dataset, nodes: int) -> Iterable[Row]:
         "bent, wide": bent_as_waves,
     }
     found = {
-        way: error(reconstruct(picked, replace(plan, **changes)), dataset) for way, changes in ways.items()
+        way: error(reconstruct(picked, plan.changed(**changes)), dataset) for way, changes in ways.items()
     }
     # It chooses by times, and hears the traces to say what waveforms would give.
     advised = reconstruct(replace(picked, waveform=dataset.waveform), replace(plan, method="auto"))
     found["auto"] = error(advised, dataset)
     exact = replace(picked, delta_tof_s=ideal(dataset), sigma_s=None)
-    found["ideal times"] = error(reconstruct(exact, replace(plan, **all_at_once)), dataset)
+    found["ideal times"] = error(reconstruct(exact, plan.changed(**all_at_once)), dataset)
     told = ", ".join(f"{way} {rms:.1f} m/s" for way, rms in found.items())
     bent = min(found[way] for way in ways if way.startswith("bent"))
     fair = min(found[way] for way in ways if way.startswith("straight"))

@@ -1,7 +1,5 @@
 """Regions of interest: one without a node in the image is refused, a slice beyond a region stays water."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -43,7 +41,7 @@ def test_a_region_without_a_node_in_the_image_is_refused(way):
     outside[0, 0] = True
     for roi in (outside, np.zeros_like(outside)):
         with pytest.raises(InvalidInput) as refusal:
-            reconstruct(scan(roi), replace(PLAN, **way))
+            reconstruct(scan(roi), PLAN.changed(**way))
         assert refusal.value.field == "mask/roi"
 
 
@@ -51,7 +49,7 @@ def test_a_region_without_a_node_in_the_image_is_refused(way):
 def test_a_slice_above_the_region_stays_water(way):
     roi = np.zeros((11, 11, 11), bool)
     roi[3:8, 3:8, 5] = True
-    found = reconstruct(scan(roi, np.array([0.0, 0.02])), replace(PLAN, **way))
+    found = reconstruct(scan(roi, np.array([0.0, 0.02])), PLAN.changed(**way))
     assert found.speed[..., 0].max() > WATER + 1.0
     assert np.allclose(found.speed[..., 1], WATER)
     assert np.array_equal(found.recovery[..., 1], np.zeros((24, 24)))

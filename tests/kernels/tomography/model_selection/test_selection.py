@@ -107,7 +107,7 @@ def test_exact_times_ask_for_thin_bent_rays_whatever_the_frequency(scan):
     seen = []
     result = reconstruct(replace(scan, center_frequency_hz=4e5), PLAN, seen.append)
     assert result.settings.rays == "curved"
-    assert result.settings.ray_width_m == 0.0
+    assert result.settings.numerics.ray_width_m == 0.0
     assert len(result.trials) == len(BANDED)
     assert [p.done / p.total for p in seen] == sorted(p.done / p.total for p in seen)
     assert seen[-1].done == seen[-1].total
@@ -203,7 +203,7 @@ def test_the_noise_is_told_or_estimated(scan):
 def test_trials_are_coarser_and_speed_alone():
     for plan, changes in zip(candidate_settings(replace(PLAN, nodes=200)), CANDIDATES, strict=True):
         assert plan.nodes == 100
-        assert not plan.attenuation
+        assert not plan.attenuation.enabled
         assert plan.method == changes["method"]
     assert {plan.nodes for plan in candidate_settings(PLAN)} == {48}
 

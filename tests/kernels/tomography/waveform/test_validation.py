@@ -7,7 +7,7 @@ import pytest
 
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.checkpoint import pack, unpack
-from bentray_kernels.tomography.waveform.automatic_settings import wave_settings
+from bentray_kernels.tomography.waveform.automatic_settings import scale_of, wave_settings
 from bentray_kernels.tomography.waveform.inversion_state import Image
 from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.validation import (
@@ -32,10 +32,15 @@ def images():
     return [Image(part, 1e-3, (-0.03, -0.03)) for part in parts]
 
 
+def plan_for(data):
+    settings = Settings(method="waveform")
+    return wave_settings(scale_of(data, settings, data.waveform.object.shape[-1], 1), settings)
+
+
 @pytest.fixture(scope="module")
 def heard():
     data = scan()
-    return MemoryWaveScan(data, judging(wave_settings(data, Settings(method="waveform"))))
+    return MemoryWaveScan(data, judging(plan_for(data)))
 
 
 def test_images_are_ranked_as_the_truth_ranks_them(heard):
@@ -49,7 +54,7 @@ def test_images_are_ranked_as_the_truth_ranks_them(heard):
 
 def test_noise_counts_as_it_does_in_water():
     data = scan(seed=1, noise=0.1)
-    noisy = MemoryWaveScan(data, judging(wave_settings(data, Settings(method="waveform"))))
+    noisy = MemoryWaveScan(data, judging(plan_for(data)))
     found = judge_by_waves(noisy, images()[0])
     assert 0.5 * found.water < found.misfit < 2.0 * found.water
 
@@ -58,7 +63,7 @@ def test_nothing_is_said_where_water_shots_cannot_be_simulated():
     data = scan()
     random = np.random.default_rng(0).normal(size=data.waveform.water.shape).astype(np.float32)
     deaf = replace(data, waveform=replace(data.waveform, water=random))
-    here = MemoryWaveScan(deaf, judging(wave_settings(deaf, Settings(method="waveform"))))
+    here = MemoryWaveScan(deaf, judging(plan_for(deaf)))
     assert here.problem(0).likeness < LEAST_LIKENESS
     assert judge_by_waves(here, images()[0]) == Judgement()
 
