@@ -20,7 +20,7 @@ from . import small_disk as small
 
 # `push`, which `make test` and CI use, tries the same examples every time: a change is not judged by luck.
 # `nightly`, of `make test-all`, searches at random and prints what repeats a failure (@reproduce_failure).
-settings.register_profile("push", derandomize=True, database=None, deadline=None)
+settings.register_profile("push", max_examples=20, derandomize=True, database=None, deadline=None)
 settings.register_profile(
     "nightly", deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
 )

@@ -80,7 +80,13 @@ def test_no_page_of_dask_is_shown(installation: Installation, part: str) -> None
 
 
 @pytest.mark.parametrize(
-    "part", ["worker", "scheduler", pytest.param("service", marks=pytest.mark.nightly), "database"]
+    "part",
+    # Workers and services are killed in tests/faults too.
+    [
+        *(pytest.param(part, marks=pytest.mark.nightly) for part in ("worker", "service")),
+        "scheduler",
+        "database",
+    ],
 )
 def test_it_works_again_after_a_part_was_killed(installation: Installation, scan: Path, part: str) -> None:
     with Client(installation.url, key=installation.key) as client:
@@ -99,6 +105,7 @@ def test_it_works_again_after_a_part_was_killed(installation: Installation, scan
         assert client.wait(again.id).state == "succeeded"
 
 
+@pytest.mark.nightly
 def test_with_certificates_the_parts_speak_tls_alone(tmp_path: Path, scan: Path) -> None:
     subprocess.run([str(compose.ROOT / "deploy" / "certificates.sh"), str(tmp_path / "tls")], check=True)
     secured = Installation(tmp_path, compose.TLS)

@@ -9,7 +9,7 @@ from bentray_workers.files.reconstruction import read_reconstruction
 
 from .machine import wait_until
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 PLAN = {"nodes": 64, "attenuation": {"enabled": False}, "method": "sart", "iterations": 200}
 

@@ -12,6 +12,8 @@ from scipy.ndimage import gaussian_filter
 from bentray_kernels import eikonal
 from bentray_kernels.eikonal import accurate
 
+from ...effort import effort
+
 SEEDS = st.integers(0, 2**32 - 1)
 CONTRASTS = st.floats(np.log10(1.5), 4.0).map(lambda decades: 10.0**decades)
 
@@ -52,14 +54,14 @@ def assert_causal(speed, source, method):
 
 
 @given(seed=SEEDS, contrast=CONTRASTS)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=effort(20, 60), deadline=None)
 def test_rough_models_give_causal_times(method, ndim, seed, contrast):
     assert_causal(*rough_problem(seed, contrast, ndim), method)
 
 
 @pytest.mark.nightly
 @given(seed=SEEDS, contrast=CONTRASTS)
-@settings(max_examples=5_000, deadline=None)
+@settings(max_examples=effort(20, 5_000), deadline=None)
 def test_many_rough_models_give_causal_times(method, ndim, seed, contrast):
     assert_causal(*rough_problem(seed, contrast, ndim), method)
 

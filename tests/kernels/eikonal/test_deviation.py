@@ -9,6 +9,8 @@ from bentray_kernels.eikonal import solve
 from bentray_kernels.eikonal.deviation import deviate, sheets
 from bentray_kernels.eikonal.problem import PointSource
 
+from ...effort import effort
+
 SPACING, WATER = 1e-3, 1480.0
 SHAPES = st.tuples(st.integers(2, 40), st.integers(2, 40))
 PARTS = st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
@@ -70,7 +72,7 @@ def test_as_accurate_as_the_accurate_solver_in_tissue(seed, part):
 
 
 @given(seed=st.integers(0, 2**32 - 1), shape=SHAPES, part=PARTS)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=effort(20, 40), deadline=None)
 def test_rough_media_give_times_that_can_be(seed, shape, part):
     speed = WATER * np.random.default_rng(seed).uniform(0.5, 2.0, shape)
     source = place(shape, part)

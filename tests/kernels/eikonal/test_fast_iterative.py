@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from bentray_kernels import eikonal
 from bentray_kernels.errors import InvalidInput
 
+from ...effort import effort
+
 SHAPES = st.one_of(
     st.tuples(st.integers(1, 14), st.integers(1, 14)),
     st.tuples(st.integers(1, 7), st.integers(1, 7), st.integers(1, 7)),
@@ -21,7 +23,7 @@ def rough_problem(seed, shape):
 
 
 @given(seed=st.integers(0, 2**32 - 1), shape=SHAPES)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=effort(20, 60), deadline=None)
 def test_equals_marching_and_sweeping(seed, shape):
     speed, source = rough_problem(seed, shape)
     tof = eikonal.solve(speed, 1.0, source, "fim")

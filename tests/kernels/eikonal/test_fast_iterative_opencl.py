@@ -11,6 +11,8 @@ from bentray_kernels import eikonal
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl import OpenCLFallbackWarning, choice
 
+from ...effort import effort
+
 SHAPES = st.one_of(st.tuples(*[st.integers(1, 26)] * 2), st.tuples(*[st.integers(1, 10)] * 3))
 
 
@@ -23,7 +25,7 @@ def rough_problems(seed, shape, batch):
 
 @pytest.mark.opencl
 @given(seed=st.integers(0, 2**32 - 1), shape=SHAPES, batch=st.integers(1, 5))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=effort(20, 50), deadline=None)
 def test_equals_fim_and_a_batch_equals_one_by_one(seed, shape, batch):
     speeds, sources = rough_problems(seed, shape, batch)
     many = eikonal.solve_many(speeds, 1.0, sources, "fim-opencl")

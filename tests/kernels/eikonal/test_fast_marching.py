@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 
 from bentray_kernels import eikonal
 
+from ...effort import effort
+
 
 def layered_speed(seed, shape, axes):
     """A speed of a few plane waves, within a factor of two, that does not change along the other axes."""
@@ -28,7 +30,7 @@ def layered_speed(seed, shape, axes):
     axes=st.tuples(*[st.booleans()] * 3),
     halves=st.tuples(*[st.integers(0, 12)] * 3),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=effort(20, 40), deadline=None)
 def test_sources_in_the_middle_of_a_cell_give_mirrored_times_in_a_mirror(
     method, order, shape, seed, axes, halves
 ):

@@ -10,6 +10,8 @@ from bentray_kernels.eikonal.fast_marching_untidy import BUCKETS, _bucket_width
 from bentray_kernels.eikonal.problem import PointSource
 from bentray_kernels.errors import InvalidInput
 
+from ...effort import effort
+
 
 def untidy_error_bound(problem, width=0.01):
     """By which part a first-order untidy time may be later than that of ``fast_marching``."""
@@ -31,7 +33,7 @@ def excess(speed, source, order, width):
 @given(
     seed=st.integers(0, 2**32 - 1), width=WIDTHS, flat=st.booleans(), contrast=st.sampled_from([1.1, 5, 100])
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=effort(20, 60), deadline=None)
 def test_first_order_stays_within_the_bound_on_rough_models(seed, width, flat, contrast):
     shape = (24, 19) if flat else (8, 9, 7)
     rng = np.random.default_rng(seed)
@@ -43,7 +45,7 @@ def test_first_order_stays_within_the_bound_on_rough_models(seed, width, flat, c
 
 
 @given(seed=st.integers(0, 2**32 - 1), width=st.sampled_from([0.01, 0.1, 0.5]), middle=st.booleans())
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=effort(20, 30), deadline=None)
 def test_second_order_stays_within_the_bound_on_smooth_models(seed, width, middle):
     rng = np.random.default_rng(seed)
     x, y = np.meshgrid(np.arange(40) / 39, np.arange(40) / 39, indexing="ij")

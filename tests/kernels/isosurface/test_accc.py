@@ -11,6 +11,8 @@ from bentray_kernels.isosurface.accc import product_ranges, weighted_range
 from bentray_kernels.isosurface.cell_weights import cell_weights
 from bentray_kernels.splines.filters import FILTERS
 
+from ...effort import effort
+
 
 def equation_18(nodes: np.ndarray, iso: float, least: np.ndarray, most: np.ndarray) -> tuple[float, float]:
     """Lower and upper bound about one iso-value."""
@@ -26,7 +28,7 @@ def test_the_range_classifies_as_equation_18_does(name):
     least, most = product_ranges(weights, 1)
 
     @given(seed=st.integers(0, 2**32 - 1), place=st.floats(-0.2, 1.2))
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=effort(20, 200), deadline=None)
     def same(seed, place):
         nodes = np.random.default_rng(seed).normal(0.0, 1.0, weights.nodes**3)
         low, high = weighted_range(nodes, least, most)

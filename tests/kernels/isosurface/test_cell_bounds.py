@@ -11,6 +11,8 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.isosurface import BOUNDS, cell_ranges
 from bentray_kernels.splines import FILTERS, Spline
 
+from ...effort import effort
+
 SHAPE = (4, 3, 5)
 
 
@@ -24,7 +26,7 @@ def dense(per_cell: int) -> np.ndarray:
 
 def test_no_bound_loses_a_value():
     @given(seed=st.integers(0, 2**32 - 1), whole=st.booleans(), name=st.sampled_from(sorted(FILTERS)))
-    @settings(max_examples=60, deadline=None)
+    @settings(max_examples=effort(20, 60), deadline=None)
     def holds(seed, whole, name):
         random = np.random.default_rng(seed)
         nodes = random.normal(100.0, 40.0, SHAPE)

@@ -22,6 +22,8 @@ from bentray_kernels.isosurface.octree import Octree, octree_of
 from bentray_kernels.isosurface.roots import Field, ray_of
 from bentray_kernels.splines import Spline
 
+from ...effort import effort
+
 SHAPE = (6, 5, 7)
 FILTERS = ("trilinear", "catmull-rom", "bspline2", "bspline3", "bspline6")
 
@@ -100,7 +102,7 @@ def test_no_crossing_is_missed_and_none_invented(name):
     dense = np.linspace(0.0, 1.0, 4001)
 
     @given(seed=st.integers(0, 2**32 - 1), bound=st.sampled_from(BOUNDS[:4]))
-    @settings(max_examples=150, deadline=None)
+    @settings(max_examples=effort(20, 150), deadline=None)
     def holds(seed, bound):
         case = Case(seed, name, bound)
         values = case.field(dense)
@@ -125,7 +127,7 @@ def test_from_surface_to_surface_all_crossings_are_met(name):
     dense = np.linspace(0.0, 1.0, 20001)
 
     @given(seed=st.integers(0, 2**32 - 1))
-    @settings(max_examples=60, deadline=None)
+    @settings(max_examples=effort(20, 60), deadline=None)
     def holds(seed):
         case = Case(seed, name)
         values = case.field(dense)

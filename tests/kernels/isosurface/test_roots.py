@@ -11,6 +11,8 @@ from bentray_kernels.compiled import kernel
 from bentray_kernels.isosurface.roots import Field, Ray, brent, field_at, first_root_of_cubic, ray_of
 from bentray_kernels.splines import Spline
 
+from ...effort import effort
+
 
 @kernel
 def root(field: Field, ray: Ray, target: float, a: float, b: float, tolerance: float) -> float:
@@ -37,7 +39,7 @@ coefficient = st.floats(-4.0, 4.0).map(lambda x: round(x, 3))
 
 
 @given(c=st.tuples(coefficient, coefficient, coefficient, coefficient))
-@settings(deadline=None, max_examples=500)
+@settings(deadline=None, max_examples=effort(20, 500))
 def test_the_first_root_of_a_cubic(c):
     assume(any(c))
     roots = np.roots(c[::-1])

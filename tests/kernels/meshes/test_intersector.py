@@ -12,6 +12,7 @@ from bentray_kernels.meshes.intersector import intersect
 from bentray_kernels.meshes.mesh import Chart, TriangleMesh
 from bentray_kernels.meshes.surface import Surface, surface_of
 
+from ...effort import effort
 from ..geometry_field.shapes import ball, octahedron, over_the_poles, random_triangles
 
 
@@ -43,7 +44,7 @@ def by_brute_force(surface: Surface, origin: np.ndarray, direction: np.ndarray) 
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 60))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=effort(20, 40), deadline=None)
 def test_the_first_face_is_that_of_brute_force(seed, count):
     surface = surface_of(random_triangles(seed, count))
     random = np.random.default_rng(seed)

@@ -11,6 +11,8 @@ from bentray_kernels.meshes.marching import isosurface_mesh
 from bentray_kernels.meshes.pieces import pieces_of
 from bentray_kernels.meshes.topology import topology_of
 
+from ...effort import effort
+
 UNIT = np.ones(3)
 
 
@@ -43,7 +45,7 @@ def test_a_plane_has_no_error():
 
 
 @given(arrays.arrays(np.int8, st.tuples(*(st.integers(2, 5),) * 3), elements=st.integers(0, 2)))
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=effort(20, 60))
 def test_any_volume_gives_closed_surfaces_about_what_is_above(values):
     """Even where values lie on the iso-value and cells touch in corners alone."""
     if values.max() <= 1 or values.min() > 1:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere
 from bentray_kernels.meshes.surface_distance import SurfaceGrid
 
+from ...effort import effort
 from .examples import mesh, tetrahedron
 
 
@@ -22,7 +23,7 @@ def by_sampling(surface, points, parts=60):
 
 
 @given(st.integers(0, 10_000))
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=effort(20, 30))
 def test_random_triangles(seed):
     random = np.random.default_rng(seed)
     number = random.integers(1, 8)

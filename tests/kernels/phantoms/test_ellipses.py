@@ -8,13 +8,15 @@ from hypothesis import strategies as st
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, Ellipse, EllipsePhantom, table6
 
+from ...effort import effort
+
 
 @given(
     axes=st.tuples(st.floats(0.2, 0.9), st.floats(0.2, 0.9)),
     centre=st.tuples(st.floats(-0.05, 0.05), st.floats(-0.05, 0.05)),
     angle=st.floats(0.0, 3.1),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=effort(20, 40), deadline=None)
 def test_average_keeps_the_area(axes, centre, angle):
     phantom = EllipsePhantom(0.5, (Ellipse(centre, axes, 1.5, 1.0, "disk", angle),))
     nodes, side = 81, 2.0

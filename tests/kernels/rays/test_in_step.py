@@ -10,6 +10,8 @@ from bentray_kernels.eikonal import solve
 from bentray_kernels.rays import sensitivities
 from bentray_kernels.rays.in_step import STRIDE, bundle, follow, lay_out, spread
 
+from ...effort import effort
+
 SHAPE = (60, 50)
 
 
@@ -41,7 +43,7 @@ def given_out(worth, steps, rays, shape=SHAPE):
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 20))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=effort(20, 25), deadline=None)
 def test_rays_through_water_are_straight(seed, count):
     rng = np.random.default_rng(seed)
     source = points(rng, 1)[0]

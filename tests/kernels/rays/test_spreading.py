@@ -9,6 +9,8 @@ from scipy.integrate import solve_ivp
 from bentray_kernels import eikonal, rays
 from bentray_kernels.errors import InvalidInput
 
+from ...effort import effort
+
 CENTRE = np.array([0.45, 0.52, 0.5])
 SOURCE = np.array([0.2, 0.23, 0.4])
 
@@ -131,7 +133,7 @@ def test_neighbouring_rays_are_as_far_apart(ndim, n):
 
 
 @given(seed=st.integers(0, 2**32 - 1), flat=st.booleans())
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=effort(20, 30), deadline=None)
 def test_reciprocal(seed, flat):
     """Tubes there and back differ by the speeds at the ends alone."""
     ndim, n = (2, 60) if flat else (3, 24)

@@ -9,6 +9,7 @@ from bentray_kernels import eikonal, rays
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.rays.fan import squared_gradient
 
+from ...effort import effort
 from ...opencl import methods
 
 
@@ -60,7 +61,7 @@ def test_steps_are_of_second_order():
 
 
 @given(factors=st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6), flat=st.booleans())
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=effort(20, 30), deadline=None)
 def test_gradient_of_a_parabola_is_exact_on_the_rim_too(factors, flat):
     shape = (6, 3) if flat else (3, 5, 4)
     strides = tuple(int(np.prod(shape[k + 1 :])) for k in range(len(shape)))
@@ -95,7 +96,7 @@ def test_slowness_along_the_ray_is_the_travel_time():
 
 
 @given(seed=st.integers(0, 2**32 - 1), flat=st.booleans())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=effort(20, 40), deadline=None)
 def test_no_ray_is_lost_in_rough_models(seed, flat):
     rng = np.random.default_rng(seed)
     shape = (14, 17) if flat else (7, 8, 6)
@@ -116,7 +117,7 @@ def test_no_ray_is_lost_in_rough_models(seed, flat):
 
 @pytest.mark.parametrize("kind", ["curved", "straight"])
 @given(seed=st.integers(0, 2**32 - 1), flat=st.booleans())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=effort(20, 25), deadline=None)
 def test_sensitivities_are_the_lengths_of_the_rays(kind, seed, flat):
     rng = np.random.default_rng(seed)
     shape = (15, 12) if flat else (7, 8, 6)

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from bentray_kernels import eikonal, rays
 from bentray_kernels.errors import InvalidInput
 
+from ...effort import effort
+
 
 def gradient_problem(n, ndim, receivers):
     """Speed 1 + 4x on the unit cube, and the exact times from one point of it to some others."""
@@ -53,7 +55,7 @@ def test_exact_in_a_homogeneous_medium(ndim):
 
 
 @given(seed=st.integers(0, 2**32 - 1), flat=st.booleans())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=effort(20, 40), deadline=None)
 def test_rough_models_give_times_that_no_straight_ray_undercuts(seed, flat):
     """Fermat: bending begins at a ray and only takes time off it, even where no valley is smooth."""
     rng = np.random.default_rng(seed)

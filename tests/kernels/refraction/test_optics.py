@@ -11,6 +11,8 @@ from bentray_kernels.arrays import Vector
 from bentray_kernels.compiled import kernel
 from bentray_kernels.refraction.optics import reflectances, refracted
 
+from ...effort import effort
+
 
 @kernel
 def bend(direction: Vector, normal: Vector, ratio: float) -> tuple[Vector, float, bool]:
@@ -28,7 +30,7 @@ def unit(seed: int) -> np.ndarray:
 
 
 @given(seeds=st.tuples(st.integers(0, 10**6), st.integers(0, 10**6)), ratio=st.floats(0.3, 3.0))
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=effort(20, 300))
 def test_snells_law_in_the_plane_of_incidence(seeds, ratio):
     direction, normal = unit(seeds[0]), unit(seeds[1])
     bent, share, passed = bend(tuple(direction), tuple(normal), ratio)

@@ -8,6 +8,8 @@ from scipy.ndimage import spline_filter
 from bentray_kernels.compiled import kernel
 from bentray_kernels.splines.cubic import coefficients, jet_2d, jet_3d, refined
 
+from ...effort import effort
+
 
 @kernel
 def jet(spline, point):
@@ -24,7 +26,7 @@ def jet(spline, point):
     ),
     seed=st.integers(0, 2**32 - 1),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=effort(20, 60), deadline=None)
 def test_coefficients_equal_scipys(shape, seed):
     values = np.random.default_rng(seed).uniform(-1.0, 1.0, shape)
     inside = (slice(1, -2),) * len(shape)
@@ -32,7 +34,7 @@ def test_coefficients_equal_scipys(shape, seed):
 
 
 @given(seed=st.integers(0, 2**32 - 1), flat=st.booleans())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=effort(20, 60), deadline=None)
 def test_jets_are_value_slope_and_second_derivative(seed, flat):
     """Second differences of a cubic spline over a small step, anywhere in the grid, its rim included."""
     rng = np.random.default_rng(seed)
@@ -73,7 +75,7 @@ def test_spline_passes_through_the_nodes():
 @given(
     shape=st.tuples(st.integers(1, 9), st.integers(1, 9)), times=st.integers(1, 4), seed=st.integers(0, 99)
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=effort(20, 40), deadline=None)
 def test_a_refined_grid_is_the_spline_read_between_the_nodes(shape, times, seed):
     values = np.random.default_rng(seed).uniform(0.0, 1.0, shape)
     fine = refined(values, times)

@@ -10,6 +10,8 @@ from scipy.ndimage import spline_filter1d
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.splines.prefilter import MOST_SMOOTHING, prefilter, sampled_bspline, symbols
 
+from ...effort import effort
+
 SHAPES = st.one_of(
     st.tuples(st.integers(1, 70)),
     st.tuples(st.integers(1, 40), st.integers(1, 9)),
@@ -51,7 +53,7 @@ def dense_minimum(values, order, smoothing):
 
 @pytest.mark.parametrize("order", range(2, 6))
 @given(shape=SHAPES, seed=SEEDS)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=effort(20, 25), deadline=None)
 def test_without_smoothing_equals_scipys(order, shape, seed):
     values = np.random.default_rng(seed).uniform(-1.0, 1.0, shape)
     expected = values

@@ -65,9 +65,9 @@ def canonical(shape: tuple[int, ...] = (3, 4, 5), kind: str = "bentray-volume", 
 
 
 def bomb(start: bytes = b"") -> bytes:
-    """A quarter of a gigabyte of zeros, packed, after ``start``: members of 16 MiB each."""
-    zeros = bytes(2**24)
-    return gzip.compress(start + zeros, 1, mtime=0) + 15 * gzip.compress(zeros, 1, mtime=0)
+    """A quarter of a gigabyte of zeros, packed, after ``start``: members of 1 MiB each."""
+    zeros = bytes(2**20)
+    return gzip.compress(start + zeros, 1, mtime=0) + 255 * gzip.compress(zeros, 1, mtime=0)
 
 
 def spoilt(value: float, dtype: str = "f4") -> bytes:

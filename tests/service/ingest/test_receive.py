@@ -13,6 +13,8 @@ from bentray_service.ingest import receive as receiving
 from bentray_service.ingest.receive import receive
 from bentray_service.refusals import EmptyBody, StorageFull, TooLarge
 
+from ...effort import effort
+
 LIMIT = 10**6
 
 
@@ -29,7 +31,7 @@ def run(path, chunks, *, announced=None, limit=LIMIT, error=None):
 
 
 @given(chunks=st.lists(st.binary(max_size=40), min_size=1), batch=st.integers(1, 60))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=effort(20, 30), deadline=None)
 def test_what_is_sent_is_on_the_disk(tmp_path_factory, chunks, batch):
     path, body = tmp_path_factory.mktemp("r") / "body", b"".join(chunks)
     with pytest.MonkeyPatch.context() as patch:

@@ -16,6 +16,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import copy_dataset, read_dataset, write_dataset
 
+from ...effort import effort
 from .datasets import datasets, small
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
@@ -34,7 +35,7 @@ def assert_same(a, b, name="dataset"):
 
 
 @given(datasets())
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=effort(20, 40), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_what_is_written_comes_back(dataset):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "d.h5"
@@ -238,7 +239,9 @@ def test_a_file_cut_short_anywhere_is_refused(whole):
         st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.integers(1, 255)), min_size=1, max_size=4
     )
 )
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=effort(20, 200), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 def test_flipped_bits_give_a_refusal_or_a_dataset_that_holds_its_rules(whole, flips):
     content = bytearray(whole)
     for place, mask in flips:

@@ -10,11 +10,13 @@ from hypothesis.extra import numpy as hnp
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.metaimage_writing import ELEMENTS, write_metaimage
 
+from ...effort import effort
+
 steps = st.floats(1e-6, 1e-1)
 places = st.floats(-1.0, 1.0)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=effort(20, 40))
 @given(dtype=st.sampled_from(list(ELEMENTS)), shape=hnp.array_shapes(min_dims=2, max_dims=3), data=st.data())
 def test_another_program_reads_the_same(tmp_path_factory, dtype, shape, data):
     path = tmp_path_factory.mktemp("mha") / "v.mha"

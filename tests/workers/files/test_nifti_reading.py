@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.volume_formats import import_volume
 
+from ...effort import effort
 from .volumes import ramp, refused
 
 AFFINE = np.array([[2.0, 0, 0, 10], [0, 3, 0, 20], [0, 0, 4, 30], [0, 0, 0, 1]])
@@ -178,7 +179,7 @@ def test_packed_values_without_the_whole_check_sum_are_refused(tmp_path, missing
     assert "damaged data" in refused(tmp_path / "v").value
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=effort(20, 150), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.dictionaries(st.integers(0, 347), st.integers(0, 255), min_size=1, max_size=6))
 def test_a_damaged_header_is_read_or_refused_and_nothing_else(tmp_path, changes):
     content = bytearray(image().to_bytes())

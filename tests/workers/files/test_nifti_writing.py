@@ -10,6 +10,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.nifti_writing import write_nifti
 from bentray_workers.files.volume_formats import import_volume
 
+from ...effort import effort
 from .volumes import ramp
 
 SPACING, ORIGIN = (1e-3, 2e-3, 3e-3), (-0.01, 0.0, 0.02)
@@ -45,7 +46,7 @@ def test_a_long_axis_takes_nifti_2(tmp_path):
     assert import_volume(tmp_path / "v.nii").values.shape == (2, 40_000, 2)
 
 
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=effort(20, 30), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(max_size=120))
 def test_any_title_fits(tmp_path, title):
     write_nifti(tmp_path / "v.nii", ramp(), SPACING, ORIGIN, title)

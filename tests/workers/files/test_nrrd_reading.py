@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.volume_formats import import_volume
 
+from ...effort import effort
 from .volumes import ramp, refused
 
 PLAIN = "type: uint8\ndimension: 3\nsizes: 3 4 5\nencoding: raw\n"
@@ -127,7 +128,7 @@ def test_packed_values_that_end_early_or_are_none(tmp_path):
         assert refused(write(tmp_path / "v", fields, data)).field == "file"
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=effort(20, 150), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(st.characters(max_codepoint=126), max_size=60), st.integers(0, 60))
 def test_a_damaged_header_is_read_or_refused_and_nothing_else(tmp_path, text, place):
     fields = PLAIN[:place] + text + PLAIN[place:]

@@ -21,6 +21,7 @@ from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.files.volume_formats import RAW_TYPES, SPACING_M, Given, import_volume
 
+from ...effort import effort
 from .reconstructions import made
 from .volumes import ramp, refused
 
@@ -193,7 +194,7 @@ def test_hdf5_of_another_kind(tmp_path):
     assert refused(tmp_path / "v.h5").field == "@format"
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=effort(20, 150), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_a_damaged_file_is_read_or_refused_and_nothing_else(tmp_path, data):
     content = bytearray(saved(ramp()))

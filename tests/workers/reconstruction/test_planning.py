@@ -38,7 +38,12 @@ def ring(elements, heights):
     [
         ({"nodes": 64, "resolution_check": True}, 128, 0),
         pytest.param({"nodes": 96}, 192, 0, marks=pytest.mark.nightly),
-        ({"nodes": 64, "method": "gauss-newton", "resolution_check": True}, 128, 0),
+        pytest.param(
+            {"nodes": 64, "method": "gauss-newton", "resolution_check": True},
+            128,
+            0,
+            marks=pytest.mark.nightly,
+        ),
         pytest.param({"nodes": 96, "method": "gauss-newton"}, 144, 0, marks=pytest.mark.nightly),
         pytest.param(
             {"nodes": 48, "method": "gauss-newton", "decomposition": "volume"},

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels.acquisition.picking.cross_correlation import likeliest
 
+from ....effort import effort
 from ..traces import ricker
 
 PERIOD = 8.0
@@ -18,7 +19,7 @@ def trace(place: float, length: int = 240) -> np.ndarray:
 
 
 @given(shift=st.floats(-28.0, 28.0), gain=st.floats(0.01, 100.0), seed=st.integers(0, 99))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=effort(20, 40), deadline=None)
 def test_the_pulse_is_found_anywhere_in_noise(shift, gain, seed):
     noise = 0.1 * np.random.default_rng(seed).standard_normal(240)
     found = likeliest(trace(100.0), gain * (trace(100.0 + shift) + noise), 90, 110, -30.0, 30.0, 0.1 * gain)

@@ -12,6 +12,7 @@ from bentray_kernels.acquisition.picking.differential import LEAST_LIKENESS
 from bentray_kernels.acquisition.picking.onset import aic, prepare, threshold
 from bentray_kernels.acquisition.picking.pickers import AIC, ENERGY_RATIO, STA_LTA, THRESHOLD, onset
 
+from ....effort import effort
 from ..traces import ricker
 
 PERIOD = 8.0
@@ -22,7 +23,7 @@ def trace(place: float, length: int = 200) -> np.ndarray:
 
 
 @given(shift=st.floats(-12.0, 12.0))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=effort(20, 30), deadline=None)
 def test_the_match_finds_a_shift_to_a_hundredth_of_a_sample(shift):
     found, likeness = match(trace(90.0), 0.3 * trace(90.0 + shift), 82, 98, shift + 2.0, 4.0)
     assert found == pytest.approx(shift, abs=0.01)
@@ -38,7 +39,7 @@ def test_the_match_refuses_what_lies_beyond_its_reach():
 
 @pytest.mark.parametrize("picker", [AIC, THRESHOLD, ENERGY_RATIO, STA_LTA])
 @given(shift=st.floats(0.0, 40.0))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=effort(20, 30), deadline=None)
 def test_an_onset_moves_with_the_pulse(picker, shift):
     first, _ = onset(trace(90.0), 40, 120, PERIOD, 0.0, picker)
     moved, strong = onset(trace(90.0 + shift), 40, 160, PERIOD, 0.0, picker)

@@ -10,6 +10,7 @@ from bentray_kernels.geometry_field.layout.distortion import crosses_itself, sig
 from bentray_kernels.geometry_field.layout.embedding import relaxed, round_embedding, unfolded
 from bentray_kernels.meshes.opening import OpenMesh
 
+from ....effort import effort
 from ...meshes.examples import flat_patch, mesh
 
 
@@ -20,7 +21,7 @@ def disk_of(surface):
 
 
 @given(st.integers(2, 9), st.integers(2, 9), st.integers(0, 1000))
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=effort(20, 30))
 def test_no_face_of_a_crumpled_patch_flips(nx, ny, seed):
     patch = flat_patch(nx, ny)
     crumpled = patch.vertices + np.random.default_rng(seed).normal(0.0, 2.0, patch.vertices.shape)

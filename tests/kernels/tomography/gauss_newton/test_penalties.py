@@ -7,11 +7,13 @@ from hypothesis import strategies as st
 
 from bentray_kernels.tomography.gauss_newton.penalties import adjoint, gradient, laplacian, shrink
 
+from ....effort import effort
+
 SHAPES = st.lists(st.integers(1, 7), min_size=2, max_size=3).map(tuple)
 
 
 @given(shape=SHAPES, seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=effort(20, 50), deadline=None)
 def test_gradient_and_its_adjoint(shape, seed):
     rng = np.random.default_rng(seed)
     image, slope = rng.normal(size=shape), rng.normal(size=(len(shape), *shape))
@@ -21,7 +23,7 @@ def test_gradient_and_its_adjoint(shape, seed):
 
 
 @given(shape=SHAPES, seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=effort(20, 50), deadline=None)
 def test_laplacian_is_its_own_adjoint_and_never_positive(shape, seed):
     rng = np.random.default_rng(seed)
     one, other = rng.normal(size=(2, *shape))

@@ -7,9 +7,11 @@ from scipy.sparse import random_array
 
 from bentray_kernels.tomography.gauss_newton.ray_matrix import back_project, normal_product, project
 
+from ....effort import effort
+
 
 @given(rows=st.integers(1, 30), nodes=st.integers(1, 40), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=effort(20, 40), deadline=None)
 def test_products_are_those_of_the_dense_matrix(rows, nodes, seed):
     rng = np.random.default_rng(seed)
     sparse = random_array((rows, nodes), density=0.3, format="csr", dtype=np.float32, rng=rng)

@@ -6,13 +6,15 @@ from hypothesis import strategies as st
 
 from bentray_kernels.tomography.waveform.lbfgs import direction, remember
 
+from ....effort import effort
+
 
 def same(image):
     return image
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=effort(20, 30), deadline=None)
 def test_a_quadratic_is_solved(seed):
     rng = np.random.default_rng(seed)
     factor = rng.standard_normal((6, 6))

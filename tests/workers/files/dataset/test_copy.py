@@ -15,12 +15,13 @@ from hypothesis import strategies as st
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import copy, copy_dataset, read_dataset, write_dataset
 
+from ....effort import effort
 from ..datasets import datasets, small
 from ..test_dataset_files import assert_same
 
 
 @given(datasets(), st.integers(1, 200))
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=effort(20, 40), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_a_copy_holds_the_same(dataset, piece_bytes):
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         patch.setattr(copy, "PIECE_BYTES", piece_bytes)
@@ -104,7 +105,7 @@ def test_memory_is_that_of_a_few_pieces(tmp_path, monkeypatch):
 
 
 @given(st.data())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=effort(20, 60), deadline=None)
 def test_boxes_cover_every_value_once_and_stay_small(data):
     shape = tuple(data.draw(st.lists(st.integers(1, 12), min_size=3, max_size=4)))
     sides = st.tuples(*(st.integers(1, n) for n in shape))

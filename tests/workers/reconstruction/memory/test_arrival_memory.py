@@ -18,7 +18,10 @@ MIB = 2**20
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("picker", "elements", "samples"), [("aic", 100, 2400), ("matched", 64, 1500)])
+@pytest.mark.parametrize(
+    ("picker", "elements", "samples"),
+    [pytest.param("aic", 100, 2400, marks=pytest.mark.nightly), ("matched", 64, 1500)],
+)
 def test_calls_take_what_the_plan_says_and_never_the_traces(tmp_path, picker, elements, samples):
     # Freed arrays go back at once, so that a fork's peak is that of its own.
     environment = {

@@ -30,8 +30,8 @@ SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
     ("asked", "elements", "samples"),
     # Each has its largest band last.
     [
-        ({"bands": 2, "emitters": 16, "attenuation": False}, 64, 260),
-        ({"attenuation": False}, 128, 300),
+        pytest.param({"bands": 2, "emitters": 16, "attenuation": False}, 64, 260, marks=pytest.mark.nightly),
+        pytest.param({"attenuation": False}, 128, 300, marks=pytest.mark.nightly),
         ({"bands": 1}, 96, 300),
     ],
 )
