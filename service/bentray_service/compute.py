@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from bentray_kernels.tomography.settings import Settings
-from bentray_workers.cluster.capacities import offers_of, prepared_offers
+from bentray_workers.cluster.capacities import capacities_of, probed_capacities
 from bentray_workers.files.dataset.counts import DatasetCounts
 from bentray_workers.files.dataset.summary import counts_in
 from bentray_workers.reconstruction import planning
@@ -15,7 +15,7 @@ from bentray_workers.rendering import picture_cost
 from bentray_workers.rendering.refraction_view import RefractionView, check_even
 from bentray_workers.rendering.scene_cache import check_size
 from bentray_workers.simulation import simulation_planning
-from bentray_workers.simulation.request import AskedSimulation
+from bentray_workers.simulation.request import PhantomScan
 
 from .rows.records import VolumeRow
 
@@ -75,17 +75,17 @@ class Compute:
             InvalidInput: for tasks that none of them can hold, or a lane that none offers.
         """
         try:
-            offers = prepared_offers(self.client, settings)
+            offers = probed_capacities(self.client, settings)
         except (OSError, TimeoutError):
             # The scheduler is gone; the job waits until it is back, on workers of which nothing is known.
             offers = ()
         known = counts_in(self._bring(path)) if counts is None else DatasetCounts(**counts)
         return planning.plan(known.summary(settings), settings, offers).to_dict()
 
-    def plan_simulation(self, asked: AskedSimulation) -> dict[str, Any]:
+    def plan_simulation(self, asked: PhantomScan) -> dict[str, Any]:
         """The same of a simulation."""
         try:
-            offers = offers_of(self.client)
+            offers = capacities_of(self.client)
         except (OSError, TimeoutError):
             offers = ()
         return simulation_planning.plan_simulation(asked, offers).to_dict()
@@ -97,7 +97,7 @@ class Compute:
             InvalidInput: naming ``volume``, with the bytes found and accepted.
         """
         try:
-            offers = offers_of(self.client)
+            offers = capacities_of(self.client)
         except (OSError, TimeoutError):
             offers = ()
         cost = picture_cost.Cost(0.0, picture_cost.refraction_bytes(shape, view))

@@ -11,7 +11,7 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 
-from bentray_workers.cluster.capacities import Offer
+from bentray_workers.cluster.capacities import WorkerCapacity
 
 from .refusals import TooOften
 from .rows.tenants import Tenant
@@ -30,7 +30,7 @@ FRESH_S = 1.0
 class _Waiter:
     """A task that waits for a worker."""
 
-    fits: Callable[[Offer], bool]
+    fits: Callable[[WorkerCapacity], bool]
     long: bool
     place: asyncio.Future[str]
 
@@ -43,12 +43,12 @@ class PictureQueue:
     event loop.
     """
 
-    def __init__(self, workers: Callable[[], Awaitable[Mapping[str, Offer]]]) -> None:
+    def __init__(self, workers: Callable[[], Awaitable[Mapping[str, WorkerCapacity]]]) -> None:
         """Args:
         workers: gives the connected ones by address; none while the scheduler is away.
         """
         self._ask_workers = workers
-        self._workers: Mapping[str, Offer] = {}
+        self._workers: Mapping[str, WorkerCapacity] = {}
         self._asked = -math.inf
         self._busy: dict[str, bool] = {}
         self._waiting: dict[Tenant, list[_Waiter]] = {}
@@ -59,15 +59,15 @@ class PictureQueue:
         self._turns = count(1)
         self._refreshing: asyncio.Task[None] | None = None
 
-    async def workers(self) -> Mapping[str, Offer]:
+    async def workers(self) -> Mapping[str, WorkerCapacity]:
         """Those that are connected now, or were a moment ago, by address."""
         if time.monotonic() - self._asked > FRESH_S:
             await self._refresh()
         return self._workers
 
-    def offer(self, address: str) -> Offer:
+    def offer(self, address: str) -> WorkerCapacity:
         """Of a worker that was given out; of one that has left meanwhile, that of no limits."""
-        return self._workers.get(address, Offer(0, ()))
+        return self._workers.get(address, WorkerCapacity(0, ()))
 
     @asynccontextmanager
     async def admitted(self, tenant: Tenant, seconds: float) -> AsyncIterator[None]:
@@ -89,7 +89,9 @@ class PictureQueue:
                 self._served.pop(tenant, None)
 
     @asynccontextmanager
-    async def place(self, tenant: Tenant, fits: Callable[[Offer], bool], *, long: bool) -> AsyncIterator[str]:
+    async def place(
+        self, tenant: Tenant, fits: Callable[[WorkerCapacity], bool], *, long: bool
+    ) -> AsyncIterator[str]:
         """A worker's render lane, by the worker's address; waits until it is this task's turn.
 
         Args:

@@ -15,16 +15,16 @@ from typing import Any, TypeVar
 from distributed import KilledWorker
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.cluster.capacities import Offer, offers_by_address
+from bentray_workers.cluster.capacities import WorkerCapacity, capacities_by_address
 from bentray_workers.files import volume_export
 from bentray_workers.images import drawing_tasks
 from bentray_workers.reconstruction.quality_report import quality_page, quality_report
 from bentray_workers.rendering import field_picture, picture_cost, refraction
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.isosurface_mesh import mesh_volume
-from bentray_workers.rendering.picture_cost import Cost, Stored
+from bentray_workers.rendering.picture_cost import Cost, VolumeFile
 from bentray_workers.rendering.refraction_view import RefractionView
-from bentray_workers.rendering.tiles import Tasks
+from bentray_workers.rendering.tiles import PictureTasks
 
 from .compute import Cluster
 from .picture_queue import LONG_S, PictureQueue
@@ -64,7 +64,7 @@ class Pictures:
         self._bring = bring
         self._threads = ThreadPoolExecutor(THREADS, "pictures")
         self._asker = ThreadPoolExecutor(1, "workers")
-        self._asking: asyncio.Future[dict[str, Offer]] | None = None
+        self._asking: asyncio.Future[dict[str, WorkerCapacity]] | None = None
         self._queue = PictureQueue(self._workers)
 
     async def slice_png(self, tenant: Tenant, volume: VolumeRow, path: Path, how: dict[str, Any]) -> bytes:
@@ -76,7 +76,7 @@ class Pictures:
             path: of its file.
             how: as in ``bentray_workers.images.slice``, or ``volume_slice`` of an upload.
         """
-        cost = picture_cost.slice_cost(Stored.of(volume), how.get("size"))
+        cost = picture_cost.slice_cost(VolumeFile.of(volume), how.get("size"))
         draw = drawing_tasks.slice_png if "job_id" in volume else drawing_tasks.volume_slice_png
         return bytes(await self._one(tenant, ("size", "this slice", cost), path, draw, how))
 
@@ -84,7 +84,7 @@ class Pictures:
         self, tenant: Tenant, volume: VolumeRow, path: Path, view: RefractionView
     ) -> bytes:
         """A volume as glass."""
-        cost = picture_cost.refraction_cost(Stored.of(volume), view)
+        cost = picture_cost.refraction_cost(VolumeFile.of(volume), view)
         what = "volume", f"shape {tuple(volume['shape'])}", cost
         return bytes(await self._made(tenant, what, path, lambda here: refraction.tasks_of(here, view)))
 
@@ -112,18 +112,18 @@ class Pictures:
         self, tenant: Tenant, volume: VolumeRow, path: Path, iso: float | None, step: int, target: Path
     ) -> dict[str, Any]:
         """The iso-surface of a volume as a mesh file; as ``isosurface_mesh.mesh_volume``."""
-        what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.mesh_cost(Stored.of(volume))
+        what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.mesh_cost(VolumeFile.of(volume))
         how = {"iso": iso, "step": step, "target": target}
         return dict(await self._one(tenant, what, path, mesh_volume, how))
 
     async def export(self, tenant: Tenant, volume: VolumeRow, path: Path, target: Path, name: str) -> None:
         """A volume in another format, a key of ``volume_export.FORMATS``."""
-        what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.export_cost(Stored.of(volume))
+        what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.export_cost(VolumeFile.of(volume))
         how = {"target": target, "name": name}
         await self._one(tenant, what, path, volume_export.export_volume, how)
 
     def waiting(self) -> dict[Tenant, int]:
-        """Tasks that wait for a worker, by tenant."""
+        """PictureTasks that wait for a worker, by tenant."""
         return self._queue.waiting()
 
     async def close(self) -> None:
@@ -143,14 +143,14 @@ class Pictures:
         task: Callable[..., Any],
         how: dict[str, Any],
     ) -> Any:
-        return await self._made(tenant, what, path, lambda here: Tasks([(task, here)], None), how)
+        return await self._made(tenant, what, path, lambda here: PictureTasks([(task, here)], None), how)
 
     async def _made(
         self,
         tenant: Tenant,
         what: tuple[str, str, Cost],
         path: Path,
-        tasks_of: Callable[[Path], Tasks],
+        tasks_of: Callable[[Path], PictureTasks],
         how: Mapping[str, Any] | None = None,
     ) -> Any:
         """The result of some tasks.
@@ -182,11 +182,11 @@ class Pictures:
     async def _in_thread(self, work: Callable[[], Found]) -> Found:
         return await asyncio.get_running_loop().run_in_executor(self._threads, work)
 
-    async def _workers(self) -> dict[str, Offer]:
+    async def _workers(self) -> dict[str, WorkerCapacity]:
         """The connected workers; none while the scheduler is away."""
         if self._asking is None or self._asking.done():
             self._asking = asyncio.get_running_loop().run_in_executor(
-                self._asker, lambda: offers_by_address(self._cluster.client)
+                self._asker, lambda: capacities_by_address(self._cluster.client)
             )
         with suppress(OSError, TimeoutError):
             async with asyncio.timeout(ASK_S):
@@ -202,16 +202,16 @@ class _Run:
         self._long = cost.seconds > LONG_S
         self._begun: list[Any] = []
 
-    async def all(self, tasks: Tasks) -> Any:
+    async def all(self, tasks: PictureTasks) -> Any:
         """Run them and fetch the result of the last; all of them are released at the end."""
         running: list[asyncio.Task[Any]] = []
         try:
             # The first one tells how long the others will take.
-            first = await self._ended(tasks.parts[0])
-            running = [asyncio.create_task(self._ended(part)) for part in tasks.parts[1:]]
+            first = await self._ended(tasks.tiles[0])
+            running = [asyncio.create_task(self._ended(part)) for part in tasks.tiles[1:]]
             last = first
-            if tasks.join is not None:
-                last = await self._ended((tasks.join, [first, *await asyncio.gather(*running)]))
+            if tasks.stack is not None:
+                last = await self._ended((tasks.stack, [first, *await asyncio.gather(*running)]))
             return await self._result(last)
         finally:
             for one in running:
@@ -251,8 +251,8 @@ class _Run:
 
         return await self._pictures._in_thread(fetched)
 
-    def _fits(self, offer: Offer) -> bool:
-        return "render" in offer.lanes and offer.task_bytes >= self._cost.bytes
+    def _fits(self, offer: WorkerCapacity) -> bool:
+        return "render" in offer.resources and offer.task_bytes >= self._cost.bytes
 
     def _submit(self, address: str, task: tuple[Any, ...]) -> Any:
         where = picture_cost.placed(self._cost.bytes, {address: self._pictures._queue.offer(address)})

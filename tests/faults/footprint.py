@@ -14,7 +14,7 @@ import psutil
 from .live_service import LiveService
 
 MIB = 2**20
-# Rows of things that clients make; all of these are deleted again. Abandoned uploads go by their age.
+# Rows of things that clients make; all of these are deleted again. TaskCancelled uploads go by their age.
 TABLES = (
     "datasets",
     "jobs",

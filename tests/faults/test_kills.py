@@ -10,7 +10,7 @@ import pytest
 from bentray_kernels.tomography import reconstruct
 from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_workers.files.reconstruction import read_reconstruction
-from bentray_workers.simulation.request import AskedSimulation
+from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_run import simulate_to_file
 
 from ..effort import effort
@@ -92,7 +92,7 @@ def test_a_simulation_goes_on_from_the_emissions_it_has(machine, tmp_path):
     done = machine.ended(job)
     assert done["state"] == "succeeded", done["error"]
     assert attempts_of(machine, job) == 2
-    simulate_to_file(None, AskedSimulation(**asked).chosen(), tmp_path / "scan.h5")
+    simulate_to_file(None, PhantomScan(**asked).chosen(), tmp_path / "scan.h5")
     found = machine.files / "datasets" / f"{done['dataset']}.h5"
     assert found.read_bytes() == (tmp_path / "scan.h5").read_bytes()
     datasets = machine.http.get("/v1/datasets").json()["datasets"]

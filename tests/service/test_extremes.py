@@ -11,7 +11,7 @@ from bentray_kernels.tomography.settings import Settings
 from bentray_service.openapi import description
 from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.turntable import Turntable
-from bentray_workers.simulation.request import AskedSimulation
+from bentray_workers.simulation.request import PhantomScan
 
 from ..extremes import EXTREMES
 
@@ -19,7 +19,7 @@ STREAM = {"Content-Type": "application/octet-stream"}
 JSON = {"Content-Type": "application/json"}
 KINDS = {
     "reconstruction": Settings,
-    "simulation": AskedSimulation,
+    "simulation": PhantomScan,
     "refraction": Turntable,
     "geometry-field": FieldSettings,
 }

@@ -9,7 +9,7 @@ from bentray_service import picture_queue
 from bentray_service.picture_queue import LATEST_S, MOST_IN_ALL, MOST_OF_TENANT, PictureQueue
 from bentray_service.refusals import TooOften
 from bentray_service.rows.tenants import Tenant
-from bentray_workers.cluster.capacities import Offer
+from bentray_workers.cluster.capacities import WorkerCapacity
 
 A, B, C = (Tenant(name) for name in "abc")
 
@@ -18,7 +18,7 @@ class Run:
     """A queue over some workers, and who had a worker when."""
 
     def __init__(self, *memory):
-        self.offers = {f"w{k}": Offer(size, ("render",)) for k, size in enumerate(memory or (0,))}
+        self.offers = {f"w{k}": WorkerCapacity(size, ("render",)) for k, size in enumerate(memory or (0,))}
         self.queue = PictureQueue(self.workers)
         self.order = []
         self.gates = {}
@@ -116,7 +116,7 @@ def test_a_task_waits_for_a_worker_that_can_hold_it(monkeypatch):
         await settle()
         assert run.order == [("a0", "w1")]
         # The next one has joined.
-        run.offers = {**run.offers, "w2": Offer(100, ("render",))}
+        run.offers = {**run.offers, "w2": WorkerCapacity(100, ("render",))}
         async with asyncio.timeout(10):
             while len(run.order) < 2:
                 await asyncio.sleep(0.01)

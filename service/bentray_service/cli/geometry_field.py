@@ -76,21 +76,19 @@ def _draw(field: Path, view: FieldView, folder: Path, step: Step) -> dict[str, s
     from concurrent.futures import ThreadPoolExecutor
 
     from bentray_workers.files.atomic import write_bytes
-    from bentray_workers.rendering.field_picture import map_png, strip_image
-    from bentray_workers.rendering.tiles import joined_png
+    from bentray_workers.rendering.field_picture import map_png, tile_image
+    from bentray_workers.rendering.tiles import stack_png
 
     rows = max(1, 2**16 // (view.width * view.rays**2))
     firsts = range(0, view.height, rows)
     strips = []
     with ThreadPoolExecutor() as pool:
-        drawn = pool.map(
-            lambda first: strip_image(field, view, first, min(first + rows, view.height)), firsts
-        )
+        drawn = pool.map(lambda first: tile_image(field, view, first, min(first + rows, view.height)), firsts)
         for strip in drawn:
             strips.append(strip)
             step(len(strips), len(firsts))
     draw: dict[str, Callable[[], bytes]] = {
-        "image": lambda: joined_png(strips),
+        "image": lambda: stack_png(strips),
         "geometry-image": lambda: map_png(field, "positions"),
         "normal-map": lambda: map_png(field, "normals"),
     }

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from bentray_kernels.refraction import Scene
     from bentray_workers.files.volume import Volume
     from bentray_workers.images.png import Colours
-    from bentray_workers.rendering.refraction import Strip
+    from bentray_workers.rendering.refraction import Tile
     from bentray_workers.rendering.refraction_view import RefractionView
 
 ACCEPTED = "a volume: NumPy, NRRD, NIfTI, HDF5 of Bentray, or raw with --shape and --dtype"
@@ -91,7 +91,7 @@ def render(
     from bentray_workers.files.atomic import write_bytes
     from bentray_workers.files.volume_formats import Given, import_volume
     from bentray_workers.images.png import png_of, read_picture
-    from bentray_workers.rendering.scene_cache import build, check_size, filtered_of
+    from bentray_workers.rendering.scene_cache import build_scene, check_size, filter_volume
 
     card = None if picture is None else read_picture(picture)
     if file is None:
@@ -102,9 +102,9 @@ def render(
         volume = import_volume(input_file(file, ACCEPTED), given, check_size)
     started = time.perf_counter()
     view = view.within(*volume.range())
-    filtered = filtered_of(volume, view.filter, view.smoothing)
+    filtered = filter_volume(volume, view.filter, view.smoothing)
     view = view.filtered_within(*filtered.range)
-    scene = build(filtered, view.layers())
+    scene = build_scene(filtered, view.layers())
     built = time.perf_counter()
     with progress_bar("Rendering") as step:
         strips = _drawn(scene, view, card, step)
@@ -144,15 +144,15 @@ def _sampled(phantom: Phantom, nodes: int) -> Volume:
 
 def _drawn(
     scene: Scene, view: RefractionView, card: Colours | None, step: Callable[[int, int], None]
-) -> list[Strip]:
-    from bentray_workers.rendering.refraction import strip
+) -> list[Tile]:
+    from bentray_workers.rendering.refraction import draw_tile
 
-    found: list[Strip] = []
+    found: list[Tile] = []
     rows = min(ROWS, max(1, RAYS // (view.width * view.times**2)))
     pool = ThreadPoolExecutor(len(os.sched_getaffinity(0)))
     try:
         drawn = [
-            pool.submit(strip, scene, view, first, min(first + rows, view.height), card)
+            pool.submit(draw_tile, scene, view, first, min(first + rows, view.height), card)
             for first in range(0, view.height, rows)
         ]
         for future in drawn:
@@ -164,7 +164,7 @@ def _drawn(
     return found
 
 
-def _joined(strips: list[Strip]) -> tuple[Colours, Any]:
+def _joined(strips: list[Tile]) -> tuple[Colours, Any]:
     """The picture, and where each pixel looks; of a shaded one nothing."""
     import numpy as np
 

@@ -35,7 +35,7 @@ def simulate_to(path: Path, asked: dict[str, Any], *, in_space: bool, as_json: b
         found = {"output": str(path), "seconds": round(seconds, 3), "settings": asdict(settings)}
         print_json({**found, "phase_speed_error": {"centre": centre, "highest": highest}})
         return
-    grid = f"{settings.told_grid} nodes of {1e3 * settings.spacing_m:.3g} mm"
+    grid = f"{settings.grid_text} nodes of {1e3 * settings.spacing_m:.3g} mm"
     rows = [
         ("elements", f"{settings.elements}, {settings.emissions} of them send"),
         ("ring", f"{1e3 * (dataset.radius_m or 0.0):.1f} mm radius"),

@@ -75,7 +75,7 @@ def worker(
     """
     from dask.utils import parse_bytes
 
-    from bentray_workers.cluster.local_workers import Joining, join
+    from bentray_workers.cluster.local_workers import JoinRequest, join
     from bentray_workers.cluster.resources import OFFERED, OPENCL
     from bentray_workers.cluster.tls import security_of
 
@@ -87,10 +87,10 @@ def worker(
                 "memory_limit", repr(memory_limit), "a size, as 4GiB; 0 for no limit"
             ) from error
     count = workers if workers is not None else len(os.sched_getaffinity(0))
-    asked = Joining(
+    asked = JoinRequest(
         scheduler=scheduler,
         workers=count,
-        lanes={**OFFERED, **(OPENCL if opencl and _has_device() else {})},
+        resources={**OFFERED, **(OPENCL if opencl and _has_device() else {})},
         memory_limit=memory_limit,
         local_directory=None if local_directory is None else output_folder(local_directory),
         host=host,
@@ -98,7 +98,7 @@ def worker(
         security=security_of(tls),
     )
     if as_json:
-        about = {"scheduler": scheduler, "workers": count, "lanes": dict(asked.lanes), "pid": os.getpid()}
+        about = {"scheduler": scheduler, "workers": count, "lanes": dict(asked.resources), "pid": os.getpid()}
         print_lines([json.dumps(about)])
     join(asked, remark)
 

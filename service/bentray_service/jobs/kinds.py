@@ -23,7 +23,7 @@ from bentray_workers.reconstruction import reconstruction_run
 from bentray_workers.rendering import geometry_field
 from bentray_workers.rendering.field_settings import FieldSettings, check_faces
 from bentray_workers.rendering.turntable import Turntable, draw_turntable
-from bentray_workers.simulation.request import AskedSimulation
+from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_run import simulate_to_file
 
 from ..asked_settings import known_only
@@ -98,15 +98,15 @@ class SimulationRequest(JobRequest):
     """Simulate the scan of a phantom; it becomes a dataset, with the truth in it."""
 
     kind: Literal["simulation"]
-    settings: Annotated[AskedSimulation, BeforeValidator(partial(known_only, of=AskedSimulation))] = Field(
-        default_factory=AskedSimulation, description=DEFAULTS
+    settings: Annotated[PhantomScan, BeforeValidator(partial(known_only, of=PhantomScan))] = Field(
+        default_factory=PhantomScan, description=DEFAULTS
     )
 
 
 class SimulationKind(Kind[SimulationRequest]):
     """The scan of a phantom, as a dataset."""
 
-    request, settings = SimulationRequest, TypeAdapter(AskedSimulation)
+    request, settings = SimulationRequest, TypeAdapter(PhantomScan)
     table, lane = schema.datasets.name, "recon"
     example: ClassVar[Example] = {
         "summary": "A scan of a phantom, with noise on its travel times",

@@ -152,13 +152,13 @@ def test_the_lane_of_opencl_is_offered_where_a_device_passed(
     from bentray_kernels import opencl
     from bentray_workers.cluster import local_workers
 
-    asked: list[local_workers.Joining] = []
+    asked: list[local_workers.JoinRequest] = []
     monkeypatch.setattr(local_workers, "join", lambda joined, say: asked.append(joined))
     device = opencl.Device(0, "PoCL", "cpu", "cpu", "", "", True)
     for found in (device, None):
         monkeypatch.setattr(opencl, "choose", lambda found=found: opencl.Choice(found, ()))
         assert bentray("worker", "--scheduler", "tcp://head:8786", "--workers", 3).exit_code == 0
-    assert [dict(one.lanes) for one in asked] == [
+    assert [dict(one.resources) for one in asked] == [
         {"recon": 1, "render": 1, "opencl": 1},
         {"recon": 1, "render": 1},
     ]

@@ -22,13 +22,13 @@ def fresh(tmp_path):
 
 
 def lanes(client):
-    return {lane for offer in capacities.offers_of(client) for lane in offer.lanes}
+    return {lane for offer in capacities.capacities_of(client) for lane in offer.resources}
 
 
 def test_memory_and_lanes_are_told(cluster):
-    found = capacities.offers_of(cluster.client)
+    found = capacities.capacities_of(cluster.client)
     assert len(found) == 2
-    assert {"recon", "render"} <= set(found[0].lanes)
+    assert {"recon", "render"} <= set(found[0].resources)
     assert found[0].memory_bytes >= 0
 
 

@@ -22,5 +22,5 @@ def test_every_worker_by_its_address():
 
 
 def test_a_client_without_its_scheduler_says_so():
-    with pytest.raises(ConnectionError, match="the scheduler is away"):
+    with pytest.raises(ConnectionError, match="the scheduler is not available"):
         connected_workers(Client({}))

@@ -46,7 +46,7 @@ def run(workers: int, jobs: Sequence[Job], until_s: float = 1e4) -> None:
     joined: dict[int, Any] = {}
 
     def drive(job: Job) -> None:
-        while job.share.may_begin(job.in_flight, job.ready):
+        while job.share.may_submit(job.in_flight, job.ready):
             queue = min(range(workers), key=lambda w: len(queues[w]) + (busy[w] is not None))
             heapq.heappush(queues[queue], (-Share.priority(job.in_flight), next(number), job))
             job.in_flight += 1
@@ -84,13 +84,13 @@ def test_a_tenant_alone_has_every_worker_with_one_task_ready_for_each() -> None:
     client: Any = SimpleNamespace(scheduler_info=lambda n_workers: {"workers": {"a": {}, "b": {}}})
     with shares.of("a", "recon", client) as share:
         begun = 0
-        while share.may_begin(begun, 100):
+        while share.may_submit(begun, 100):
             begun += 1
         assert begun == IN_FLIGHT * 2
         with shares.of("b", "render", client) as other:
-            assert not share.may_begin(begun, 100)
-            assert share.may_begin(begun - 1, 100), "another lane is no rival"
-            assert not other.may_begin(0, 0)
+            assert not share.may_submit(begun, 100)
+            assert share.may_submit(begun - 1, 100), "another lane is no rival"
+            assert not other.may_submit(0, 0)
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3, 8])

@@ -12,7 +12,7 @@ from distributed.security import Security
 
 from bentray_workers.cluster import local_workers
 from bentray_workers.cluster.dask_settings import NO_DASHBOARD, ours
-from bentray_workers.cluster.local_workers import Joining
+from bentray_workers.cluster.local_workers import JoinRequest
 from bentray_workers.cluster.resources import OFFERED
 
 PATIENCE_S = 60.0
@@ -28,12 +28,12 @@ def test_a_lost_worker_is_replaced_until_the_scheduler_is_gone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(local_workers, "PRELOADS", [])
-    monkeypatch.setattr(local_workers, "LOOK_S", 0.1)
+    monkeypatch.setattr(local_workers, "CHECK_S", 0.1)
     said: list[str] = []
 
     async def lose_some() -> None:
         async with Scheduler(host="127.0.0.1", port=0, dashboard_address=NO_DASHBOARD) as scheduler:
-            asked = Joining(scheduler.address, 2, OFFERED, None, tmp_path, None, None, Security())
+            asked = JoinRequest(scheduler.address, 2, OFFERED, None, tmp_path, None, None, Security())
             nannies = [local_workers._nanny(asked, number) for number in range(2)]
             working = asyncio.create_task(local_workers._work(asked, nannies, said.append))
             await until(lambda: said)

@@ -5,7 +5,7 @@ import pytest
 from bentray_workers.cluster import memory_cache
 from bentray_workers.cluster.attempts import marked
 from bentray_workers.cluster.capacities import USABLE, WARM_BYTES
-from bentray_workers.cluster.memory_cache import Kept, limit
+from bentray_workers.cluster.memory_cache import MemoryCache, set_memory_limit
 
 MIB = 2**20
 
@@ -13,12 +13,12 @@ MIB = 2**20
 @pytest.fixture
 def worker(monkeypatch):
     """A worker with room for 100 MiB."""
-    monkeypatch.setattr(memory_cache, "_ROOM", memory_cache._Room())
-    limit(round((WARM_BYTES + 100 * MIB) / USABLE))
+    monkeypatch.setattr(memory_cache, "_LIMITS", memory_cache._Limits())
+    set_memory_limit(round((WARM_BYTES + 100 * MIB) / USABLE))
 
 
 def test_what_is_made_makes_room_in_every_store(worker):
-    one, two = Kept(1000 * MIB), Kept(1000 * MIB)
+    one, two = MemoryCache(1000 * MIB), MemoryCache(1000 * MIB)
     one.get("a", 30 * MIB, str)
     two.get("b", 30 * MIB, str)
     one.get("a", 30 * MIB, str)
@@ -28,19 +28,19 @@ def test_what_is_made_makes_room_in_every_store(worker):
 
 
 def test_a_job_finds_little_kept(worker, tmp_path):
-    store = Kept(1000 * MIB)
+    store = MemoryCache(1000 * MIB)
     store.get("a", 30 * MIB, str)
     store.get("b", 10 * MIB, str)
     assert marked(tmp_path / "marker", True, store.held) == 10 * MIB
 
 
 def test_without_a_limit_all_is_kept(tmp_path):
-    store = Kept(1000 * MIB)
+    store = MemoryCache(1000 * MIB)
     store.get("a", 900 * MIB, str)
     assert marked(tmp_path / "marker", True, store.held) == 900 * MIB
 
 
 def test_a_task_that_draws_finds_all_that_is_kept(worker, tmp_path):
-    store = Kept(1000 * MIB)
+    store = MemoryCache(1000 * MIB)
     store.get("a", 90 * MIB, str)
     assert marked(tmp_path / "marker", False, store.held) == 90 * MIB

@@ -20,13 +20,11 @@ from bentray_workers.reconstruction.reconstruction_run import reconstruct
 from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.geometry_field import build_field
 from bentray_workers.rendering.turntable import Turntable, draw_turntable
-from bentray_workers.simulation.request import AskedSimulation
+from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_run import simulate_to_file
 
 PLAN = Settings(nodes=32, iterations=6, method="gauss-newton", resolution_check=True)
-SCAN = AskedSimulation(
-    waveform=True, nodes=32, elements=16, frequency_hz=2e5, side_m=0.03, emissions=8, snr=20.0
-)
+SCAN = PhantomScan(waveform=True, nodes=32, elements=16, frequency_hz=2e5, side_m=0.03, emissions=8, snr=20.0)
 TURNTABLE = Turntable(iso=(0.5,), width=32, height=24, frames=8)
 FIELD = FieldSettings(samples=24, inner_samples=8, divisions=8, image_size=33)
 

@@ -16,7 +16,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.cluster import providers
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.cluster.dask_settings import ours
-from bentray_workers.cluster.providers import PROVIDERS, Wanted, deploy
+from bentray_workers.cluster.providers import PROVIDERS, ClusterRequest, deploy
 from bentray_workers.cluster.tls import security_of
 
 DEPLOY = Path(__file__).resolve().parents[3] / "deploy"
@@ -52,7 +52,7 @@ def managers(monkeypatch: pytest.MonkeyPatch) -> list[FakeManager]:
 
 
 def test_slurm_jobs_offer_our_lanes_are_warm_and_publish_no_page(managers: list[FakeManager]) -> None:
-    deploy("slurm", Wanted(workers=12, template=DEPLOY / "slurm" / "cluster.yaml"))
+    deploy("slurm", ClusterRequest(workers=12, template=DEPLOY / "slurm" / "cluster.yaml"))
     (made,) = managers
     assert made.scaled == {"jobs": 12}
     assert (made.asked["processes"], made.asked["cores"]) == (1, 2)
@@ -76,18 +76,18 @@ def test_a_scheduler_that_adds_pages_adds_them_to_its_own_settings_alone() -> No
 
 def test_a_site_can_add_a_lane(managers: list[FakeManager], tmp_path: Path) -> None:
     (tmp_path / "site.yaml").write_text("worker_extra_args: ['--resources=recon=1,render=1,opencl=1']\n")
-    deploy("slurm", Wanted(template=tmp_path / "site.yaml"))
+    deploy("slurm", ClusterRequest(template=tmp_path / "site.yaml"))
     assert managers[0].asked["worker_extra_args"][-1] == "--resources=recon=1,render=1,opencl=1"
 
 
 def test_slurm_takes_certificates(managers: list[FakeManager], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(providers, "security_of", lambda folder: ("security of", folder))
-    deploy("slurm", Wanted(tls=Path("certificates")))
+    deploy("slurm", ClusterRequest(tls=Path("certificates")))
     assert managers[0].asked["security"] == ("security of", Path("certificates"))
 
 
 def test_kubernetes_is_given_the_template_with_the_number_of_workers(managers: list[FakeManager]) -> None:
-    deploy("kubernetes", Wanted(workers=7, template=DEPLOY / "kubernetes" / "cluster.yaml"))
+    deploy("kubernetes", ClusterRequest(workers=7, template=DEPLOY / "kubernetes" / "cluster.yaml"))
     spec = managers[0].asked["custom_cluster_spec"]
     assert spec["kind"] == "DaskCluster"
     assert spec["spec"]["worker"]["replicas"] == 7
@@ -118,15 +118,17 @@ def test_the_command_of_its_workers_is_one_of_ours() -> None:
 @pytest.mark.parametrize(
     ("kind", "wanted", "field"),
     [
-        ("mesos", Wanted(), "cluster"),
-        ("embedded", Wanted(template=Path("x.yaml")), "cluster_template"),
-        ("embedded", Wanted(workers=0), "workers"),
-        ("slurm", Wanted(template=Path("absent.yaml")), "cluster_template"),
-        ("kubernetes", Wanted(), "cluster_template"),
-        ("kubernetes", Wanted(tls=Path("x")), "tls"),
+        ("mesos", ClusterRequest(), "cluster"),
+        ("embedded", ClusterRequest(template=Path("x.yaml")), "cluster_template"),
+        ("embedded", ClusterRequest(workers=0), "workers"),
+        ("slurm", ClusterRequest(template=Path("absent.yaml")), "cluster_template"),
+        ("kubernetes", ClusterRequest(), "cluster_template"),
+        ("kubernetes", ClusterRequest(tls=Path("x")), "tls"),
     ],
 )
-def test_what_cannot_be_is_named(managers: list[FakeManager], kind: str, wanted: Wanted, field: str) -> None:
+def test_what_cannot_be_is_named(
+    managers: list[FakeManager], kind: str, wanted: ClusterRequest, field: str
+) -> None:
     with pytest.raises(InvalidInput) as refusal:
         deploy(kind, wanted)
     assert refusal.value.field == field
@@ -138,7 +140,7 @@ def test_a_template_that_the_library_does_not_take_is_refused(
 ) -> None:
     (tmp_path / "site.yaml").write_text(text)
     with pytest.raises(InvalidInput, match="cluster_template"):
-        deploy("slurm", Wanted(template=tmp_path / "site.yaml"))
+        deploy("slurm", ClusterRequest(template=tmp_path / "site.yaml"))
 
 
 @pytest.mark.parametrize("kind", ["slurm", "kubernetes"])
@@ -181,5 +183,5 @@ def test_leaving_ends_what_was_started(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_certificates_of_an_embedded_cluster_must_be_there(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="without authority"):
-        deploy("embedded", Wanted(workers=1, tls=tmp_path))
+        deploy("embedded", ClusterRequest(workers=1, tls=tmp_path))
     assert security_of(None).require_encryption is False

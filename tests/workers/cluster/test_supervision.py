@@ -46,7 +46,7 @@ def worker_pids() -> set[int]:
 def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Cluster]:
     """An embedded cluster of one process, which compiles nothing at its start."""
     monkeypatch.setattr(providers, "PRELOAD", None)
-    monkeypatch.setattr(supervision, "LOOK_S", 0.1)
+    monkeypatch.setattr(supervision, "CHECK_S", 0.1)
     with open_cluster(workers=1, local_directory=tmp_path) as cluster:
         yield cluster
 

@@ -9,7 +9,7 @@ from distributed import Client, LocalCluster
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.refraction import Layers
 from bentray_workers.cluster.dask_settings import NO_DASHBOARD
-from bentray_workers.cluster.task_cancellation import Abandoned, look_out
+from bentray_workers.cluster.task_cancellation import TaskCancelled, cancellation_check
 from bentray_workers.files.volume import Volume
 from bentray_workers.rendering import scene_cache
 
@@ -18,13 +18,13 @@ PATIENCE_S = 60.0
 
 
 def long_task():
-    check, until = look_out(), time.monotonic() + PATIENCE_S
+    check, until = cancellation_check(), time.monotonic() + PATIENCE_S
     BEGUN.set()
     try:
         while time.monotonic() < until:
             check()
             time.sleep(0.01)
-    except Abandoned:
+    except TaskCancelled:
         ENDED.append("early")
         raise
     ENDED.append("late")
@@ -52,17 +52,17 @@ def test_a_task_that_is_released_ends():
 
 
 def test_outside_of_a_worker_nothing_is_abandoned():
-    look_out()()
+    cancellation_check()()
 
 
 def test_a_scene_is_not_made_for_nobody(monkeypatch):
     def nobody():
         def check():
-            raise Abandoned("task")
+            raise TaskCancelled("task")
 
         return check
 
-    monkeypatch.setattr(scene_cache, "look_out", nobody)
-    filtered = scene_cache.filtered_of(Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3), "bspline3", 0.0)
-    with pytest.raises(Abandoned):
-        scene_cache.build(filtered, Layers((0.5,), (1.0, 1.5)))
+    monkeypatch.setattr(scene_cache, "cancellation_check", nobody)
+    filtered = scene_cache.filter_volume(Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3), "bspline3", 0.0)
+    with pytest.raises(TaskCancelled):
+        scene_cache.build_scene(filtered, Layers((0.5,), (1.0, 1.5)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.bounded_reading import LARGEST_BYTES, declared, refusing, whole
+from bentray_workers.files.bounded_reading import LARGEST_BYTES, declared, rejecting_damage, whole
 
 
 class Endless(io.RawIOBase):
@@ -42,12 +42,12 @@ def test_bytes_of_a_declared_volume():
 
 @pytest.mark.parametrize("error", [StopIteration, ZeroDivisionError, UnicodeError, EOFError, RecursionError])
 def test_whatever_a_reader_raises_is_damage(error):
-    with pytest.raises(InvalidInput, match="damaged"), refusing("file", "a whole one"):
+    with pytest.raises(InvalidInput, match="damaged"), rejecting_damage("file", "a whole one"):
         raise error("odd")
 
 
 @pytest.mark.parametrize("error", [MemoryError(), InvalidInput("a", "b", "c")])
 def test_what_says_more_is_passed_on(error):
-    with pytest.raises(type(error)) as caught, refusing("file", "a whole one"):
+    with pytest.raises(type(error)) as caught, rejecting_damage("file", "a whole one"):
         raise error
     assert caught.value is error

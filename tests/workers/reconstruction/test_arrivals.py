@@ -14,7 +14,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.task_graph import Cancelled, ThreadPool, run
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
-from bentray_workers.cluster.job_cancellation import Unwanted
+from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.files.findings import read_findings
 from bentray_workers.reconstruction import reconstruction_run
@@ -142,10 +142,10 @@ def test_calls_end_with_their_emission_once_the_job_has(tmp_path):
     with source.slice(0) as one:
         assert one.waveform.object[0].any()
         folder.rmdir()
-        with pytest.raises(Unwanted):
+        with pytest.raises(JobEnded):
             one.waveform.object[1]
     for function, arguments in ((measure, (range(4),)), (read, ((), None, range(4)))):
-        with pytest.raises(Unwanted):
+        with pytest.raises(JobEnded):
             function(source, 0, *arguments)
 
 

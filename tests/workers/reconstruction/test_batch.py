@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Progress, Sweep
 from bentray_workers.reconstruction import batch
-from bentray_workers.reconstruction.batch import Entry, reason_of, run
+from bentray_workers.reconstruction.batch import Entry, explain_failure, run
 
 
 def entries(count: int) -> list[Entry]:
@@ -100,5 +100,5 @@ def test_an_entry_tells_how_far_it_is_and_keeps_its_time() -> None:
     ],
 )
 def test_reasons_are_one_line(error: Exception, words: str) -> None:
-    assert reason_of(error).startswith(words)
-    assert "\n" not in reason_of(error)
+    assert explain_failure(error).startswith(words)
+    assert "\n" not in explain_failure(error)

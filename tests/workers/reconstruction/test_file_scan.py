@@ -7,7 +7,7 @@ import pytest
 from bentray_kernels.tomography.waveform.band_inversion import Model
 from bentray_kernels.tomography.waveform.refinement_graph import look_at_waves
 from bentray_kernels.wave import time_blocks
-from bentray_workers.cluster.job_cancellation import Unwanted
+from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.findings import Found, write_findings
 from bentray_workers.reconstruction.file_scan import FileWaveScan
@@ -26,5 +26,5 @@ def test_a_look_at_waves_ends_with_its_job(tmp_path, monkeypatch):
     assert look_at_waves(waves, 0, water, 0).misfit > 0.0
     monkeypatch.setattr(time_blocks, "STRIP", 10**5)
     folder.rename(tmp_path / "job.ended")
-    with pytest.raises(Unwanted):
+    with pytest.raises(JobEnded):
         look_at_waves(waves, 0, water, 0)

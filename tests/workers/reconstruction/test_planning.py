@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
-from bentray_workers.cluster.capacities import MIB, Offer
+from bentray_workers.cluster.capacities import MIB, WorkerCapacity
 from bentray_workers.files.dataset.counts import Summary, Traces
 from bentray_workers.reconstruction.memory.ray_memory import field_bytes
 from bentray_workers.reconstruction.planning import blocks_of, plan
@@ -23,7 +23,7 @@ PROGRAM = Path(__file__).with_name("call_memory.py")
 ROOT = Path(__file__).parents[3]
 RING = Summary(256, 256, 256 * 256, 1, False, 0.0, 0.16, 0, True)
 BOTH = ("recon", "render")
-LARGE, SMALL = Offer(8 * 1024 * MIB, BOTH), Offer(560 * MIB, BOTH)
+LARGE, SMALL = WorkerCapacity(8 * 1024 * MIB, BOTH), WorkerCapacity(560 * MIB, BOTH)
 
 
 def ring(elements, heights):
@@ -93,19 +93,19 @@ def test_what_no_worker_can_hold_is_refused_with_a_grid_that_fits():
         plan(RING, replace(asked, nodes=fits + 1), [SMALL])
     assert plan(RING, asked, [SMALL, LARGE]).workers == 1
     assert plan(RING, asked, []).workers == 0
-    assert plan(RING, asked, [Offer(0, BOTH)]).workers == 1
+    assert plan(RING, asked, [WorkerCapacity(0, BOTH)]).workers == 1
 
 
 def test_no_limit_is_none():
-    assert Offer(0, BOTH).task_bytes == math.inf
-    assert Offer(100 * MIB, BOTH).task_bytes == 0
+    assert WorkerCapacity(0, BOTH).task_bytes == math.inf
+    assert WorkerCapacity(100 * MIB, BOTH).task_bytes == 0
 
 
 def test_a_device_lane_needs_a_worker_that_offers_it():
     asked = Settings(eikonal="fim-opencl")
     with pytest.raises(InvalidInput, match="eikonal"):
         plan(RING, asked, [LARGE])
-    found = plan(RING, asked, [LARGE, Offer(0, (*BOTH, "opencl"))])
+    found = plan(RING, asked, [LARGE, WorkerCapacity(0, (*BOTH, "opencl"))])
     assert (found.lane, found.workers) == ("opencl", 1)
     assert "OpenCL" in found.why
     assert plan(RING, replace(asked, rays="straight"), [LARGE]).lane == "recon"
@@ -122,7 +122,7 @@ def test_a_device_lane_needs_a_worker_that_offers_it():
 )
 def test_the_choice_is_told_in_a_sentence(changes, decomposition, words):
     scan = replace(RING, slices=40, pairs=40 * 256**2, height_m=0.05)
-    found = plan(scan, Settings.of(**changes), [Offer(0, BOTH)])
+    found = plan(scan, Settings.of(**changes), [WorkerCapacity(0, BOTH)])
     assert found.decomposition == decomposition
     assert words in found.why
     assert found.why.endswith(".")
@@ -153,12 +153,12 @@ def test_waves_are_planned_for():
     assert {"enter", "look_at_waves", "step_by_waves"} < set(found.call_bytes)
     assert found.tasks > plan(heard, replace(asked, method="auto"), [LARGE]).tasks
     with pytest.raises(InvalidInput) as refusal:
-        plan(heard, replace(asked, nodes=32), [Offer(160 * MIB, BOTH)])
+        plan(heard, replace(asked, nodes=32), [WorkerCapacity(160 * MIB, BOTH)])
     assert refusal.value.field == "minutes"
     # ``auto`` judges by waves; in space by times alone.
     tried = replace(asked, method="auto", nodes=32)
     with pytest.raises(InvalidInput) as refusal:
-        plan(heard, tried, [Offer(100 * MIB, BOTH)])
+        plan(heard, tried, [WorkerCapacity(100 * MIB, BOTH)])
     assert refusal.value.field == "method"
     assert "judge_by_waves" not in plan(replace(heard, in_space=True, height_m=0.1), tried, []).call_bytes
 
@@ -185,7 +185,7 @@ def test_more_nodes_and_more_slices_never_take_less(nodes, method, volume, check
     limits=st.lists(st.integers(900, 4000), min_size=1, max_size=9),
 )
 def test_blocks_fit_into_the_workers_that_hold_them(shape, limits):
-    offers = [Offer(limit * MIB, BOTH) for limit in limits]
+    offers = [WorkerCapacity(limit * MIB, BOTH) for limit in limits]
     least = min(offer.task_bytes for offer in offers)
     if 24 * math.prod(shape) > len(offers) * least and field_bytes(shape, "fsm") > max(limits) * MIB:
         with pytest.raises(InvalidInput, match="speed"):
@@ -204,4 +204,4 @@ def test_blocks_fit_into_the_workers_that_hold_them(shape, limits):
 
 def test_small_fields_stay_whole():
     assert blocks_of((200, 200, 200), [LARGE]) == (1, 1, 1)
-    assert math.prod(blocks_of((700, 700, 300), [Offer(4096 * MIB, BOTH)] * 8)) > 1
+    assert math.prod(blocks_of((700, 700, 300), [WorkerCapacity(4096 * MIB, BOTH)] * 8)) > 1

@@ -22,13 +22,13 @@ from bentray_kernels.limits import (
     WIDTH_M,
 )
 from bentray_kernels.tomography import Settings
-from bentray_workers.cluster.capacities import MIB, Offer
+from bentray_workers.cluster.capacities import MIB, WorkerCapacity
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.counts import DatasetCounts
 from bentray_workers.files.dataset.summary import counts_in
 from bentray_workers.reconstruction.planning import plan
 from bentray_workers.simulation.parts import count_of, parts_of
-from bentray_workers.simulation.request import AskedSimulation
+from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_planning import plan_simulation
 
 from ..files.datasets import datasets
@@ -41,7 +41,7 @@ WAYS = [
     {"decomposition": "volume"},
     {"guided_rounds": 3, "amplitudes": "ratio"},
 ]
-OFFERS = [Offer(0, ("recon", "render"))]
+OFFERS = [WorkerCapacity(0, ("recon", "render"))]
 SMALL = DatasetCounts(256, 256, 256, 2, False, 0.004, 0.2, False, True, 2**30, 4000, 2, 2.5e7, 1e6, 1500.0)
 LARGEST = DatasetCounts(
     EMISSIONS.most,
@@ -102,7 +102,7 @@ def test_the_largest_dataset_is_planned_in_as_many_steps_as_a_small_one(way):
 @pytest.mark.parametrize("way", WAYS, ids=str)
 def test_what_the_largest_dataset_takes_is_refused_in_as_few(way):
     settings = Settings.of(**way)
-    little = [Offer(2048 * MIB, ("recon", "render"))]
+    little = [WorkerCapacity(2048 * MIB, ("recon", "render"))]
 
     def refused():
         with pytest.raises(InvalidInput):
@@ -171,7 +171,7 @@ def test_the_counts_of_a_dataset_are_those_of_its_file(dataset, tmp_path_factory
     ids=str,
 )
 def test_parts_of_a_simulation_are_counted_without_being_made(asked):
-    settings = AskedSimulation(**asked).chosen()
+    settings = PhantomScan(**asked).chosen()
     assert count_of(settings) == len(parts_of(settings))
 
 
@@ -180,6 +180,6 @@ def test_the_largest_simulation_is_refused_in_few_steps():
 
     def refused():
         with pytest.raises(InvalidInput, match="elements"):
-            plan_simulation(AskedSimulation(**largest, elements=1400), OFFERS)
+            plan_simulation(PhantomScan(**largest, elements=1400), OFFERS)
 
     assert steps(refused)[1] < 2 * MIB

@@ -12,7 +12,7 @@ from bentray_kernels.tomography.sart import sart_update
 from bentray_kernels.tomography.sart.sart_step import advance, begin
 from bentray_kernels.tomography.settings import DEVIATION
 from bentray_kernels.tomography.solver_choice import needs_device, solver_of
-from bentray_workers.cluster.capacities import MIB, lane_of
+from bentray_workers.cluster.capacities import MIB, resource_of
 from bentray_workers.files.dataset.counts import Summary
 from bentray_workers.reconstruction.memory.ray_memory import call_bytes
 from bentray_workers.simulation.plane import SimulationSettings
@@ -85,4 +85,4 @@ def test_a_device_is_asked_for_where_one_is_used(method, rays, eikonal):
         pytest.skip("refused")
     used = eikonal in ON_DEVICE and (rays == "curved" or method == "auto")
     assert needs_device(settings) is used
-    assert lane_of(settings) == ("opencl" if used else "recon")
+    assert resource_of(settings) == ("opencl" if used else "recon")

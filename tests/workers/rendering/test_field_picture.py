@@ -13,7 +13,7 @@ from bentray_workers.files.geometry_image import GeometryMaps, read_geometry_ima
 from bentray_workers.images.png import colours_of
 from bentray_workers.rendering import field_cache, tiles
 from bentray_workers.rendering.field_cache import world_at
-from bentray_workers.rendering.field_picture import map_png, picture_png, strip_image, tasks_of
+from bentray_workers.rendering.field_picture import map_png, picture_png, tasks_of, tile_image
 from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.field_view import CHOICES, LOOKUPS, FieldView
 
@@ -61,11 +61,11 @@ def test_the_accurate_lookup_is_nearly_exact(folder, scene, mode):
 def test_strips_are_parts_of_the_whole(folder, cluster, monkeypatch):
     view = FieldView(**SIZE, rays=2)
     whole = picture_png(folder, view)
-    parts = [strip_image(folder, view, first, first + 8) for first in range(0, 40, 8)]
+    parts = [tile_image(folder, view, first, first + 8) for first in range(0, 40, 8)]
     off = np.abs(np.concatenate(parts).astype(int) - colours_of(whole)).max(axis=2)
     assert (off > 2).mean() < 0.002
     monkeypatch.setattr(tiles, "TASK_RAYS", 8 * 48 * 4)
-    assert len(tiles.strips_of(view)) == 5
+    assert len(tiles.tile_rows(view)) == 5
     assert Image.open(io.BytesIO(tiles.submit(cluster.client, tasks_of(folder, view), 0).result())).size == (
         48,
         40,
@@ -103,8 +103,8 @@ def test_maps(folder):
 
 
 def test_a_scene_is_made_once_and_tables_are_not_copied(folder, monkeypatch):
-    monkeypatch.setattr(field_cache, "_WORLDS", field_cache.Kept(2**30))
-    monkeypatch.setattr(field_cache, "_SHAPES", field_cache.Kept(2**30))
+    monkeypatch.setattr(field_cache, "_WORLDS", field_cache.MemoryCache(2**30))
+    monkeypatch.setattr(field_cache, "_SHAPES", field_cache.MemoryCache(2**30))
     view = FieldView(scene="mirror-ball")
     world = world_at(folder, view)
     assert world_at(folder, FieldView(scene="mirror-ball", azimuth_deg=3.0)) is world
@@ -116,7 +116,7 @@ def test_a_scene_is_made_once_and_tables_are_not_copied(folder, monkeypatch):
 
 
 def test_what_does_not_fit_is_not_kept(folder, monkeypatch):
-    monkeypatch.setattr(field_cache, "_WORLDS", field_cache.Kept(10))
+    monkeypatch.setattr(field_cache, "_WORLDS", field_cache.MemoryCache(10))
     view = FieldView(scene="two-mirrors")
     assert world_at(folder, view) is not world_at(folder, view)
     assert field_cache._WORLDS.held() == 0

@@ -11,7 +11,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.request_fields import MOST_PIXELS
-from bentray_workers.cluster.capacities import Offer
+from bentray_workers.cluster.capacities import WorkerCapacity
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.files.volume_export import export_volume
 from bentray_workers.images.drawing_tasks import volume_slice_png
@@ -19,13 +19,13 @@ from bentray_workers.rendering import picture_cost
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.picture_cost import (
     Cost,
-    Stored,
+    VolumeFile,
     check_memory,
     field_cost,
     placed,
     refraction_cost,
 )
-from bentray_workers.rendering.refraction import strip_image
+from bentray_workers.rendering.refraction import tile_image
 from bentray_workers.rendering.refraction_view import RefractionView
 
 GIB = 2**30
@@ -33,7 +33,7 @@ LANES = ("recon", "render")
 
 
 def test_a_large_picture_of_smooth_glass_is_taken_and_a_deep_one_refused():
-    stored = Stored((128, 128, 128), 6)
+    stored = VolumeFile((128, 128, 128), 6)
     large = RefractionView(width=MOST_PIXELS, height=MOST_PIXELS)
     assert refraction_cost(stored, large).seconds < picture_cost.MOST_SECONDS + 1.0
     with pytest.raises(InvalidInput, match=r"width, height, depth: .* or submit a job of kind `refraction`"):
@@ -59,7 +59,7 @@ def test_the_page_may_draw_a_field_and_the_largest_picture_of_few_surfaces():
 
 
 def test_it_grows_with_whatever_takes_longer():
-    stored, view = Stored((64, 64, 64), 6), RefractionView
+    stored, view = VolumeFile((64, 64, 64), 6), RefractionView
     usual = refraction_cost(stored, view()).seconds
     for more in (
         view(width=1024),
@@ -72,7 +72,7 @@ def test_it_grows_with_whatever_takes_longer():
 
 
 def test_what_no_worker_can_hold_is_refused_with_both_numbers():
-    offers = [Offer(GIB, LANES), Offer(2 * GIB, LANES)]
+    offers = [WorkerCapacity(GIB, LANES), WorkerCapacity(2 * GIB, LANES)]
     room = math.floor(offers[1].task_bytes)
     check_memory("volume", "it", Cost(1.0, room), offers)
     with pytest.raises(
@@ -80,14 +80,14 @@ def test_what_no_worker_can_hold_is_refused_with_both_numbers():
     ):
         check_memory("volume", "it", Cost(1.0, room + 1), offers)
     check_memory("volume", "it", Cost(1.0, 2**60), [])
-    check_memory("volume", "it", Cost(1.0, 2**60), [Offer(0, LANES)])
+    check_memory("volume", "it", Cost(1.0, 2**60), [WorkerCapacity(0, LANES)])
 
 
 def test_where_pictures_of_a_turntable_may_be_drawn():
-    workers = {"small": Offer(GIB, LANES), "large": Offer(8 * GIB, LANES)}
+    workers = {"small": WorkerCapacity(GIB, LANES), "large": WorkerCapacity(8 * GIB, LANES)}
     assert placed(2**20, workers) == {"resources": {"render": 1}}
     assert placed(GIB, workers) == {"resources": {"render": 1, "recon": 1}, "workers": ["large"]}
-    assert placed(GIB, {"any": Offer(0, LANES)}) == {"resources": {"render": 1}}
+    assert placed(GIB, {"any": WorkerCapacity(0, LANES)}) == {"resources": {"render": 1}}
 
 
 def taken(work, *given) -> int:
@@ -128,7 +128,7 @@ def volumes(tmp_path_factory):
     return folder
 
 
-LARGE = Stored((200, 200, 200), 6)
+LARGE = VolumeFile((200, 200, 200), 6)
 
 
 @pytest.mark.slow
@@ -138,7 +138,7 @@ def test_a_strip_takes_no_more_memory_than_planned(volumes, name):
     small = RefractionView(iso=(0.9,), filter=name, width=8, height=8)
     view = RefractionView(iso=(0.9,), filter=name, width=4096, height=4096)
     measured = taken(
-        strip_image, (volumes / "small.h5", small, 0, 8), volumes / "large.h5", view, 1024, 1024 + 128
+        tile_image, (volumes / "small.h5", small, 0, 8), volumes / "large.h5", view, 1024, 1024 + 128
     )
     planned = picture_cost.refraction_bytes((200, 200, 200), view)
     assert planned / 2 < measured < planned

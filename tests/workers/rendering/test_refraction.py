@@ -12,10 +12,10 @@ from bentray_workers.cluster.resources import RECONSTRUCTION
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.images.png import colours_of
 from bentray_workers.rendering import refraction, tiles
-from bentray_workers.rendering.refraction import frame_of, picture_png, strip, strip_image
+from bentray_workers.rendering.refraction import draw_tile, frame_of, picture_png, tile_image
 from bentray_workers.rendering.refraction_view import RefractionView
 from bentray_workers.rendering.scene_cache import scene_at
-from bentray_workers.rendering.tiles import joined_png, strips_of
+from bentray_workers.rendering.tiles import stack_png, tile_rows
 
 SMALL = RefractionView(iso=(0.5,), width=48, height=32)
 
@@ -28,7 +28,7 @@ def path(tmp_path_factory):
 
 
 def whole(path, view, card=None):
-    return strip(scene_at(path, view), view, 0, view.height, card)
+    return draw_tile(scene_at(path, view), view, 0, view.height, card)
 
 
 @pytest.mark.parametrize("camera", ["orthographic", "perspective"])
@@ -92,8 +92,8 @@ def test_the_frame_is_right_handed_with_z_up():
 def test_strips_make_the_whole(path, how):
     view = replace(SMALL, **how)
     image = whole(path, view).image
-    parts = [strip_image(path, view, first, min(first + 7, 32)) for first in range(0, 32, 7)]
-    joined = colours_of(joined_png(parts))
+    parts = [tile_image(path, view, first, min(first + 7, 32)) for first in range(0, 32, 7)]
+    joined = colours_of(stack_png(parts))
     assert joined.shape == (32, 48, 3)
     # The same rays but for the last digit, which may move a pixel over the border of a square.
     assert (joined != image).any(axis=-1).mean() < 0.005
@@ -131,8 +131,8 @@ def test_a_picture_of_ones_own(path):
     ],
 )
 def test_a_task_has_about_a_second_of_work(view, rows):
-    assert [last - first for first, last in strips_of(view)] == rows
-    assert strips_of(view)[-1][1] == view.height
+    assert [last - first for first, last in tile_rows(view)] == rows
+    assert tile_rows(view)[-1][1] == view.height
 
 
 @pytest.mark.parametrize("rays", [2**19, 200])

@@ -1,4 +1,4 @@
-"""Kept scenes: made once, made anew when file or filter change, never more than there is room for."""
+"""MemoryCache scenes: made once, made anew when file or filter change, never more than there is room for."""
 
 import os
 from dataclasses import replace
@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.splines import Spline
-from bentray_workers.cluster.memory_cache import Kept
+from bentray_workers.cluster.memory_cache import MemoryCache
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.rendering import scene_cache
@@ -31,7 +31,7 @@ def path(tmp_path):
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 60)), max_size=60))
 def test_there_is_never_more_than_fits(asked):
-    kept, made_of = Kept(100), {}
+    kept, made_of = MemoryCache(100), {}
     for key, size in asked:
         size = made_of.setdefault(key, size)
         assert kept.get(key, size, lambda key=key: key) == key
@@ -39,7 +39,7 @@ def test_there_is_never_more_than_fits(asked):
 
 
 def test_the_least_lately_used_goes_first():
-    kept, made_now = Kept(100), []
+    kept, made_now = MemoryCache(100), []
 
     def get(key, size):
         return kept.get(key, size, lambda: made_now.append(key) or key)
@@ -53,7 +53,7 @@ def test_the_least_lately_used_goes_first():
 
 
 def test_what_fails_is_not_kept():
-    kept = Kept(10)
+    kept = MemoryCache(10)
     with pytest.raises(ZeroDivisionError):
         kept.get("a", 1, lambda: 1 / 0)
     assert kept.get("a", 1, lambda: 5) == 5
@@ -126,12 +126,12 @@ def test_the_figures_for_memory_are_no_less_than_what_is_used():
     import tracemalloc
 
     volume = Volume.of(sampled(ONE_HOLE, 64), (1e-3,) * 3)
-    filtered = scene_cache.filtered_of(volume, "bspline3", 0.0)
-    scene_cache.build(filtered, RefractionView(iso=(0.5,)).layers())
+    filtered = scene_cache.filter_volume(volume, "bspline3", 0.0)
+    scene_cache.build_scene(filtered, RefractionView(iso=(0.5,)).layers())
     tracemalloc.start()
-    filtered = scene_cache.filtered_of(volume, "bspline3", 0.0)
+    filtered = scene_cache.filter_volume(volume, "bspline3", 0.0)
     spline = tracemalloc.get_traced_memory()[0]
-    scene = scene_cache.build(filtered, RefractionView(iso=(0.5,)).layers())
+    scene = scene_cache.build_scene(filtered, RefractionView(iso=(0.5,)).layers())
     kept, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert scene.layers.isos == (0.5,)

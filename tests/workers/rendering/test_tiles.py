@@ -6,14 +6,14 @@ from types import SimpleNamespace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bentray_workers.rendering.tiles import TASK_RAYS, strips_of
+from bentray_workers.rendering.tiles import TASK_RAYS, tile_rows
 
 SIDES = st.integers(1, 4096)
 
 
 @given(SIDES, SIDES, st.integers(1, 8))
 def test_every_row_is_in_one_strip(width, height, times):
-    parts = strips_of(SimpleNamespace(width=width, height=height, times=times))
+    parts = tile_rows(SimpleNamespace(width=width, height=height, times=times))
     assert [row for first, last in parts for row in range(first, last)] == list(range(height))
     rays = [(last - first) * width * times**2 for first, last in parts]
     assert all(

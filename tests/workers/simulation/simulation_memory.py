@@ -17,7 +17,7 @@ from benchmarks.shared._peak_memory import peak
 
 from bentray_workers.simulation.assembly import write_scan
 from bentray_workers.simulation.parts import Part, make_part, parts_of
-from bentray_workers.simulation.request import AskedSimulation, Simulated
+from bentray_workers.simulation.request import PhantomScan, Simulated
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
 TINY: list[dict[str, Any]] = [
@@ -47,7 +47,7 @@ def main(scans: list[dict[str, Any]]) -> None:
     with tempfile.TemporaryDirectory() as outer:
         found = []
         for k, scan in enumerate([*TINY, *scans]):
-            settings, folder = AskedSimulation(**scan).chosen(), Path(outer) / str(k)
+            settings, folder = PhantomScan(**scan).chosen(), Path(outer) / str(k)
             folder.mkdir()
             if k < len(TINY):
                 # Loading compiled code takes memory too, here and not in the forks.

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.simulation.plane import SimulationSettings
-from bentray_workers.simulation.request import OWN, AskedSimulation
+from bentray_workers.simulation.request import CONDITIONS, PhantomScan
 from bentray_workers.simulation.volume import VolumeSimulationSettings
 from bentray_workers.simulation.volume_waves import VolumeWaveSettings
 from bentray_workers.simulation.waves import WaveSimulationSettings
@@ -33,20 +33,20 @@ TIMES = {"refinement": st.none() | st.integers(4, 64), "attenuation": st.none() 
     )
 )
 def test_what_is_stored_gives_the_same_scan(given):
-    asked = AskedSimulation(**given)
+    asked = PhantomScan(**given)
     stored = json.loads(json.dumps(asked.plain()))
-    assert AskedSimulation(**stored).chosen() == asked.chosen()
+    assert PhantomScan(**stored).chosen() == asked.chosen()
     for name, value in given.items():
         if name not in ("phantom", "waveform") and value is not None:
             assert getattr(asked.chosen(), name) == value
 
 
 def test_which_scan_is_meant():
-    assert AskedSimulation().chosen() == SimulationSettings()
-    assert AskedSimulation(phantom="table7").chosen() == VolumeSimulationSettings()
-    waves = AskedSimulation(waveform=True, nodes=256, elements=128).chosen()
+    assert PhantomScan().chosen() == SimulationSettings()
+    assert PhantomScan(phantom="table7").chosen() == VolumeSimulationSettings()
+    waves = PhantomScan(waveform=True, nodes=256, elements=128).chosen()
     assert waves == WaveSimulationSettings()
-    in_space = AskedSimulation(phantom="table7", waveform=True, nodes=256, elements=128).chosen()
+    in_space = PhantomScan(phantom="table7", waveform=True, nodes=256, elements=128).chosen()
     assert in_space == VolumeWaveSettings()
 
 
@@ -60,10 +60,10 @@ def test_which_scan_is_meant():
         ({"phantom": "table7", "array": "rings"}, "array"),
         ({"phantom": "table7", "noise_s": 1e-8}, "noise_s"),
         ({"waveform": True, "attenuation": False}, "attenuation"),
-        *(({name: 4}, name) for name in OWN if name not in ("refinement", "noise_s", "attenuation")),
+        *(({name: 4}, name) for name in CONDITIONS if name not in ("refinement", "noise_s", "attenuation")),
     ],
 )
 def test_what_is_refused(given, field):
     with pytest.raises(InvalidInput) as caught:
-        AskedSimulation(**given)
+        PhantomScan(**given)
     assert caught.value.field == field

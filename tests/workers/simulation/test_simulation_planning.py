@@ -12,27 +12,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.cluster.capacities import MIB, Offer
+from bentray_workers.cluster.capacities import MIB, WorkerCapacity
 from bentray_workers.simulation import simulation_planning
 from bentray_workers.simulation.cost import task_bytes
 from bentray_workers.simulation.parts import parts_of
-from bentray_workers.simulation.request import AskedSimulation
+from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_planning import plan_simulation
 
 PROGRAM = Path(__file__).with_name("simulation_memory.py")
 ROOT = Path(__file__).parents[3]
-WORKER = Offer(1024 * MIB, ("recon", "render"))
-WAVES = AskedSimulation(waveform=True)
+WORKER = WorkerCapacity(1024 * MIB, ("recon", "render"))
+WAVES = PhantomScan(waveform=True)
 
 
 @given(
     asked=st.sampled_from(
         [
-            AskedSimulation(),
-            AskedSimulation(attenuation=True),
-            AskedSimulation(phantom="table7", slices=3, nodes=64),
+            PhantomScan(),
+            PhantomScan(attenuation=True),
+            PhantomScan(phantom="table7", slices=3, nodes=64),
             WAVES,
-            AskedSimulation(phantom="table7", waveform=True),
+            PhantomScan(phantom="table7", waveform=True),
         ]
     ),
     more=st.sampled_from(["elements", "nodes"]),
@@ -54,7 +54,7 @@ def test_more_of_anything_takes_more(asked, more, by):
 
 @given(st.integers(1, 300), st.integers(16, 128), st.integers(2, 3))
 def test_every_emitter_is_in_one_part(elements, nodes, slices):
-    asked = AskedSimulation(phantom="table7", elements=elements + 2, nodes=nodes, slices=slices)
+    asked = PhantomScan(phantom="table7", elements=elements + 2, nodes=nodes, slices=slices)
     found = [(part.scan, k) for part in parts_of(asked.chosen()) for k in range(part.first, part.last)]
     assert found == [(scan, k) for scan in range(slices) for k in range(elements + 2)]
 
@@ -62,25 +62,27 @@ def test_every_emitter_is_in_one_part(elements, nodes, slices):
 @pytest.mark.parametrize(
     ("asked", "field"),
     [
-        (AskedSimulation(refinement=60), "nodes"),
-        (AskedSimulation(elements=4096, attenuation=True, snr=9.0), "elements"),
-        (AskedSimulation(phantom="table7", three_d=True, refinement=4), "nodes"),
-        (AskedSimulation(waveform=True, frequency_hz=5e6), "frequency_hz"),
-        (AskedSimulation(phantom="table7", waveform=True, frequency_hz=4e5), "frequency_hz"),
-        (AskedSimulation(waveform=True, elements=4096, side_m=0.3), "elements"),
-        (AskedSimulation(phantom="table7", elements=4096, slices=1000), "elements"),
+        (PhantomScan(refinement=60), "nodes"),
+        (PhantomScan(elements=4096, attenuation=True, snr=9.0), "elements"),
+        (PhantomScan(phantom="table7", three_d=True, refinement=4), "nodes"),
+        (PhantomScan(waveform=True, frequency_hz=5e6), "frequency_hz"),
+        (PhantomScan(phantom="table7", waveform=True, frequency_hz=4e5), "frequency_hz"),
+        (PhantomScan(waveform=True, elements=4096, side_m=0.3), "elements"),
+        (PhantomScan(phantom="table7", elements=4096, slices=1000), "elements"),
     ],
 )
 def test_what_no_worker_can_hold_is_refused(asked, field):
     with pytest.raises(InvalidInput) as caught:
-        plan_simulation(asked, [WORKER, Offer(64 * MIB, ("recon",)), Offer(2**50, ("render",))])
+        plan_simulation(
+            asked, [WORKER, WorkerCapacity(64 * MIB, ("recon",)), WorkerCapacity(2**50, ("render",))]
+        )
     assert caught.value.field == field
     assert "bytes" in caught.value.accepted
 
 
 def test_files_that_nobody_could_read_and_too_many_tasks_are_refused(monkeypatch):
     with pytest.raises(InvalidInput, match=r"elements: found .* a file of"):
-        plan_simulation(AskedSimulation(phantom="table7", elements=4096, slices=1000), [])
+        plan_simulation(PhantomScan(phantom="table7", elements=4096, slices=1000), [])
     monkeypatch.setattr(simulation_planning, "MOST_TASKS", 20)
     with pytest.raises(InvalidInput, match="at most 20 tasks"):
         plan_simulation(WAVES, [])
@@ -101,7 +103,7 @@ def test_tasks_take_what_the_plan_says():
     command = [sys.executable, str(PROGRAM), json.dumps(scans)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     for scan, measured in zip(scans, json.loads(done.stdout), strict=True):
-        told = task_bytes(AskedSimulation(**scan).chosen())
+        told = task_bytes(PhantomScan(**scan).chosen())
         assert set(told) == set(measured)
         for name, taken in measured.items():
             assert taken <= told[name] <= 2.2 * taken + 24 * MIB, (scan, name, told[name], taken)

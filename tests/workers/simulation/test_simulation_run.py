@@ -9,15 +9,15 @@ import pytest
 from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.wave import time_blocks
 from bentray_workers.cluster.attempts import ResultsLostError
-from bentray_workers.cluster.job_cancellation import Unwanted
+from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import read_dataset
 from bentray_workers.files.dataset.record import record_of
 from bentray_workers.simulation import parts
 from bentray_workers.simulation.parts import folder_of, make_part, parts_of
-from bentray_workers.simulation.request import AskedSimulation
+from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_run import simulate_to_file
 
-TIMES = AskedSimulation(nodes=16, elements=70, snr=10.0, attenuation=True)
+TIMES = PhantomScan(nodes=16, elements=70, snr=10.0, attenuation=True)
 WAVES = {"waveform": True, "nodes": 32, "elements": 16, "frequency_hz": 2e5, "side_m": 0.03, "emissions": 4}
 
 
@@ -89,7 +89,7 @@ def test_a_stop_does_not_wait_for_the_emission_at_work_which_ends_with_the_folde
     monkeypatch.setattr(parts, "simulate_emission", endless)
     try:
         with pytest.raises(Cancelled):
-            run(AskedSimulation(**WAVES), stop=begun.is_set)
+            run(PhantomScan(**WAVES), stop=begun.is_set)
         assert not ended.is_set()
         assert not (tmp_path / "scan.h5").exists()
     finally:
@@ -99,15 +99,15 @@ def test_a_stop_does_not_wait_for_the_emission_at_work_which_ends_with_the_folde
 
 def test_an_emission_asks_between_its_steps_whether_anybody_waits(tmp_path, monkeypatch):
     monkeypatch.setattr(time_blocks, "STRIP", 10**6)
-    settings = AskedSimulation(**WAVES).chosen()
+    settings = PhantomScan(**WAVES).chosen()
     polled = []
 
     def gone(folder):
         polled.append(folder)
         if len(polled) == 3:
-            raise Unwanted
+            raise JobEnded
 
-    monkeypatch.setattr(parts, "check_wanted", gone)
+    monkeypatch.setattr(parts, "check_job_active", gone)
     make_part(settings, parts_of(settings)[0], tmp_path)
     assert polled == 3 * [tmp_path]
     assert not list(tmp_path.iterdir())

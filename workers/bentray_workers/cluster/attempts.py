@@ -11,7 +11,7 @@ from distributed import Client, Future, KilledWorker
 
 from bentray_kernels.task_graph import Task
 
-from .memory_cache import leave_room
+from .memory_cache import evict_for_job
 from .resources import RECONSTRUCTION
 
 # Deaths of workers while a task runs, after which it fails.
@@ -114,7 +114,7 @@ def _futures(arguments: Iterable[Any]) -> Iterator[Future]:
 def marked(marker: Path, evict: bool, function: Callable[..., Any], *arguments: Any) -> Any:
     """Task: run a function, with a file that exists as long as it runs."""
     if evict:
-        leave_room()
+        evict_for_job()
     marker.touch()
     try:
         return function(*arguments)

@@ -1,4 +1,4 @@
-"""What connected workers offer: memory and lanes; embedded ones try their OpenCL devices when first asked."""
+"""Capacities of connected workers: memory and resources; embedded workers test OpenCL devices on demand."""
 
 from __future__ import annotations
 
@@ -22,91 +22,89 @@ MIB = 2**20
 
 Lane = Literal["recon", "opencl"]
 
-# What a worker holds once it is warm (266 MiB were measured), and to draw a picture beside its task.
+# Memory of a warm worker (266 MiB were measured), and of a picture drawn beside its task.
 WARM_BYTES = 384 * MIB
 
-# Dask gives a worker no task while it holds more than this part of its limit.
+# Dask pauses a worker that uses more than this part of its memory limit.
 USABLE = 0.8
 
 
 @dataclass(frozen=True)
-class Offer:
-    """A worker that is connected.
+class WorkerCapacity:
+    """Capacity of a connected worker.
 
     Attributes:
         memory_bytes: its limit; 0: none.
-        lanes: what it offers, by the names in ``resources``.
+        resources: by the names in ``cluster.resources``.
     """
 
     memory_bytes: int
-    lanes: tuple[str, ...]
+    resources: tuple[str, ...]
 
     @property
     def task_bytes(self) -> float:
-        """The largest task that it can hold."""
+        """Memory of the largest task that it can run."""
         return max(0.0, USABLE * self.memory_bytes - WARM_BYTES) if self.memory_bytes else math.inf
 
 
-def lane_of(settings: Settings) -> Lane:
-    """Where the calls of a reconstruction run: wave fronts on a device need a worker that has one."""
+def resource_of(settings: Settings) -> Lane:
+    """The resource that tasks of a reconstruction need: OpenCL where wave fronts are computed on a device."""
     return "opencl" if needs_device(settings) else "recon"
 
 
-def offers_of(client: Client) -> tuple[Offer, ...]:
-    """Of every worker that is connected now."""
-    return tuple(offers_by_address(client).values())
+def capacities_of(client: Client) -> tuple[WorkerCapacity, ...]:
+    """Capacities of all workers that are connected now."""
+    return tuple(capacities_by_address(client).values())
 
 
-def offers_by_address(client: Client) -> dict[str, Offer]:
-    """The same by the worker's address."""
+def capacities_by_address(client: Client) -> dict[str, WorkerCapacity]:
+    """The same by the address of the worker."""
     return {
-        address: Offer(
+        address: WorkerCapacity(
             int(worker.get("memory_limit") or 0),
-            tuple(lane for lane, amount in worker.get("resources", {}).items() if amount > 0),
+            tuple(name for name, amount in worker.get("resources", {}).items() if amount > 0),
         )
         for address, worker in connected_workers(client).items()
     }
 
 
-def prepared_offers(client: Client, settings: Settings) -> tuple[Offer, ...]:
-    """As ``offers_of``, once embedded workers have tried their devices where the settings want one.
+def probed_capacities(client: Client, settings: Settings) -> tuple[WorkerCapacity, ...]:
+    """As ``capacities_of``, after embedded workers have tested their devices where the settings need one.
 
-    A trial takes seconds in a process of its own, and few jobs want a device: at the start it would cost
-    every service those seconds. Its outcome is kept on disk. Workers that joined have tried at their start,
-    as they were told to, and are not asked.
+    The test takes seconds in a separate process and few jobs need a device, so it is not made at the start
+    of every service. Its result is stored on disk. Workers that joined the cluster test at their start.
     """
-    if lane_of(settings) == "opencl" and isinstance(client.cluster, LocalCluster):
-        client.run(offer_device)
-    return offers_of(client)
+    if resource_of(settings) == "opencl" and isinstance(client.cluster, LocalCluster):
+        client.run(probe_device)
+    return capacities_of(client)
 
 
 def resources_for(client: Client, settings: Settings) -> dict[str, int]:
-    """What each call of a reconstruction asks for.
+    """The resources that each task of a reconstruction needs.
 
-    One that tracks wave fronts on a device takes the place of a reconstruction too, so that a process never
-    holds two.
+    A task on a device uses the reconstruction resource too, so that a process never runs two of them.
 
     Raises:
-        InvalidInput: for a device where no connected worker offers one: its tasks would wait for ever.
+        InvalidInput: for a device that no connected worker has: its tasks would wait for ever.
     """
-    if lane_of(settings) != "opencl":
+    if resource_of(settings) != "opencl":
         return RECONSTRUCTION
-    if not any("opencl" in offer.lanes for offer in prepared_offers(client, settings)):
+    if not any("opencl" in capacity.resources for capacity in probed_capacities(client, settings)):
         raise InvalidInput(
-            "eikonal", f"{settings.eikonal!r}, which no connected worker offers", "a method without a device"
+            "eikonal", f"{settings.eikonal!r}, which no connected worker has", "a method without a device"
         )
     return {**RECONSTRUCTION, **OPENCL}
 
 
-async def offer_device(dask_worker: Any) -> bool:
-    """On a worker: offer the OpenCL lane if a device passes its trial; whether it does."""
+async def probe_device(dask_worker: Any) -> bool:
+    """On a worker: add the OpenCL resource if a device passes its self-test; returns whether it does."""
     if "opencl" in dask_worker.state.total_resources:
         return True
-    # Not in the loop, which must go on telling the scheduler that the worker lives.
-    found = await asyncio.get_running_loop().run_in_executor(None, _has_device)
-    if found:
+    # Not in the event loop, which sends heartbeats to the scheduler.
+    passed = await asyncio.get_running_loop().run_in_executor(None, _has_device)
+    if passed:
         await dask_worker.set_resources(**OPENCL)
-    return found
+    return passed
 
 
 def _has_device() -> bool:

@@ -1,4 +1,4 @@
-"""Which workers are connected now."""
+"""The workers that are connected now."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from distributed import Client
 
 
 def connected_workers(client: Client) -> Mapping[str, Any]:
-    """What the scheduler tells of every worker, by its address.
+    """Information of the scheduler about every worker, by address.
 
     Raises:
-        ConnectionError: when the scheduler is away; a client that has just lost it tells of none at all.
+        ConnectionError: when the scheduler is not available.
     """
-    told = client.scheduler_info(n_workers=-1)
-    if "workers" not in told:
-        raise ConnectionError("the scheduler is away")
-    return dict(told["workers"])
+    info = client.scheduler_info(n_workers=-1)
+    # A client that has just lost its scheduler returns an empty record.
+    if "workers" not in info:
+        raise ConnectionError("the scheduler is not available")
+    return dict(info["workers"])

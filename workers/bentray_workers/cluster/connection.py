@@ -1,4 +1,4 @@
-"""A client of a cluster: of one that is already running, or of one that a provider starts."""
+"""Client of a cluster that is running, or that a provider starts."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from bentray_kernels.errors import InvalidInput
 
 from .connected import connected_workers
 from .dask_settings import OF_CLIENTS
-from .providers import Deployed, Wanted, deploy
+from .providers import ClusterRequest, DeployedCluster, deploy
 from .tls import security_of
 
-# What tells that nothing, or something else, is at an address; other protocols look like huge messages.
+# Errors without a scheduler at an address; other protocols look like huge messages.
 NO_SCHEDULER = (OSError, TimeoutError, ValueError, MemoryError)
 
 
 class Cluster:
-    """A client of a running scheduler, and the scheduler itself where it is ours."""
+    """A client of a running scheduler, and the scheduler itself if it was started here."""
 
-    def __init__(self, connect: Callable[[], Client], deployed: Deployed | None = None) -> None:
-        # For the whole process: a client looks them up whenever something is submitted.
+    def __init__(self, connect: Callable[[], Client], deployed: DeployedCluster | None = None) -> None:
+        # For the whole process: a client reads them at each submission.
         dask.config.set(OF_CLIENTS)
         self._connect = connect
         self._deployed = deployed
@@ -38,13 +38,13 @@ class Cluster:
 
     @property
     def client(self) -> Client:
-        """A ``distributed.Client``; tasks name their lane by ``resources=``.
+        """A ``distributed.Client``; tasks are submitted with ``resources=``.
 
-        A client gives up when its scheduler stays away for longer than the time to connect. The next call
-        then makes a new one, so that a scheduler that was started again is found again.
+        A client gives up when its scheduler is not available for longer than the time to connect. The next
+        call then makes a new client, so that a restarted scheduler is found.
 
         Raises:
-            ConnectionError: while there is no scheduler.
+            ConnectionError: without a scheduler.
         """
         with self._changing:
             if self._client.status == "closed":
@@ -55,7 +55,7 @@ class Cluster:
             return self._client
 
     def describe(self) -> dict[str, Any]:
-        """What there is now: scheduler address, workers, threads and the lanes offered."""
+        """Scheduler address, and the present workers, threads and resources (``lanes``)."""
         client = self.client
         workers = connected_workers(client).values()
         lanes: dict[str, float] = {}
@@ -71,7 +71,7 @@ class Cluster:
         }
 
     def close(self) -> None:
-        """Leave; a cluster that was started for us ends with it."""
+        """Close the client, and a cluster that was started here."""
         self._client.close()
         if self._deployed is not None:
             self._deployed.close()
@@ -96,14 +96,14 @@ def open_cluster(
     processes: bool = True,
     connect_timeout_s: float = 10.0,
 ) -> Cluster:
-    """A cluster by its scheduler's address, or one that is started for us.
+    """A cluster by the address of its scheduler, or a new one.
 
     Args:
-        scheduler_address: as ``tcp://host:port``; None starts a cluster.
-        workers: worker processes of a cluster that is started; None: what its kind thinks right.
-        local_directory: where embedded workers keep their scratch files.
-        kind: of the cluster that is started, a key of ``cluster.providers.PROVIDERS``.
-        template: what that kind must be told about this site.
+        scheduler_address: as ``tcp://host:port``; None: start a cluster.
+        workers: worker processes of a new cluster; None: the default of its kind.
+        local_directory: for scratch files of embedded workers.
+        kind: of a new cluster, a key of ``cluster.providers.PROVIDERS``.
+        template: settings of this site for that kind.
         tls: a folder of certificates, see ``security_of``.
         processes: False keeps embedded workers in this process (for tests).
         connect_timeout_s: how long to try an address, s.
@@ -112,12 +112,12 @@ def open_cluster(
         InvalidInput: when no scheduler answers at the address, or from the provider.
     """
     if scheduler_address is None:
-        deployed = deploy(kind, Wanted(workers, local_directory, template, tls, processes))
+        deployed = deploy(kind, ClusterRequest(workers, local_directory, template, tls, processes))
         return Cluster(lambda: Client(deployed, set_as_default=False), deployed)
     security = security_of(tls)
 
     def connect() -> Client:
-        # A scheduler that accepts and stays silent would hold a client for ever, so it is asked first.
+        # A scheduler that accepts and never answers would block a client for ever: read its identity first.
         identity_of(scheduler_address, security, connect_timeout_s)
         return Client(scheduler_address, timeout=connect_timeout_s, security=security, set_as_default=False)
 
@@ -125,10 +125,10 @@ def open_cluster(
 
 
 def identity_of(address: str, security: Security, timeout_s: float, workers: int = 0) -> dict[str, Any]:
-    """What the scheduler at an address says of itself, with so many of its workers, -1 for all.
+    """Identity of the scheduler at an address, with so many of its workers, -1 for all.
 
     Raises:
-        InvalidInput: when there is none, with the reason.
+        InvalidInput: without a scheduler, with the reason.
     """
     encrypted = address.startswith("tls://")
     if (encrypted and security.tls_ca_file is None) or (security.require_encryption and not encrypted):

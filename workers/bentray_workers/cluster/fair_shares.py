@@ -1,4 +1,4 @@
-"""Shares of the workers: tenants alike, then the jobs of each alike, task by task, whoever came first."""
+"""Fair shares of the workers: equal for tenants, then for the jobs of each, task by task."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from distributed import Client
 
 from .connected import connected_workers
 
-# Tasks in flight for each worker where nobody else wants it: one at work and one ready.
+# Tasks in flight for each worker without competition: one running and one ready.
 IN_FLIGHT = 2
 # How often the workers are counted, s.
 COUNT_S = 2.0
-# A job that has not asked for so long wants nothing now: it reads, writes or waits for something else, s.
+# A job without a request for so long has no tasks to submit at present, s.
 ASKED_S = 1.0
-# How long a job without a task in flight waits for its turn before it looks again, s.
+# How long a job without a task in flight waits before it requests again, s.
 TURN_S = 0.2
 
 
 class Share:
-    """What one job may have of the workers; see ``Shares``.
+    """The share of one job of the workers; see ``Shares``.
 
     Attributes:
-        tenant, lane: whose it is, and what its tasks ask for.
-        in_flight, ready: tasks that it has begun and not seen the end of; tasks that could begin.
-        begun: which task of all was its last; asked: when it was last heard of, s.
+        tenant, lane: owner of the job, and the resource of its tasks.
+        in_flight, ready: tasks that are submitted and not finished; tasks that could be submitted.
+        begun: number of its last task among all tasks; asked: time of its last request, s.
     """
 
     def __init__(self, shares: Shares, tenant: str, lane: str, count: Callable[[], int]) -> None:
@@ -38,15 +38,15 @@ class Share:
         self._count = count
         self._workers, self._counted = 1, -COUNT_S
 
-    def may_begin(self, in_flight: int, ready: int) -> bool:
-        """Whether to begin one more task now; to be asked before each, and again once tasks have ended.
+    def may_submit(self, in_flight: int, ready: int) -> bool:
+        """Whether to submit one more task now; to be called before each, and again once tasks have finished.
 
         Args:
-            in_flight: tasks of this job that have begun and whose end has not been seen.
-            ready: tasks that could begin.
+            in_flight: submitted and not finished tasks of this job.
+            ready: tasks that could be submitted.
 
         Raises:
-            ConnectionError: when the scheduler is away.
+            ConnectionError: when the scheduler is not available.
         """
         now = self._shares.clock()
         if now - self._counted >= COUNT_S:
@@ -54,26 +54,26 @@ class Share:
         return self._shares.decide(self, in_flight, ready, self._workers)
 
     def pause(self) -> None:
-        """Say that nothing is in flight and nothing wanted."""
+        """Report that nothing is in flight or ready."""
         self._shares.decide(self, 0, 0, self._workers)
 
     def wait(self) -> None:
-        """Wait for a turn, a moment at most; for jobs with nothing in flight that they could wait for."""
+        """Wait briefly for a turn; for jobs with nothing in flight to wait for."""
         self._shares.wait(TURN_S)
 
     @staticmethod
     def priority(in_flight: int) -> int:
-        """Of the next task, for Dask: the first of a job goes before what others have ready beside theirs."""
+        """Dask priority of the next task: the first of a job runs before the second of others."""
         return -in_flight
 
 
 class Shares:
     """Divides the workers among the jobs of one service.
 
-    A tenant alone has all workers, with a task ready for each. Where several are at work, each may have an
-    equal part at any time, one worker is kept free for each that has less, and what remains goes to whoever
-    has tasks for it. With fewer workers than tenants they take turns by the time they have had. The jobs of
-    one tenant divide its part alike.
+    A single tenant uses all workers, with a task ready for each. Several tenants get equal parts: a worker
+    is kept free for each that has less than its part, and the rest goes to any tenant with ready tasks. With
+    fewer workers than tenants they take turns by the worker time used. The jobs of one tenant divide its part
+    equally.
 
     Args:
         clock: seconds.
@@ -83,7 +83,7 @@ class Shares:
         self.clock = clock
         self._changed = threading.Condition()
         self._jobs: list[Share] = []
-        # Time of workers that each tenant has had, s, since others were there.
+        # Worker time that each tenant has used, s, since it has competitors.
         self._had: dict[tuple[str, str], float] = {}
         self._updated = clock()
         self._begun = 0
@@ -93,8 +93,8 @@ class Shares:
         """The share of a job while it runs.
 
         Args:
-            tenant: whose job it is.
-            lane: what its tasks ask for, as ``recon``.
+            tenant: owner of the job.
+            lane: resource of its tasks, as ``recon``.
             client: of the cluster.
         """
         share = self.join(tenant, lane, client)
@@ -104,12 +104,12 @@ class Shares:
             self._leave(share)
 
     def join(self, tenant: str, lane: str, client: Client) -> Share:
-        """As ``of``, for good."""
+        """As ``of``, without an end."""
         share = Share(self, tenant, lane, lambda: len(connected_workers(client)))
         with self._changed:
             self._account()
             others = [self._had[one.lane, one.tenant] for one in self._jobs if one.lane == lane]
-            # Whoever comes anew has had as much as the one who has had least.
+            # A new tenant starts with the least worker time of the others.
             self._had.setdefault((lane, tenant), min(others, default=0.0))
             self._jobs.append(share)
         return share
@@ -124,7 +124,7 @@ class Shares:
             self._changed.notify_all()
 
     def decide(self, share: Share, in_flight: int, ready: int, workers: int) -> bool:
-        """As ``Share.may_begin``."""
+        """As ``Share.may_submit``."""
         with self._changed:
             self._account()
             fewer = in_flight < share.in_flight
@@ -139,7 +139,7 @@ class Shares:
             return may
 
     def wait(self, seconds: float) -> None:
-        """Until something has changed."""
+        """Wait until something has changed."""
         with self._changed:
             self._changed.wait(seconds)
 
@@ -158,14 +158,14 @@ class Shares:
         return all((share.in_flight, share.begun) <= (one.in_flight, one.begun) for one in others)
 
     def _most(self, share: Share, jobs: dict[str, list[Share]], held: dict[str, int], workers: int) -> int:
-        """How many tasks the tenant of a job may have in flight."""
+        """Tasks that the tenant of a job may have in flight."""
         if len(jobs) == 1:
             return IN_FLIGHT * workers
         had = self._had[share.lane, share.tenant]
         equal, kept = workers // len(jobs), 0
         for tenant, of_it in jobs.items():
             if tenant != share.tenant:
-                # What cannot be divided goes to those who have had less.
+                # The remainder of the division goes to tenants that have used less.
                 part = equal + (self._had[share.lane, tenant] < had and workers % len(jobs) > 0)
                 kept += min(part, held[tenant] + max(1, sum(one.ready for one in of_it)))
         return max(1, equal, workers - kept)
@@ -173,9 +173,9 @@ class Shares:
     def _has_turn(
         self, share: Share, jobs: dict[str, list[Share]], held: dict[str, int], workers: int
     ) -> bool:
-        """Of more tenants than workers: whether one is free, and nobody who waits for it has had less.
+        """With more tenants than workers: whether a worker is free, and no waiting tenant has used less.
 
-        Who is new need not wait for what others have ready, only for what they have at work.
+        A new tenant waits for running tasks of others only, not for their ready ones.
         """
         if not any(one.begun for one in jobs[share.tenant]):
             return True
@@ -199,5 +199,5 @@ class Shares:
 
 
 def alone(client: Client, lane: str) -> Share:
-    """The share of a job with which no other has to share."""
+    """The share of a single job: all workers."""
     return Shares().join("", lane, client)

@@ -1,6 +1,6 @@
-"""The sign of life of a worker that joined a scheduler: a file that is fresh while it serves there.
+"""Heartbeat file of a worker that joined a scheduler, for health checks.
 
-A preload module of Dask; a health check reads the file, so Dask is imported where a worker starts.
+A preload module of Dask; the health check must not load Dask, so it is imported in a worker only.
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ import time
 from pathlib import Path
 from typing import Any
 
-# Between two signs, s.
+# Between two heartbeats, s.
 BEAT_S = 5.0
-# A worker whose last sign is older has lost its scheduler or hangs, s.
+# A worker with an older heartbeat has lost its scheduler or hangs, s.
 STALE_S = 30.0
 
 
 def file_for(scheduler: str) -> Path:
-    """What the workers of this user touch that serve the scheduler at an address, as ``tcp://head:8786``."""
+    """The heartbeat file of workers of this user at a scheduler address, as ``tcp://head:8786``."""
     name = re.sub(r"\W+", "-", scheduler)
     return Path(tempfile.gettempdir()) / f"bentray-worker-{os.getuid()}-{name}.alive"
 
 
 def silence_s(scheduler: str) -> float | None:
-    """Time since the last sign of life, s; None where there was none, or who gave it is gone."""
+    """Time since the last heartbeat, s; None without one, or if its worker is gone."""
     try:
         with file_for(scheduler).open("rb") as file:
             try:
-                # A worker that was killed leaves a file that is fresh for a while, but not its lock.
+                # A killed worker leaves a recent file, but its lock is released.
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 return max(time.time() - os.fstat(file.fileno()).st_mtime, 0.0)
@@ -40,7 +40,7 @@ def silence_s(scheduler: str) -> float | None:
 
 
 def dask_setup(worker: Any) -> None:
-    """Called by Dask before a worker joins: from then on its event loop gives the signs."""
+    """Called by Dask before a worker joins: its event loop then writes the heartbeats."""
     from distributed.core import Status
     from tornado.ioloop import PeriodicCallback
 

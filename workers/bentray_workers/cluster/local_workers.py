@@ -1,4 +1,4 @@
-"""Workers of this machine that join a scheduler elsewhere, again when it comes back or when they are lost."""
+"""Workers of this machine for a scheduler elsewhere: they reconnect, and lost ones are replaced."""
 
 from __future__ import annotations
 
@@ -21,36 +21,36 @@ from .connection import NO_SCHEDULER, identity, identity_of
 from .dask_settings import NO_DASHBOARD, ours
 from .providers import PRELOAD
 from .resources import THREADS
-from .supervision import FIRST_PAUSE_S, LONGEST_PAUSE_S, LOOK_S, Losses
+from .supervision import CHECK_S, FIRST_PAUSE_S, LONGEST_PAUSE_S, Losses
 
 # What Dask loads into each worker before it joins.
 PRELOADS = [PRELOAD, heartbeat.__name__]
 # How long a worker may take to compile its kernels and to join, s.
 START_S = 600
-# How long workers may take to hand over their results when they are told to stop, s.
+# How long workers may take to transfer their results when they stop, s.
 STOP_S = 20.0
-# Between two looks for a scheduler that has gone, s.
+# Between two attempts to reach a scheduler, s.
 AGAIN_S = 2.0
 
 
 @dataclass(frozen=True)
-class Joining:
-    """What joins where.
+class JoinRequest:
+    """Workers to start, and the scheduler that they join.
 
     Attributes:
         scheduler: as ``tcp://host:port``, or ``tls://host:port`` with certificates.
-        workers: processes, each with ``THREADS`` threads and one of each lane.
-        lanes: what each offers, as ``cluster.resources.OFFERED``.
-        memory_limit: of each, as Dask takes it: ``4GiB``, ``0`` for none; None: its share of this machine's.
-        local_directory: for scratch files; None: where Dask puts them.
-        host: the address that others reach this machine by; None: the one that leads to the scheduler.
+        workers: processes with ``THREADS`` threads each.
+        resources: of each, as ``cluster.resources.OFFERED``.
+        memory_limit: of each, as ``4GiB``, ``0`` for none; None: an equal part of the memory of this machine.
+        local_directory: for scratch files; None: the default of Dask.
+        host: address of this machine for others; None: that of the interface to the scheduler.
         name: of a single worker; several get ``-0``, ``-1`` and so on after it. None: its address.
         security: see ``cluster.tls.security_of``.
     """
 
     scheduler: str
     workers: int
-    lanes: Mapping[str, float]
+    resources: Mapping[str, float]
     memory_limit: str | None
     local_directory: Path | None
     host: str | None
@@ -58,12 +58,12 @@ class Joining:
     security: Security
 
 
-def join(asked: Joining, say: Callable[[str], None], connect_timeout_s: float = 10.0) -> None:
-    """Work for a scheduler until SIGTERM, SIGHUP or Ctrl-C; when it goes, wait for it to come back.
+def join(asked: JoinRequest, say: Callable[[str], None], connect_timeout_s: float = 10.0) -> None:
+    """Run workers for a scheduler until SIGTERM, SIGHUP or Ctrl-C; reconnect when it returns.
 
     Args:
-        asked: what joins where.
-        say: told in one line what has changed.
+        asked: the workers and the scheduler.
+        say: called with a line about each change.
         connect_timeout_s: how long to try the address at first, s.
 
     Raises:
@@ -74,7 +74,7 @@ def join(asked: Joining, say: Callable[[str], None], connect_timeout_s: float = 
         asyncio.run(_serve(asked, say))
 
 
-async def _serve(asked: Joining, say: Callable[[str], None]) -> None:
+async def _serve(asked: JoinRequest, say: Callable[[str], None]) -> None:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
@@ -90,7 +90,7 @@ async def _serve(asked: Joining, say: Callable[[str], None]) -> None:
         except asyncio.CancelledError:
             pass
         except (OSError, TimeoutError, RuntimeError) as error:
-            # Dask wraps in the last whatever keeps a nanny from starting, as a scheduler that goes meanwhile.
+            # Dask raises the last for any failed start of a nanny, as when the scheduler stops meanwhile.
             say(f"could not join {asked.scheduler}: {error}")
         finally:
             await _close(nannies)
@@ -99,19 +99,19 @@ async def _serve(asked: Joining, say: Callable[[str], None]) -> None:
             await asyncio.wait([stopped], timeout=AGAIN_S)
 
 
-async def _work(asked: Joining, nannies: list[Any], say: Callable[[str], None]) -> None:
-    """Start the workers and replace those that are lost, in the list too; ends once the scheduler is gone."""
+async def _work(asked: JoinRequest, nannies: list[Any], say: Callable[[str], None]) -> None:
+    """Start the workers and replace lost ones, in the list too; returns once the scheduler is gone."""
     await asyncio.gather(*nannies)
     scheduler = await _scheduler(asked)
     say(f"{asked.workers} workers joined {asked.scheduler}; Ctrl-C stops them.")
     losses, pause = Losses(), FIRST_PAUSE_S
     while True:
-        await asyncio.sleep(LOOK_S)
+        await asyncio.sleep(CHECK_S)
         lost = [number for number, nanny in enumerate(nannies) if losses.lost(nanny)]
         if not lost:
             pause = FIRST_PAUSE_S
             continue
-        # A worker that loses its scheduler ends; so do all of them, and there is nothing to replace them for.
+        # Workers that lose their scheduler end; they are not replaced.
         if scheduler is None or await _scheduler(asked) != scheduler:
             return
         say(f"{len(lost)} of {asked.workers} workers are lost; starting others.")
@@ -125,46 +125,46 @@ async def _work(asked: Joining, nannies: list[Any], say: Callable[[str], None]) 
             pause = min(2.0 * pause, LONGEST_PAUSE_S)
 
 
-async def _scheduler(asked: Joining) -> str | None:
-    """What tells the scheduler from the next one at its address; None where there is none."""
+async def _scheduler(asked: JoinRequest) -> str | None:
+    """Identity of the scheduler at the address; None without one."""
     with suppress(*NO_SCHEDULER):
         return str((await identity(asked.scheduler, asked.security, AGAIN_S, 0))["id"])
     return None
 
 
-def _nanny(asked: Joining, number: int) -> Any:
+def _nanny(asked: JoinRequest, number: int) -> Any:
     name = asked.name if asked.name is None or asked.workers == 1 else f"{asked.name}-{number}"
     return Nanny(
         asked.scheduler,
         nthreads=THREADS,
-        resources=dict(asked.lanes),
-        # Dask takes a number up to 1 as a part of what the machine, or the container, has.
+        resources=dict(asked.resources),
+        # Dask takes a number up to 1 as a part of the memory of the machine or container.
         memory_limit=asked.memory_limit if asked.memory_limit is not None else 1.0 / asked.workers,
         local_directory=None if asked.local_directory is None else str(asked.local_directory),
-        # Dask would listen on every interface; whoever reaches a worker can run code on it.
+        # Dask would listen on every interface; anyone who reaches a worker can run code on it.
         host=asked.host or own_address(asked.scheduler),
         name=name,
         security=asked.security,
         preload=PRELOADS,
         dashboard=False,
         dashboard_address=NO_DASHBOARD,
-        # One process that cannot join must not wait for ever: all of them try again together.
+        # A process that cannot join must not wait for ever: all of them try again together.
         death_timeout=START_S,
         silence_logs=logging.WARNING,
     )
 
 
 def own_address(scheduler: str) -> str:
-    """The address of this machine that the scheduler sees: that of the interface which leads to it."""
+    """Address of this machine on the interface to the scheduler."""
     host, port = parse_host_port(scheduler.partition("://")[2])
-    family, kind, _, _, there = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-    # Connecting sends nothing; it only asks for the way.
-    with socket.socket(family, kind) as way:
-        way.connect(there)
-        return str(way.getsockname()[0])
+    family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+    # Connecting a datagram socket sends nothing; it only selects the route.
+    with socket.socket(family, kind) as route:
+        route.connect(address)
+        return str(route.getsockname()[0])
 
 
 async def _close(nannies: list[Any]) -> None:
-    """End the workers; one that does not stop in time is killed by its nanny."""
+    """Stop the workers; one that does not stop in time is killed by its nanny."""
     closing = [nanny.close(timeout=STOP_S, reason="bentray-worker-stops") for nanny in nannies]
     await asyncio.gather(*closing, return_exceptions=True)

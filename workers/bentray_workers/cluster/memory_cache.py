@@ -1,4 +1,4 @@
-"""What a process keeps to use again: values by key, dropped when memory is needed for something else."""
+"""Memory cache of a process: values by key, evicted when the memory is needed for other work."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from threading import RLock
 from typing import Any, NamedTuple
 from weakref import WeakSet
 
-from .capacities import Offer
+from .capacities import WorkerCapacity
 
-# Of a worker's memory, what may be kept while it does something else than drawing. Jobs are planned for 80 %
-# of it, and Dask kills at 95 %.
+# Part of the memory of a worker that may stay cached during tasks that do not draw. Jobs are planned for 80 %
+# of the memory, and Dask kills a worker at 95 %.
 LEFT_PART = 0.05
 
-# One lock for all: what is made for one store makes room in the others.
-_MAKING = RLock()
-_STORES: WeakSet[Kept] = WeakSet()
+# One lock for all caches: a new value of one evicts values of the others.
+_LOCK = RLock()
+_CACHES: WeakSet[MemoryCache] = WeakSet()
 _CLOCK = count()
 
 
@@ -28,35 +28,35 @@ class _Value(NamedTuple):
     used: int
 
 
-class Kept:
-    """Values by key, the least lately used ones dropped to stay below so many bytes.
+class MemoryCache:
+    """Values by key within a limit of bytes; the least recently used ones are evicted.
 
-    A value is made with the lock held: two tasks that want the same large one must not make it twice.
+    A value is made with the lock held, so that two tasks never make the same large value twice.
     """
 
     def __init__(self, most_bytes: int) -> None:
         self._most = most_bytes
         self._values: OrderedDict[Hashable, _Value] = OrderedDict()
-        _STORES.add(self)
+        _CACHES.add(self)
 
     def get(self, key: Hashable, size: int, make: Callable[[], Any], making: int = 0) -> Any:
-        """The value of ``key``, made if it is not there.
+        """The value of ``key``, made if it is not cached.
 
         Args:
-            key: of it.
-            size: of it, bytes; these are made free before.
-            make: makes it.
-            making: bytes that there are at once while it is made, itself among them, if more than ``size``.
-                A worker drops for them what was used longest ago in any store.
+            key: of the value.
+            size: of the value, bytes; as many are evicted before.
+            make: makes the value.
+            making: peak memory while the value is made, bytes, if more than ``size``. A worker evicts the
+                least recently used values of any cache for it.
         """
-        with _MAKING:
+        with _LOCK:
             if key in self._values:
                 found = self._values.pop(key)
                 self._values[key] = found._replace(used=next(_CLOCK))
                 return found.value
             while self._values and self.held() + size > self._most:
                 self._values.popitem(last=False)
-            make_room(_ROOM.task_bytes - max(size, making))
+            evict_to(_LIMITS.task_bytes - max(size, making))
             value = make()
             if size <= self._most:
                 self._values[key] = _Value(value, size, next(_CLOCK))
@@ -67,41 +67,41 @@ class Kept:
         return sum(value.size for value in self._values.values())
 
     def oldest(self) -> float:
-        """When the first value to be dropped was used last; infinite where there is none."""
+        """Last use of the least recently used value; infinite without values."""
         return next((value.used for value in self._values.values()), math.inf)
 
     def drop_oldest(self) -> None:
-        """Drop that value."""
+        """Evict that value."""
         self._values.popitem(last=False)
 
 
-class _Room:
-    """Of a process that is a worker: bytes for one task, and those that may stay kept beside one of a job."""
+class _Limits:
+    """Memory of a worker process: for one task, and for values cached beside a task of a job."""
 
     task_bytes = math.inf
-    left_bytes = math.inf
+    cached_bytes = math.inf
 
 
-_ROOM = _Room()
+_LIMITS = _Limits()
 
 
-def limit(memory_bytes: int) -> None:
-    """Tell that this process is a worker with so much memory, bytes; 0: without a limit."""
-    _ROOM.task_bytes = Offer(memory_bytes, ()).task_bytes
-    _ROOM.left_bytes = LEFT_PART * memory_bytes if memory_bytes else math.inf
+def set_memory_limit(memory_bytes: int) -> None:
+    """Set the memory of this worker process, bytes; 0: no limit."""
+    _LIMITS.task_bytes = WorkerCapacity(memory_bytes, ()).task_bytes
+    _LIMITS.cached_bytes = LEFT_PART * memory_bytes if memory_bytes else math.inf
 
 
-def make_room(most_bytes: float) -> None:
-    """Drop values of all stores, those used longest ago first, until so many bytes are left at most."""
-    with _MAKING:
-        while sum(store.held() for store in _STORES) > most_bytes:
-            oldest = min(_STORES, key=Kept.oldest)
+def evict_to(most_bytes: float) -> None:
+    """Evict the least recently used values of all caches until at most so many bytes are left."""
+    with _LOCK:
+        while sum(cache.held() for cache in _CACHES) > most_bytes:
+            oldest = min(_CACHES, key=MemoryCache.oldest)
             if oldest.oldest() == math.inf:
                 return
             oldest.drop_oldest()
 
 
-def leave_room() -> None:
-    """Before a call of a job, which is planned as if no picture had been drawn: keep little."""
-    if _ROOM.left_bytes < math.inf:
-        make_room(_ROOM.left_bytes)
+def evict_for_job() -> None:
+    """Before a task of a job, which is planned without cached values: evict most of them."""
+    if _LIMITS.cached_bytes < math.inf:
+        evict_to(_LIMITS.cached_bytes)

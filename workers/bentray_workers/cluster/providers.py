@@ -1,4 +1,4 @@
-"""Who starts a scheduler and its workers: this process, Slurm, or the Dask operator of Kubernetes."""
+"""Providers of clusters: this process, Slurm, or the Dask operator of Kubernetes."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ PRELOAD = "bentray_workers.compilation.warmup"
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What a provider is asked for.
+class ClusterRequest:
+    """A request for a cluster.
 
     Attributes:
-        workers: worker processes; None: as many as the provider thinks right.
-        local_directory: where workers keep scratch files; None: where Dask puts them.
-        template: a YAML file with what differs from site to site; None where there is nothing to say.
-        tls: the folder of the certificates, as ``security_of`` takes it; None for none.
+        workers: worker processes; None: the default of the provider.
+        local_directory: for scratch files of workers; None: the default of Dask.
+        template: a YAML file with the settings of a site; None: no such settings.
+        tls: the folder of the certificates, see ``security_of``; None: no TLS.
         processes: False keeps embedded workers in this process (for tests).
     """
 
@@ -42,78 +42,82 @@ class Wanted:
     processes: bool = True
 
 
-class Deployed(Protocol):
-    """A scheduler with workers, as every cluster manager of Dask gives it; a ``Client`` takes it."""
+class DeployedCluster(Protocol):
+    """A scheduler with workers: a cluster manager of Dask, accepted by ``Client``."""
 
     def close(self) -> Any:
-        """End the workers and the scheduler."""
+        """Stop the workers and the scheduler."""
 
 
 class Provider(Protocol):
-    """Starts a scheduler and workers that offer our lanes and are warm; raises ``InvalidInput``."""
+    """Starts a scheduler and warm workers with our resources; raises ``InvalidInput``."""
 
-    def __call__(self, wanted: Wanted) -> Deployed: ...
+    def __call__(self, request: ClusterRequest) -> DeployedCluster: ...
 
 
-def embedded(wanted: Wanted) -> Deployed:
-    """Processes of this machine; without a number one a core.
+def embedded(request: ClusterRequest) -> DeployedCluster:
+    """Processes of this machine, by default one per core.
 
-    Other users of the machine can reach their ports, so what comes there must prove itself: by the given
-    certificates, else by a key that only this process and its workers know.
+    Other users of the machine can reach their ports, so connections are authenticated: by the given
+    certificates, else by a key that only this process and its workers hold.
     """
-    count = wanted.workers if wanted.workers is not None else len(os.sched_getaffinity(0))
-    if wanted.template is not None:
-        raise InvalidInput("cluster_template", wanted.template, "none with an embedded cluster")
-    secured = wanted.tls is not None or wanted.processes
-    security = own_security() if wanted.tls is None else security_of(wanted.tls)
-    local: Deployed = (SupervisedCluster if wanted.processes else LocalCluster)(
+    count = request.workers if request.workers is not None else len(os.sched_getaffinity(0))
+    if request.template is not None:
+        raise InvalidInput("cluster_template", request.template, "none with an embedded cluster")
+    secured = request.tls is not None or request.processes
+    security = own_security() if request.tls is None else security_of(request.tls)
+    local: DeployedCluster = (SupervisedCluster if request.processes else LocalCluster)(
         n_workers=count,
         threads_per_worker=THREADS,
-        processes=wanted.processes,
+        processes=request.processes,
         resources=OFFERED,
         dashboard_address=NO_DASHBOARD,
         scheduler_kwargs={"dashboard": False},
         preload=PRELOAD,
         # Workers in this process have no ports.
         security=security if secured else None,
-        local_directory=None if wanted.local_directory is None else str(wanted.local_directory),
+        local_directory=None if request.local_directory is None else str(request.local_directory),
     )
     return local
 
 
-def slurm(wanted: Wanted) -> Deployed:
-    """Jobs of Slurm, one worker a job; the scheduler is in this process.
+def slurm(request: ClusterRequest) -> DeployedCluster:
+    """Jobs of Slurm, one worker each; the scheduler is in this process.
 
     The template holds arguments of ``dask_jobqueue.SLURMCluster``, see ``deploy/slurm/``.
     """
-    asked = {"cores": THREADS, "processes": 1, **_template(wanted)}
-    own = [f"--resources={_words(OFFERED)}", f"--preload={PRELOAD}", f"--dashboard-address={NO_DASHBOARD}"]
-    # The template's come last, so that a site with OpenCL devices can say which lanes it has.
-    asked["worker_extra_args"] = [*own, "--no-dashboard", *asked.get("worker_extra_args", ())]
-    if wanted.tls is not None:
-        asked["security"] = security_of(wanted.tls)
-    options = {"dashboard_address": NO_DASHBOARD, "dashboard": False, **asked.pop("scheduler_options", {})}
-    cluster = _made(
-        _library("dask_jobqueue", "slurm").SLURMCluster, wanted, **asked, scheduler_options=options
+    arguments = {"cores": THREADS, "processes": 1, **_template(request)}
+    own = [f"--resources={_argument(OFFERED)}", f"--preload={PRELOAD}", f"--dashboard-address={NO_DASHBOARD}"]
+    # Arguments of the template come last, so that a site with OpenCL devices can set its resources.
+    arguments["worker_extra_args"] = [*own, "--no-dashboard", *arguments.get("worker_extra_args", ())]
+    if request.tls is not None:
+        arguments["security"] = security_of(request.tls)
+    options = {
+        "dashboard_address": NO_DASHBOARD,
+        "dashboard": False,
+        **arguments.pop("scheduler_options", {}),
+    }
+    cluster = _start(
+        _library("dask_jobqueue", "slurm").SLURMCluster, request, **arguments, scheduler_options=options
     )
     scalable: Any = cluster
-    scalable.scale(jobs=wanted.workers or 1)
+    scalable.scale(jobs=request.workers or 1)
     return cluster
 
 
-def kubernetes(wanted: Wanted) -> Deployed:
-    """Pods that the Dask operator keeps: the template is a ``DaskCluster``, see ``deploy/kubernetes/``."""
-    if wanted.tls is not None:
+def kubernetes(request: ClusterRequest) -> DeployedCluster:
+    """Pods of the Dask operator: the template is a ``DaskCluster``, see ``deploy/kubernetes/``."""
+    if request.tls is not None:
         raise InvalidInput(
-            "tls", wanted.tls, "none with kubernetes; mount the folder in the template instead"
+            "tls", request.tls, "none with kubernetes; mount the folder in the template instead"
         )
-    if wanted.template is None:
+    if request.template is None:
         raise InvalidInput("cluster_template", None, "a file that describes a DaskCluster")
-    spec = _template(wanted)
-    if wanted.workers is not None:
-        spec["spec"]["worker"]["replicas"] = wanted.workers
+    spec = _template(request)
+    if request.workers is not None:
+        spec["spec"]["worker"]["replicas"] = request.workers
     manager = _library("dask_kubernetes.operator", "kubernetes").KubeCluster
-    return _made(manager, wanted, custom_cluster_spec=spec)
+    return _start(manager, request, custom_cluster_spec=spec)
 
 
 PROVIDERS: Mapping[str, Provider] = MappingProxyType(
@@ -121,30 +125,30 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
 )
 
 
-def deploy(kind: str, wanted: Wanted) -> Deployed:
+def deploy(kind: str, request: ClusterRequest) -> DeployedCluster:
     """Start a scheduler and workers under our settings of Dask.
 
     Raises:
-        InvalidInput: for an unknown kind, a library that is not installed, or what the provider refuses.
+        InvalidInput: for an unknown kind, a library that is not installed, or an error of the provider.
     """
     if kind not in PROVIDERS:
         raise InvalidInput("cluster", repr(kind), "one of " + ", ".join(PROVIDERS))
-    if wanted.workers is not None and wanted.workers < 1:
-        raise InvalidInput("workers", wanted.workers, "at least 1")
+    if request.workers is not None and request.workers < 1:
+        raise InvalidInput("workers", request.workers, "at least 1")
     with ours():
-        return PROVIDERS[kind](wanted)
+        return PROVIDERS[kind](request)
 
 
-def _template(wanted: Wanted) -> dict[str, Any]:
-    if wanted.template is None:
+def _template(request: ClusterRequest) -> dict[str, Any]:
+    if request.template is None:
         return {}
     try:
-        found = yaml.safe_load(wanted.template.read_text())
+        found = yaml.safe_load(request.template.read_text())
     except (OSError, ValueError, yaml.YAMLError) as error:
         reason = str(error).splitlines()[0]
-        raise InvalidInput("cluster_template", f"{wanted.template} ({reason})", "a YAML file") from error
+        raise InvalidInput("cluster_template", f"{request.template} ({reason})", "a YAML file") from error
     if not isinstance(found, dict):
-        raise InvalidInput("cluster_template", f"{wanted.template} ({found!r})", "a YAML mapping")
+        raise InvalidInput("cluster_template", f"{request.template} ({found!r})", "a YAML mapping")
     return found
 
 
@@ -156,15 +160,15 @@ def _library(name: str, extra: str) -> Any:
         raise InvalidInput("cluster", f"{extra} ({error})", accepted) from error
 
 
-def _made(manager: Any, wanted: Wanted, **asked: Any) -> Deployed:
+def _start(manager: Any, request: ClusterRequest, **arguments: Any) -> DeployedCluster:
     try:
-        made: Deployed = manager(**asked)
-        return made
+        cluster: DeployedCluster = manager(**arguments)
+        return cluster
     except (TypeError, ValueError, KeyError) as error:
-        reason = f"{wanted.template} ({error})"
+        reason = f"{request.template} ({error})"
         raise InvalidInput("cluster_template", reason, f"arguments that {manager.__name__} takes") from error
 
 
-def _words(lanes: Mapping[str, float]) -> str:
-    """As ``dask worker --resources`` takes them, without a blank that a job script would have to quote."""
-    return ",".join(f"{lane}={amount}" for lane, amount in lanes.items())
+def _argument(resources: Mapping[str, float]) -> str:
+    """For ``dask worker --resources``, without blanks, which a job script would have to quote."""
+    return ",".join(f"{name}={amount}" for name, amount in resources.items())

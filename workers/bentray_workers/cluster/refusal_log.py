@@ -1,4 +1,4 @@
-"""What a worker logs of bad input that it refused: one line, since the user is told and nothing is broken."""
+"""Log filter of workers: one line for rejected input, which is an error of the user only."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from bentray_kernels.errors import InvalidInput
 
 
 def shorten(record: logging.LogRecord) -> bool:
-    """A logging filter that keeps every record, and makes Dask's report of an InvalidInput one line."""
+    """A logging filter that shortens the report of Dask on InvalidInput to one line, and drops no record."""
     message, given = str(record.msg), record.args
     if message.startswith("Compute Failed") and isinstance(given, tuple) and len(given) == 5:
         key, refused = given[0], str(given[3])
         if refused.startswith(InvalidInput.__name__):
             record.levelno, record.levelname = logging.WARNING, "WARNING"
-            record.msg, record.args = "Refused: %s in %s", (refused, key)
+            record.msg, record.args = "Rejected: %s in %s", (refused, key)
     return True
 
 
 def install() -> None:
-    """Shorten what the workers of this process log; again has no effect."""
+    """Install the filter for the workers of this process; repeated calls have no effect."""
     logging.getLogger("distributed.worker").addFilter(shorten)

@@ -1,11 +1,11 @@
-"""The resource lanes of a worker: what a task asks for so that renders never queue behind reconstructions."""
+"""Dask resources of workers, so that rendering never queues behind reconstructions."""
 
 from __future__ import annotations
 
-# Every worker offers one of each; with two threads a render starts at once beside a full queue.
+# Every worker has one of each; with two threads, rendering starts at once beside a full queue.
 RECONSTRUCTION = {"recon": 1}
 RENDER = {"render": 1}
-# Only where a device passed its trial; OpenCL runs one task a process.
+# Only where a device passed its self-test; OpenCL runs one task per process.
 OPENCL = {"opencl": 1}
 OFFERED = {**RECONSTRUCTION, **RENDER}
 

@@ -1,4 +1,4 @@
-"""Scheduler preload: keep no history of tasks that are done, which would grow for as long as it runs."""
+"""Scheduler preload: keep no history of finished tasks, which would grow without bound."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from .dask_settings import LOGS
 
 
 class NoSpans:
-    """In place of Dask's spans, which sum up what has run and refer to every group of tasks there ever was.
+    """Replaces the spans extension of Dask, which keeps every group of tasks for ever.
 
-    Each task that is submitted by itself is a group: a few kilobytes in the scheduler, and in its worker the
-    times of each span, none of them ever given up. Dask has no setting for that.
+    Each task that is submitted separately is a group: a few kilobytes in the scheduler, and the times of each
+    span in its worker. Dask has no setting for it.
     """
 
     def observe_tasks(self, tasks: Iterable[Any], code: Any, span_metadata: Any) -> dict[Any, Any]:
-        """Called with tasks that are new; nothing is to be told of their spans."""
+        """Called with new tasks; returns no annotations of spans."""
         return {}
 
     def heartbeat(self, worker: Any, data: dict[Any, Any]) -> None:
-        """Called with the times that a worker has measured."""
+        """Called with the times measured by a worker."""
 
 
 def dask_setup(scheduler: Any) -> None:
     """Called by Dask in a scheduler that preloads this module, before anything is submitted."""
-    # One that is started by hand has read no settings of ours.
+    # A scheduler that is started by hand has not read our settings.
     dask.config.set(LOGS)
     scheduler.extensions["spans"] = NoSpans()
-    # As long as there is work, Dask adds it all to the latest of these.
+    # While there is work, Dask appends all of it to the last of these.
     scheduler.computations = deque(maxlen=0)

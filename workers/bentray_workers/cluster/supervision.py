@@ -1,4 +1,4 @@
-"""Worker processes that are replaced until the wanted number is back, whatever has ended them."""
+"""Supervision of worker processes: lost ones are replaced until their number is restored."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from distributed.core import Status
 
 log = logging.getLogger("bentray.workers")
 
-# Between two looks at the workers, s.
-LOOK_S = 1.0
-# A nanny starts its worker again within a moment; one that has had no process for this long never will, s.
+# Between two checks of the workers, s.
+CHECK_S = 1.0
+# A nanny restarts its worker quickly; without a process for this long it never will, s.
 WITHOUT_PROCESS_S = 10.0
-# Between two attempts to replace workers of which none starts, s.
+# Between two attempts to replace workers, s.
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 60.0
 
 OVER = (Status.closing, Status.closed, Status.failed, Status.closing_gracefully)
 
 
 class Losses:
-    """Tells which nannies will never have a worker again."""
+    """Detects nannies that will never have a worker again."""
 
     def __init__(self) -> None:
         self._without_since: dict[Any, float] = {}
@@ -40,10 +40,10 @@ class Losses:
 
 
 class SupervisedCluster(LocalCluster):  # type: ignore[misc] # Dask has no types
-    """A ``LocalCluster`` of processes that starts another worker for every one that is lost for good.
+    """A ``LocalCluster`` of processes that starts a new worker for every one that is permanently lost.
 
-    Dask replaces the process of a worker that dies. It does not replace a nanny: one that failed to start its
-    worker, or that Dask ended because its worker was away for longer than ``lost-worker-timeout``.
+    Dask replaces the process of a worker that dies. It does not replace a nanny that failed to start its
+    worker, or that Dask closed because its worker was missing for longer than ``lost-worker-timeout``.
     """
 
     async def _start(self) -> None:
@@ -57,11 +57,11 @@ class SupervisedCluster(LocalCluster):  # type: ignore[misc] # Dask has no types
 
     async def _supervise(self) -> None:
         losses, pause = Losses(), FIRST_PAUSE_S
-        # The first start is not ours: whoever made the cluster is told when it fails.
+        # Errors of the first start are raised by the constructor of the cluster.
         while self.status != Status.running or set(self.worker_spec) - set(self.workers):
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(CHECK_S)
         while self.status == Status.running:
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(CHECK_S)
             for name in [name for name, nanny in self.workers.items() if losses.lost(nanny)]:
                 nanny = self.workers.pop(name)
                 with suppress(Exception):
@@ -72,7 +72,7 @@ class SupervisedCluster(LocalCluster):  # type: ignore[misc] # Dask has no types
                 continue
             log.warning("%d of %d workers are lost; starting others", missing, len(self.worker_spec))
             try:
-                # A cluster that closes meanwhile waits for the start, and ends what was started.
+                # A cluster that closes meanwhile waits for the start, and stops the new workers.
                 await asyncio.shield(self._correct_state())
             except Exception as error:
                 log.warning("no worker could be started (%s); trying again in %g s", error, pause)

@@ -1,4 +1,4 @@
-"""Whether anybody still waits for the Dask task that runs here: long kernels look now and then."""
+"""Cancellation of the Dask task that runs in this thread, checked by long kernels."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Callable
 from distributed import get_worker
 
 
-class Abandoned(Exception):  # noqa: N818 - names a state, as ``cluster.task_loop.Cancelled``
-    """Nobody waits for the result any more: the client has released or cancelled it."""
+class TaskCancelled(Exception):  # noqa: N818 - names a state, as ``task_graph.Cancelled``
+    """The client has released or cancelled the task."""
 
 
-def look_out() -> Callable[[], None]:
-    """Called in the thread of a task: what to call from any thread, as often as one likes.
+def cancellation_check() -> Callable[[], None]:
+    """A check for the task of this thread, which may be called from any thread.
 
-    It raises ``Abandoned`` once nobody waits for the task; outside of a Dask worker it never does. It asks
-    the worker's own record of the task, not the scheduler, and takes less than a microsecond.
+    The check raises ``TaskCancelled`` once the task is cancelled; outside of a Dask worker it never does. It
+    reads the record of the worker, not of the scheduler, and takes less than a microsecond.
     """
     try:
         worker = get_worker()
@@ -26,6 +26,6 @@ def look_out() -> Callable[[], None]:
     def check() -> None:
         task = worker.state.tasks.get(key)
         if task is None or task.state == "cancelled":
-            raise Abandoned(key)
+            raise TaskCancelled(key)
 
     return check

@@ -35,7 +35,7 @@ class ClusterPool:
 
     def may_submit(self, running: int, ready: int) -> bool:
         self._next_priority = self._priority + self._share.priority(running)
-        return self._share.may_begin(running, ready)
+        return self._share.may_submit(running, ready)
 
     def submit(self, task: Task) -> Future:
         return self._attempts.submit(task, self._next_priority)

@@ -1,4 +1,4 @@
-"""TLS between scheduler, workers and clients: by the certificates of a folder, or by a new one in memory."""
+"""TLS between scheduler, workers and clients: certificates of a folder, or a new one in memory."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ AUTHORITY = "authority.pem"
 CERTIFICATE = "certificate.pem"
 KEY = "key.pem"
 
-# A key that dies with its process needs no end, and a clock that is set back must not make it invalid.
+# A key in memory needs no expiry, and a clock that is set back must not invalidate it.
 ALWAYS = datetime(2000, 1, 1), datetime(9999, 12, 31, 23, 59, 59)
 
 
 def security_of(folder: Path | None) -> Security:
-    """What scheduler, workers and clients prove themselves with, and ask of each other.
+    """Mutual authentication of scheduler, workers and clients.
 
-    Whoever holds a certificate of the authority is trusted, in any role: the key of the authority decides who
-    may run code on the workers. Names of machines are not compared, as Dask never does.
+    Any holder of a certificate of the authority is trusted, in any role: the key of the authority decides who
+    may run code on the workers. Host names are not checked, as Dask never does.
 
     Args:
         folder: with ``authority.pem``, ``certificate.pem`` and ``key.pem``, as ``deploy/certificates.sh``
-            makes it; None: what Dask's own configuration says, which is no TLS unless it was changed.
+            makes it; None: the configuration of Dask, which is no TLS by default.
 
     Raises:
-        InvalidInput: when a file is missing, or certificate and key do not belong together.
+        InvalidInput: for a missing file, or a certificate and key that do not match.
     """
     if folder is None:
         return Security()
@@ -58,7 +58,7 @@ def security_of(folder: Path | None) -> Security:
 
 
 def own_security() -> Security:
-    """What only this process, and whoever it hands it to, can prove itself with: a certificate made anew.
+    """Authentication by a new certificate of this process.
 
     Key and certificate stay in memory; worker processes get them through a pipe.
     """

@@ -38,9 +38,9 @@ from ..reconstruction import quality_report as quality
 from ..reconstruction.reconstruction_run import reconstruct
 from ..rendering import geometry_field
 from ..rendering.field_settings import FieldSettings
-from ..rendering.refraction import strip
+from ..rendering.refraction import draw_tile
 from ..rendering.refraction_view import RefractionView
-from ..rendering.scene_cache import build, filtered_of
+from ..rendering.scene_cache import build_scene, filter_volume
 from ..simulation.plane import SimulationSettings
 from ..simulation.simulation_run import simulate
 from ..simulation.volume import VolumeSimulationSettings
@@ -143,10 +143,10 @@ def _refraction() -> None:
         RefractionView(iso=(0.5,), mode="shaded", supersampling="none", width=8, height=8),
     )
     for name in FILTERS:
-        filtered = filtered_of(volume, name, 0.0)
+        filtered = filter_volume(volume, name, 0.0)
         for view in views:
             chosen = replace(view, filter=name)
-            strip(build(filtered, chosen.layers()), chosen, 0, 8)
+            draw_tile(build_scene(filtered, chosen.layers()), chosen, 0, 8)
 
 
 def _field(folder: Path) -> None:

@@ -32,9 +32,9 @@ from ..cluster import memory_cache, refusal_log
 from ..files.volume import Volume
 from ..rendering.field_scenes import camera_of, scene_of
 from ..rendering.field_view import FieldView
-from ..rendering.refraction import strip
+from ..rendering.refraction import draw_tile
 from ..rendering.refraction_view import RefractionView
-from ..rendering.scene_cache import build, filtered_of
+from ..rendering.scene_cache import build_scene, filter_volume
 from . import cache_misses
 
 
@@ -53,10 +53,10 @@ def warm_up() -> None:
 
 def warm_up_rendering() -> None:
     """Draw a small ball through the default filter, refracted and shaded; other filters wait."""
-    filtered = filtered_of(Volume.of(sampled(ONE_HOLE, 8), (1e-3,) * 3), "bspline3", 0.0)
+    filtered = filter_volume(Volume.of(sampled(ONE_HOLE, 8), (1e-3,) * 3), "bspline3", 0.0)
     for mode in ("refract", "shaded"):
         view = RefractionView(iso=(0.5,), mode=mode, width=4, height=4)
-        strip(build(filtered, view.layers()), view, 0, 4)
+        draw_tile(build_scene(filtered, view.layers()), view, 0, 4)
 
 
 def warm_up_tracing() -> None:
@@ -78,7 +78,7 @@ def dask_setup(worker: Any) -> None:
     if worker.nanny is not None:
         # In a process of its own: what its tasks write is for its user alone.
         os.umask(0o077)
-        memory_cache.limit(int(worker.memory_manager.memory_limit or 0))
+        memory_cache.set_memory_limit(int(worker.memory_manager.memory_limit or 0))
     with _one_at_a_time():
         warm_up()
         warm_up_rendering()

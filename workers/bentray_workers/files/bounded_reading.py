@@ -68,7 +68,7 @@ def at_end(file: Any, tail: int = 0) -> None:
 
 
 @contextmanager
-def refusing(field: str, accepted: str) -> Iterator[None]:
+def rejecting_damage(field: str, accepted: str) -> Iterator[None]:
     """Turn what readers raise on damage into InvalidInput for this field."""
     try:
         yield

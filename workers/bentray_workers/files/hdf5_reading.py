@@ -16,7 +16,7 @@ from bentray_kernels.errors import InvalidInput
 
 from .hdf5_checks import OTHER_TYPES, TYPES, Limits, check_storage
 
-__all__ = ["SIGNATURE", "Limits", "Reader", "opened", "printable", "refusing"]
+__all__ = ["SIGNATURE", "Limits", "Reader", "opened", "printable", "rejecting_damage"]
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -67,7 +67,7 @@ class Reader:
 
     def names(self) -> tuple[str, ...]:
         """Names of what lies in the root."""
-        with refusing("file", "a whole HDF5 file"):
+        with rejecting_damage("file", "a whole HDF5 file"):
             return tuple(self._file)
 
     def array(self, path: str, kinds: str, accepted: str) -> NDArray[Any] | None:
@@ -85,7 +85,7 @@ class Reader:
         if found is None:
             return None
         self._read_bytes += found.size * found.dtype.itemsize
-        with refusing(path, accepted):
+        with rejecting_damage(path, accepted):
             return np.asarray(found[()])
 
     def checked(self, path: str, kinds: str, accepted: str) -> h5py.Dataset | None:
@@ -95,7 +95,7 @@ class Reader:
             return None
         if not isinstance(found, h5py.Dataset):
             raise InvalidInput(path, "a group", accepted)
-        with refusing(path, accepted):
+        with rejecting_damage(path, accepted):
             check_storage(path, found, accepted, self._limits, self._read_bytes)
             if found.dtype.kind not in kinds:
                 raise InvalidInput(
@@ -113,7 +113,7 @@ class Reader:
         owner = self._object(path)
         if owner is None:
             return None
-        with refusing(field, "text or numbers"):
+        with rejecting_damage(field, "text or numbers"):
             if not h5py.h5a.exists(owner.id, name.encode()):
                 return None
             attribute = h5py.h5a.open(owner.id, name.encode())
@@ -167,7 +167,7 @@ class Reader:
         walked = ""
         for name in filter(None, path.split("/")):
             walked = f"{walked}/{name}".lstrip("/")
-            with refusing(walked, "a group or an array of this file"):
+            with rejecting_damage(walked, "a group or an array of this file"):
                 if not isinstance(here, h5py.Group):
                     raise InvalidInput(walked.rpartition("/")[0], "an array", "a group")
                 if not here.id.links.exists(name.encode()):
@@ -181,7 +181,7 @@ class Reader:
 
 
 @contextmanager
-def refusing(field: str, accepted: str) -> Iterator[None]:
+def rejecting_damage(field: str, accepted: str) -> Iterator[None]:
     """Turn what HDF5 raises on damage into InvalidInput for this field."""
     try:
         yield

@@ -19,7 +19,7 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.defects import SoundMesh, sound
 
-from .bounded_reading import refusing
+from .bounded_reading import rejecting_damage
 from .gltf_checks import check_gltf
 from .obj_checks import check_obj
 from .off_checks import HEADERS, check_off
@@ -121,7 +121,7 @@ def _kind(data: bytes) -> str:
 def _whole(kind: str) -> Iterator[None]:
     """What trimesh raises on damage in words of ours: its own are those of the arrays that it makes."""
     try:
-        with refusing("file", f"a whole {kind.upper()} file"):
+        with rejecting_damage("file", f"a whole {kind.upper()} file"):
             yield
     except InvalidInput as error:
         if not error.value.startswith("damaged data"):

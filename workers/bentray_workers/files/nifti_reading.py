@@ -19,7 +19,7 @@ from .bounded_reading import (
     any_shape,
     at_end,
     declared,
-    refusing,
+    rejecting_damage,
     whole,
 )
 from .volume import Volume
@@ -46,7 +46,7 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
     from nibabel.nifti2 import Nifti2Header
     from nibabel.spatialimages import HeaderDataError
 
-    with refusing("file", "a whole NIfTI file of one part"):
+    with rejecting_damage("file", "a whole NIfTI file of one part"):
         start = file.read(540)
         kind, size = (Nifti2Header, 540) if start[4:8] == b"n+2\0" else (Nifti1Header, 348)
         if b"n+" not in (start[344:346], start[4:6]):

@@ -19,7 +19,7 @@ from .bounded_reading import (
     any_shape,
     at_end,
     declared,
-    refusing,
+    rejecting_damage,
     whole,
 )
 from .volume import Volume
@@ -59,7 +59,7 @@ def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
     if not ends:
         raise InvalidInput("file", "an NRRD header without an end", f"one of at most {LONGEST_HEADER} bytes")
     accepted = "a whole NRRD file in three dimensions"
-    with refusing("file", accepted):
+    with rejecting_damage("file", accepted):
         header: Any = nrrd.read_header(start[: min(ends)].splitlines(keepends=True))
         # A data file beside the header could be any file of this machine; its name is not repeated.
         for field in ELSEWHERE:

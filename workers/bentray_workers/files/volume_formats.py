@@ -12,7 +12,7 @@ import numpy as np
 
 from bentray_kernels.errors import InvalidInput
 
-from .bounded_reading import LARGEST_BYTES, ShapeCheck, any_shape, declared, refusing
+from .bounded_reading import LARGEST_BYTES, ShapeCheck, any_shape, declared, rejecting_damage
 from .hdf5_reading import SIGNATURE, Limits, opened, printable
 from .nifti_reading import read_nifti
 from .npy_headers import PARSING
@@ -91,7 +91,7 @@ def _read(path: Path, file: IO[bytes], start: bytes, given: Given, check: ShapeC
     if start.startswith(b"NRRD000"):
         return read_nrrd(file, check)
     if start.startswith(b"\x1f\x8b"):
-        with refusing("file", "a whole NIfTI file packed with gzip"), gzip.open(file) as unpacked:
+        with rejecting_damage("file", "a whole NIfTI file packed with gzip"), gzip.open(file) as unpacked:
             return read_nifti(unpacked, check)
     if start[344:348] == b"n+1\0" or start[4:8] == b"n+2\0":
         return read_nifti(file, check)
@@ -114,7 +114,7 @@ def _raw(path: Path, given: Given, check: ShapeCheck) -> Volume:
 
 
 def _numpy(path: Path, file: IO[bytes], given: Given, check: ShapeCheck) -> Volume:
-    with refusing("file", "a whole NumPy file of numbers"):
+    with rejecting_damage("file", "a whole NumPy file of numbers"):
         version = np.lib.format.read_magic(file)
         if version not in {(1, 0), (2, 0)}:
             raise InvalidInput(

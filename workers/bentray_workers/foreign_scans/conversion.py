@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bentray_kernels.acquisition import Dataset
 
-from ..files.bounded_reading import refusing
+from ..files.bounded_reading import rejecting_damage
 from ..files.dataset.copy import copy_dataset
 from ..files.dataset.read import trace_type
 from ..files.dataset.write import Piece, bytes_of, write_dataset
@@ -53,7 +53,7 @@ def convert_dataset(
     if start.startswith(matlab5.START):
         return _converted(matlab5.Matlab5(source), target, on_size)
     if start.startswith(npz.START):
-        with refusing("file", npz.WHOLE):
+        with rejecting_damage("file", npz.WHOLE):
             archive = zipfile.ZipFile(source)
         with archive:
             many = is_kwave(archive.namelist())

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from ..files.bounded_reading import refusing as refusing_zip
-from ..files.hdf5_reading import Limits, Reader, opened, refusing
+from ..files.bounded_reading import rejecting_damage as refusing_zip
+from ..files.hdf5_reading import Limits, Reader, opened, rejecting_damage
 from .arrays import LARGEST_ROW, LARGEST_TOTAL, LARGEST_WHOLE
 from .npz import Npz
 from .zip_checks import WHOLE, check_zip
@@ -149,7 +149,7 @@ class KWave:
 def _of(output: str) -> Iterator[None]:
     """Say in which output a field was wrong."""
     try:
-        with refusing(output, "an output of k-Wave"):
+        with rejecting_damage(output, "an output of k-Wave"):
             yield
     except InvalidInput as error:
         if error.field.startswith(output):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from ..files.hdf5_reading import Reader, refusing
+from ..files.hdf5_reading import Reader, rejecting_damage
 from .arrays import check_row
 
 NUMBERS = "a plain array of real numbers"
@@ -49,6 +49,6 @@ class Matlab73:
             raise InvalidInput(name, "nothing", NUMBERS)
         check_row(name, found.shape, found.dtype)
         for k in range(found.shape[0]):
-            with refusing(name, NUMBERS):
+            with rejecting_damage(name, NUMBERS):
                 row = np.asarray(found[k])
             yield row

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from ..files.bounded_reading import LONGEST_HEADER, at_end, refusing
+from ..files.bounded_reading import LONGEST_HEADER, at_end, rejecting_damage
 from ..files.npy_headers import PARSING
 from .arrays import check_declared, check_row
 from .zip_checks import PACKING, check_zip
@@ -38,7 +38,7 @@ class Npz:
     reversed_axes = False
 
     def __init__(self, archive: zipfile.ZipFile | IO[bytes]) -> None:
-        with refusing("file", WHOLE):
+        with rejecting_damage("file", WHOLE):
             self._zip = archive if isinstance(archive, zipfile.ZipFile) else zipfile.ZipFile(archive)
             check_zip(self._zip, MOST_MEMBERS)
         self._members = {
@@ -53,12 +53,12 @@ class Npz:
     def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
         if name not in self._members:
             return None
-        with refusing(name, WHOLE), self._open(name) as file:
+        with rejecting_damage(name, WHOLE), self._open(name) as file:
             shape, _, dtype = self._header(name, file)
         return shape, dtype
 
     def whole(self, name: str) -> NDArray[Any]:
-        with refusing(name, WHOLE), self._open(name) as file:
+        with rejecting_damage(name, WHOLE), self._open(name) as file:
             shape, fortran, dtype = self._header(name, file)
             data = _exactly(name, file, math.prod(shape) * dtype.itemsize)
             self._check_end(name, file)
@@ -67,20 +67,20 @@ class Npz:
 
     def rows(self, name: str) -> Iterator[NDArray[Any]]:
         with self._open(name) as file:
-            with refusing(name, WHOLE):
+            with rejecting_damage(name, WHOLE):
                 shape, fortran, dtype = self._header(name, file)
             if fortran and len(shape) > 1:
                 raise InvalidInput(name, "an array in Fortran order", "numpy.ascontiguousarray of it")
             check_row(name, shape, dtype)
             for _ in range(shape[0]):
-                with refusing(name, WHOLE):
+                with rejecting_damage(name, WHOLE):
                     data = _exactly(name, file, math.prod(shape[1:]) * dtype.itemsize)
                 yield np.frombuffer(data, dtype=dtype).reshape(shape[1:])
-            with refusing(name, WHOLE):
+            with rejecting_damage(name, WHOLE):
                 self._check_end(name, file)
 
     def _open(self, name: str) -> IO[bytes]:
-        with refusing(name, WHOLE):
+        with rejecting_damage(name, WHOLE):
             return self._zip.open(self._members[name])
 
     def _check_end(self, name: str, file: IO[bytes]) -> None:

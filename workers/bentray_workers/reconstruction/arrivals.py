@@ -25,7 +25,7 @@ from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Progress
 from bentray_kernels.tomography.guided_picking import predicted_delta
 
-from ..cluster.job_cancellation import check_wanted
+from ..cluster.job_cancellation import check_job_active
 from ..files.dataset.traces import slice_opened, trace_samples
 from ..files.dataset.write import write_dataset
 from ..files.findings import Found, read_findings, write_findings
@@ -121,7 +121,7 @@ class Source(NamedTuple):
     @contextmanager
     def slice(self, index: int, findings: Sequence[Finding] = ()) -> Iterator[Dataset]:
         """One slice with traces that are read as they are asked for, and what was found corrected."""
-        with slice_opened(self.path, self.dataset, index, partial(check_wanted, self.folder)) as one:
+        with slice_opened(self.path, self.dataset, index, partial(check_job_active, self.folder)) as one:
             yield apply(one, findings)
 
 

@@ -114,7 +114,7 @@ def _settle(entry: Entry, future: Future[None]) -> None:
         future.result()
     # Whatever it was, the other datasets must not suffer from it.
     except Exception as error:
-        entry.end("failed", reason_of(error))
+        entry.end("failed", explain_failure(error))
     else:
         entry.end("succeeded")
 
@@ -125,7 +125,7 @@ def report_of(result: Path, source: Path) -> bytes:
     return report_png(read_reconstruction(result), dataset.truth, dataset.roi)
 
 
-def reason_of(error: Exception) -> str:
+def explain_failure(error: Exception) -> str:
     """Why a dataset failed, in one line."""
     if isinstance(error, InvalidInput):
         return str(error)

@@ -16,7 +16,7 @@ from bentray_kernels.tomography.waveform.preparation import prepare
 from bentray_kernels.tomography.waveform.waveform_problem import WaveProblem
 from bentray_kernels.tomography.waveform.waveform_settings import WaveSettings
 
-from ..cluster.job_cancellation import check_wanted
+from ..cluster.job_cancellation import check_job_active
 from ..files.dataset import read_dataset
 from ..files.dataset.traces import slice_opened
 from ..files.findings import read_findings
@@ -79,6 +79,6 @@ def read_once(path: Path, stamp: int) -> Dataset:
 @lru_cache(maxsize=2)
 def _wave_problem(scan: FileWaveScan, number: int) -> WaveProblem:
     faults = read_findings(scan.findings).of_traces(scan.slice)
-    poll = partial(check_wanted, scan.findings.parent)
+    poll = partial(check_job_active, scan.findings.parent)
     with slice_opened(scan.path, read_once(scan.path, scan.stamp), scan.slice, poll) as one:
         return prepare(apply(one, faults), scan.plan, number, poll=poll)

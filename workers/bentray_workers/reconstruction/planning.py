@@ -13,7 +13,7 @@ from bentray_kernels.tomography.model_selection.selection import CANDIDATES
 from bentray_kernels.tomography.settings import LEAST_NODES, Settings
 from bentray_kernels.tomography.stage_graphs import BATCH
 
-from ..cluster.capacities import MIB, REAL, Lane, Offer, lane_of
+from ..cluster.capacities import MIB, REAL, Lane, WorkerCapacity, resource_of
 from ..cluster.checkpoints import KEPT
 from ..files.dataset.counts import Summary
 from ..files.dataset.format import PAIR_ARRAYS
@@ -21,11 +21,11 @@ from ..files.reconstruction import IMAGES
 from .memory.arrival_memory import arrival_tasks
 from .memory.ray_memory import (
     call_bytes,
+    emitters_of,
     field_bytes,
     rays_of,
     rows_bytes,
     shape_of,
-    sounding_of,
     state_bytes,
 )
 from .memory.waveform_memory import wave_call_bytes, wave_tasks
@@ -77,7 +77,7 @@ class Plan:
         return {**asdict(self), "call_bytes": dict(self.call_bytes), "largest_bytes": self.largest[1]}
 
 
-def plan(scan: Summary, settings: Settings, offers: Sequence[Offer]) -> Plan:
+def plan(scan: Summary, settings: Settings, offers: Sequence[WorkerCapacity]) -> Plan:
     """The plan of a reconstruction on the workers that are connected now.
 
     Args:
@@ -91,8 +91,8 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[Offer]) -> Plan:
             refused.
     """
     _check_extent(scan)
-    lane: Lane = "opencl" if lane_of(settings) == "opencl" else "recon"
-    fitting = [offer for offer in offers if lane in offer.lanes]
+    lane: Lane = "opencl" if resource_of(settings) == "opencl" else "recon"
+    fitting = [offer for offer in offers if lane in offer.resources]
     if offers and not fitting:
         raise InvalidInput(
             "eikonal", f"{settings.eikonal!r}, which no connected worker offers", "a method without a device"
@@ -147,7 +147,7 @@ def _check_extent(scan: Summary) -> None:
         raise InvalidInput("slice/z_m", f"slices over {scan.height_m:.4g} m", f"at most {WIDTH_M.most:g} m")
 
 
-def blocks_of(shape: tuple[int, ...], offers: Sequence[Offer]) -> tuple[int, ...]:
+def blocks_of(shape: tuple[int, ...], offers: Sequence[WorkerCapacity]) -> tuple[int, ...]:
     """Blocks along each axis for ``reconstruction.subdomains.solve``.
 
     One where a worker can hold the whole field by ``fsm``, else as few as all workers together can hold, the
@@ -156,7 +156,7 @@ def blocks_of(shape: tuple[int, ...], offers: Sequence[Offer]) -> tuple[int, ...
     Raises:
         InvalidInput: where they cannot hold it together.
     """
-    rooms = [offer.task_bytes for offer in offers if "recon" in offer.lanes]
+    rooms = [offer.task_bytes for offer in offers if "recon" in offer.resources]
     if not rooms or max(rooms) >= field_bytes(shape, "fsm"):
         return (1,) * len(shape)
     least, together = min(rooms), len(rooms)
@@ -182,7 +182,7 @@ def _decomposition(settings: Settings) -> Decomposition:
 def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
     """About how many calls, the stages on coarser grids included."""
     problems = 1 if settings.decomposition == "volume" else scan.slices
-    emitters = sounding_of(scan, settings)
+    emitters = emitters_of(scan, settings)
     parts = -(-emitters // BATCH)
     passes = settings.iterations * (settings.numerics.coarser_grids + 1)
     passes += settings.numerics.straight_iterations if settings.rays != "straight" else 0
@@ -225,15 +225,15 @@ def _why(
     lane: Lane,
     tasks: int,
     largest: tuple[str, int],
-    offers: Sequence[Offer],
-    able: Sequence[Offer],
+    offers: Sequence[WorkerCapacity],
+    able: Sequence[WorkerCapacity],
 ) -> str:
     slices = f"{scan.slices} slice{'s' if scan.slices > 1 else ''}"
     cut: dict[Decomposition, Callable[[], str]] = {
         "slices": lambda: f"{slices} side by side, for SART uses the emitters of a slice one after the other",
         "emitters": lambda: f"the {scan.emitters} emitters of each of {slices} side by side",
         "volume": lambda: (
-            f"one volume, as asked for by decomposition, of {sounding_of(scan, settings)} emitters"
+            f"one volume, as asked for by decomposition, of {emitters_of(scan, settings)} emitters"
             + (" one after the other (SART)" if settings.method == "sart" else " side by side")
         ),
     }

@@ -14,7 +14,7 @@ from bentray_kernels.acquisition.quality import Report, examine_slices
 from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.errors import InvalidInput
 
-from ..cluster.task_cancellation import look_out
+from ..cluster.task_cancellation import cancellation_check
 from ..files.dataset import Limits, read_dataset
 from ..files.dataset.read import NUMERIC, TRACES
 from ..files.dataset.traces import slice_opened
@@ -123,7 +123,7 @@ def quality_page(path: Path, picker: str) -> bytes:
 
 def _waited_for(path: Path, picker: str) -> Quality:
     """An examination that ends early when nobody waits for it any more."""
-    check = look_out()
+    check = cancellation_check()
     return examine_file(path, picker, lambda done, total: check(), LARGEST_BYTES)
 
 

@@ -1,4 +1,4 @@
-"""How far lookups in a field are from the exact intersector, on rays from anywhere to anywhere."""
+"""Accuracy of lookups in a geometry field against exact intersection, for random rays."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ RAYS = 50_000
 
 
 def accuracy(surface: Surface, field: OuterField) -> dict[str, float]:
-    """Walks from the nearest entry against the exact intersector, on the same rays at each call.
+    """Compare lookups from the nearest entry with exact intersections, always for the same rays.
 
     Returns:
-        ``lookup_wrong``: share of rays that meet something by one of both alone. ``lookup_median`` and
-        ``lookup_99``: distances between what both meet, edges of the cube; 0 where no ray meets the mesh.
+        ``lookup_wrong``: share of rays that hit the mesh by only one of the methods. ``lookup_median`` and
+        ``lookup_99``: distances between both hits, edges of the cube; 0 if no ray hits the mesh.
     """
     origins, ends = _ends()
     directions = ends - origins

@@ -16,7 +16,7 @@ from bentray_kernels.geometry_field.tracing.packed_scene import World, world_of
 from bentray_kernels.geometry_field.tracing.scene import Shape
 from bentray_kernels.meshes.surface import surface_of
 
-from ..cluster.memory_cache import Kept
+from ..cluster.memory_cache import MemoryCache
 from ..files.geometry_field_folder import FieldFiles, mapped, read_chart, read_json
 from ..files.geometry_image import read_geometry_image
 from .field_scenes import scene_of
@@ -29,8 +29,8 @@ KEPT_BYTES = 2 * 2**30
 SCENE_BYTES = 32 * 2**20
 
 # One of each for the process, as ``functools.lru_cache`` would have.
-_SHAPES = Kept(KEPT_BYTES // 2)
-_WORLDS = Kept(KEPT_BYTES // 2)
+_SHAPES = MemoryCache(KEPT_BYTES // 2)
+_WORLDS = MemoryCache(KEPT_BYTES // 2)
 
 
 class Textured(NamedTuple):

@@ -1,4 +1,4 @@
-"""Pictures of geometry fields: scenes traced whole or strip by strip, geometry images and normal maps."""
+"""Pictures of geometry fields: ray-traced scenes, whole or in tiles, geometry images and normal maps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from bentray_kernels.geometry_field.tracing.ray_tracer import TraceSettings, trace
 from bentray_kernels.refraction.supersampling import averaged
 
-from ..cluster.task_cancellation import look_out
+from ..cluster.task_cancellation import cancellation_check
 from ..files.geometry_field_folder import FieldFiles
 from ..files.geometry_image import colour_png, normal_png, position_png, read_geometry_image
 from ..images.png import Colours, png_of
@@ -18,8 +18,8 @@ from .field_view import LOOKUPS, FieldView
 from .refraction import part_of
 
 
-def strip_image(folder: Path, view: FieldView, first: int, last: int) -> Colours:
-    """Task: rows of a field's picture, the last one not included.
+def tile_image(folder: Path, view: FieldView, first: int, last: int) -> Colours:
+    """Task: rows of the picture of a field, the last one not included.
 
     Raises:
         InvalidInput: as ``world_at``.
@@ -32,28 +32,28 @@ def strip_image(folder: Path, view: FieldView, first: int, last: int) -> Colours
         eye=LOOKUPS[view.eye],
     )
     camera = part_of(camera_of(view), first / view.height, last / view.height)
-    return averaged(trace(world_at(folder, view), camera, settings, look_out()), view.rays)
+    return averaged(trace(world_at(folder, view), camera, settings, cancellation_check()), view.rays)
 
 
 def picture_png(folder: Path, view: FieldView) -> bytes:
     """Task: the whole picture, as PNG."""
-    return png_of(strip_image(folder, view, 0, view.height))
+    return png_of(tile_image(folder, view, 0, view.height))
 
 
-def tasks_of(folder: Path, view: FieldView) -> tiles.Tasks:
-    """The picture of the field in a folder as tasks for a cluster."""
-    return tiles.tasks_of(picture_png, strip_image, folder, view)
+def tasks_of(folder: Path, view: FieldView) -> tiles.PictureTasks:
+    """The picture of the field in a folder as tasks."""
+    return tiles.tasks_of(picture_png, tile_image, folder, view)
 
 
-def map_png(folder: Path, what: str) -> bytes:
+def map_png(folder: Path, quantity: str) -> bytes:
     """Task: the geometry image of a field as PNG.
 
     Args:
         folder: of the field.
-        what: "positions", "normals" or "colours".
+        quantity: "positions", "normals" or "colours".
 
     Raises:
-        InvalidInput: for colours that the mesh has not.
+        InvalidInput: for colours of a mesh without any.
     """
     drawn = {"positions": position_png, "normals": normal_png, "colours": colour_png}
-    return drawn[what](read_geometry_image(FieldFiles(folder).image))
+    return drawn[quantity](read_geometry_image(FieldFiles(folder).image))

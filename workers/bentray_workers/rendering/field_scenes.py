@@ -1,4 +1,4 @@
-"""Scenes of a mesh and its geometry field, and the cameras that look at them."""
+"""Scenes of a mesh and its geometry field, and their cameras."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ CLAY, RED, BLUE, SILVER = (0.85, 0.62, 0.42), (0.85, 0.3, 0.22), (0.28, 0.42, 0.
 DARK = np.full((2, 4, 3), 0.06)
 GROUND = Ground(0.0, 0.5, 7.0, ((0.86, 0.84, 0.79), (0.32, 0.36, 0.42)))
 
-# Strips of the mirroring ball, and vertices around it.
+# Resolution of the reflecting ball.
 BALL = 96
 VIEW_DEG = 38.0
 
 
 class Framing(NamedTuple):
-    """What a camera shows at zoom 1: a ball about a point, m."""
+    """The view of a camera at zoom 1: a ball around a point, m."""
 
     centre: tuple[float, float, float]
     radius: float
@@ -47,14 +47,14 @@ def scene_of(shape: Shape, texture: Floats | None, view: FieldView) -> Scene:
     Args:
         shape: the mesh and its fields.
         texture: (n, n, 3) colours of the mesh over (u, v), as ``Material.texture``, or None.
-        view: what is asked for.
+        view: the settings.
     """
     if view.scene == "object":
         instances = (
             Instance(shape, _turned(view, (0.0, 0.0, 0.0), 1.0, 0.0), _material(view, CLAY, texture)),
         )
         return Scene(instances, DARK if view.mode == "self-only" else landscape())
-    # The mesh is the first shape: so its tables are not copied.
+    # The mesh is the first shape, so its tables are not copied.
     left, right = _material(view, CLAY, texture), _material(view, BLUE, texture)
     if view.scene == "two-mirrors":
         pair = (
@@ -97,7 +97,7 @@ def _material(view: FieldView, colour: tuple[float, float, float], texture: Floa
 
 
 def _turned(view: FieldView, centre: tuple[float, float, float], size: float, turn_deg: float) -> Floats:
-    """Where the unit cube is put: its up axis to z, and turned about the vertical."""
+    """Transform of the unit cube: its up axis to z, rotated about the vertical."""
     about = placed((0.0, 0.0, 0.0), size, (0.0, 0.0, 1.0), turn_deg)[:, :3]
     upright = placed((0.0, 0.0, 0.0), 1.0, (1.0, 0.0, 0.0), 90.0 if view.up == "y" else 0.0)[:, :3]
     linear = about @ upright
@@ -115,6 +115,6 @@ def _standing(
 
 @cache
 def _ball() -> Shape:
-    """The mirroring ball, intersected exactly: it is the mesh whose field is shown."""
+    """The reflecting ball, intersected exactly: only the mesh has a field."""
     mesh = sphere(BALL, BALL).in_unit_cube()
     return Shape(surface_of(Chart(mesh, mesh.corners[..., :2])))

@@ -1,4 +1,4 @@
-"""The tasks that make a geometry field in a folder: layout, rows of its tables, and the end."""
+"""Tasks of the computation of a geometry field in a folder: layout, table rows, borders and accuracy."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from bentray_kernels.meshes.geometric_error import GeometricError, geometric_err
 from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import Surface, surface_of
 
-from ..cluster.memory_cache import Kept
+from ..cluster.memory_cache import MemoryCache
 from ..files.geometry_field_folder import (
     FieldFiles,
     fill_rows,
@@ -40,18 +40,18 @@ MOST_INNER = 2**28
 # Rays of one task: a second or two.
 TASK_RAYS = 2**21
 
-# What a process keeps of surfaces while it makes fields, and about how much one is, bytes a face.
+# Memory of a process for cached surfaces, and of one surface, bytes per face.
 KEPT_BYTES = 2**29
 FACE_BYTES = 320
-_SURFACES = Kept(KEPT_BYTES)
+_SURFACES = MemoryCache(KEPT_BYTES)
 
 
 def lay_out(mesh_path: Path, settings: FieldSettings, folder: Path) -> None:
     """Task: chart, geometry image and empty tables; ``FieldFiles.layout`` last.
 
     Raises:
-        InvalidInput: for a mesh that is too large, a threshold that no image reaches, or an inner table that
-            would be too large.
+        InvalidInput: for a mesh that is too large, a threshold that no image reaches, or too large an inner
+            table.
     """
     files, started = FieldFiles(folder), time.perf_counter()
     stored = load_mesh(mesh_path)
@@ -95,7 +95,7 @@ def lay_out(mesh_path: Path, settings: FieldSettings, folder: Path) -> None:
 
 
 def _image(chart: Chart, settings: FieldSettings) -> tuple[GeometryImage, GeometricError | None]:
-    """The geometry image, and its error where that has chosen it."""
+    """The geometry image, and its error if the size was chosen by it."""
     if settings.image_threshold > 0.0:
         fitted = fitted_image(chart, settings.image_threshold, settings.image_size, COARSEST)
         return fitted.image, fitted.error
@@ -103,7 +103,7 @@ def _image(chart: Chart, settings: FieldSettings) -> tuple[GeometryImage, Geomet
 
 
 def outer_rows(folder: Path, n: int, first: int, last: int, done: Path) -> None:
-    """Task: rows of the outer table, and a file that says so."""
+    """Task: rows of the outer table, and a file that marks them as finished."""
     files, started = FieldFiles(folder), time.perf_counter()
     for path, rows in zip(files.outer, build_rows(_surface(files), n, first, last), strict=True):
         fill_rows(path, first, rows)
@@ -111,7 +111,7 @@ def outer_rows(folder: Path, n: int, first: int, last: int, done: Path) -> None:
 
 
 def inner_rows(folder: Path, n: int, first: int, last: int, done: Path) -> None:
-    """Task: rows of the inner table, and a file that says so."""
+    """Task: rows of the inner table, and a file that marks them as finished."""
     files, started = FieldFiles(folder), time.perf_counter()
     points = mapped(files.points)[first:last]
     fill_rows(files.inner, first, build_inner_rows(_surface(files), n, points))
@@ -119,12 +119,12 @@ def inner_rows(folder: Path, n: int, first: int, last: int, done: Path) -> None:
 
 
 def finish(folder: Path, settings: FieldSettings, done: Path) -> dict[str, Any]:
-    """Task: mark borders in the outer table, measure it, and tell all figures.
+    """Task: mark borders in the outer table, measure its accuracy, and return all figures.
 
     Args:
         folder: of the field.
         settings: of it.
-        done: the folder with what the other tasks left there.
+        done: the folder with the marks of the other tasks.
     """
     files, started = FieldFiles(folder), time.perf_counter()
     faces, fractions = (mapped(path, "r+") for path in files.outer)
@@ -147,7 +147,7 @@ def finish(folder: Path, settings: FieldSettings, done: Path) -> dict[str, Any]:
 
 
 def _synchronised(path: Path, faces: Any) -> None:
-    """Let what was changed in a map reach the disk."""
+    """Flush a memory map to the disk."""
     base = faces.base
     while not isinstance(base, np.memmap):
         base = base.base
@@ -155,7 +155,7 @@ def _synchronised(path: Path, faces: Any) -> None:
 
 
 def _surface(files: FieldFiles) -> Surface:
-    """The surface of a chart, made once a process."""
+    """The surface of a chart, made once per process."""
     status = files.chart.stat()
     key = files.chart, status.st_mtime_ns, status.st_size
     faces = read_json(files.layout)["faces"]

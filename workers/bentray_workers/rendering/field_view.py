@@ -38,31 +38,33 @@ class FieldView:
     )
     mode: Literal["reflect", "refract", "refract-single", "self", "self-only", "diffuse"] = asked(
         "reflect",
-        "What the mesh is made of. reflect: a mirror; self: one that sees itself too; self-only: that, in "
-        "the dark; refract: glass; refract-single: glass that bends light once; diffuse: clay, or its own "
-        "colours.",
+        "Material of the mesh. reflect: a mirror; self: with self-reflection; self-only: the same before a "
+        "dark background; refract: glass; refract-single: glass with a single refraction; diffuse: clay, or "
+        "its own colours.",
     )
     lookup: Literal["nearest", "linear", "accurate", "exact"] = asked(
-        "accurate", "How mirrored and refracted rays ask the field; exact intersects the mesh itself."
+        "accurate", "Field lookup of reflected and refracted rays; exact intersects the mesh itself."
     )
-    eye: Literal["nearest", "linear", "accurate", "exact"] = asked("exact", "The same for rays of the eye.")
+    eye: Literal["nearest", "linear", "accurate", "exact"] = asked("exact", "The same for camera rays.")
     index: float = asked(1.5, "Refractive index of glass.", Range(0.1, 10.0))
     share: float = asked(
         0.85,
-        "Of the light, what is mirrored or refracted; the rest is the mesh's own colour.",
+        "Share of reflected or refracted light; the rest is the colour of the mesh.",
         Range(0.0, 1.0),
     )
     camera: Literal["perspective", "orthographic"] = asked("perspective", "Kind of camera.")
     azimuth_deg: float = asked(
-        -60.0, "Where the camera stands: angle about the vertical, degrees.", Range(-36000.0, 36000.0)
+        -60.0, "Azimuth of the camera about the vertical, degrees.", Range(-36000.0, 36000.0)
     )
-    elevation_deg: float = asked(15.0, "Its height above the horizon, degrees.", Range(-89.0, 89.0))
+    elevation_deg: float = asked(
+        15.0, "Elevation of the camera above the horizon, degrees.", Range(-89.0, 89.0)
+    )
     zoom: float = asked(1.0, "1 shows the whole scene, 2 half of it.", Range(0.05, 50.0))
-    up: Literal["z", "y"] = asked("z", "Which axis of the mesh is up.")
+    up: Literal["z", "y"] = asked("z", "Axis of the mesh that is up.")
     width: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
     height: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
     rays: int = asked(1, "Along each side of a pixel.", Range(1, 8))
-    depth: int = asked(4, "Most surfaces at which a ray goes on.", Range(0, 64))
+    depth: int = asked(4, "Largest number of surfaces on a ray.", Range(0, 64))
 
     def __post_init__(self) -> None:
         check(self, CHOICES)
@@ -76,5 +78,5 @@ class FieldView:
         return self.rays
 
     def plain(self) -> dict[str, Any]:
-        """Its fields as JSON has them."""
+        """The fields as JSON values."""
         return asdict(self)

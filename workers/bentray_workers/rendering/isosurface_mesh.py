@@ -1,4 +1,4 @@
-"""The largest piece of a volume's iso-surface as a mesh."""
+"""The largest connected piece of an iso-surface of a volume, as a mesh."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from ..files.volume_formats import import_volume
 from .refraction_view import check_even
 
 MOST_NODES = 2**26
-# Edges of the grid that the surface cuts; it has some eight triangles for each.
+# Grid edges cut by the surface; it has about eight triangles for each.
 MOST_CROSSINGS = 75_000
 MOST_STEP = 32
-# Of an edge that is cut, not packed: eight triangles, and as many vertices at worst.
+# Per cut edge, without compression: eight triangles, and at most as many vertices.
 EDGE_BYTES = 8 * (3 * 4 + 3 * 8)
 HEADER_BYTES = 64 * 2**10
 
 
 def check_nodes(shape: tuple[int, ...], step: int) -> None:
-    """Refuse a volume that is too large to be meshed.
+    """Reject a volume that is too large to be meshed.
 
     Raises:
         InvalidInput: naming ``step`` or ``volume``.
@@ -41,7 +41,7 @@ def check_nodes(shape: tuple[int, ...], step: int) -> None:
 
 
 def largest_bytes(shape: Sequence[int], step: int) -> int:
-    """Bytes that the mesh of a volume of this shape takes at most."""
+    """Largest size of the mesh of a volume of this shape, bytes."""
     nodes = math.prod(-(-n // step) for n in shape)
     return min(MOST_CROSSINGS, len(shape) * nodes) * EDGE_BYTES + HEADER_BYTES
 
@@ -50,9 +50,9 @@ def mesh_volume(path: Path, iso: float | None, step: int, target: Path) -> dict[
     """Task: write the mesh of a volume or reconstruction file.
 
     Args:
-        path: of the volume, in space with even spacing.
-        iso: in its unit; None for the middle of its range.
-        step: every so many nodes along each axis are taken.
+        path: of the 3-D volume with even spacing.
+        iso: in the unit of the volume; None: the middle of its range.
+        step: subsampling along each axis.
         target: the mesh file to write.
 
     Returns:

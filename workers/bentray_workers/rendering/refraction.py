@@ -1,4 +1,4 @@
-"""Pictures of volumes as glass: whole, or strip by strip as tasks of the render lane."""
+"""Refractive rendering of volumes: whole pictures, or tiles of rows."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ from bentray_kernels.refraction import (
 )
 from bentray_kernels.refraction.supersampling import averaged
 
-from ..cluster.task_cancellation import look_out
+from ..cluster.task_cancellation import cancellation_check
 from ..images.backdrop_card import backdrop_card
 from ..images.png import Colours, png_of
 from . import tiles
 from .refraction_view import RefractionView
 from .scene_cache import scene_at
 
-# Of what is shown at zoom 1, over the longest side of the volume.
-ROOM = 1.25
-# Of the eye from the middle of the volume, in its diagonals.
+# Width of the view at zoom 1, relative to the longest side of the volume.
+VIEW_MARGIN = 1.25
+# Distance of the eye from the centre of the volume, in its diagonals.
 EYE_DISTANCE = 2.5
 BEYOND = (90, 90, 90)
 
 
-class Strip(NamedTuple):
+class Tile(NamedTuple):
     """Rows of a picture.
 
     Attributes:
         image: (rows, width, 3) 8-bit RGB.
-        position_m: (rows, width, 2) where each ray ends on the backdrop, from its middle, right and down, m;
-            NaN where it ends nowhere; None of a shaded picture. With real supersampling the mean of a pixel.
+        position_m: (rows, width, 2) where each ray meets the backdrop, from its centre, right and down, m;
+            NaN where it meets none; None for a shaded picture. With real supersampling the mean of a pixel.
     """
 
     image: Colours
@@ -59,29 +59,29 @@ def picture_png(path: Path, view: RefractionView) -> bytes:
     Raises:
         InvalidInput: as ``scene_at``.
     """
-    return png_of(strip(scene_at(path, view), view, 0, view.height).image)
+    return png_of(draw_tile(scene_at(path, view), view, 0, view.height).image)
 
 
-def strip_image(path: Path, view: RefractionView, first: int, last: int) -> Colours:
+def tile_image(path: Path, view: RefractionView, first: int, last: int) -> Colours:
     """Task: the rows ``first`` to ``last`` of it, the last one not included."""
-    return strip(scene_at(path, view), view, first, last).image
+    return draw_tile(scene_at(path, view), view, first, last).image
 
 
-def tasks_of(path: Path, view: RefractionView) -> tiles.Tasks:
-    """The picture of a file as tasks for a cluster."""
-    return tiles.tasks_of(picture_png, strip_image, path, view)
+def tasks_of(path: Path, view: RefractionView) -> tiles.PictureTasks:
+    """The picture of a file as tasks."""
+    return tiles.tasks_of(picture_png, tile_image, path, view)
 
 
-def strip(scene: Scene, view: RefractionView, first: int, last: int, card: Colours | None = None) -> Strip:
+def draw_tile(scene: Scene, view: RefractionView, first: int, last: int, card: Colours | None = None) -> Tile:
     """Draw rows of a picture.
 
     Args:
-        scene: the volume; its middle lies at 0.
+        scene: the volume, centred at 0.
         view: what to draw.
         first, last: rows, the last one not included.
-        card: picture for the backdrop, 8-bit RGB; None: our test card.
+        card: picture for the backdrop, 8-bit RGB; None: the test card.
     """
-    # Post-refraction supersampling looks at the rows beside.
+    # Post-refraction supersampling uses the adjacent rows.
     margin = 1 if view.supersampling == "prss" else 0
     top, bottom = max(first - margin, 0), min(last + margin, view.height)
     camera = part_of(camera_of(scene, view), top / view.height, bottom / view.height)
@@ -89,7 +89,7 @@ def strip(scene: Scene, view: RefractionView, first: int, last: int, card: Colou
     own = slice(first - top, last - top)
     if view.mode == "shaded":
         shaded = shade(scene, camera, _light(view), rows * view.times, view.width * view.times)
-        return Strip(averaged(shaded.image, view.times)[own], None)
+        return Tile(averaged(shaded.image, view.times)[own], None)
     settings = RenderSettings(
         rows=rows,
         columns=view.width,
@@ -99,13 +99,13 @@ def strip(scene: Scene, view: RefractionView, first: int, last: int, card: Colou
         fresnel=view.fresnel,
         seed=top,
     )
-    picture = render(scene, camera, _backdrop(scene, view, card), settings, pause=look_out())
+    picture = render(scene, camera, _backdrop(scene, view, card), settings, pause=cancellation_check())
     position = picture.position_m.reshape(rows, view.times, view.width, view.times, 2).mean(axis=(1, 3))
-    return Strip(picture.image[own], position[own])
+    return Tile(picture.image[own], position[own])
 
 
 def camera_of(scene: Scene, view: RefractionView) -> Camera:
-    """The camera of a view, as wide as the volume's longest side and some room at zoom 1."""
+    """The camera of a view; at zoom 1 it shows the longest side of the volume and a margin."""
     ahead, _, down = frame_of(view)
     diagonal, width = _diagonal(scene), _width(scene, view)
     aspect = view.height / view.width
@@ -116,7 +116,7 @@ def camera_of(scene: Scene, view: RefractionView) -> Camera:
 
 
 def frame_of(view: RefractionView) -> tuple[Floats, Floats, Floats]:
-    """Unit vectors ahead, to the right and down in the picture; z is up where it can be."""
+    """Unit vectors ahead, to the right and down in the picture, with z up."""
     azimuth, elevation = math.radians(view.azimuth_deg), math.radians(view.elevation_deg)
     east, north = math.cos(azimuth), math.sin(azimuth)
     ahead = -np.array([math.cos(elevation) * east, math.cos(elevation) * north, math.sin(elevation)])
@@ -142,14 +142,14 @@ def _backdrop(scene: Scene, view: RefractionView, card: Colours | None) -> Backd
 
 
 def _light(view: RefractionView) -> Light:
-    """From behind the camera's left shoulder."""
+    """From above and left of the camera."""
     ahead, right, down = frame_of(view)
     towards = -ahead - 0.6 * right - 0.8 * down
     return Light(tuple((towards / np.linalg.norm(towards)).tolist()), background=BEYOND)
 
 
 def part_of(camera: Camera, top: float, bottom: float) -> Camera:
-    """The camera of a strip, from and to a part of the height."""
+    """The camera of a tile between two fractions of the height."""
     middle, share = 0.5 * (top + bottom) - 0.5, bottom - top
     origin, direction = camera.origin.copy(), camera.direction.copy()
     for rays in (origin, direction):
@@ -167,8 +167,8 @@ def _diagonal(scene: Scene) -> float:
 
 
 def _width(scene: Scene, view: RefractionView) -> float:
-    """Of the picture at the middle of the volume, m; its shorter side holds the volume."""
-    return ROOM * float(_extent(scene).max()) / view.zoom * max(1.0, view.width / view.height)
+    """Width of the view at the centre of the volume, m; its shorter side holds the volume."""
+    return VIEW_MARGIN * float(_extent(scene).max()) / view.zoom * max(1.0, view.width / view.height)
 
 
 def _degrees(tangent: float) -> float:

@@ -1,4 +1,4 @@
-"""How a volume is looked at as glass: surfaces, camera, backdrop and picture, checked once for every door."""
+"""Settings of refractive rendering: iso-surfaces, camera, backdrop and picture, with their checks."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ CHOICES = {
 
 @dataclass(frozen=True)
 class RefractionView:
-    """A picture of a volume through its iso-surfaces.
+    """A refractive rendering of the iso-surfaces of a volume.
 
-    What each field means is its metadata ``description``; query parameters and options are made of them.
+    The meaning of each field is its metadata ``description``, used by query parameters and options too.
 
     Raises:
         InvalidInput: naming the first field that is wrong.
@@ -37,18 +37,18 @@ class RefractionView:
 
     iso: tuple[float, ...] = asked(
         (),
-        "Rising iso-values, unit of the volume; without any, the middle of its range after smoothing.",
+        "Increasing iso-values, unit of the volume; by default the middle of its range after smoothing.",
         schema={"maxItems": MOST_ISOS},
     )
     index: tuple[float, ...] = asked(
         (1.5,),
-        "Refractive index above each iso-value: as many as there are of these, or one.",
+        "Refractive index above each iso-value: one for each, or one.",
         schema={"items": {"type": "number", **INDEX.schema}, "minItems": 1, "maxItems": MOST_ISOS},
     )
     outside: float = asked(1.0, "Refractive index below the first iso-value.", INDEX)
     surroundings: int = asked(
         0,
-        "Which layer goes on around the volume: 0 the one below the first iso-value, 1 the next, ...",
+        "Layer that surrounds the volume: 0 the one below the first iso-value, 1 the next, ...",
         schema={"minimum": 0, "maximum": MOST_ISOS},
     )
     filter: str = asked(
@@ -58,36 +58,38 @@ class RefractionView:
     )
     smoothing: float = asked(
         0.0,
-        "How much a B-spline smooths away; 0 passes through the nodes, 10 to 100 takes off steps of 8 bits.",
+        "Smoothing of a B-spline; 0 interpolates the nodes, 10 to 100 removes the steps of 8-bit data.",
         Range(0.0, MOST_SMOOTHING),
     )
     camera: Literal["orthographic", "perspective"] = asked("orthographic", "Kind of camera.")
     azimuth_deg: float = asked(
-        30.0, "Where the camera stands: angle about the z axis, degrees.", Range(-36000.0, 36000.0)
+        30.0, "Azimuth of the camera about the z axis, degrees.", Range(-36000.0, 36000.0)
     )
-    elevation_deg: float = asked(20.0, "Its height above the x-y plane, degrees.", Range(-90.0, 90.0))
+    elevation_deg: float = asked(
+        20.0, "Elevation of the camera above the x-y plane, degrees.", Range(-90.0, 90.0)
+    )
     zoom: float = asked(1.0, "1 shows the whole volume, 2 half of it.", Range(0.05, 50.0))
-    backdrop: Literal["checkerboard", "picture"] = asked("checkerboard", "What is seen through the volume.")
+    backdrop: Literal["checkerboard", "picture"] = asked("checkerboard", "What is behind the volume.")
     squares: int = asked(
         16, "Squares of the checkerboard across the shorter side of the picture.", Range(1, 512)
     )
     backdrop_distance: float = asked(
-        1.0, "From the middle of the volume, in its diagonals.", Range(0.5, 100.0)
+        1.0, "Distance from the centre of the volume, in its diagonals.", Range(0.5, 100.0)
     )
     supersampling: Literal["none", "prss", "real"] = asked(
         "prss",
         "prss: more samples of the backdrop after refraction; real: more rays.",
     )
     degree: int = asked(
-        1, "Samples beside each pixel for prss; rays along each side of it for real.", Range(1, 8)
+        1, "prss: samples between pixels; real: rays along each side of a pixel.", Range(1, 8)
     )
-    fresnel: bool = asked(False, "Whether light is weakened by what each surface mirrors away.")
+    fresnel: bool = asked(False, "Attenuate light by the Fresnel reflection at each surface.")
     mode: Literal["refract", "shaded"] = asked("refract", "refract, or shaded: the first surface, lit.")
     width: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
     height: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
     depth: int = asked(
         16,
-        "Most surfaces that a ray may meet; where it would meet more, the picture is dark grey.",
+        "Largest number of surfaces on a ray; beyond it the picture is dark grey.",
         Range(1, 256),
     )
 
@@ -115,23 +117,22 @@ class RefractionView:
         return self.degree if self.supersampling == "real" else 1
 
     def layers(self) -> Layers:
-        """Iso-values and indices as the ray caster takes them; raises InvalidInput unless the values rise."""
+        """Iso-values and indices for the ray caster; raises InvalidInput unless the values increase."""
         return Layers(self.iso, (self.outside, *self.index), self.surroundings)
 
     def within(self, low: float, high: float) -> RefractionView:
-        """The same for a volume with values from ``low`` to ``high``: with an iso-value, if it has none.
+        """The view for a volume with values from ``low`` to ``high``, with the default iso-value filled in.
 
-        With smoothing it gets none yet: that changes the range, and ``filtered_within`` takes the middle of
-        the new one.
+        With smoothing it is not filled in yet: smoothing changes the range, see ``filtered_within``.
 
         Raises:
-            InvalidInput: for an iso-value out of that range, or a volume that has one value only.
+            InvalidInput: for an iso-value out of that range, or a constant volume.
         """
         self._check_range(low, high, "the range of the volume")
         return self if self.iso or self.smoothing else self._at_middle(low, high)
 
     def filtered_within(self, low: float, high: float) -> RefractionView:
-        """The same for a volume whose nodes lie from ``low`` to ``high`` behind the filter, as ``within``.
+        """As ``within`` for a filtered volume with values from ``low`` to ``high`` at the nodes.
 
         Raises:
             InvalidInput: as ``within``.
@@ -151,18 +152,18 @@ class RefractionView:
         return replace(self, iso=(0.5 * (low + high),))
 
     def plain(self) -> dict[str, Any]:
-        """Its fields as JSON has them."""
+        """The fields as JSON values."""
         found = {one.name: getattr(self, one.name) for one in fields(self)}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in found.items()}
 
 
 def check_even(shape: tuple[int, ...], spacing_m: tuple[float | None, ...]) -> None:
-    """Refuse what is not a volume in space on an even grid, as the slices of a ring at odd heights are.
+    """Reject images and volumes with uneven spacing, such as slices at uneven heights.
 
     Raises:
         InvalidInput: naming ``volume``.
     """
-    accepted = "a volume in space, two nodes or more along each axis, with even spacing"
+    accepted = "a 3-D volume with two nodes or more along each axis and even spacing"
     if len(shape) != 3 or min(shape) < 2:
         raise InvalidInput("volume", f"shape {tuple(shape)}", accepted)
     if not all(step is not None and math.isfinite(step) for step in spacing_m):

@@ -18,16 +18,16 @@ from bentray_kernels.request_fields import asked
 from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Progress
 
-from ..cluster.capacities import offers_by_address
+from ..cluster.capacities import capacities_by_address
 from ..cluster.fair_shares import Share
 from ..cluster.task_pool import Placement, open_pool, run_job
 from ..files.atomic import replacing, write_bytes
 from ..images.png import Colours
 from .picture_cost import placed, refraction_bytes
-from .refraction import strip_image
+from .refraction import tile_image
 from .refraction_view import RefractionView
 from .scene_cache import stored_shape
-from .tiles import joined_png, strips_of
+from .tiles import stack_png, tile_rows
 
 FORMATS = ("zip", "apng")
 MOST_FRAMES = 720
@@ -51,13 +51,13 @@ class Turntable(RefractionView):
         InvalidInput: naming the first field that is wrong.
     """
 
-    frames: int = asked(36, "Pictures.", Range(1, MOST_FRAMES))
+    frames: int = asked(36, "Number of frames.", Range(1, MOST_FRAMES))
     turn_deg: float = asked(
         360.0,
-        "How far the camera goes, degrees; the last picture is a step short of it.",
+        "Rotation of the camera, degrees; the last frame is one step before the end.",
         Range(-3600.0, 3600.0),
     )
-    format: Literal["zip", "apng"] = asked("zip", "zip: one PNG a picture; apng: an animated PNG.")
+    format: Literal["zip", "apng"] = asked("zip", "zip: one PNG per frame; apng: an animated PNG.")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -66,7 +66,7 @@ class Turntable(RefractionView):
         pixels = self.frames * self.width * self.height
         if pixels > MOST_PIXELS:
             raise InvalidInput(
-                "frames", f"{self.frames}, {pixels} pixels in all", f"at most {MOST_PIXELS} pixels"
+                "frames", f"{self.frames}, {pixels} pixels in total", f"at most {MOST_PIXELS} pixels"
             )
 
     @property
@@ -75,14 +75,14 @@ class Turntable(RefractionView):
         return 2 * (self.frames * (PIXEL_BYTES * self.width + 1) * self.height + PICTURE_BYTES * self.frames)
 
     def frame(self, number: int) -> RefractionView:
-        """The view of one picture, from 0."""
+        """The view of one frame, from 0."""
         view: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(RefractionView)}
         view["azimuth_deg"] = (self.azimuth_deg + self.turn_deg * number / self.frames) % 360.0
         return RefractionView(**view)
 
 
 class TurntableGraph:
-    """Task graph of a turntable: strips of each frame, the frame as PNG, then the file of all frames.
+    """Task graph of a turntable: tiles of each frame, the frame as PNG, then the file of all frames.
 
     Args:
         path: of a volume or reconstruction file, readable by every worker.
@@ -95,26 +95,26 @@ class TurntableGraph:
         self._path, self._turntable, self._target = path, turntable, target
         self._frames = [folder / f"{number:04d}.png" for number in range(turntable.frames)]
         self._missing = [number for number, frame in enumerate(self._frames) if not frame.exists()]
-        self._strips: dict[int, dict[int, Any]] = defaultdict(dict)
+        self._tiles: dict[int, dict[int, Any]] = defaultdict(dict)
         self.total = turntable.frames
         self.done = self.total - len(self._missing)
 
     def first(self) -> list[Task]:
         return [
-            Task(draw_strip, (self._path, self._turntable, number, *rows), keep_on_worker=True)
+            Task(draw_frame_tile, (self._path, self._turntable, number, *rows), keep_on_worker=True)
             for number in self._missing
-            for rows in strips_of(self._turntable)
+            for rows in tile_rows(self._turntable)
         ] or [self._pack()]
 
     def after(self, task: Task, result: Any) -> list[Task]:
-        if task.function is draw_strip:
+        if task.function is draw_frame_tile:
             _, _, number, first, _ = task.arguments
-            strips = self._strips[number]
-            strips[first] = result
-            if len(strips) < len(strips_of(self._turntable)):
+            tiles = self._tiles[number]
+            tiles[first] = result
+            if len(tiles) < len(tile_rows(self._turntable)):
                 return []
-            parts = [strip for _, strip in sorted(self._strips.pop(number).items())]
-            return [Task(write_frame, (self._frames[number], parts))]
+            stacked = [tile for _, tile in sorted(self._tiles.pop(number).items())]
+            return [Task(write_frame, (self._frames[number], stacked))]
         if task.function is not write_frame:
             return []
         self.done += 1
@@ -157,20 +157,20 @@ def draw_turntable(
     size = refraction_bytes(stored_shape(path), turntable)
 
     def placement() -> Placement:
-        return placed(size, offers_by_address(client))
+        return placed(size, capacities_by_address(client))
 
     pool = open_pool(client, work_dir, share, lane="render", placement=placement, priority=PRIORITY)
     run_job(TurntableGraph(path, turntable, target, work_dir), pool, on_progress, on_saved, stop)
 
 
-def draw_strip(path: Path, turntable: Turntable, number: int, first: int, last: int) -> Colours:
+def draw_frame_tile(path: Path, turntable: Turntable, number: int, first: int, last: int) -> Colours:
     """Task: the rows ``first`` to ``last`` of a frame, the last one not included."""
-    return strip_image(path, turntable.frame(number), first, last)
+    return tile_image(path, turntable.frame(number), first, last)
 
 
-def write_frame(frame: Path, strips: Sequence[Colours]) -> None:
-    """Task: strips, one below the other, as PNG file."""
-    write_bytes(frame, joined_png(strips))
+def write_frame(frame: Path, tiles: Sequence[Colours]) -> None:
+    """Task: tiles, stacked from top to bottom, as PNG file."""
+    write_bytes(frame, stack_png(tiles))
 
 
 def write_zip(frames: Sequence[Path], target: Path) -> None:

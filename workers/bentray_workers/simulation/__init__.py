@@ -1,1 +1,1 @@
-"""Simulated scans on a cluster: planned, run in tasks, written as datasets."""
+"""Simulated scans: requests, plans, task graphs and datasets."""

@@ -57,15 +57,15 @@ def _timed(settings: Timed, folder: Path) -> Dataset:
 
 
 def _write_waves(settings: WaveSimulationSettings, folder: Path, target: Path) -> Dataset:
-    """One emission after the other: all traces may be more than the memory."""
+    """Write one emission after the other: all traces may exceed the memory."""
     parts = parts_of(settings)
     shape = len(parts), settings.elements, settings.samples
-    absent = np.broadcast_to(np.zeros((), np.float32), shape)
-    dataset = waves.scan_of(settings, Waveform(absent, absent))
+    placeholder = np.broadcast_to(np.zeros((), np.float32), shape)
+    dataset = waves.scan_of(settings, Waveform(placeholder, placeholder))
     noise = None
     if settings.snr is not None:
-        heights = [np.abs(read_part(part, folder)[1]).max(axis=-1) for part in parts]
-        noise = Noise(settings, np.stack(heights))
+        peaks = [np.abs(read_part(part, folder)[1]).max(axis=-1) for part in parts]
+        noise = Noise(settings, np.stack(peaks))
 
     def pieces(name: str, chunk: tuple[int, ...]) -> Iterator[Piece]:
         for k, part in enumerate(parts):

@@ -1,4 +1,4 @@
-"""What a simulated scan takes: bytes of its tasks, seconds of its workers, bytes of its file."""
+"""Cost of a simulated scan: memory of its tasks, CPU time, size of its file."""
 
 from __future__ import annotations
 
@@ -16,20 +16,19 @@ Timed = SimulationSettings | VolumeSimulationSettings
 # Python's own part of any task.
 FLOOR_BYTES = 18 * MIB
 
-# Bytes a node of the fine grid: its media, one of them while it is sampled, and a marching front; of a wave's
-# padded grid: both media while they are made, and two fields.
+# Bytes per node of the fine grid: media, sampling of one of them, and a marching front; of the padded grid
+# of a wave: both media while they are made, and two fields.
 PLANE_BYTES, SPACE_BYTES, WAVE_BYTES = 96, 96, 88
 
-# Bytes a pair while the file is written: times, losses, and the noise on them.
+# Bytes per pair while the file is written: times, losses, and their noise.
 PAIR_BYTES, LOSS_BYTES, NOISE_BYTES = 20, 12, 16
 
-# Seconds on a core of 2020: a node of a medium while it is sampled, without and with attenuation; a node that
-# a front crosses; a padded node of a wave's media, and one that a step moves, in a plane and in space; a
-# byte of a file.
+# Seconds on a core of 2020: per node of a medium, without and with attenuation; per node of a wave front;
+# per padded node of the media of a wave, and per node and time step in 2-D and 3-D; per byte of a file.
 MEDIUM_S, LOSSY_MEDIUM_S, FRONT_S, WAVE_MEDIUM_S, BYTE_S = 3e-6, 1.4e-5, 4e-7, 1.5e-5, 2e-8
 STEP_S = {2: 1e-9, 3: 2.1e-9}
 
-# Of a task that has several emitters.
+# Of a task with several emitters.
 TASK_S = 1.0
 MOST_EMITTERS = 64
 
@@ -43,12 +42,12 @@ def fine_nodes(settings: Timed) -> int:
 
 
 def emitters_a_task(settings: Timed) -> int:
-    """As many as take about ``TASK_S``."""
+    """Emitters that take about ``TASK_S``."""
     return max(1, min(MOST_EMITTERS, int(TASK_S / (FRONT_S * fine_nodes(settings)))))
 
 
 def task_bytes(settings: Timed | WaveSimulationSettings) -> dict[str, int]:
-    """Bytes that each kind of task takes beyond what a warm worker holds.
+    """Memory of each kind of task beyond that of a warm worker, bytes.
 
     Returns:
         By function: ``make_part`` and ``write_scan``.
@@ -70,7 +69,7 @@ def task_bytes(settings: Timed | WaveSimulationSettings) -> dict[str, int]:
 
 
 def costly_setting(settings: Timed | WaveSimulationSettings, task: str) -> str:
-    """The setting that the bytes of a task hang on most."""
+    """The setting with the largest effect on the memory of a task."""
     if task == "write_scan":
         return "elements"
     if isinstance(settings, WaveSimulationSettings):
@@ -79,18 +78,18 @@ def costly_setting(settings: Timed | WaveSimulationSettings, task: str) -> str:
 
 
 def result_bytes(settings: Timed | WaveSimulationSettings) -> int:
-    """Of the arrays in the file, before they are packed."""
+    """Of the arrays in the file, before compression."""
     if isinstance(settings, WaveSimulationSettings):
         return 2 * 4 * settings.emissions * settings.elements * settings.samples
     return REAL * pairs(settings) * (1 + settings.attenuation + _noisy(settings))
 
 
 def cpu_seconds(settings: Timed | WaveSimulationSettings) -> tuple[float, float]:
-    """Of all tasks together but for media, and of the media that each worker makes for itself."""
+    """Of all tasks without media, and of the media that each worker makes for itself."""
     packing = BYTE_S * result_bytes(settings)
     if isinstance(settings, WaveSimulationSettings):
         steps = settings.samples * settings.skip * settings.emissions
-        # Each element is read from the nodes about it.
+        # Each element is interpolated from the nodes around it.
         moved = _padded(settings) + settings.elements * (2 * REACH) ** settings.dimensions
         waves = 2 * STEP_S[settings.dimensions] * moved * steps
         return waves + packing, WAVE_MEDIUM_S * _padded(settings)
@@ -110,7 +109,7 @@ def _grid_bytes(settings: WaveSimulationSettings) -> int:
 
 
 def _trace_bytes(settings: WaveSimulationSettings) -> int:
-    """Every time step of both media, and the samples that are kept."""
+    """Every time step in both media, and the recorded samples."""
     return (2 * REAL * settings.skip + 8) * settings.elements * settings.samples
 
 

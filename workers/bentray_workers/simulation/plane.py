@@ -17,10 +17,10 @@ from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
 from bentray_kernels.tomography.problem import MARGIN_NODES
 
-# More costs memory, which grows with its square, and gains nothing that noise would not hide.
+# The memory grows with its square; more gains less than the noise of any scan.
 MOST_REFINEMENT = 64
 
-# Of every simulated scan.
+# Of all kinds of simulated scans.
 NODES = Range(16, 1024)
 SNR = Range(1e-6, 1e12)
 
@@ -32,8 +32,8 @@ class SimulationSettings:
     Attributes:
         nodes: nodes along a side of the truth image, and of the reconstruction it is meant for.
         elements: of the ring, each emitter and receiver.
-        coupling_mps: speed of the medium around the breast, m/s.
-        refinement: how many times finer the data are made; at least 4.
+        coupling_mps: speed of sound in the coupling medium around the breast, m/s.
+        refinement: of the simulation grid over the image grid, at least 4.
         noise_s: standard deviation of Gaussian noise on the travel times, s.
         seed: of the noise.
         attenuation: whether to record amplitudes beside the travel times.
@@ -63,7 +63,7 @@ class SimulationSettings:
 
     @property
     def scans(self) -> int:
-        """How many are simulated one by one."""
+        """Number of scans that are simulated separately."""
         return 1
 
     @property
@@ -90,11 +90,11 @@ def ring_radius(side_m: float, nodes: int) -> float:
 
 
 def scan_of(settings: SimulationSettings, delta: Floats, ratio: Floats | None) -> Dataset:
-    """The dataset of what every element received, with its noise.
+    """The dataset of simulated travel times and amplitudes, with noise.
 
     Args:
         settings: of the scan.
-        delta: (elements, elements), s; taken over.
+        delta: (elements, elements), s; may be changed.
         ratio: as ``delta``, Np, or None without attenuation.
     """
     scan = settings.scan()

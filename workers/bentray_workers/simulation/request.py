@@ -1,4 +1,4 @@
-"""A simulated scan as it is asked for by name: which phantom, by travel times or by waves, how finely."""
+"""Request for a simulated scan: phantom, travel times or waves, resolution."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ KINDS = (SimulationSettings, VolumeSimulationSettings, WaveSimulationSettings, V
 CHOICES = {"phantom": ("table6", "table7")}
 
 
-def among(name: str) -> Range:
-    """What a number may be in any of the scans; each of them checks its own range."""
+def range_of(name: str) -> Range:
+    """The range of a number over all kinds of scan; each checks its own range."""
     found = [known[name] for known in map(ranges_of, KINDS) if name in known]
     return Range(
         min(one.least for one in found),
@@ -33,8 +33,8 @@ def among(name: str) -> Range:
     )
 
 
-# What only some scans have, and when.
-OWN = {
+# Settings of some kinds of scan only, and their condition.
+CONDITIONS = {
     "refinement": "waveform is false",
     "noise_s": "phantom is table6 and waveform is false",
     "slices": "phantom is table7 and waveform is false",
@@ -48,11 +48,11 @@ OWN = {
 
 
 @dataclass(frozen=True)
-class AskedSimulation:
-    """What each setting means is its metadata ``description``; left out, those of other scans stay None.
+class PhantomScan:
+    """The meaning of each setting is its metadata ``description``; those of other kinds of scan stay None.
 
     Raises:
-        InvalidInput: naming the first field that is wrong, or that another scan has.
+        InvalidInput: naming the first field that is wrong, or belongs to another kind of scan.
     """
 
     phantom: Literal["table6", "table7"] = asked(
@@ -62,36 +62,36 @@ class AskedSimulation:
         False, "Simulate waves and record traces of object and water, not travel times; of table7 in space."
     )
     nodes: int = asked(
-        128, "Nodes along a side of the truth, and of the image it is meant for.", among("nodes")
+        128, "Nodes along a side of the truth, and of the image it is meant for.", range_of("nodes")
     )
-    elements: int = asked(256, "Transducers of a ring; each sends and receives.", among("elements"))
-    coupling_mps: float = asked(1500.0, "Speed of the water, m/s.", among("coupling_mps"))
-    snr: float | None = asked(None, "Signal over noise, as 10; none without it.", among("snr"))
-    seed: int = asked(0, "Of the noise.", among("seed"))
+    elements: int = asked(256, "Transducers of a ring; each sends and receives.", range_of("elements"))
+    coupling_mps: float = asked(1500.0, "Speed of the water, m/s.", range_of("coupling_mps"))
+    snr: float | None = asked(None, "Signal over noise, as 10; none without it.", range_of("snr"))
+    seed: int = asked(0, "Of the noise.", range_of("seed"))
     refinement: int | None = asked(
         None,
         "Travel times: how many times finer their grid is, 4 by default; at least 2 in space, else 4.",
-        among("refinement"),
+        range_of("refinement"),
     )
     attenuation: bool | None = asked(None, "Travel times: record amplitudes too.")
     noise_s: float | None = asked(
         None,
         "Travel times of table6: standard deviation of the noise on them, s; 0 by default.",
-        among("noise_s"),
+        range_of("noise_s"),
     )
     slices: int | None = asked(
-        None, "table7: heights of the ring, one node apart; 40 by default.", among("slices")
+        None, "table7: heights of the ring, one node apart; 40 by default.", range_of("slices")
     )
     array: Literal["moved", "rings"] | None = asked(
         None, "table7: one ring moved (the default), or rings at all heights that receive each other."
     )
     three_d: bool | None = asked(None, "table7: wave fronts in space, not in each slice by itself.")
     frequency_hz: float | None = asked(
-        None, "Waves: middle of the pulse, Hz; 500000 by default, of table7 100000.", among("frequency_hz")
+        None, "Waves: middle of the pulse, Hz; 500000 by default, of table7 100000.", range_of("frequency_hz")
     )
-    emissions: int | None = asked(None, "Waves: elements that send; 64 by default.", among("emissions"))
+    emissions: int | None = asked(None, "Waves: elements that send; 64 by default.", range_of("emissions"))
     side_m: float | None = asked(
-        None, "Waves: side of the square with phantom and ring, m; 0.12 by default.", among("side_m")
+        None, "Waves: side of the square with phantom and ring, m; 0.12 by default.", range_of("side_m")
     )
 
     def __post_init__(self) -> None:
@@ -99,7 +99,7 @@ class AskedSimulation:
         self.chosen()
 
     def chosen(self) -> Simulated:
-        """The settings of the scan that is meant, with the defaults of what is left out."""
+        """The settings of the scan, with defaults for absent ones."""
         kind: type[Simulated] = SimulationSettings
         if self.waveform:
             kind = VolumeWaveSettings if self.phantom == "table7" else WaveSimulationSettings
@@ -113,10 +113,10 @@ class AskedSimulation:
         }
         for name, value in given.items():
             if name not in known:
-                raise InvalidInput(name, value, f"nothing, unless {OWN[name]}")
+                raise InvalidInput(name, value, f"nothing, unless {CONDITIONS[name]}")
         return kind(**given)
 
     def plain(self) -> dict[str, Any]:
-        """All that holds for this scan, as JSON has it; gives the same scan again."""
+        """All settings of this scan as JSON values, which give the same scan again."""
         given = {name: value for name, value in asdict(self.chosen()).items() if value is not None}
         return {"phantom": self.phantom, "waveform": self.waveform, **given}

@@ -20,7 +20,7 @@ from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
 
 from .plane import MOST_REFINEMENT, NODES, SNR, ring_radius
 
-# The coarsest voxels that the phantom's lesions are measured in; wider ones would join them.
+# The coarsest voxels in which the lesions of the phantom are separate.
 LEAST_NODES = min(nodes for nodes, _ in TABLE7_GRIDS)
 
 
@@ -30,12 +30,12 @@ class VolumeSimulationSettings:
 
     Attributes:
         nodes: nodes along x and y of the truth, and of the reconstruction it is meant for.
-        slices: heights of the ring, one node apart, the phantom's middle in their middle.
+        slices: heights of the ring, one node apart, centred on the phantom.
         elements: of the ring, each emitter and receiver.
-        coupling_mps: speed of the medium around the breast, m/s.
-        refinement: how many times finer the data are made; at least 4, or 2 with ``three_d``.
-        three_d: wave fronts in space; else each slice is a world of its own.
-        array: ``moved``, one ring at each height in turn, whose elements receive their own ring alone;
+        coupling_mps: speed of sound in the coupling medium around the breast, m/s.
+        refinement: of the simulation grid over the image grid; at least 4, or 2 with ``three_d``.
+        three_d: 3-D wave fronts; else each slice is simulated in 2-D.
+        array: ``moved``, one ring at each height in turn, whose elements receive their own ring only;
             ``rings``, all rings at once, each element receiving every other, with ``three_d`` only.
         attenuation: whether to record amplitudes beside the travel times.
         snr: root mean square of the data over the standard deviation of Gaussian noise on them; None: none.
@@ -75,7 +75,7 @@ class VolumeSimulationSettings:
 
     @property
     def scans(self) -> int:
-        """How many are simulated one by one."""
+        """Number of scans that are simulated separately."""
         return 1 if self.array == "rings" else self.slices
 
     @property
@@ -105,7 +105,7 @@ class VolumeSimulationSettings:
 
 
 def scan_of(settings: VolumeSimulationSettings, delta: Floats, ratio: Floats | None) -> Dataset:
-    """The dataset of what every element received, with its noise.
+    """The dataset of simulated travel times and amplitudes, with noise.
 
     Args:
         settings: of the scan.

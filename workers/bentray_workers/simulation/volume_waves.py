@@ -1,4 +1,4 @@
-"""A ring scan of the Table 7 phantom by waves in space: one ring, with what comes from above and below."""
+"""A 3-D wave simulation of a ring scan of the 3-D breast phantom (Li 2008, Table 7)."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from .waves import FREQUENCY_HZ, WaveSimulationSettings
 
 @dataclass(frozen=True)
 class VolumeWaveSettings(WaveSimulationSettings):
-    """As in a plane, but of waves in space, for which the frequency is lower unless it is given.
+    """As ``WaveSimulationSettings`` in 3-D, with a lower default frequency.
 
-    The truth of the scan is the section at the ring's height; what arrives from above and below it is in the
-    traces too. Beyond the chest wall the breast goes on as it is there, into the absorbing edge.
+    The truth of the scan is the section at the height of the ring; the traces also contain waves from above
+    and below it. Beyond the chest wall the breast continues unchanged into the absorbing boundary.
     """
 
     frequency_hz: float = ranged(1e5, FREQUENCY_HZ)
 
     dimensions: ClassVar[int] = 3
-    # Each node of an edge costs far more than in a plane.
+    # Each node of the boundary costs far more than in 2-D.
     edge_nodes: ClassVar[int] = EDGE_NODES
     phantom_side_m: ClassVar[float] = TABLE7_SIDE_M
     phantom_name: ClassVar[str] = "Table 7"
@@ -52,18 +52,18 @@ class VolumeWaveSettings(WaveSimulationSettings):
         return np.column_stack((super().places_m(), np.full(self.elements, height)))
 
     def speed(self) -> Floats:
-        """Of the object on the grid, m/s."""
+        """Speed of sound of the object on the grid, m/s."""
         below, above = self._heights
         z = np.arange(-below, above + 1) * self._scaled_spacing
         return self.phantom.volume.speed(self.fine_nodes, TABLE7_SIDE_M, z)
 
     @property
     def _scaled_spacing(self) -> float:
-        """Of the nodes where the phantom has its own size, m."""
+        """Node spacing in the scale of the phantom, m."""
         return TABLE7_SIDE_M / (self.fine_nodes - 1)
 
     @property
     def _heights(self) -> tuple[int, int]:
-        """Nodes below the ring and above it: all of the breast, and the reach of the elements."""
+        """Nodes below and above the ring: all of the breast, and the interpolation range of the elements."""
         below, above = (math.ceil(abs(end) / self._scaled_spacing) + REACH for end in (CHEST_M, NIPPLE_M))
         return below, above

@@ -28,42 +28,43 @@ from bentray_kernels.wave.time_blocks import Poll, unheeded
 
 from .plane import NODES, SNR, ring_radius
 
-# The pulse is a sine under a Gaussian; at this many times its centre frequency it has 3 % of its height.
+# The pulse is a sine with a Gaussian envelope; at this multiple of its centre frequency its spectrum has 3 %
+# of its maximum.
 HIGHEST = 1.54
 
-# The simulation has another order in space than a refinement's 8, more nodes in its shortest wave than that
-# one's 4.5, and steps of this part of the longest stable one.
+# Unlike the simulations of a refinement (order 8, 4.5 nodes per shortest wavelength), so that data are not
+# inverted with the model that made them; and the time step relative to the longest stable one.
 ORDER, NODES_A_WAVE, STEP = 6, 7.0, 0.5
 
 FREQUENCY_HZ = Range(1e4, 1e7, unit="Hz")
 
-# Wider than those of a refinement.
+# Of the absorbing boundary; wider than that of a refinement.
 EDGE_NODES = 40
 
-# More nodes than these nobody waits for.
+# Larger grids take too long.
 MOST_NODES = 8192**2
 
 # Recorded samples in a period of the centre frequency.
 SAMPLES_A_PERIOD = 8
 
-# Periods of the pulse before its middle, and of the record after the slowest arrival.
+# Periods of the pulse before its centre, and of the record after the slowest arrival.
 BEFORE, AFTER = 2.5, 12.0
 
 
 @dataclass(frozen=True)
 class WaveSimulationSettings:
-    """A ring scan by waves.
+    """A ring scan by 2-D wave simulation.
 
     Attributes:
-        frequency_hz: of the middle of the pulse, Hz.
-        side_m: of the square that holds phantom and ring, m; the phantom is as large a part of it as in
-            the dissertation's 0.2 m.
+        frequency_hz: centre frequency of the pulse, Hz.
+        side_m: of the square around phantom and ring, m; the phantom fills the same part of it as in the
+            0.2 m of the dissertation.
         elements: of the ring, each a receiver.
-        emissions: of them that send, evenly spread.
+        emissions: number of emitting elements, evenly spaced.
         nodes: along a side of the truth image.
         coupling_mps: speed of the water, m/s.
-        snr: highest sample of a water trace, in the median over all, over the standard deviation of Gaussian
-            noise on every trace; None: no noise.
+        snr: peak of the water traces (median over all) relative to the standard deviation of Gaussian noise
+            on every trace; None: no noise.
         seed: of the noise.
     """
 
@@ -76,7 +77,7 @@ class WaveSimulationSettings:
     snr: float | None = ranged(None, SNR)
     seed: int = ranged(0, SEED)
 
-    # Of the waves, what a scan in space has otherwise.
+    # These differ in 3-D.
     dimensions: ClassVar[int] = 2
     edge_nodes: ClassVar[int] = EDGE_NODES
     phantom_side_m: ClassVar[float] = TABLE6_SIDE_M
@@ -93,7 +94,7 @@ class WaveSimulationSettings:
 
     @property
     def phantom(self) -> EllipsePhantom | PhantomSlice:
-        """In the plane of the ring."""
+        """The phantom in the plane of the ring."""
         return table6(self.coupling_mps)
 
     @property
@@ -106,7 +107,7 @@ class WaveSimulationSettings:
         return self.elements_m() + 0.5 * self.side_m
 
     def speed(self) -> Floats:
-        """Of the object on the grid, m/s."""
+        """Speed of sound of the object on the grid, m/s."""
         return self.phantom.speed(self.fine_nodes, self.phantom_side_m)
 
     @property
@@ -122,8 +123,8 @@ class WaveSimulationSettings:
         return int(np.ceil(self.side_m * NODES_A_WAVE / wave)) + 2 * REACH
 
     @property
-    def told_grid(self) -> str:
-        """As people read it."""
+    def grid_text(self) -> str:
+        """The grid in words."""
         return " by ".join(str(nodes) for nodes in self.grid)
 
     @property
@@ -150,7 +151,7 @@ class WaveSimulationSettings:
 
     @property
     def dispersion(self) -> tuple[float, float]:
-        """Error of the phase speed at the centre frequency and at the highest one of the pulse, relative."""
+        """Relative errors of the phase speed at the centre and at the highest frequency of the pulse."""
         courant = self.coupling_mps * self.step_s / self.spacing_m
         waves = (self.coupling_mps / (times * self.frequency_hz) for times in (1.0, HIGHEST))
         centre, highest = (phase_error(wave / self.spacing_m, courant, order=ORDER) for wave in waves)
@@ -161,31 +162,31 @@ class WaveSimulationSettings:
         return Ring(self.elements, ring_radius(self.side_m, self.nodes)).positions()
 
     def senders(self) -> NDArray[np.int64]:
-        """Elements that send, (emissions,)."""
+        """Emitting elements, (emissions,)."""
         return np.arange(self.emissions) * self.elements // self.emissions
 
 
 class Noise:
-    """Noise on traces, drawn an emission at a time: of the object all, then of the water.
+    """Noise of traces, drawn per emission: first all of the object, then of the water.
 
     Args:
         settings: with an ``snr``.
-        heights: highest sample of each water trace, (emissions, elements).
+        peaks: maximum of each water trace, (emissions, elements).
     """
 
-    def __init__(self, settings: WaveSimulationSettings, heights: NDArray[np.float32]) -> None:
+    def __init__(self, settings: WaveSimulationSettings, peaks: NDArray[np.float32]) -> None:
         assert settings.snr is not None
         self._random = np.random.default_rng(settings.seed)
-        self._sigma = float(np.median(heights)) / settings.snr
+        self._sigma = float(np.median(peaks)) / settings.snr
         self._shape = settings.elements, settings.samples
 
     def drawn(self) -> NDArray[np.float32]:
-        """Of the next emission, (elements, samples)."""
+        """The noise of the next emission, (elements, samples)."""
         return (self._sigma * self._random.standard_normal(self._shape)).astype(np.float32)
 
 
 def scan_of(settings: WaveSimulationSettings, waveform: Waveform) -> Dataset:
-    """The dataset of traces, or of stand-ins for them."""
+    """The dataset of traces, or of placeholders for them."""
     phantom = settings.phantom
     spacing = settings.side_m / (settings.nodes - 1)
     low, high = settings.dispersion
@@ -210,7 +211,7 @@ def scan_of(settings: WaveSimulationSettings, waveform: Waveform) -> Dataset:
             f"waves of {1e-3 * settings.frequency_hz:g} kHz"
         ),
         source=(
-            f"made by bentray simulate: order {ORDER} in space, {settings.told_grid} nodes of "
+            f"made by bentray simulate: order {ORDER} in space, {settings.grid_text} nodes of "
             f"{1e3 * settings.spacing_m:.3g} mm, phase speed wrong by {low:.1e} in the middle of the pulse "
             f"and {high:.1e} at its highest frequency"
         ),

@@ -11,8 +11,8 @@ import h5py
 
 from bentray_kernels.acquisition import Dataset
 
-from ..hdf5_reading import Limits, opened, refusing
-from .read import NUMERIC, TRACES, dataset_of, stand_ins, trace_type
+from ..hdf5_reading import Limits, opened, rejecting_damage
+from .read import NUMERIC, TRACES, dataset_of, placeholder_traces, trace_type
 from .write import Piece, bytes_of, write_dataset
 
 # Of one piece. It takes about three times as much while it is read, converted and packed.
@@ -41,7 +41,7 @@ def copy_dataset(
         OSError: where the folder cannot be written to or the disk is full.
     """
     with opened(source, limits or Limits()) as reader:
-        dataset = dataset_of(reader, stand_ins)
+        dataset = dataset_of(reader, placeholder_traces)
         on_size(bytes_of(dataset))
 
         def pieces(name: str, chunk: tuple[int, ...]) -> Iterator[Piece]:
@@ -49,7 +49,7 @@ def copy_dataset(
             found = reader.checked(path, NUMERIC, TRACES)
             assert found is not None
             for where in blocks(found, chunk):
-                with refusing(path, TRACES):
+                with rejecting_damage(path, TRACES):
                     values = found[where]
                 yield where, trace_type(path, values)
 

@@ -140,7 +140,7 @@ def traces_in(reader: Reader) -> bool:
     return reader.checked("waveform/object", "iuf", "traces over (ntx, nrx, nt)") is not None
 
 
-def stand_ins(reader: Reader) -> Waveform:
+def placeholder_traces(reader: Reader) -> Waveform:
     """The traces of a file as arrays of their shape and type that take no memory; they are all 0."""
 
     def stand_in(path: str) -> NDArray[Any] | None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.emissions import Emissions
 
-from ..hdf5_reading import Limits, Reader, opened, refusing
+from ..hdf5_reading import Limits, Reader, opened, rejecting_damage
 from .counts import BLOCK_BYTES
 from .read import NUMERIC, TRACES, trace_type
 
@@ -86,7 +86,7 @@ def _emissions(reader: Reader, path: str, *, poll: Callable[[], None], index: in
     @lru_cache(maxsize=1)
     def rows(number: int) -> NDArray[Any]:
         some = slice(number * block, (number + 1) * block)
-        with refusing(path, TRACES):
+        with rejecting_damage(path, TRACES):
             found = stored[some] if index is None else stored[index, some]
         return trace_type(path, found)
 

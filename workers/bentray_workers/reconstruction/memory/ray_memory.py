@@ -56,14 +56,14 @@ def shape_of(scan: Summary, settings: Settings) -> tuple[int, ...]:
     return nodes, nodes, heights
 
 
-def sounding_of(scan: Summary, settings: Settings) -> int:
+def emitters_of(scan: Summary, settings: Settings) -> int:
     """Emitters of one problem."""
     return scan.emitters * (scan.slices if settings.decomposition == "volume" else 1)
 
 
 def rays_of(scan: Summary, settings: Settings) -> int:
     """Rays of one problem that are rows at a time."""
-    rays = sounding_of(scan, settings) * scan.receivers
+    rays = emitters_of(scan, settings) * scan.receivers
     return -(-rays // 2) if settings.method == "gauss-newton" and settings.numerics.reciprocity else rays
 
 
@@ -99,7 +99,7 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     image = REAL * math.prod(shape)
     state = state_bytes(shape, settings)
     # A process keeps the dataset's times and losses, and those of problems that it was asked for last.
-    kept = 3 * REAL * scan.pairs + 3 * REAL * sounding_of(scan, settings) * scan.receivers
+    kept = 3 * REAL * scan.pairs + 3 * REAL * emitters_of(scan, settings) * scan.receivers
     tracked = shape
     if settings.numerics.axial_margin_nodes is not None and len(shape) == 3:
         tracked = (*shape[:2], min(shape[2], 2 * settings.numerics.axial_margin_nodes + 2))
@@ -109,7 +109,7 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     base = FLOOR_BYTES + kept + state
 
     def look(rows: int) -> int:
-        share = min(BATCH, sounding_of(scan, settings)) / max(1, sounding_of(scan, settings))
+        share = min(BATCH, emitters_of(scan, settings)) / max(1, emitters_of(scan, settings))
         # The parts of each emitter, and the same put together.
         return base + field + image + 2 * rows_bytes(scan, settings, math.ceil(share * rows))
 
