@@ -132,9 +132,13 @@ def run(
             while pool.may_submit(len(running), len(ready)):
                 name, task = ready.popleft()
                 running[pool.submit(task)] = name, task
-            for handle in pool.finished(list(running)):
+            finished = pool.finished(list(running))
+            while finished:
+                handle = finished.pop(0)
                 name, task = running.pop(handle)
                 retry, result = pool.result(handle)
+                # While anything refers to a result, a cluster computes it again if its worker dies.
+                del handle
                 if retry is not None:
                     running[retry] = name, task
                     continue

@@ -175,7 +175,7 @@ def test_no_output_replaces_another_or_an_input(bentray: Callable[..., Result], 
     assert volume.read_bytes() == before
 
 
-def test_an_interrupt_begins_no_more_strips(
+def test_an_interrupt_starts_no_more_tiles(
     bentray: Callable[..., Result], tmp_path: Path, volume: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun = []
@@ -186,7 +186,7 @@ def test_an_interrupt_begins_no_more_strips(
             raise KeyboardInterrupt
         time.sleep(0.05)
 
-    monkeypatch.setattr(refraction, "strip", interrupted)
+    monkeypatch.setattr(refraction, "draw_tile", interrupted)
     many = ("--width", 16, "--height", 4096)
     assert bentray("render", volume, "-o", tmp_path / "p.png", "--iso", 0.5, *many).exit_code == 130
     assert 0 < len(begun) < 20

@@ -54,6 +54,9 @@ def lay_out(mesh_path: Path, settings: FieldSettings, folder: Path) -> None:
             table.
     """
     files, started = FieldFiles(folder), time.perf_counter()
+    # A cluster may run a finished task again; this must not undo later ones.
+    if files.layout.exists():
+        return
     stored = load_mesh(mesh_path)
     check_faces(len(stored.mesh.faces))
     found = parameterise(stored.mesh)
@@ -104,6 +107,8 @@ def _image(chart: Chart, settings: FieldSettings) -> tuple[GeometryImage, Geomet
 
 def outer_rows(folder: Path, n: int, first: int, last: int, done: Path) -> None:
     """Task: rows of the outer table, and a file that marks them as finished."""
+    if done.exists():
+        return
     files, started = FieldFiles(folder), time.perf_counter()
     for path, rows in zip(files.outer, build_rows(_surface(files), n, first, last), strict=True):
         fill_rows(path, first, rows)
@@ -112,6 +117,8 @@ def outer_rows(folder: Path, n: int, first: int, last: int, done: Path) -> None:
 
 def inner_rows(folder: Path, n: int, first: int, last: int, done: Path) -> None:
     """Task: rows of the inner table, and a file that marks them as finished."""
+    if done.exists():
+        return
     files, started = FieldFiles(folder), time.perf_counter()
     points = mapped(files.points)[first:last]
     fill_rows(files.inner, first, build_inner_rows(_surface(files), n, points))
