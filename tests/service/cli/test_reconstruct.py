@@ -77,7 +77,7 @@ def test_worker_processes_give_the_same_bits(
 def test_auto_says_in_one_line_what_it_chose_and_why(
     bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
 ) -> None:
-    words = ("--method", "auto", "--set", "resolution_check=true", "--workers", 1)
+    words = ("--method", "auto", "--resolution-check", "--workers", 1)
     result = bentray("reconstruct", scan_file, "-o", tmp_path, *QUICK, *words)
     assert result.exit_code == 0
     told = [line for line in result.stdout.splitlines() if line.startswith("auto chose ")]

@@ -88,7 +88,7 @@ def test_the_settings_of_a_guided_result_make_it_again(path):
     plan = PLAN.changed(method="auto", rays="curved", guided_rounds=1)
     first = reconstruction_run.reconstruct(None, path, plan)
     assert first.settings.method != "auto"
-    assert first.settings.guided_rounds == 1
+    assert first.settings.numerics.guided_rounds == 1
     assert len(first.trials) > 1
     again = reconstruction_run.reconstruct(None, path, first.settings)
     np.testing.assert_array_equal(again.speed, first.speed)

@@ -28,7 +28,7 @@ from .memory.ray_memory import (
     shape_of,
     state_bytes,
 )
-from .memory.waveform_memory import wave_call_bytes, wave_tasks
+from .memory.waveform_memory import budgeted, wave_call_bytes, wave_tasks
 
 Decomposition = Literal["slices", "emitters", "volume"]
 
@@ -106,7 +106,8 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[WorkerCapacity]) ->
             calls[name] = max(size, calls.get(name, 0))
     # Trials of elements in space are judged by times alone.
     heard = None if scan.in_space and settings.method == "auto" else scan.traces
-    waves = wave_call_bytes(heard, scan.width_m, scan.slices, settings)
+    refining = budgeted(heard, scan.width_m, scan.slices, settings)
+    waves = wave_call_bytes(heard, scan.width_m, refining)
     calls |= waves
     room = max((offer.task_bytes for offer in fitting), default=math.inf)
     name, size = max(calls.items(), key=lambda item: item[1])
@@ -122,7 +123,7 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[WorkerCapacity]) ->
     shape = shape_of(scan, settings)
     decomposition = _decomposition(settings)
     tasks = sum(_tasks(scan, way, shape) for way in ways)
-    tasks += scan.slices * wave_tasks(heard, scan.width_m, scan.slices, settings)
+    tasks += scan.slices * wave_tasks(heard, scan.width_m, refining)
     if scan.traces_bytes:
         tasks = tasks * (1 + settings.numerics.guided_rounds) + arrival_tasks(
             scan.traces, scan.slices, settings

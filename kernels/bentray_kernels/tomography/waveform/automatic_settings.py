@@ -45,29 +45,35 @@ class WaveScale(NamedTuple):
 
     def minutes(self, settings: Settings) -> float:
         """About how long one core works on the refinement."""
-        plan = bands_of(self.centre_hz, self.water_mps, settings)
+        return self._minutes(settings, settings.numerics.bands, settings.numerics.emitters)
+
+    def bands(self, settings: Settings) -> tuple[Band, ...]:
+        """The bands that the settings have fixed, or all."""
+        fixed = settings.numerics
+        return bands_of(self.centre_hz, self.water_mps, settings, fixed.bands, fixed.emitters)
+
+    def _minutes(self, settings: Settings, count: int | None, emitters: int | None) -> float:
+        plan = bands_of(self.centre_hz, self.water_mps, settings, count, emitters)
         fastest = settings.speed_bounds_mps[1]
         return self.slices * core_seconds(plan, self.width_m, self.record_s, fastest) / 60.0
 
+    def budgeted(self, settings: Settings) -> Settings:
+        """The settings with the bands and emitters that the time budget allows.
 
-def budgeted(settings: Settings, scale: WaveScale) -> Settings:
-    """The settings with the bands and emitters that the time budget allows.
-
-    As many bands as it allows, at least one, and if one takes too long fewer emitters, at least
-    ``LEAST_EMITTERS``. Bands and emitters that are fixed stay; without a budget all bands are used.
-    """
-    given, most = settings.numerics, settings.minutes
-    if most is None or given.bands is not None:
-        return settings
-    for count in range(BANDS, 0, -1):
-        found = settings.changed(bands=count)
-        if scale.minutes(found) <= most:
-            return found
-    emitters = min(band.emitters for band in bands(scale.centre_hz, scale.water_mps))
-    while given.emitters is None and scale.minutes(found) > most and emitters > LEAST_EMITTERS:
-        emitters //= 2
-        found = found.changed(emitters=emitters)
-    return found
+        As many bands as it allows, at least one, and if one takes too long fewer emitters, at least
+        ``LEAST_EMITTERS``. Bands and emitters that are fixed stay; without a budget all bands are used.
+        """
+        most, emitters = settings.minutes, settings.numerics.emitters
+        if most is None or settings.numerics.bands is not None:
+            return settings
+        count = BANDS
+        while count > 1 and self._minutes(settings, count, emitters) > most:
+            count -= 1
+        if emitters is None and self._minutes(settings, count, None) > most:
+            emitters = min(band.emitters for band in bands(self.centre_hz, self.water_mps))
+            while emitters > LEAST_EMITTERS and self._minutes(settings, count, emitters) > most:
+                emitters //= 2
+        return settings.changed(bands=count, emitters=emitters)
 
 
 def scale_of(dataset: Dataset, settings: Settings, samples: int, slices: int) -> WaveScale:
@@ -103,7 +109,7 @@ def wave_settings(scale: WaveScale, settings: Settings) -> WaveSettings:
     """How to refine a scan."""
     across, pulse = scale.width_m / scale.water_mps, PERIODS / scale.centre_hz
     return WaveSettings(
-        bands_of(scale.centre_hz, scale.water_mps, settings),
+        scale.bands(settings),
         window_s=(BEFORE * across + pulse, AFTER * across + pulse),
         nearest_m=NEAREST * scale.width_m,
         speed_bounds_mps=settings.speed_bounds_mps,
@@ -112,14 +118,22 @@ def wave_settings(scale: WaveScale, settings: Settings) -> WaveSettings:
     )
 
 
-def bands_of(centre_hz: float, water_mps: float, settings: Settings) -> tuple[Band, ...]:
-    """The bands that are gone through; that of the attenuation comes last."""
-    found = bands(centre_hz, water_mps)[: settings.numerics.bands]
+def bands_of(
+    centre_hz: float, water_mps: float, settings: Settings, count: int | None, emitters: int | None
+) -> tuple[Band, ...]:
+    """The bands of a refinement; that of the attenuation comes last.
+
+    Args:
+        centre_hz: of the pulse, Hz.
+        water_mps: speed of the water, m/s.
+        settings: whether the attenuation is refined.
+        count: of the speed's bands, from the lowest frequency; None: all.
+        emitters: of each band; None: as many as is usual.
+    """
+    found = bands(centre_hz, water_mps)[:count]
     if settings.attenuation.enabled:
         found = (*found, loss_band(centre_hz, water_mps))
-    if settings.numerics.emitters is not None:
-        found = tuple(replace(band, emitters=settings.numerics.emitters) for band in found)
-    return found
+    return found if emitters is None else tuple(replace(band, emitters=emitters) for band in found)
 
 
 def check_traces(samples: int) -> None:

@@ -16,7 +16,7 @@ from ..numerics import recorded
 from ..reconstruction_graph import Run, progress_of
 from ..result import Reconstruction
 from ..settings import Settings
-from .automatic_settings import budgeted, scale_of, wave_settings
+from .automatic_settings import scale_of, wave_settings
 from .inversion_state import BandEnd, Image
 from .refinement_graph import RefinementGraph, WaveScan, resampled
 from .validation import Judge, judging, passes
@@ -49,7 +49,7 @@ class Following:
         self._water_np_m = dataset.water_attenuation_np_m or 0.0
         slices = pairs.count(dataset, settings)
         scale = scale_of(dataset, settings, samples, slices)
-        self._settings = budgeted(settings, scale)
+        self._settings = scale.budgeted(settings)
         self._plan = wave_settings(scale, self._settings)
         # What ``advised`` states is the time without a budget.
         self._whole_minutes = scale.minutes(settings)

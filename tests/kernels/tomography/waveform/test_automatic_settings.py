@@ -9,8 +9,6 @@ from bentray_kernels.tomography.numerics import BANDS
 from bentray_kernels.tomography.waveform.automatic_settings import (
     LEAST_EMITTERS,
     WaveScale,
-    bands_of,
-    budgeted,
 )
 
 SCALE = WaveScale(centre_hz=4e5, water_mps=1500.0, width_m=0.2, record_s=2e-4, slices=2)
@@ -18,12 +16,12 @@ WAVEFORM = Settings(method="waveform")
 
 
 def within(minutes, **fixed):
-    return budgeted(WAVEFORM.changed(minutes=minutes, **fixed), SCALE)
+    return SCALE.budgeted(WAVEFORM.changed(minutes=minutes, **fixed))
 
 
 def test_without_a_budget_all_bands_are_used():
     assert within(None) == WAVEFORM
-    assert len(bands_of(SCALE.centre_hz, SCALE.water_mps, WAVEFORM)) == BANDS + 1
+    assert len(SCALE.bands(WAVEFORM)) == BANDS + 1
 
 
 @given(st.floats(0.0, 1e4))

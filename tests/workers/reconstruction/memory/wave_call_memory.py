@@ -21,7 +21,7 @@ from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.emissions import Emissions
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.waveform import waveform_chain as waves
+from bentray_kernels.tomography.waveform import refinement_graph as waves
 from bentray_kernels.tomography.waveform.automatic_settings import scale_of, wave_settings
 from bentray_kernels.tomography.waveform.band_inversion import WavePass
 from bentray_kernels.tomography.waveform.inversion_state import Image

@@ -8,8 +8,6 @@ from __future__ import annotations
 from bentray_kernels.tomography.settings import Settings
 from bentray_kernels.tomography.waveform.automatic_settings import (
     WaveScale,
-    bands_of,
-    budgeted,
     check_traces,
 )
 from bentray_kernels.tomography.waveform.band_grid import Extent
@@ -30,11 +28,14 @@ SHOT_BYTES, LOOK_BYTES, SAMPLER_BYTES = 140, 96, 64
 MEDIUM_BYTES, STEP_BYTES = 72, 280
 
 
-def plan_of(traces: Traces, width_m: float, slices: int, settings: Settings) -> tuple[Band, ...]:
-    """The bands of a refinement within the time budget."""
+def budgeted(traces: Traces | None, width_m: float, slices: int, settings: Settings) -> Settings:
+    """The settings with the bands and emitters of a refinement within the time budget."""
+    return settings if traces is None else _scale(traces, width_m, slices).budgeted(settings)
+
+
+def _scale(traces: Traces, width_m: float, slices: int = 1) -> WaveScale:
     record_s = (traces.samples - 1) / traces.rate_hz
-    scale = WaveScale(traces.frequency_hz, traces.water_mps, width_m, record_s, slices)
-    return bands_of(scale.centre_hz, scale.water_mps, budgeted(settings, scale))
+    return WaveScale(traces.frequency_hz, traces.water_mps, width_m, record_s, slices)
 
 
 def refines(settings: Settings) -> bool:
@@ -42,23 +43,22 @@ def refines(settings: Settings) -> bool:
     return settings.method == "waveform" or (settings.method == "auto" and bool(settings.minutes))
 
 
-def wave_tasks(traces: Traces | None, width_m: float, slices: int, settings: Settings) -> int:
+def wave_tasks(traces: Traces | None, width_m: float, settings: Settings) -> int:
     """Calls of each slice: looks of single emitters and steps, unless some are shortened; 0 without waves."""
     if not refines(settings) or traces is None:
         return 0
-    plan = plan_of(traces, width_m, slices, settings)
+    plan = _scale(traces, width_m).bands(settings)
     held_out = WaveSettings(plan).held_out
     return sum(band.looks(held_out) + band.iterations + 2 for band in plan)
 
 
-def wave_call_bytes(traces: Traces | None, width_m: float, slices: int, settings: Settings) -> dict[str, int]:
+def wave_call_bytes(traces: Traces | None, width_m: float, settings: Settings) -> dict[str, int]:
     """Bytes of each kind of call, over all bands, and of the call by which trials are judged.
 
     Args:
         traces: of the dataset.
         width_m: of the array.
-        slices: of the scan.
-        settings: as requested.
+        settings: with the bands of the time budget, see ``budgeted``.
 
     Returns:
         By the call's name in ``waveform_chain`` and ``validation``; nothing where no waves are simulated.
@@ -70,7 +70,7 @@ def wave_call_bytes(traces: Traces | None, width_m: float, slices: int, settings
         check_traces(0 if traces is None else traces.samples)
     if traces is None or not settings.selects_model:
         return {}
-    plan = plan_of(traces, width_m, slices, settings)
+    plan = _scale(traces, width_m).bands(settings)
     (judge,) = judging(WaveSettings(plan)).bands
     found = {"judge_by_waves": _band_bytes(traces, width_m, settings, judge)["enter"]}
     for band in plan if refines(settings) else ():
