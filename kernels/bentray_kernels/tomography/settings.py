@@ -17,6 +17,8 @@ DEVIATION = "deviation"
 LEAST_NODES = 16
 # What a speed may be, as JSON Schema says it.
 SPEED = {"type": "number", **SPEED_MPS.schema}
+# What holds before the scan is known.
+AUTOMATIC = Numerics()
 # No unknown names in JSON.
 FORBID = {"extra": "forbid"}
 
@@ -231,15 +233,16 @@ class Settings:
                 inner.setdefault(record, {})[leaf] = value
             else:
                 own[name] = value
-        numerics = replace(self.numerics, **inner.pop("numerics", {}))
+        fixed = inner.pop("numerics", {})
+        numerics = replace(self.numerics, **fixed) if fixed else self.numerics
         for record, parts in inner.items():
             own[record] = replace(own[record], **parts)
-        return Settings(**own) if numerics == Numerics() else FixedSettings(**own, numerics=numerics)
+        return Settings(**own) if numerics == AUTOMATIC else FixedSettings(**own, numerics=numerics)
 
     @property
     def numerics(self) -> Numerics:
         """The numerical parameters that hold before the scan is known."""
-        return Numerics()
+        return AUTOMATIC
 
     @property
     def selects_model(self) -> bool:
@@ -265,7 +268,7 @@ class Settings:
 class FixedSettings(Settings):
     """Settings with some numerical parameters fixed; made by ``Settings.changed``, never from JSON."""
 
-    numerics: Numerics = field(default=Numerics())
+    numerics: Numerics = field(default=AUTOMATIC)
 
     def __post_init__(self) -> None:
         super().__post_init__()
