@@ -145,7 +145,7 @@ def test_a_volume_in_space_is_shown_as_glass(page, serve, scan, work, monkeypatc
 
 
 def test_a_turntable_is_shown(page, serve, scan, work, monkeypatch):
-    monkeypatch.setattr(kinds, "turn", lambda *given: given[3].write_bytes(b"pictures"))
+    monkeypatch.setattr(kinds, "draw_turntable", lambda *given: given[3].write_bytes(b"pictures"))
     address = serve()
     values = io.BytesIO()
     np.save(values, sampled(ONE_HOLE, 12))
@@ -176,7 +176,7 @@ def saved(tmp_path, values):
 
 
 def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, monkeypatch):
-    monkeypatch.setattr(kinds, "turn", lambda *given: given[3].write_bytes(b"pictures"))
+    monkeypatch.setattr(kinds, "draw_turntable", lambda *given: given[3].write_bytes(b"pictures"))
     page.goto(serve())
     turn = page.get_by_role("button", name="Render a turntable")
     expect(turn).to_be_disabled()
@@ -317,7 +317,7 @@ def test_a_simulated_scan_is_there_to_be_reconstructed(page, serve, monkeypatch)
         target.write_bytes(b"scan")
         return made
 
-    monkeypatch.setattr(kinds, "simulate_scan", simulate_scan)
+    monkeypatch.setattr(kinds, "simulate_to_file", simulate_scan)
     url = serve()
     asked = {"kind": "simulation", "settings": {"nodes": 16, "elements": 16}}
     assert httpx.post(f"{url}/v1/jobs", json=asked).status_code == 202
