@@ -28,7 +28,7 @@ from bentray_workers.cluster.fair_shares import IN_FLIGHT
 from bentray_workers.cluster.task_pool import finished
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
-from bentray_workers.reconstruction.subdomains import settle
+from bentray_workers.reconstruction.subdomains import solve_in_blocks
 
 from ..shared._made_up_scan import made_up_scan
 
@@ -209,7 +209,7 @@ def blocks(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
 def in_blocks(cluster: Cluster, *arguments: Any) -> Callable[[], object]:
     """A solve whose blocks stay where they are."""
 
-    return partial(settle, cluster.client, *arguments)
+    return partial(solve_in_blocks, cluster.client, *arguments)
 
 
 def least(run: Callable[[], object], runs: int) -> float:

@@ -66,7 +66,14 @@ def test_a_torn_job_gives_the_image_of_one_process(http, torn, tmp_path):
     sent = http.post("/v1/datasets", content=(tmp_path / "scan.h5").read_bytes(), headers=HDF5)
     asked = {"kind": "reconstruction", "dataset": sent.json()["id"], "settings": ASKED}
     job = http.post("/v1/jobs", json=asked).json()
-    assert {"measure", "judge", "read", "settle", "join", "enter"} < set(job["plan"]["call_bytes"])
+    assert {
+        "measure_traces",
+        "examine_slice",
+        "pick_emissions",
+        "finish_slice",
+        "write_picked",
+        "enter",
+    } < set(job["plan"]["call_bytes"])
     deadline = time.monotonic() + PATIENCE_S
     while job["state"] not in ENDED:
         assert time.monotonic() < deadline

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from bentray_kernels.acquisition.quality import Finding
-from bentray_workers.files.findings import Found, read_findings, write_findings
+from bentray_workers.files.findings import ScanFindings, read_findings, write_findings
 
 findings = st.builds(
     Finding,
@@ -30,7 +30,7 @@ findings = st.builds(
 )
 
 
-@given(found=st.builds(Found, st.lists(findings, max_size=3).map(tuple), st.booleans(), st.booleans()))
+@given(found=st.builds(ScanFindings, st.lists(findings, max_size=3).map(tuple), st.booleans(), st.booleans()))
 def test_a_round_trip_changes_nothing(found, tmp_path_factory):
     path = tmp_path_factory.getbasetemp() / "findings.json"
     write_findings(path, found)
@@ -51,7 +51,7 @@ def test_a_damaged_file_is_told(tmp_path, content):
 
 def test_a_million_pairs_take_a_bit_each(tmp_path):
     wrong = Finding("dead elements", "1", "", "left out", pairs=np.ones((1000, 1000), bool), value=math.nan)
-    write_findings(tmp_path / "findings.json", Found((wrong,), True, True))
+    write_findings(tmp_path / "findings.json", ScanFindings((wrong,), True, True))
     assert (tmp_path / "findings.json").stat().st_size < 200_000
     assert json.loads((tmp_path / "findings.json").read_text())["content"]["findings"][0]["value"] is None
 
@@ -61,7 +61,7 @@ def test_a_million_pairs_take_a_bit_each(tmp_path):
 def test_damage_of_either_file_is_found(tmp_path, spoiled, how):
     path, picked = tmp_path / "findings.json", tmp_path / "picked.h5"
     picked.write_bytes(bytes(range(256)))
-    found = Found((), True, True)
+    found = ScanFindings((), True, True)
     write_findings(path, found, picked)
     assert read_findings(path, picked) == found
     file = tmp_path / spoiled

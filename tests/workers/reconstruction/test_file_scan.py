@@ -9,7 +9,7 @@ from bentray_kernels.tomography.waveform.refinement_graph import look_at_waves
 from bentray_kernels.wave import time_blocks
 from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.files.findings import Found, write_findings
+from bentray_workers.files.findings import ScanFindings, write_findings
 from bentray_workers.reconstruction.file_scan import FileWaveScan
 
 from ...kernels.tomography.waveform.scans import SETTINGS, scan
@@ -19,7 +19,7 @@ def test_a_look_at_waves_ends_with_its_job(tmp_path, monkeypatch):
     path, folder = tmp_path / "scan.h5", tmp_path / "job"
     write_dataset(path, scan())
     folder.mkdir()
-    write_findings(folder / "findings.json", Found((), examined=True, changed=False))
+    write_findings(folder / "findings.json", ScanFindings((), examined=True, changed=False))
     waves = FileWaveScan(path, path.stat().st_mtime_ns, SETTINGS, 0, folder / "findings.json")
     problem = waves.problem(0)
     water = Model(problem.water.speed + 0.0 * problem.region)

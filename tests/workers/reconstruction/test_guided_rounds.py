@@ -14,7 +14,7 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.guided_picking import alternate
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.reconstruction import reconstruction_run
-from bentray_workers.reconstruction.memory import arrival_memory
+from bentray_workers.reconstruction.memory import picking_memory
 
 from ...kernels.acquisition.traces import blob_delay, scan
 from ..cluster.tearing import torn_runs
@@ -39,7 +39,7 @@ def expected():
 @pytest.fixture
 def path(tmp_path, monkeypatch):
     # A few emissions a call.
-    monkeypatch.setattr(arrival_memory, "CALL_SAMPLES", 50_000)
+    monkeypatch.setattr(picking_memory, "TASK_SAMPLES", 50_000)
     write_dataset(tmp_path / "scan.h5", noisy())
     return tmp_path / "scan.h5"
 

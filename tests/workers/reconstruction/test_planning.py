@@ -19,7 +19,7 @@ from bentray_workers.files.dataset.counts import Summary, Traces
 from bentray_workers.reconstruction.memory.ray_memory import field_bytes
 from bentray_workers.reconstruction.planning import blocks_of, plan
 
-PROGRAM = Path(__file__).with_name("call_memory.py")
+PROGRAM = Path(__file__).with_name("ray_task_memory.py")
 ROOT = Path(__file__).parents[3]
 RING = Summary(256, 256, 256 * 256, 1, False, 0.0, 0.16, 0, True)
 BOTH = ("recon", "render")
@@ -114,10 +114,10 @@ def test_a_device_lane_needs_a_worker_that_offers_it():
 @pytest.mark.parametrize(
     ("changes", "decomposition", "words"),
     [
-        ({}, "slices", "40 slices side by side"),
+        ({}, "slices", "40 slices in parallel"),
         ({"method": "gauss-newton"}, "emitters", "he 256 emitters"),
         ({"decomposition": "volume"}, "volume", "10240 emitters"),
-        ({"method": "auto"}, "emitters", "side by side"),
+        ({"method": "auto"}, "emitters", "in parallel"),
     ],
 )
 def test_the_choice_is_told_in_a_sentence(changes, decomposition, words):
@@ -134,14 +134,16 @@ def test_traces_are_planned_for():
     heard = Traces(256, 256, 12_000, 2, 5e7, 2.5e6, 1500.0)
     scan = replace(RING, traces=heard, traces_bytes=2 * heard.bytes_of(heard.emissions))
     found = plan(scan, Settings(nodes=64), [])
-    assert {"measure", "judge", "read", "settle", "join"} < set(found.call_bytes)
+    assert {"measure_traces", "examine_slice", "pick_emissions", "finish_slice", "write_picked"} < set(
+        found.call_bytes
+    )
     assert found.tasks > plan(RING, Settings(nodes=64), []).tasks + 2 * 64
     # No call holds more than an emission of what is 3 GiB.
     assert found.largest[1] < scan.traces_bytes / 8
     unseen = plan(scan, Settings.of(nodes=64, examine=False), [])
-    assert "measure" not in unseen.call_bytes
-    assert "settle" in plan(replace(RING, period=True), Settings(), []).call_bytes
-    assert "settle" not in plan(replace(RING, period=True), Settings.of(examine=False), []).call_bytes
+    assert "measure_traces" not in unseen.call_bytes
+    assert "finish_slice" in plan(replace(RING, period=True), Settings(), []).call_bytes
+    assert "finish_slice" not in plan(replace(RING, period=True), Settings.of(examine=False), []).call_bytes
 
 
 def test_waves_are_planned_for():

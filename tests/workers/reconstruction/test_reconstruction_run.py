@@ -15,7 +15,7 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers.cluster.fair_shares import Shares
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.reconstruction import arrivals, reconstruction_run
+from bentray_workers.reconstruction import picking_graph, reconstruction_run
 
 from ..cluster.tearing import torn_runs
 
@@ -99,7 +99,7 @@ def test_a_folder_goes_under_the_hands_of_a_call_at_work():
 def test_stop_does_not_wait_for_the_picker(cluster, path, monkeypatch):
     done = threading.Event()
     # The workers are threads of this process, so they meet what is put in place here.
-    monkeypatch.setattr(arrivals, "apply", lambda *arguments: done.wait(30.0))
+    monkeypatch.setattr(picking_graph, "apply", lambda *arguments: done.wait(30.0))
     with pytest.raises(Cancelled):
         reconstruction_run.reconstruct(cluster.client, path, PLAN, stop=lambda: True)
     assert not done.is_set()

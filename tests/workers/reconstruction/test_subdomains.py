@@ -35,7 +35,8 @@ def test_it_equals_the_whole_domain(cluster, grid, seed, on_node):
 def test_a_file_serves_and_blocks_can_be_had_one_by_one(cluster, tmp_path):
     speed = np.random.default_rng(1).uniform(1.0, 2.0, (12, 10, 9))
     np.save(tmp_path / "speed.npy", speed.astype(np.float32))
-    field = subdomains.settle(cluster.client, tmp_path / "speed.npy", 1.0, (5.5, 5.0, 2.2), (2, 2, 1))
+    path, source = tmp_path / "speed.npy", (5.5, 5.0, 2.2)
+    field = subdomains.solve_in_blocks(cluster.client, path, 1.0, source, (2, 2, 1))
     expected = eikonal.solve(speed.astype(np.float32), 1.0, (5.5, 5.0, 2.2), "fsm")
     assert np.allclose(field.whole(), expected, rtol=1e-12, atol=0.0)
     assert np.array_equal(field.block((1, 0, 0)), field.whole()[6:, :5])
@@ -57,7 +58,7 @@ def test_a_lost_workers_blocks_are_made_again(tmp_path):
     expected = solve_by_blocks(PointSource.checked(speed, 1.0, (2.0, 2.0)), (2, 2))
     with open_cluster(workers=2, local_directory=tmp_path, processes=False) as cluster:
         client = cluster.client
-        field = subdomains.settle(client, speed, 1.0, (2.0, 2.0), (2, 2))
+        field = subdomains.solve_in_blocks(client, speed, 1.0, (2.0, 2.0), (2, 2))
         worker = next(iter(client.cluster.workers.values()))
         client.sync(worker.close, nanny=False, executor_wait=False)
         assert np.array_equal(field.whole(), expected)

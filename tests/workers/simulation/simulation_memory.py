@@ -1,4 +1,4 @@
-"""Peak memory of the tasks of simulated scans, in processes of their own; see ``call_memory``.
+"""Peak memory of the tasks of simulated scans, in processes of their own; see ``ray_task_memory``.
 
 Called as ``simulation_memory.py SCANS``, a list of settings as JSON; prints for each scan bytes by task, as
 JSON. Parts are made up for the task that writes the file.

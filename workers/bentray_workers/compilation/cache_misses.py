@@ -1,4 +1,4 @@
-"""Notice of what numba compiles because its cache holds nothing for this processor and these sources."""
+"""Detection of kernels that numba compiles because they are not in its cache."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ KIND = "numba:compile"
 
 
 class _Listener(event.Listener):  # type: ignore[misc]
-    """Notes the name of each kernel that is compiled; those that the cache has make no event."""
+    """Records the name of each compiled kernel; cached kernels cause no event."""
 
     def __init__(self) -> None:
         self.kernels: list[str] = []
@@ -34,7 +34,7 @@ class _Announcer(_Listener):
     def on_start(self, event: Any) -> None:
         if not self.kernels:
             log.warning(
-                "Compiling kernels for this processor (%s), which the cache does not hold: minutes, once.",
+                "Compiling kernels for this processor (%s), which are not in the cache: minutes, once.",
                 get_host_cpu_name(),
             )
         super().on_start(event)
@@ -42,7 +42,7 @@ class _Announcer(_Listener):
 
 @cache
 def announce() -> None:
-    """From now on, the first kernel that this process compiles is said in the log."""
+    """Log the first kernel that this process compiles."""
     event.register(KIND, _Announcer())
 
 

@@ -41,7 +41,7 @@ from . import cache_misses
 def warm_up() -> None:
     """Reconstruct eight elements in water with every solver but OpenCL and with both kinds of ray.
 
-    OpenCL devices are tried when first asked for: a trial takes seconds, and few jobs want one.
+    OpenCL devices are tested on demand: a test takes seconds, and few jobs need one.
     """
     elements = np.arange(8)
     water = Dataset(Ring(8, 0.01).positions(), elements, elements, 1500.0, delta_tof_s=np.zeros((8, 8)))
@@ -52,7 +52,7 @@ def warm_up() -> None:
 
 
 def warm_up_rendering() -> None:
-    """Draw a small ball through the default filter, refracted and shaded; other filters wait."""
+    """Draw a small ball with the default filter, refracted and shaded; other filters compile on demand."""
     filtered = filter_volume(Volume.of(sampled(ONE_HOLE, 8), (1e-3,) * 3), "bspline3", 0.0)
     for mode in ("refract", "shaded"):
         view = RefractionView(iso=(0.5,), mode=mode, width=4, height=4)
@@ -60,7 +60,7 @@ def warm_up_rendering() -> None:
 
 
 def warm_up_tracing() -> None:
-    """Trace a ball through a geometry field of its own; laying meshes out waits for the first job."""
+    """Trace a ball with a geometry field; the layout of meshes compiles on demand."""
     mesh = sphere(4, 5).in_unit_cube()
     surface = surface_of(Chart(mesh, mesh.corners[..., :2]))
     points, starts = spread_points(surface, 2)
@@ -76,7 +76,7 @@ def dask_setup(worker: Any) -> None:
     refusal_log.install()
     cache_misses.announce()
     if worker.nanny is not None:
-        # In a process of its own: what its tasks write is for its user alone.
+        # A separate process: its files are readable by its user only.
         os.umask(0o077)
         memory_cache.set_memory_limit(int(worker.memory_manager.memory_limit or 0))
     with _one_at_a_time():
@@ -87,8 +87,8 @@ def dask_setup(worker: Any) -> None:
 
 @contextmanager
 def _one_at_a_time() -> Iterator[None]:
-    """The first worker of an installation compiles, for minutes; the others then load what it has made."""
-    # Where its kernels are cached: in the folder that the environment names, else beside their sources.
+    """The first worker of an installation compiles for minutes; the others then load its cache."""
+    # Folder of the cached kernels: named by the environment, else that of their sources.
     cache = os.environ.get("NUMBA_CACHE_DIR") or str(Path(bentray_kernels.__file__).parent)
     name = f"bentray-warm-up-{os.getuid()}-{hashlib.sha256(cache.encode()).hexdigest()[:16]}.lock"
     with (Path(tempfile.gettempdir()) / name).open("ab") as file:

@@ -19,7 +19,7 @@ from bentray_kernels.arrays import Flags
 from .atomic import write_bytes
 
 
-class Found(NamedTuple):
+class ScanFindings(NamedTuple):
     """What was found.
 
     Attributes:
@@ -44,7 +44,7 @@ class Found(NamedTuple):
         return words(self.findings, stacked=stacked)
 
 
-def write_findings(path: Path, found: Found, picked: Path | None = None) -> None:
+def write_findings(path: Path, found: ScanFindings, picked: Path | None = None) -> None:
     """Write them; ``path`` is replaced whole or not touched.
 
     Args:
@@ -60,7 +60,7 @@ def write_findings(path: Path, found: Found, picked: Path | None = None) -> None
     write_bytes(path, json.dumps({"sha256": _digest(content), "content": content}, allow_nan=False).encode())
 
 
-def read_findings(path: Path, picked: Path | None = None) -> Found:
+def read_findings(path: Path, picked: Path | None = None) -> ScanFindings:
     """What ``write_findings`` wrote.
 
     Args:
@@ -77,7 +77,7 @@ def read_findings(path: Path, picked: Path | None = None) -> Found:
     if picked is not None and content["changed"] and _digest_of(picked) != content["picked_sha256"]:
         raise ValueError(f"{picked.name} is damaged")
     findings = tuple(_finding(plain) for plain in content["findings"])
-    return Found(findings, bool(content["examined"]), bool(content["changed"]))
+    return ScanFindings(findings, bool(content["examined"]), bool(content["changed"]))
 
 
 def _digest(content: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""Many datasets through one cluster: a bounded number at a time, each failing by itself."""
+"""Batch processing: many datasets on one cluster, a bounded number at a time, with separate failures."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ POLL_S = 0.25
 
 @dataclass
 class Entry:
-    """One dataset of a batch, as it stands; written by the thread that works on it.
+    """State of one dataset of a batch; written by the thread that processes it.
 
     Attributes:
         source: the dataset's file.
         state: ``waiting``, ``running``, then ``succeeded``, ``failed`` or ``skipped``.
-        done, total: of the work, as ``Progress`` has them.
-        residual_rms_s: of the newest sweep, s; None before the first has ended.
-        seconds: from its begin to its end; while it runs, to now.
-        reason: why it failed.
+        done, total: see ``Progress``.
+        residual_rms_s: of the latest iteration, s; None before the first is finished.
+        seconds: duration so far.
+        reason: of a failure.
     """
 
     source: Path
@@ -57,22 +57,22 @@ class Entry:
         return time.perf_counter() - self._begun if self.state == "running" else 0.0
 
     def begin(self) -> None:
-        """It is worked on from now."""
+        """Start."""
         self.state, self._begun = "running", time.perf_counter()
 
     def show(self, progress: Progress) -> None:
-        """How far it is."""
+        """Set the progress."""
         self.done, self.total = progress.done, progress.total
         if progress.history:
             self.residual_rms_s = progress.history[-1].residual_rms_s
 
     def end(self, state: str, reason: str = "") -> None:
-        """It is over."""
+        """Finish in a state."""
         self._seconds = self.seconds
         self.state, self.reason = state, reason
 
     def skip(self, seconds: float, residual_rms_s: float | None) -> None:
-        """Its result was there already."""
+        """Skip: its result exists already."""
         self.state, self._seconds, self.residual_rms_s = "skipped", seconds, residual_rms_s
 
 
@@ -82,14 +82,14 @@ def run(
     watch: Callable[[], None],
     at_once: int,
 ) -> None:
-    """See every entry to its end, in their order.
+    """Process all entries in order.
 
     Args:
-        entries: those that wait; changed in place.
-        work: called in a thread; its second argument tells whether to give up. The entry has failed if it
-            raises, and succeeded if it does not.
+        entries: waiting ones; changed in place.
+        work: called in a thread; its second argument returns whether to stop. The entry has failed if it
+            raises an exception.
         watch: called in this thread several times a second.
-        at_once: entries that are worked on at the same time.
+        at_once: entries processed at the same time.
     """
     stop = threading.Event()
     waiting = deque(entries)
@@ -105,14 +105,14 @@ def run(
                     _settle(running.pop(future), future)
                 watch()
         finally:
-            # Also after Ctrl-C: the pool waits for its threads, and they look at this.
+            # Also after Ctrl-C: the pool waits for its threads, which poll this event.
             stop.set()
 
 
 def _settle(entry: Entry, future: Future[None]) -> None:
     try:
         future.result()
-    # Whatever it was, the other datasets must not suffer from it.
+    # Any failure must not affect the other datasets.
     except Exception as error:
         entry.end("failed", explain_failure(error))
     else:
@@ -120,21 +120,21 @@ def _settle(entry: Entry, future: Future[None]) -> None:
 
 
 def report_of(result: Path, source: Path) -> bytes:
-    """Task: the picture of a reconstruction file beside the truth of its dataset, as PNG."""
+    """Task: report of a reconstruction file with the truth of its dataset, as PNG."""
     dataset = read_dataset(source, traces=False)
     return report_png(read_reconstruction(result), dataset.truth, dataset.roi)
 
 
 def explain_failure(error: Exception) -> str:
-    """Why a dataset failed, in one line."""
+    """Reason of a failure in one line."""
     if isinstance(error, InvalidInput):
         return str(error)
     if isinstance(error, MemoryError):
         return "the memory ran out: use fewer nodes"
     if isinstance(error, KilledWorker):
-        return "the workers that ran it died one after the other, most often for lack of memory"
+        return "the workers that ran it died one after the other, usually for lack of memory"
     if isinstance(error, NoValidWorkerError | NoWorkerError):
-        return "the cluster has no worker that takes reconstructions"
+        return "the cluster has no worker for reconstructions"
     if isinstance(error, CommClosedError):
         return "the connection to the scheduler was lost"
     words = " ".join(str(error).split())

@@ -1,4 +1,4 @@
-"""A scan as tasks know it: a file and settings; every process reads what it needs once."""
+"""A scan for tasks: a file and settings; every process reads it once."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ..files.findings import read_findings
 
 
 class FileScan(NamedTuple):
-    """See ``tomography.stage_graphs.Scan``; ``stamp`` tells a rewritten file from the old one."""
+    """See ``tomography.stage_graphs.Scan``; ``stamp`` distinguishes a rewritten file from the old one."""
 
     path: Path
     stamp: int
@@ -41,8 +41,8 @@ class FileWaveScan(NamedTuple):
     """See ``tomography.waveform.refinement_graph.WaveScan``; ``path`` is that of a file with traces.
 
     Attributes:
-        findings: the file of what was found in the scan; faults of its traces are corrected or left out. Once
-            its folder, the job's, has gone, calls end within a second.
+        findings: the file of findings in the scan; faulty traces are corrected or left out. Tasks end within
+            a second once its folder, that of the job, is removed.
     """
 
     path: Path
@@ -71,11 +71,11 @@ def _problem(scan: FileScan, index: int, stage: int) -> Problem:
 
 @lru_cache(maxsize=2)
 def read_once(path: Path, stamp: int) -> Dataset:
-    """A dataset without its traces; ``stamp`` tells a rewritten file from the old one."""
+    """A dataset without its traces; ``stamp`` distinguishes a rewritten file from the old one."""
     return read_dataset(path, traces=False)
 
 
-# Two jobs may take turns; more would cost memory, for a problem holds the traces of the object.
+# Two jobs may alternate; more would cost memory, since a problem holds the traces of the object.
 @lru_cache(maxsize=2)
 def _wave_problem(scan: FileWaveScan, number: int) -> WaveProblem:
     faults = read_findings(scan.findings).of_traces(scan.slice)

@@ -1,4 +1,4 @@
-"""What a reconstruction will take of its workers, computed before it starts, and whether they have it."""
+"""Plan of a reconstruction: tasks and memory, computed before it starts and checked against the workers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..cluster.checkpoints import KEPT
 from ..files.dataset.counts import Summary
 from ..files.dataset.format import PAIR_ARRAYS
 from ..files.reconstruction import IMAGES
-from .memory.arrival_memory import arrival_tasks
+from .memory.picking_memory import picking_tasks
 from .memory.ray_memory import (
     call_bytes,
     emitters_of,
@@ -28,32 +28,32 @@ from .memory.ray_memory import (
     shape_of,
     state_bytes,
 )
-from .memory.waveform_memory import budgeted, wave_call_bytes, wave_tasks
+from .memory.waveform_memory import budgeted, wave_task_bytes, wave_tasks
 
 Decomposition = Literal["slices", "emitters", "volume"]
 
-# What a result and a checkpoint say beside their images.
+# Size of a result or a checkpoint without its images.
 RECORD_BYTES = 64 * 2**10
 
-# Nodes that an emitter's rays cross in half a second of SART, on a core of 2020; only tells how many tasks.
+# Nodes crossed by rays in half a second of SART on a core of 2020; for the estimated number of tasks.
 NODES_IN_A_TASK = 1.5e7
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How a reconstruction is cut into tasks and what the tasks take.
+    """Tasks of a reconstruction and their memory.
 
     Attributes:
-        decomposition: ``slices`` side by side; ``emitters`` of each slice side by side; a ``volume``.
-        lane: which workers take the tasks.
-        tasks: about how many there will be.
-        workers: how many are connected and can hold each of them.
-        call_bytes: of one task, by its name; working arrays, arguments and what
-            a process keeps of the dataset.
-        field_bytes, rows_bytes, state_bytes: of a travel time while it is made; of all rows of an image; of
-            what comes back between two calls.
-        stored_bytes: on disk while it runs, at most: the result, and the checkpoints beside it.
-        why: all of it in a sentence.
+        decomposition: ``slices`` in parallel; ``emitters`` of each slice in parallel; a ``volume``.
+        lane: resource of the workers.
+        tasks: estimated number of tasks.
+        workers: connected workers that can run each of them.
+        call_bytes: memory of one task by its name: working arrays, arguments and cached parts of the
+            dataset.
+        field_bytes, rows_bytes, state_bytes: of a travel time; of all rays of an image; of the state between
+            two tasks.
+        stored_bytes: largest disk space of result and checkpoints.
+        why: summary in a sentence.
     """
 
     decomposition: Decomposition
@@ -69,7 +69,7 @@ class Plan:
 
     @property
     def largest(self) -> tuple[str, int]:
-        """The call that takes most, and its bytes."""
+        """The task with the largest memory, and this memory, bytes."""
         return max(self.call_bytes.items(), key=lambda item: item[1])
 
     def to_dict(self) -> dict[str, Any]:
@@ -77,55 +77,54 @@ class Plan:
         return {**asdict(self), "call_bytes": dict(self.call_bytes), "largest_bytes": self.largest[1]}
 
 
-def plan(scan: Summary, settings: Settings, offers: Sequence[WorkerCapacity]) -> Plan:
+def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]) -> Plan:
     """The plan of a reconstruction on the workers that are connected now.
 
     Args:
         scan: the dataset.
-        settings: see ``Settings``; ``decomposition`` and ``eikonal`` override what a plan could choose.
-        offers: the connected workers; none says nothing, for some may come.
+        settings: see ``Settings``.
+        capacities: of the connected workers; without any, no limit is checked.
 
     Raises:
-        InvalidInput: for a lane that no connected worker offers, for a task that none can hold (``nodes``
-            with the bytes found and accepted), and for an array of no width, taken in before that was
-            refused.
+        InvalidInput: for a resource that no connected worker has, for a task that none can run (``nodes``
+            with the bytes found and accepted), and for an array without width, stored by earlier versions.
     """
     _check_extent(scan)
     lane: Lane = "opencl" if resource_of(settings) == "opencl" else "recon"
-    fitting = [offer for offer in offers if lane in offer.resources]
-    if offers and not fitting:
+    fitting = [one for one in capacities if lane in one.resources]
+    if capacities and not fitting:
         raise InvalidInput(
-            "eikonal", f"{settings.eikonal!r}, which no connected worker offers", "a method without a device"
+            "eikonal", f"{settings.eikonal!r}, which no connected worker has", "a method without a device"
         )
-    ways = [settings]
+    methods = [settings]
     if settings.selects_model:
-        ways = [settings.changed(**changes) for changes in CANDIDATES]
+        methods = [settings.changed(**changes) for changes in CANDIDATES]
     calls: dict[str, int] = {}
-    for way in ways:
-        for name, size in call_bytes(scan, way).items():
+    for method in methods:
+        for name, size in call_bytes(scan, method).items():
             calls[name] = max(size, calls.get(name, 0))
-    # Trials of elements in space are judged by times alone.
-    heard = None if scan.in_space and settings.method == "auto" else scan.traces
-    refining = budgeted(heard, scan.width_m, scan.slices, settings)
-    waves = wave_call_bytes(heard, scan.width_m, refining)
+    # Candidates of 3-D arrays are validated by times alone.
+    traces = None if scan.in_space and settings.method == "auto" else scan.traces
+    refining = budgeted(traces, scan.width_m, scan.slices, settings)
+    waves = wave_task_bytes(traces, scan.width_m, refining)
     calls |= waves
-    room = max((offer.task_bytes for offer in fitting), default=math.inf)
+    limit = max((one.task_bytes for one in fitting), default=math.inf)
     name, size = max(calls.items(), key=lambda item: item[1])
-    if size > room:
+    if size > limit:
         field: str = "nodes" if name not in waves else "method" if name == "judge_by_waves" else "minutes"
         found = getattr(settings, field)
         raise InvalidInput(
             field,
             f"{found}, for which a task ({name}) takes {size} bytes",
-            f"settings whose tasks take at most {room:.0f} bytes" + _advice(scan, settings, room),
+            f"settings whose tasks take at most {limit:.0f} bytes" + _advice(scan, settings, limit),
         )
-    able = [offer for offer in fitting if offer.task_bytes >= size]
+    able = [one for one in fitting if one.task_bytes >= size]
     shape = shape_of(scan, settings)
     decomposition = _decomposition(settings)
-    tasks = sum(_tasks(scan, way, shape) for way in ways)
-    tasks += scan.slices * wave_tasks(heard, scan.width_m, refining)
+    tasks = sum(_tasks(scan, method, shape) for method in methods)
+    tasks += scan.slices * wave_tasks(traces, scan.width_m, refining)
     if scan.traces_bytes:
-        tasks = tasks * (1 + settings.numerics.guided_rounds) + arrival_tasks(
+        tasks = tasks * (1 + settings.numerics.guided_rounds) + picking_tasks(
             scan.traces, scan.slices, settings
         )
     return Plan(
@@ -134,11 +133,11 @@ def plan(scan: Summary, settings: Settings, offers: Sequence[WorkerCapacity]) ->
         tasks,
         len(able),
         calls,
-        max(field_bytes(shape, way.ray_eikonal) for way in ways),
-        max(rows_bytes(scan, way, rays_of(scan, way)) for way in ways),
+        max(field_bytes(shape, method.ray_eikonal) for method in methods),
+        max(rows_bytes(scan, method, rays_of(scan, method)) for method in methods),
         state_bytes(shape, settings),
         _stored_bytes(scan, settings, shape),
-        _why(scan, settings, decomposition, lane, tasks, (name, size), offers, able),
+        _why(scan, settings, decomposition, lane, tasks, (name, size), capacities, able),
     )
 
 
@@ -148,21 +147,21 @@ def _check_extent(scan: Summary) -> None:
         raise InvalidInput("slice/z_m", f"slices over {scan.height_m:.4g} m", f"at most {WIDTH_M.most:g} m")
 
 
-def blocks_of(shape: tuple[int, ...], offers: Sequence[WorkerCapacity]) -> tuple[int, ...]:
+def blocks_of(shape: tuple[int, ...], capacities: Sequence[WorkerCapacity]) -> tuple[int, ...]:
     """Blocks along each axis for ``reconstruction.subdomains.solve``.
 
-    One where a worker can hold the whole field by ``fsm``, else as few as all workers together can hold, the
-    longest sides cut first.
+    One if a worker can hold the whole field by ``fsm``, else the smallest number that all workers together
+    can hold, cutting the longest sides first.
 
     Raises:
-        InvalidInput: where they cannot hold it together.
+        InvalidInput: for a field larger than the memory of all workers.
     """
-    rooms = [offer.task_bytes for offer in offers if "recon" in offer.resources]
-    if not rooms or max(rooms) >= field_bytes(shape, "fsm"):
+    limits = [one.task_bytes for one in capacities if "recon" in one.resources]
+    if not limits or max(limits) >= field_bytes(shape, "fsm"):
         return (1,) * len(shape)
-    least, together = min(rooms), len(rooms)
+    least, together = min(limits), len(limits)
     blocks = [1] * len(shape)
-    # A worker keeps slowness, times and one earlier copy of each of its blocks, and sweeps one at a time.
+    # A worker holds slowness, times and one earlier copy of each of its blocks, and sweeps one at a time.
     while True:
         block = tuple(-(-n // b) for n, b in zip(shape, blocks, strict=True))
         kept = 3 * REAL * math.prod(block) * -(-math.prod(blocks) // together)
@@ -181,7 +180,7 @@ def _decomposition(settings: Settings) -> Decomposition:
 
 
 def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
-    """About how many calls, the stages on coarser grids included."""
+    """Estimated number of tasks, with stages on coarser grids."""
     problems = 1 if settings.decomposition == "volume" else scan.slices
     emitters = emitters_of(scan, settings)
     parts = -(-emitters // BATCH)
@@ -197,18 +196,18 @@ def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
 
 
 def _stored_bytes(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
-    """As if nothing could be packed: all images of the result, checkpoints, and what is picked in traces."""
+    """Without compression: all images of the result, checkpoints, and picked times."""
     problems = 1 if settings.decomposition == "volume" else scan.slices
     picked = len(PAIR_ARRAYS) * REAL * scan.pairs if scan.traces_bytes else 0
     each = len(IMAGES) * REAL * math.prod(shape) + KEPT * state_bytes(shape, settings) + RECORD_BYTES
     return problems * each + picked
 
 
-def _advice(scan: Summary, settings: Settings, room: float) -> str:
-    """The largest grid that fits, in words; empty where none does."""
+def _advice(scan: Summary, settings: Settings, limit: float) -> str:
+    """The largest grid that fits, in words; empty without one."""
 
     def fits(nodes: int) -> bool:
-        return max(call_bytes(scan, settings.changed(nodes=nodes, coarser_grids=0)).values()) <= room
+        return max(call_bytes(scan, settings.changed(nodes=nodes, coarser_grids=0)).values()) <= limit
 
     if settings.selects_model or not fits(LEAST_NODES):
         return ""
@@ -216,7 +215,7 @@ def _advice(scan: Summary, settings: Settings, room: float) -> str:
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if fits(middle) else (low, middle)
-    return f", as nodes up to {low}, or a worker with more memory"
+    return f", such as nodes up to {low}, or a worker with more memory"
 
 
 def _why(
@@ -226,25 +225,25 @@ def _why(
     lane: Lane,
     tasks: int,
     largest: tuple[str, int],
-    offers: Sequence[WorkerCapacity],
+    capacities: Sequence[WorkerCapacity],
     able: Sequence[WorkerCapacity],
 ) -> str:
     slices = f"{scan.slices} slice{'s' if scan.slices > 1 else ''}"
     cut: dict[Decomposition, Callable[[], str]] = {
-        "slices": lambda: f"{slices} side by side, for SART uses the emitters of a slice one after the other",
-        "emitters": lambda: f"the {scan.emitters} emitters of each of {slices} side by side",
+        "slices": lambda: f"{slices} in parallel; SART uses the emitters of a slice one after the other",
+        "emitters": lambda: f"the {scan.emitters} emitters of each of {slices} in parallel",
         "volume": lambda: (
-            f"one volume, as asked for by decomposition, of {emitters_of(scan, settings)} emitters"
-            + (" one after the other (SART)" if settings.method == "sart" else " side by side")
+            f"one volume of {emitters_of(scan, settings)} emitters"
+            + (" one after the other (SART)" if settings.method == "sart" else " in parallel")
         ),
     }
     name, size = largest
-    if not offers:
+    if not capacities:
         who = "no worker is connected yet"
     else:
-        limits = [offer.task_bytes for offer in able]
-        told = "no limit" if math.isinf(max(limits)) else f"up to {max(limits) / MIB:.0f} MiB"
-        who = f"{len(able)} of {len(offers)} workers can hold it ({told})"
+        limits = [one.task_bytes for one in able]
+        memory = "no limit" if math.isinf(max(limits)) else f"up to {max(limits) / MIB:.0f} MiB"
+        who = f"{len(able)} of {len(capacities)} workers can run it ({memory})"
     where = " on OpenCL devices" if lane == "opencl" else ""
     what = cut[decomposition]()
     return (

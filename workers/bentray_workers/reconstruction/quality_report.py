@@ -1,4 +1,4 @@
-"""The quality report of a dataset file: what was found, and a page; traces are read an emission at a time."""
+"""Quality report of a dataset file: findings and a page; traces are read one emission at a time."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from ..files.dataset.read import NUMERIC, TRACES
 from ..files.dataset.traces import slice_opened
 from ..files.hdf5_reading import opened
 
-# Told (emissions gone through, in all).
-Told = Callable[[int, int], None]
+# Called with the number of examined emissions, and of all.
+OnEmission = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class Quality:
-    """What a scan's examination gives.
+    """Result of the examination of a scan.
 
     Attributes:
         report: plain values for JSON, see ``acquisition.quality.Report``.
         page: PNG about the slice with the most findings.
-        picked: what goes on, with travel times; None for a refused scan.
-        examined: the report as it was made.
+        picked: the corrected dataset with travel times; None for a rejected scan.
+        examined: the report itself.
     """
 
     report: dict[str, Any]
@@ -41,24 +41,24 @@ class Quality:
     examined: Report
 
 
-# Traces that a task examines while somebody waits, bytes: it takes a core half a minute.
+# Largest traces of an interactive examination, bytes: half a minute of a core.
 LARGEST_BYTES = 2**30
 
 
 def calibrate_file(
-    path: Path, picker: str, progress: Told | None = None, *, fit_speed: bool
+    path: Path, picker: str, progress: OnEmission | None = None, *, fit_speed: bool
 ) -> tuple[Quality, Calibration | None]:
     """Examine a dataset file, and calibrate its array from the water shot of its first slice.
 
     Args:
         path: of the file.
-        picker: what reads times that are not there.
+        picker: for datasets without travel times.
         progress: of the examination.
-        fit_speed: whether the size of the array is trusted more than the speed of the water.
+        fit_speed: fit the speed of sound in water instead of the size of the array.
 
     Returns:
-        The examination, ``picked`` with the elements and the water of the calibration; and this, None for a
-        refused scan.
+        The examination, with the elements and the water of the calibration in ``picked``; and the
+        calibration, None for a rejected scan.
 
     Raises:
         InvalidInput: as ``examine_file``, and for a scan without a water shot.
@@ -74,15 +74,15 @@ def calibrate_file(
 
 
 def examine_file(
-    path: Path, picker: str = "aic", progress: Told | None = None, largest_bytes: int | None = None
+    path: Path, picker: str = "aic", progress: OnEmission | None = None, largest_bytes: int | None = None
 ) -> Quality:
     """Examine a dataset file.
 
     Args:
         path: of the file.
-        picker: what reads times that are not there.
-        progress: called after each emission, as often as its traces are looked at.
-        largest_bytes: of traces; None: as many as there are, for they are never in memory together.
+        picker: for datasets without travel times.
+        progress: called after each emission, in each pass over the traces.
+        largest_bytes: of traces; None: no limit, since they are never all in memory.
 
     Raises:
         InvalidInput: from the file, for an unknown picker, or for more traces than allowed.
@@ -92,8 +92,8 @@ def examine_file(
     return _examined(path, read_dataset(path, traces=False), picker, progress)
 
 
-def _examined(path: Path, whole: Dataset, picker: str, progress: Told | None) -> Quality:
-    # Matplotlib comes with it, which the service, that only hands the task out, need not hold.
+def _examined(path: Path, whole: Dataset, picker: str, progress: OnEmission | None) -> Quality:
+    # It loads Matplotlib, which the service, where the task is only submitted, does not need.
     from ..images.quality_page import quality_png
 
     examined = examine_slices(whole, _slices(path, whole), picker, progress)
@@ -105,7 +105,7 @@ def _examined(path: Path, whole: Dataset, picker: str, progress: Told | None) ->
 
 
 def _slices(path: Path, whole: Dataset) -> Iterator[Dataset]:
-    """Each slice, its traces readable until the next is asked for."""
+    """Each slice, with traces that are readable until the next one."""
     for index in range(whole.slices):
         with slice_opened(path, whole, index) as one:
             yield one
@@ -113,16 +113,16 @@ def _slices(path: Path, whole: Dataset) -> Iterator[Dataset]:
 
 def quality_report(path: Path, picker: str) -> dict[str, Any]:
     """Task: the report alone."""
-    return _waited_for(path, picker).report
+    return _cancellable(path, picker).report
 
 
 def quality_page(path: Path, picker: str) -> bytes:
     """Task: the page alone."""
-    return _waited_for(path, picker).page
+    return _cancellable(path, picker).page
 
 
-def _waited_for(path: Path, picker: str) -> Quality:
-    """An examination that ends early when nobody waits for it any more."""
+def _cancellable(path: Path, picker: str) -> Quality:
+    """An examination that ends early when its task is cancelled."""
     check = cancellation_check()
     return examine_file(path, picker, lambda done, total: check(), LARGEST_BYTES)
 
@@ -133,5 +133,5 @@ def _check_size(path: Path, largest_bytes: int) -> None:
         size = sum(math.prod(one.shape) * one.dtype.itemsize for one in found if one is not None)
     if size > largest_bytes:
         raise InvalidInput(
-            "dataset", f"{size} bytes of traces", f"at most {largest_bytes}; bentray quality takes more"
+            "dataset", f"{size} bytes of traces", f"at most {largest_bytes}; bentray quality has no limit"
         )

@@ -25,12 +25,12 @@ from ..cluster.resources import RECONSTRUCTION
 from ..cluster.task_pool import open_pool
 from ..files.dataset import read_dataset
 from ..files.dataset.traces import trace_samples
-from ..files.findings import Found, read_findings
+from ..files.findings import ScanFindings, read_findings
 from ..files.reconstruction import write_reconstruction
-from .arrivals import Files, Guide, PickingGraph, Source
 from .file_scan import FileScan, FileWaveScan
+from .picking_graph import PickingFiles, PickingGraph, PickingGuide, PickingSource
 
-# The phase of a job's progress after those of ``arrivals``.
+# Phase of the progress of a job, after those of ``picking_graph``.
 RECONSTRUCTING = "reconstructing"
 
 
@@ -93,14 +93,14 @@ class _Job(NamedTuple):
 
 def _pick_with_guides(
     job: _Job, settings: Settings, progress: _JobProgress
-) -> tuple[Path, Found, Settings, tuple[Trial, ...]]:
+) -> tuple[Path, ScanFindings, Settings, tuple[Trial, ...]]:
     """A file with travel times, and the findings in the scan: picked, and again guided by images.
 
     Also the settings to continue with: what ``auto`` chose for the first image holds for all, so that the
     settings of the result reproduce it.
     """
     amplitudes = settings.attenuation.amplitudes if settings.reads_amplitudes else "recorded"
-    source = Source(
+    source = PickingSource(
         job.scan,
         job.scan.stat().st_mtime_ns,
         job.folder,
@@ -108,7 +108,7 @@ def _pick_with_guides(
         settings.picking.examine,
         amplitudes,
     )
-    path, findings = _pick(job, source, Files.of(job.folder), None, progress)
+    path, findings = _pick(job, source, PickingFiles.of(job.folder), None, progress)
     rounds = 0 if source.dataset.picked else settings.numerics.guided_rounds
     rays = settings.changed(
         method="auto" if settings.method == "waveform" else settings.method,
@@ -129,8 +129,8 @@ def _pick_with_guides(
                 name: getattr(settings, name) for name in ("attenuation", "resolution_check", "minutes")
             }
             settings = rays.changed(**requested)
-        guide = Guide(image, Files.of(job.folder).findings)
-        again, findings_again = _pick(job, source, Files.of(job.folder, number), guide, progress)
+        guide = PickingGuide(image, PickingFiles.of(job.folder).findings)
+        again, findings_again = _pick(job, source, PickingFiles.of(job.folder, number), guide, progress)
         if same_picks(*(read_dataset(one, traces=False) for one in (path, again))):
             break
         path, findings = again, findings_again
@@ -139,8 +139,8 @@ def _pick_with_guides(
 
 
 def _pick(
-    job: _Job, source: Source, files: Files, guide: Guide | None, progress: _JobProgress
-) -> tuple[Path, Found]:
+    job: _Job, source: PickingSource, files: PickingFiles, guide: PickingGuide | None, progress: _JobProgress
+) -> tuple[Path, ScanFindings]:
     """The file to reconstruct after a round of picking, and its findings."""
     try:
         findings = read_findings(files.findings, files.picked)
@@ -155,7 +155,7 @@ def _pick(
 
 def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _JobProgress) -> Reconstruction:
     stamp, recorded = path.stat().st_mtime_ns, job.scan.stat().st_mtime_ns
-    faults = Files.of(job.folder).findings
+    faults = PickingFiles.of(job.folder).findings
 
     def run_graphs(graphs: Sequence[TomographyGraph], before: int, after: int) -> None:
         # A resumed job runs the same groups in the same order, so a number names the same graph again.

@@ -1,7 +1,7 @@
-"""One travel-time field in blocks that stay on the workers and trade their faces until they agree.
+"""Domain decomposition of one travel-time field: blocks on workers exchange faces until convergence.
 
-For fields larger than a worker's memory: a block's slowness and times never leave the workers; from block to
-block go faces, and to this process only whether they have changed.
+For fields larger than the memory of a worker: slowness and times of a block never leave the workers; faces go
+from block to block, and to this process only the information whether they have changed.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from ..cluster.connected import connected_workers
 from ..cluster.resources import RECONSTRUCTION
 from ..files.npy_headers import PARSING
 
-# A file that every worker reads its blocks of, or the speed itself.
+# A file from which workers read their blocks, or the speed itself.
 Speed = Path | Floats
 
 
 class Edges(NamedTuple):
-    """What a block tells its neighbours, in the order of ``reconstruction.subdomains.Faces``."""
+    """Faces of a block for its neighbours, and which of them have changed."""
 
     faces: tuple[Floats, ...]
     changed: tuple[bool, ...]
@@ -46,12 +46,12 @@ class Edges(NamedTuple):
 
 @dataclass(frozen=True)
 class BlockField:
-    """A settled travel time whose blocks are still on the workers; they go with the last reference to it.
+    """A converged travel time with its blocks on the workers; they are freed with the last reference.
 
     Attributes:
         shape: (nx, ny[, nz]).
-        boxes: the nodes of each block, by its place among the blocks.
-        rounds: how often blocks swept and then traded faces.
+        boxes: the nodes of each block, by its position among the blocks.
+        rounds: number of sweeps with exchanges of faces.
     """
 
     shape: tuple[int, ...]
@@ -87,7 +87,7 @@ def solve(
     Args:
         client: of the cluster.
         speed: (nx, ny[, nz]), m/s, or a ``.npy`` file of it that every worker can read. Of an array each
-            block travels with its task, so that a lost worker's blocks are made again elsewhere.
+            block is sent with its task, so that blocks of a lost worker are computed again elsewhere.
         spacing: node spacing, m.
         source: (ndim,), m, in the grid; node 0 lies at 0.
         blocks: along each axis, from 1 to the nodes there; see ``planning.blocks_of`` for a number that fits.
@@ -99,10 +99,10 @@ def solve(
     Raises:
         InvalidInput: for a speed, source or number of blocks that does not fit.
     """
-    return settle(client, speed, spacing, source, blocks, tolerance=tolerance).whole()
+    return solve_in_blocks(client, speed, spacing, source, blocks, tolerance=tolerance).whole()
 
 
-def settle(
+def solve_in_blocks(
     client: Client,
     speed: Path | ArrayLike,
     spacing: float,
@@ -111,7 +111,7 @@ def settle(
     *,
     tolerance: float = 1e-12,
 ) -> BlockField:
-    """As ``solve``, but the field stays in its blocks, for grids that no process can hold."""
+    """As ``solve``, but the field stays in its blocks, for grids larger than any process."""
     given: Speed = speed if isinstance(speed, Path) else np.asarray(speed, dtype=np.float64)
     array = opened(given)
     if array.ndim not in (2, 3) or array.size == 0:
@@ -136,7 +136,7 @@ def settle(
         place: run(place, slowness_of, given if isinstance(given, Path) else array[box], box)
         for place, box in boxes.items()
     }
-    # A block with seeds begins with them; every other one knows nothing before a face comes in.
+    # A block around the source starts from seeds; others start with the first face that arrives.
     own = {place: _within(seeds, box) for place, box in boxes.items()}
     swept: dict[Place, Future] = {}
     held: dict[Place, list[Future | None]] = {place: [None] * (2 * array.ndim) for place in boxes}
@@ -149,9 +149,9 @@ def settle(
             swept[place] = run(place, sweep, slowness[place], before, list(held[place]), spacing, tolerance)
             edges[place] = run(place, _edges, swept[place])
         changed = {place: run(place, _changed, edge) for place, edge in edges.items()}
-        told: dict[Place, tuple[bool, ...]] = client.gather(changed)
+        changes: dict[Place, tuple[bool, ...]] = client.gather(changed)
         waiting = set()
-        for place, sides in told.items():
+        for place, sides in changes.items():
             for side, beyond in neighbours(place, boxes):
                 if sides[side]:
                     held[beyond][opposite(side)] = run(beyond, _face, edges[place], side)
@@ -160,10 +160,10 @@ def settle(
 
 
 def opened(speed: Speed) -> Floats:
-    """The speed itself, or what maps its file without reading it.
+    """The speed itself, or a memory map of its file.
 
     Raises:
-        InvalidInput: for a file that is none of one array of numbers.
+        InvalidInput: for a file without an array of numbers.
     """
     if not isinstance(speed, Path):
         return speed
@@ -197,14 +197,14 @@ def sweep(
     spacing: float,
     tolerance: float,
 ) -> BlockSweep:
-    """Task: settle one block, from what it was or, at first, from the seeds in it, by their nodes in it."""
+    """Task: sweep one block to convergence, from its earlier times or, at first, from the seeds in it."""
     if isinstance(before, BlockSweep):
         return sweep_block(slowness, before.times, faces, spacing, tolerance)
     times = np.full(slowness.shape, math.inf)
     for node, time in before.items():
         times[node] = time
     found = sweep_block(slowness, times, faces, spacing, tolerance)
-    # To the neighbours the seeds are news as well.
+    # The seeds are changes for the neighbours too.
     return BlockSweep(found.times, found.faces, tuple(bool(np.isfinite(face).any()) for face in found.faces))
 
 
@@ -225,7 +225,7 @@ def _times(swept: BlockSweep) -> Floats:
 
 
 def _seeds(speed: Floats, spacing: float, source: Floats) -> dict[Node, float]:
-    """Times of the nodes around the source, s; of the speed only those nodes are read."""
+    """Times of the nodes around the source, s; only these nodes of the speed are read."""
     cell = cell_of(source, speed.shape, spacing)
     at_nodes = [float(speed[node]) for node, _ in cell]
     for (node, _), value in zip(cell, at_nodes, strict=True):
@@ -244,7 +244,7 @@ def _within(seeds: Mapping[Node, float], box: Box) -> dict[Node, float]:
 
 
 def _homes(client: Client, places: Sequence[Place]) -> dict[Place, str]:
-    """A worker for each block, neighbours in turn: data stay with it while it lives.
+    """A worker for each block, in turn; its data stay there as long as the worker lives.
 
     Raises:
         ConnectionError: without workers.

@@ -16,11 +16,11 @@ from bentray_workers.cluster.capacities import MIB
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.counts import Traces
 from bentray_workers.files.dataset.summary import summary_of
-from bentray_workers.reconstruction.memory.waveform_memory import wave_call_bytes, wave_tasks
+from bentray_workers.reconstruction.memory.waveform_memory import wave_task_bytes, wave_tasks
 
 from ....kernels.tomography.waveform.scans import CENTRE_HZ, ELEMENTS, RATE_HZ, WATER, scan
 
-PROGRAM = Path(__file__).with_name("wave_call_memory.py")
+PROGRAM = Path(__file__).with_name("wave_task_memory.py")
 ROOT = Path(__file__).parents[4]
 SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
 
@@ -47,7 +47,7 @@ def test_calls_take_what_the_plan_says(asked, elements, samples):
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     measured = json.loads(done.stdout)
     traces = replace(SCAN, emissions=elements, receivers=elements, samples=samples)
-    told = wave_call_bytes(traces, 0.1, Settings.of(method="waveform", **asked))
+    told = wave_task_bytes(traces, 0.1, Settings.of(method="waveform", **asked))
     assert set(told) == set(measured)
     wrong = {
         name: (told[name], taken)
@@ -66,31 +66,31 @@ def test_calls_take_what_the_plan_says(asked, elements, samples):
 def test_more_of_anything_never_takes_less(bands, emissions, samples, width):
     traces = replace(SCAN, emissions=emissions, samples=samples)
     settings = Settings.of(method="waveform", bands=bands)
-    found = wave_call_bytes(traces, width, settings)
+    found = wave_task_bytes(traces, width, settings)
     # Beyond those that a band uses emissions do not count, but where they are read in blocks.
-    many = wave_call_bytes(replace(traces, emissions=emissions + 64), width, settings)
+    many = wave_task_bytes(replace(traces, emissions=emissions + 64), width, settings)
     assert all(many[name] >= size for name, size in found.items())
     assert emissions < 64 or many["look_at_waves"] == found["look_at_waves"]
     for other in (
-        wave_call_bytes(replace(traces, receivers=traces.receivers + 64), width, settings),
-        wave_call_bytes(replace(traces, samples=samples + 300), width, settings),
-        wave_call_bytes(traces, width + 0.05, settings),
+        wave_task_bytes(replace(traces, receivers=traces.receivers + 64), width, settings),
+        wave_task_bytes(replace(traces, samples=samples + 300), width, settings),
+        wave_task_bytes(traces, width + 0.05, settings),
     ):
         assert all(other[name] > size for name, size in found.items())
-    more = wave_call_bytes(traces, width, settings.changed(bands=bands + 1))
+    more = wave_task_bytes(traces, width, settings.changed(bands=bands + 1))
     assert all(more[name] >= size for name, size in found.items())
 
 
 def test_what_auto_may_do_is_planned():
     """It judges by waves where there are traces, and refines where it is given minutes."""
     auto = Settings(method="auto")
-    judged = wave_call_bytes(SCAN, 0.1, auto)
+    judged = wave_task_bytes(SCAN, 0.1, auto)
     assert list(judged) == ["judge_by_waves"]
-    assert wave_call_bytes(SCAN, 0.1, replace(auto, minutes=1e4)) == wave_call_bytes(
+    assert wave_task_bytes(SCAN, 0.1, replace(auto, minutes=1e4)) == wave_task_bytes(
         SCAN, 0.1, replace(auto, method="waveform")
     )
     assert wave_tasks(SCAN, 0.1, auto) == 0 < wave_tasks(SCAN, 0.1, replace(auto, minutes=1e4))
-    assert wave_call_bytes(None, 0.1, auto) == wave_call_bytes(SCAN, 0.1, Settings()) == {}
+    assert wave_task_bytes(None, 0.1, auto) == wave_task_bytes(SCAN, 0.1, Settings()) == {}
 
 
 def test_traces_are_summed_up_where_there_are_both(tmp_path):

@@ -1,7 +1,6 @@
-"""Bytes that the calls of a reconstruction take, counted from the arrays that the kernels make.
+"""Memory of the tasks of a reconstruction beyond that of a warm worker, from the arrays of the kernels.
 
-``tests/workers/reconstruction/test_planning.py`` holds them against measured peaks. They are what a process
-takes beyond what a warm worker holds anyway.
+Compared with measured peaks in ``tests/workers/reconstruction/test_planning.py``.
 """
 
 from __future__ import annotations
@@ -17,16 +16,16 @@ from bentray_kernels.tomography.stage_graphs import BATCH
 
 from ...cluster.capacities import MIB, REAL
 from ...files.dataset.counts import Summary
-from .arrival_memory import arrival_call_bytes, emissions_a_call, settle_bytes
+from .picking_memory import emissions_per_task, finish_slice_bytes, picking_task_bytes
 
-# Python's own part of any call.
+# Overhead of Python in any task.
 FLOOR_BYTES = 7 * MIB // 2
 
-# Bytes a padded node of a travel time with its gradient, spline and copies, beside the sweeps' arrays.
+# Bytes per padded node of a travel time with gradient, spline and copies, without the arrays of the sweeps.
 FIELD_BYTES_PER_NODE = 80
 
-# Entries of a ray's row over the nodes of a side: chords are 0.64 of the ring's width on average, and each
-# step between nodes touches the corners of its cells. In space a level ray stays in its plane.
+# Matrix entries of a ray per node of a side: chords are 0.64 of the ring's width on average, and each step
+# between nodes touches the corners of its cells. In 3-D a level ray stays in its plane.
 ENTRIES_LEVEL, ENTRIES_IN_SPACE = 1.55, 3.1
 
 # An entry is a column of 4 bytes and a length of 4.
@@ -34,20 +33,20 @@ ENTRY_BYTES = 8
 
 
 def field_bytes(shape: tuple[int, ...], method: str) -> int:
-    """Peak of one travel time with what rays are traced by.
+    """Peak memory of one travel time with the data for ray tracing.
 
     Args:
         shape: (nx, ny[, nz]).
         method: one of ``eikonal.methods()``.
     """
     nodes = math.prod(n + 2 for n in shape)
-    # Both grids of times and crossings, and the one that says that nothing is known.
+    # Two grids of times and crossings, and the mask of known nodes.
     swept = 5 * REAL * Diagonals.of(shape).size if method in ("accurate", "fsm") else 0
     return FIELD_BYTES_PER_NODE * nodes + swept
 
 
 def shape_of(scan: Summary, settings: Settings) -> tuple[int, ...]:
-    """Of an image, as ``Problem.of`` makes it."""
+    """Shape of an image, as ``Problem.of`` makes it."""
     nodes = settings.nodes
     if settings.decomposition == "slices":
         return nodes, nodes
@@ -57,48 +56,48 @@ def shape_of(scan: Summary, settings: Settings) -> tuple[int, ...]:
 
 
 def emitters_of(scan: Summary, settings: Settings) -> int:
-    """Emitters of one problem."""
+    """Number of emitters of one problem."""
     return scan.emitters * (scan.slices if settings.decomposition == "volume" else 1)
 
 
 def rays_of(scan: Summary, settings: Settings) -> int:
-    """Rays of one problem that are rows at a time."""
+    """Number of rays of one problem that are held at the same time."""
     rays = emitters_of(scan, settings) * scan.receivers
     return -(-rays // 2) if settings.method == "gauss-newton" and settings.numerics.reciprocity else rays
 
 
 def _entries(settings: Settings, in_space: bool) -> float:
-    """Of a ray's row."""
+    """Matrix entries per ray."""
     level = settings.decomposition == "slices" or (settings.rays == "straight" and not in_space)
     return settings.nodes * (ENTRIES_LEVEL if level else ENTRIES_IN_SPACE)
 
 
 def rows_bytes(scan: Summary, settings: Settings, rays: int) -> int:
-    """Of so many rays as ``linearisation.Rows``: their entries, and a pointer and a residual each."""
+    """Memory of rays as ``linearisation.Rows``: their entries, and a pointer and a residual each."""
     return math.ceil(rays * (_entries(settings, scan.in_space) * ENTRY_BYTES + 2 * REAL))
 
 
 def state_bytes(shape: tuple[int, ...], settings: Settings) -> int:
-    """Slowness and coverage; Gauss–Newton has the best image, the one it began with and the dual too."""
+    """Slowness and coverage; with Gauss–Newton the best image, the start and the dual too."""
     images = 2 if settings.method == "sart" else 4 + len(shape)
     return images * REAL * math.prod(shape)
 
 
 def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
-    """Bytes of each kind of call of one way to reconstruct.
+    """Memory of each kind of task of one method, bytes.
 
     Args:
         scan: the dataset.
-        settings: of one way; never ``method`` auto.
+        settings: of one method; never ``method`` auto.
 
     Returns:
-        By the name of the task, in ``arrivals`` too where traces must be picked: working arrays, arguments
-        and result, and what the process keeps of the dataset.
+        By the name of the task, with those of ``picking_graph`` where traces are picked: working arrays,
+        arguments, result, and cached parts of the dataset.
     """
     shape, rays = shape_of(scan, settings), rays_of(scan, settings)
     image = REAL * math.prod(shape)
     state = state_bytes(shape, settings)
-    # A process keeps the dataset's times and losses, and those of problems that it was asked for last.
+    # A process caches times and losses of the dataset, and those of recent problems.
     kept = 3 * REAL * scan.pairs + 3 * REAL * emitters_of(scan, settings) * scan.receivers
     tracked = shape
     if settings.numerics.axial_margin_nodes is not None and len(shape) == 3:
@@ -108,43 +107,44 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         field = field_bytes(tracked, settings.ray_eikonal)
     base = FLOOR_BYTES + kept + state
 
-    def look(rows: int) -> int:
+    def tracing(rows: int) -> int:
         share = min(BATCH, emitters_of(scan, settings)) / max(1, emitters_of(scan, settings))
-        # The parts of each emitter, and the same put together.
+        # The rows of each emitter, and their concatenation.
         return base + field + image + 2 * rows_bytes(scan, settings, math.ceil(share * rows))
 
-    def step(rows: int) -> int:
-        # Beside each row its time, what is missed, Huber's weight and their product.
+    def solving(rows: int) -> int:
+        # For each row its time, residual, Huber weight and their product.
         entries = rows * _entries(settings, scan.in_space)
         return base + math.ceil(entries * ENTRY_BYTES) + 5 * REAL * rows + (8 + 8 * len(shape)) * image
 
     found: dict[str, int] = {}
     if scan.traces_bytes:
-        found |= arrival_call_bytes(scan.traces, scan.pairs, settings)
+        found |= picking_task_bytes(scan.traces, scan.pairs, settings)
         if settings.numerics.guided_rounds and scan.traces is not None:
-            # The rays of each of its emissions through the image that guides it.
-            part = emissions_a_call(scan.traces.receivers * scan.traces.samples)
+            # The rays of its emissions through the guiding image.
+            part = emissions_per_task(scan.traces.receivers * scan.traces.samples)
             part = min(part, scan.traces.emissions)
-            found["read"] += field + 2 * image + 2 * rows_bytes(scan, settings, part * scan.traces.receivers)
+            predicted = part * scan.traces.receivers
+            found["pick_emissions"] += field + 2 * image + 2 * rows_bytes(scan, settings, predicted)
     elif scan.period and settings.picking.examine:
-        found["settle"] = settle_bytes(scan.pairs // scan.slices)
+        found["finish_slice"] = finish_slice_bytes(scan.pairs // scan.slices)
     if settings.method == "gauss-newton":
-        found["trace_rays"] = look(rays)
-        found["update_gauss_newton"] = step(rays)
+        found["trace_rays"] = tracing(rays)
+        found["update_gauss_newton"] = solving(rays)
     elif solver_of(settings, len(shape)).compiled:
         found["update_sart"] = base + _pass_bytes(shape, scan.receivers)
     else:
         found["update_sart"] = base + field + 8 * image
     if settings.attenuation.enabled and scan.amplitudes:
-        found["trace_attenuation_rays"] = look(rays)
-        found["solve_attenuation"] = step(rays)
+        found["trace_attenuation_rays"] = tracing(rays)
+        found["solve_attenuation"] = solving(rays)
     if settings.resolution_check:
-        found["trace_resolution_rays"] = look(rays)
-        found["check_resolution"] = step(rays)
+        found["trace_resolution_rays"] = tracing(rays)
+        found["check_resolution"] = solving(rays)
     return found
 
 
 def _pass_bytes(shape: tuple[int, ...], receivers: int) -> int:
-    """Of the arrays of ``emitter_pass.EmitterPass``: sheets, rays in step, fields; float32."""
+    """Memory of ``emitter_pass.EmitterPass``: sheets, rays in lockstep, fields; float32."""
     steps = LONGEST * sum(shape)
     return MIB + 4 * (8 * Diagonals.of(shape).size + 3 * steps * receivers + 12 * math.prod(shape))

@@ -1,6 +1,6 @@
-"""Bytes that the calls of a refinement by waveforms take, counted from the arrays that the kernels make.
+"""Memory of the tasks of a full-waveform refinement, from the arrays of the kernels.
 
-``tests/workers/reconstruction/memory/test_waveform_memory.py`` holds them against measured peaks.
+Compared with measured peaks in ``tests/workers/reconstruction/memory/test_waveform_memory.py``.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSett
 
 from ...files.dataset.counts import Traces
 
-# Python's own part of any call.
+# Overhead of Python in any task.
 FLOOR_BYTES = 11 * 2**20 // 2
 
-# Bytes a sample: of the simulated water shots with recorded ones, spectra and windows; of one emitter's
-# traces, window and residuals; of an entry of the resampler while it is made.
+# Bytes per sample: simulated and recorded water shots, spectra and windows; traces, window and residuals of
+# one emitter; entries of the resampler while it is made.
 SHOT_BYTES, LOOK_BYTES, SAMPLER_BYTES = 140, 96, 64
 
-# Bytes a node: of what a medium is made of and its fields; of an image in a step, beside pairs of changes.
+# Bytes per node: medium and fields; images of an update, without L-BFGS pairs.
 MEDIUM_BYTES, STEP_BYTES = 72, 280
 
 
@@ -39,12 +39,12 @@ def _scale(traces: Traces, width_m: float, slices: int = 1) -> WaveScale:
 
 
 def refines(settings: Settings) -> bool:
-    """Whether an image may be refined by waves; ``auto`` does so where it is given the minutes."""
+    """Whether an image may be refined by waveforms; ``auto`` needs a time budget for it."""
     return settings.method == "waveform" or (settings.method == "auto" and bool(settings.minutes))
 
 
 def wave_tasks(traces: Traces | None, width_m: float, settings: Settings) -> int:
-    """Calls of each slice: looks of single emitters and steps, unless some are shortened; 0 without waves."""
+    """Number of tasks of each slice, without shortened steps; 0 without a refinement."""
     if not refines(settings) or traces is None:
         return 0
     plan = _scale(traces, width_m).bands(settings)
@@ -52,8 +52,8 @@ def wave_tasks(traces: Traces | None, width_m: float, settings: Settings) -> int
     return sum(band.looks(held_out) + band.iterations + 2 for band in plan)
 
 
-def wave_call_bytes(traces: Traces | None, width_m: float, settings: Settings) -> dict[str, int]:
-    """Bytes of each kind of call, over all bands, and of the call by which trials are judged.
+def wave_task_bytes(traces: Traces | None, width_m: float, settings: Settings) -> dict[str, int]:
+    """Memory of each kind of task over all bands, and of the validation of candidates, bytes.
 
     Args:
         traces: of the dataset.
@@ -61,7 +61,7 @@ def wave_call_bytes(traces: Traces | None, width_m: float, settings: Settings) -
         settings: with the bands of the time budget, see ``budgeted``.
 
     Returns:
-        By the call's name in ``waveform_chain`` and ``validation``; nothing where no waves are simulated.
+        By the name of the task in ``refinement_graph`` and ``validation``; empty if no waves are simulated.
 
     Raises:
         InvalidInput: for a refinement without traces.
@@ -85,7 +85,7 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
     image, padded = 8 * extent.nodes**2, extent.padded**2
     samples = traces.receivers * extent.steps
     looks = band.emitters + WaveSettings((band,)).held_out
-    # What a process keeps of a problem: traces of its emitters, what takes them to the simulator's time.
+    # Cached data of a problem: traces of its emitters, and the resampler to the time steps of the simulation.
     kept = traces.bytes_of(looks) + 4 * traces.samples * extent.steps
     base = FLOOR_BYTES + kept
     medium = MEDIUM_BYTES * padded
@@ -100,7 +100,7 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
         + LOOK_BYTES * samples
         + medium
         + 4 * image,
-        # The looks of all emitters, and the pairs of changes before and after.
+        # The results of all emitters, and the L-BFGS pairs before and after.
         "step_by_waves": base
         + 2 * image * looks
         + 4 * WaveSettings((band,)).memory * image

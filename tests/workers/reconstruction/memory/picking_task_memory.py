@@ -1,6 +1,6 @@
-"""Peak memory of the calls that examine and pick a scan, in processes of their own; see ``call_memory``.
+"""Peak memory of the calls that examine and pick a scan, in processes of their own; see ``ray_task_memory``.
 
-Called as ``arrival_call_memory.py FOLDER PICKER ELEMENTS SAMPLES``; prints bytes by task as JSON, and those
+Called as ``picking_task_memory.py FOLDER PICKER ELEMENTS SAMPLES``; prints bytes by task as JSON, and those
 of the traces. FOLDER is for the scan's file.
 """
 
@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 from benchmarks.shared._peak_memory import peak
-from tests.workers.reconstruction.call_memory import held
+from tests.workers.reconstruction.ray_task_memory import held
 
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.reconstruction.arrivals import Files, PickingGraph, Source
+from bentray_workers.reconstruction.picking_graph import PickingFiles, PickingGraph, PickingSource
 
 RATE_HZ, CENTRE_HZ, WATER_MPS, RADIUS_M = 8e6, 1e6, 1480.0, 0.05
 
@@ -47,7 +47,7 @@ def scan(elements: int, samples: int) -> Dataset:
 def bytes_of(path: Path, picker: str) -> dict[str, int]:
     """The first task of each name, with its arguments, less a fork that does nothing."""
     graph = PickingGraph(
-        Source(path, path.stat().st_mtime_ns, path.parent, picker, True), Files.of(path.parent)
+        PickingSource(path, path.stat().st_mtime_ns, path.parent, picker, True), PickingFiles.of(path.parent)
     )
     waiting, found = graph.first(), {}
     while waiting:

@@ -1,6 +1,6 @@
-"""Peak memory of the calls of a refinement by waveforms, in processes of their own; see ``call_memory``.
+"""Peak memory of the calls of a refinement by waveforms, in processes of their own; see ``ray_task_memory``.
 
-Called as ``wave_call_memory.py SETTINGS ELEMENTS SAMPLES``, the settings as JSON; prints bytes by call as
+Called as ``wave_task_memory.py SETTINGS ELEMENTS SAMPLES``, the settings as JSON; prints bytes by call as
 JSON, of the last of the bands.
 """
 
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from benchmarks.shared._peak_memory import peak
 from numpy.typing import NDArray
-from tests.workers.reconstruction.call_memory import held
+from tests.workers.reconstruction.ray_task_memory import held
 
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.emissions import Emissions

@@ -18,8 +18,15 @@ from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.files.findings import read_findings
 from bentray_workers.reconstruction import reconstruction_run
-from bentray_workers.reconstruction.arrivals import PICKED, Files, PickingGraph, Source, measure, read
-from bentray_workers.reconstruction.memory import arrival_memory
+from bentray_workers.reconstruction.memory import picking_memory
+from bentray_workers.reconstruction.picking_graph import (
+    PICKED,
+    PickingFiles,
+    PickingGraph,
+    PickingSource,
+    measure_traces,
+    pick_emissions,
+)
 
 from ...kernels.acquisition.traces import RATE_HZ, blob_delay, scan
 from ...kernels.tomography.waveform.scans import SETTINGS
@@ -65,8 +72,8 @@ def arrived(dataset, folder, picker="aic", *, examined=True):
     """What goes on of a dataset in a file, and what was found."""
     path = folder / "scan.h5"
     write_dataset(path, dataset)
-    files = Files.of(folder)
-    graph = PickingGraph(Source(path, path.stat().st_mtime_ns, folder, picker, examined), files)
+    files = PickingFiles.of(folder)
+    graph = PickingGraph(PickingSource(path, path.stat().st_mtime_ns, folder, picker, examined), files)
     run({"picking": graph}, ThreadPool())
     found = read_findings(files.findings)
     return read_dataset(files.picked if found.changed else path), found
@@ -83,13 +90,13 @@ def assert_same(one, other):
 @pytest.mark.parametrize("samples", [30_000, 10**9])
 @pytest.mark.parametrize("picker", PICKERS)
 def test_batches_give_what_the_whole_gives(tmp_path, monkeypatch, picker, samples):
-    monkeypatch.setattr(arrival_memory, "CALL_SAMPLES", samples)
+    monkeypatch.setattr(picking_memory, "TASK_SAMPLES", samples)
     assert_same(arrived(clean(), tmp_path, picker, examined=False)[0], pick(clean(), picker))
 
 
 @pytest.mark.parametrize("whole", [True, False])
 def test_faults_are_found_and_corrected_as_in_one_piece(tmp_path, monkeypatch, whole):
-    monkeypatch.setattr(arrival_memory, "CALL_SAMPLES", 10**9 if whole else 30_000)
+    monkeypatch.setattr(picking_memory, "TASK_SAMPLES", 10**9 if whole else 30_000)
     both = stacked(clean(), spoilt(clean(), damaged))
     expected = examine(both)
     picked, found = arrived(both, tmp_path)
@@ -119,7 +126,7 @@ def test_a_clean_scan_gives_the_image_that_it_gave_unexamined(tmp_path):
 
 
 def test_it_tells_how_many_emissions_are_examined_and_picked(tmp_path, monkeypatch):
-    monkeypatch.setattr(arrival_memory, "CALL_SAMPLES", 50_000)
+    monkeypatch.setattr(picking_memory, "TASK_SAMPLES", 50_000)
     write_dataset(tmp_path / "scan.h5", clean())
     told = []
     reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN, told.append)
@@ -138,13 +145,13 @@ def test_calls_end_with_their_emission_once_the_job_has(tmp_path):
     path, folder = tmp_path / "scan.h5", tmp_path / "job"
     write_dataset(path, clean())
     folder.mkdir()
-    source = Source(path, path.stat().st_mtime_ns, folder, "aic", True)
+    source = PickingSource(path, path.stat().st_mtime_ns, folder, "aic", True)
     with source.slice(0) as one:
         assert one.waveform.object[0].any()
         folder.rmdir()
         with pytest.raises(JobEnded):
             one.waveform.object[1]
-    for function, arguments in ((measure, (range(4),)), (read, ((), None, range(4)))):
+    for function, arguments in ((measure_traces, (range(4),)), (pick_emissions, ((), None, range(4)))):
         with pytest.raises(JobEnded):
             function(source, 0, *arguments)
 

@@ -1,6 +1,6 @@
 """Peak memory of the calls of a reconstruction, in processes of their own: prints bytes by task as JSON.
 
-Called as ``call_memory.py SETTINGS ELEMENTS HEIGHTS``, the settings as JSON, with the repository on the
+Called as ``ray_task_memory.py SETTINGS ELEMENTS HEIGHTS``, the settings as JSON, with the repository on the
 path; 0 heights for one slice. As in ``benchmarks/shared/_peak_memory.py`` each task runs in a fork of a warm
 process, less a fork that does nothing; the bytes of what was there before are added: dataset, problem and
 arguments.

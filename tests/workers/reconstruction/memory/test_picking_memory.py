@@ -10,9 +10,9 @@ import pytest
 
 from bentray_kernels.tomography import Settings
 from bentray_workers.files.dataset.summary import summary_of
-from bentray_workers.reconstruction.memory.arrival_memory import arrival_call_bytes, parts_of
+from bentray_workers.reconstruction.memory.picking_memory import parts_of, picking_task_bytes
 
-PROGRAM = Path(__file__).with_name("arrival_call_memory.py")
+PROGRAM = Path(__file__).with_name("picking_task_memory.py")
 ROOT = Path(__file__).parents[4]
 MIB = 2**20
 
@@ -36,7 +36,7 @@ def test_calls_take_what_the_plan_says_and_never_the_traces(tmp_path, picker, el
     traces = measured.pop("traces")
     settings = Settings.of(picker=picker)
     scan = summary_of(tmp_path / "scan.h5", settings)
-    told = arrival_call_bytes(scan.traces, scan.pairs, settings)
+    told = picking_task_bytes(scan.traces, scan.pairs, settings)
     assert set(told) == set(measured)
     wrong = {
         name: (told[name], taken)

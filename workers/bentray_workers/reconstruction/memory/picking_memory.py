@@ -1,0 +1,90 @@
+"""Memory of the tasks that examine and pick a scan, from the arrays of the kernels.
+
+Compared with measured peaks in ``tests/workers/reconstruction/memory/test_picking_memory.py``. It does not
+grow with the number of emissions times samples: a task reads one emission after the other.
+"""
+
+from __future__ import annotations
+
+import math
+
+from bentray_kernels.acquisition.picking.gate import FREQUENCIES
+from bentray_kernels.acquisition.picking.pickers import PICKERS
+from bentray_kernels.acquisition.picking.pulse import AFTER, BEFORE, EMISSIONS
+from bentray_kernels.tomography.settings import Settings
+
+from ...files.dataset.counts import Traces
+
+# Samples of object and water in one task: half a second to a second.
+TASK_SAMPLES = 10_000_000
+
+# Overhead of tasks that read traces, with their libraries; that examine times; that write the result.
+READING_BYTES, TIMES_BYTES, WRITING_BYTES = 30 * 2**20, 6 * 2**20, 11 * 2**20
+
+# Bytes per sample of one emission: statistics; reading; filtering, padded to a power of two.
+MEASURE_BYTES, READ_BYTES, FILTER_BYTES = 58, 12, 64
+
+# Bytes for amplitudes of one emission: per sample of the gate, as long as the pulse; per frequency.
+GATE_BYTES, POWER_BYTES = 24, 100
+
+# Bytes per pair: copies of a period of its pulse and statistics; neighbours and their medians.
+PULSE_COPIES, FIGURE_BYTES, SETTLE_BYTES = 3 * 8, 100, 720
+
+
+def parts_of(emissions: int, trace_samples: int) -> list[range]:
+    """Batches of emissions, one for each task.
+
+    Args:
+        emissions: of one slice.
+        trace_samples: of all traces of one emission.
+    """
+    step = emissions_per_task(trace_samples)
+    return [range(k, min(k + step, emissions)) for k in range(0, emissions, step)]
+
+
+def emissions_per_task(trace_samples: int) -> int:
+    """Largest number of emissions of one task."""
+    return max(1, TASK_SAMPLES // max(trace_samples, 1))
+
+
+def picking_tasks(traces: Traces | None, slices: int, settings: Settings) -> int:
+    """Number of tasks that examine and pick a scan."""
+    if traces is None:
+        return 0
+    parts = -(-traces.emissions // emissions_per_task(traces.receivers * traces.samples))
+    examined = slices * (parts + 1) if settings.picking.examine else 0
+    return examined + (slices * (parts + 1) + 1) * (1 + settings.numerics.guided_rounds)
+
+
+def picking_task_bytes(traces: Traces | None, pairs: int, settings: Settings) -> dict[str, int]:
+    """Memory of each kind of task by its name in ``picking_graph``, bytes.
+
+    Args:
+        traces: of the scan; None without traces from which times can be picked.
+        pairs: in all slices.
+        settings: of the reconstruction.
+    """
+    found = {"write_picked": WRITING_BYTES + 48 * pairs}
+    if traces is None:
+        return found
+    of_slice = traces.emissions * traces.receivers
+    samples = traces.receivers * traces.samples
+    reading = READING_BYTES + 2 * samples * traces.sample_bytes
+    filtered = FILTER_BYTES if PICKERS[settings.picking.picker].filtered else 0
+    found["pick_emissions"] = reading + (READ_BYTES + filtered) * samples + 8 * of_slice
+    if settings.reads_amplitudes:
+        pulse = math.ceil((BEFORE + AFTER) * traces.rate_hz / traces.frequency_hz) + 1
+        # The pulse is the median over several emissions.
+        found["pick_emissions"] += traces.receivers * pulse * (GATE_BYTES + PULSE_COPIES * EMISSIONS)
+        found["pick_emissions"] += traces.receivers * FREQUENCIES * POWER_BYTES + 8 * of_slice
+    found["finish_slice"] = finish_slice_bytes(of_slice)
+    if settings.picking.examine:
+        pulse = PULSE_COPIES * (2 * math.ceil(traces.rate_hz / traces.frequency_hz) + 1)
+        found["measure_traces"] = reading + MEASURE_BYTES * samples
+        found["examine_slice"] = reading + READ_BYTES * samples + (pulse + FIGURE_BYTES) * of_slice
+    return found
+
+
+def finish_slice_bytes(pairs: int) -> int:
+    """Memory of the task that finishes one slice."""
+    return TIMES_BYTES + SETTLE_BYTES * pairs

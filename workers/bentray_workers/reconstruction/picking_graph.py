@@ -1,0 +1,297 @@
+"""Task graph of examination and picking: a scan is checked, corrected and picked in batches of emissions."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.picking.amplitudes import read_log_ratios
+from bentray_kernels.acquisition.picking.first_arrivals import reach_of, read_times, require_traces, settled
+from bentray_kernels.acquisition.quality import Finding
+from bentray_kernels.acquisition.quality.correction import apply, stacked
+from bentray_kernels.acquisition.quality.examination import times_judged
+from bentray_kernels.acquisition.quality.recording import Measured, judged
+from bentray_kernels.arrays import Floats
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.task_graph import Task
+from bentray_kernels.tomography import Progress
+from bentray_kernels.tomography.guided_picking import predicted_delta
+
+from ..cluster.job_cancellation import check_job_active
+from ..files.dataset.traces import slice_opened, trace_samples
+from ..files.dataset.write import write_dataset
+from ..files.findings import ScanFindings, read_findings, write_findings
+from ..files.reconstruction import read_reconstruction
+from .file_scan import read_once
+from .memory.picking_memory import parts_of
+
+PICKED, FINDINGS = "picked.h5", "findings.json"
+
+# Phases of the progress of a job, each counted in emissions.
+EXAMINING, PICKING = "examining", "picking"
+
+
+class PickingFiles(NamedTuple):
+    """Results of picking: the picked dataset, unless it equals the scan, and the findings."""
+
+    picked: Path
+    findings: Path
+
+    @classmethod
+    def of(cls, folder: Path, number: int = 0) -> PickingFiles:
+        """The files of a round of picking in the folder of a job, from 0."""
+        before = f"{number}-" if number else ""
+        return cls(folder / (before + PICKED), folder / (before + FINDINGS))
+
+
+class PickingGuide(NamedTuple):
+    """Guide of a repeated picking: the file of an image that predicts arrivals, and of the findings."""
+
+    image: Path
+    findings: Path
+
+    def predicted(self, one: Dataset, index: int, part: range) -> Floats:
+        """(ntx, nrx), s: predicted times, object minus water; NaN outside the batch of emissions."""
+        times, rows = np.full((len(one.tx), len(one.rx)), np.nan), slice(part.start, part.stop)
+        image = read_reconstruction(self.image)
+        speed = image.speed if image.speed.ndim == 2 else image.speed[:, :, index]
+        bare = replace(one, waveform=None, valid=None, tof_s=None, sigma_s=None, log_ratio_np=None)
+        some = replace(bare, tx=one.tx[rows], delta_tof_s=times[rows])
+        times[rows] = predicted_delta(some, replace(image, speed=speed))
+        return times
+
+    def faults(self, index: int) -> tuple[Finding, ...]:
+        """Findings in the traces of a slice."""
+        return read_findings(self.findings).of_traces(index)
+
+
+class EmissionPicks(NamedTuple):
+    """Picks of a batch of emissions, (emissions, nrx) each.
+
+    Attributes:
+        delta, sigma: s.
+        ratio: Np; None without amplitudes.
+    """
+
+    delta: Floats
+    sigma: Floats
+    ratio: Floats | None
+
+
+class PickingSource(NamedTuple):
+    """The scan for tasks; ``stamp`` distinguishes a rewritten file from the old one.
+
+    Attributes:
+        folder: of the job; once it is removed, tasks end with their present emission.
+        picker: for scans without travel times.
+        examine: whether the scan is examined first.
+        amplitudes: their source, see ``Settings``.
+    """
+
+    path: Path
+    stamp: int
+    folder: Path
+    picker: str
+    examine: bool
+    amplitudes: str = "recorded"
+
+    @property
+    def dataset(self) -> Dataset:
+        """The scan without its traces."""
+        return read_once(self.path, self.stamp)
+
+    @property
+    def examines_times(self) -> bool:
+        """Whether times are examined: this needs the period, which bounds the difference of neighbours."""
+        return self.examine and self.dataset.center_frequency_hz is not None
+
+    @property
+    def reads_amplitudes(self) -> bool:
+        """Whether amplitudes are read from the traces."""
+        return self.amplitudes != "recorded"
+
+    @contextmanager
+    def slice(self, index: int, findings: Sequence[Finding] = ()) -> Iterator[Dataset]:
+        """One slice with traces that are read on access, with the findings corrected."""
+        with slice_opened(self.path, self.dataset, index, partial(check_job_active, self.folder)) as one:
+            yield apply(one, findings)
+
+
+class PickingGraph:
+    """Task graph of examination and picking; its result is ``Files``.
+
+    Of a scan with travel times only these are examined, see ``PickingSource.examines_times``; its traces are
+    read if amplitudes are taken from them.
+
+    Args:
+        source: the scan.
+        files: to write, in a folder that every worker can write.
+        guide: for picking again near predicted times; None: the first picking.
+
+    Raises:
+        InvalidInput: for a scan without times or amplitudes, and without the traces to read them from.
+    """
+
+    def __init__(self, source: PickingSource, files: PickingFiles, guide: PickingGuide | None = None) -> None:
+        self._source, self._files, self._guide = source, files, guide
+        dataset = source.dataset
+        self._slices = range(dataset.slices)
+        self._parts: list[range] = []
+        if source.reads_amplitudes or not dataset.picked:
+            with source.slice(0) as one:
+                require_traces(one)
+            self._parts = parts_of(len(dataset.tx), trace_samples(source.path) * len(dataset.rx))
+        self._findings: dict[int, Any] = {k: guide.faults(k) if guide else () for k in self._slices}
+        self._results: dict[tuple[Any, int], dict[int, Any]] = defaultdict(dict)
+        self._emissions_done: dict[Any, int] = defaultdict(int)
+
+    @property
+    def progress(self) -> Progress:
+        """Emissions examined, then emissions picked, of all; 0 of 0 if no traces are read."""
+        total = len(self._slices) * sum(map(len, self._parts))
+        examined, picked = self._emissions_done[measure_traces], self._emissions_done[pick_emissions]
+        examines = self._source.examine and not self._source.dataset.picked and not self._guide
+        if examines and examined < total:
+            return Progress(examined, total, phase=EXAMINING)
+        return Progress(picked, total, phase=PICKING)
+
+    @property
+    def done(self) -> int:
+        return self.progress.done
+
+    @property
+    def total(self) -> int:
+        return self.progress.total
+
+    def first(self) -> list[Task]:
+        if not self._parts:
+            return [Task(finish_slice, (self._source, k, (), []), keep_on_worker=True) for k in self._slices]
+        if self._guide or not self._source.examine or self._source.dataset.picked:
+            return [task for k in self._slices for task in self._picking(k)]
+        return [
+            Task(measure_traces, (self._source, k, part), keep_on_worker=True)
+            for k in self._slices
+            for part in self._parts
+        ]
+
+    def after(self, task: Task, result: Any) -> list[Task]:
+        if task.function is write_picked:
+            return []
+        index = task.arguments[1]
+        if task.function is examine_slice:
+            self._findings[index] = result
+            return self._picking(index)
+        if task.function is finish_slice:
+            finished = self._results[finish_slice, 0]
+            finished[index] = result
+            if len(finished) < len(self._slices):
+                return []
+            return [Task(write_picked, (self._source, self._files, self._pop(finish_slice, 0)))]
+        part: range = task.arguments[-1]
+        self._emissions_done[task.function] += len(part)
+        self._results[task.function, index][part.start] = result
+        if len(self._results[task.function, index]) < len(self._parts):
+            return []
+        parts = self._pop(task.function, index)
+        if task.function is measure_traces:
+            return [Task(examine_slice, (self._source, index, parts), keep_on_worker=True)]
+        return [Task(finish_slice, (self._source, index, self._findings[index], parts), keep_on_worker=True)]
+
+    def _picking(self, index: int) -> list[Task]:
+        arguments = self._source, index, self._findings[index], self._guide
+        return [Task(pick_emissions, (*arguments, part), keep_on_worker=True) for part in self._parts]
+
+    def _pop(self, function: Any, index: int) -> list[Any]:
+        """Results of the tasks of a kind in order, and forget them."""
+        return [result for _, result in sorted(self._results.pop((function, index)).items())]
+
+
+def measure_traces(source: PickingSource, index: int, part: range) -> Measured:
+    """Task: statistics of the traces of a batch of emissions."""
+    with source.slice(index) as one:
+        return Measured.of(one, part)
+
+
+def examine_slice(source: PickingSource, index: int, parts: list[Measured]) -> tuple[Finding, ...]:
+    """Task: findings in the traces of a slice; an unusable scan is rejected."""
+    with source.slice(index) as one:
+        findings, _ = judged(one, Measured.joined(parts))
+    return _usable(source, index, findings)
+
+
+def pick_emissions(
+    source: PickingSource, index: int, findings: tuple[Finding, ...], guide: PickingGuide | None, part: range
+) -> EmissionPicks:
+    """Task: times of a batch of emissions with standard deviations, and amplitudes if needed."""
+    with source.slice(index, findings) as one:
+        if one.picked:
+            delta = one.differential_tof()[part.start : part.stop]
+            sigma = np.full_like(delta, np.nan)
+        else:
+            if guide is None:
+                predicted = np.full((len(one.tx), len(one.rx)), np.nan)
+            else:
+                predicted = guide.predicted(one, index, part)
+            delta, sigma = read_times(one, part, source.picker, predicted, reach_of(one, source.picker))
+        ratio = read_log_ratios(one, part, delta, source.amplitudes) if source.reads_amplitudes else None
+        return EmissionPicks(delta, sigma, ratio)
+
+
+def finish_slice(
+    source: PickingSource, index: int, findings: tuple[Finding, ...], parts: list[EmissionPicks]
+) -> tuple[Dataset, tuple[Finding, ...]]:
+    """Task: one slice to reconstruct, without traces, and all findings in it."""
+    one = apply(source.dataset.slice(index), findings)
+    if parts and not one.picked:
+        delta, sigma = (np.concatenate(rows) for rows in zip(*(part[:2] for part in parts), strict=True))
+        delta, sigma = settled(one, delta, sigma, screened=not source.examine)
+        one = replace(one, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=source.picker)
+    if source.reads_amplitudes:
+        ratio = np.concatenate([part.ratio for part in parts if part.ratio is not None])
+        ratio = np.where(np.isfinite(one.differential_tof()), ratio, np.nan)
+        one = replace(one, log_ratio_np=ratio, amplitude_frequency_hz=one.center_frequency_hz)
+    if source.examines_times:
+        later = _usable(source, index, times_judged(one))
+        one, findings = apply(one, later), (*findings, *later)
+    return one, findings
+
+
+def write_picked(
+    source: PickingSource, files: PickingFiles, slices: list[tuple[Dataset, tuple[Finding, ...]]]
+) -> None:
+    """Task: write the picked dataset, unless it equals the scan, and then all findings."""
+    whole = source.dataset
+    findings = tuple(replace(finding, slice=k) for k, (_, found) in enumerate(slices) for finding in found)
+    corrected = any(finding.action != "reported" for finding in findings)
+    changed = source.reads_amplitudes or not whole.picked or corrected
+    if changed:
+        parts = [one for one, _ in slices]
+        picked = parts[0] if whole.slice_z_m is None else stacked(whole, parts)
+        write_dataset(files.picked, replace(picked, truth=whole.truth))
+    record = ScanFindings(findings, source.examines_times, changed)
+    write_findings(files.findings, record, files.picked if changed else None)
+
+
+def _usable(source: PickingSource, index: int, findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """The findings, unless one of them rejects the scan.
+
+    Raises:
+        InvalidInput: for a rejected scan.
+    """
+    for finding in findings:
+        if finding.action == "refused":
+            where = f" (slice {index})" if source.dataset.slice_z_m is not None else ""
+            raise InvalidInput(
+                finding.check,
+                finding.found + where,
+                f"{finding.accepted}; with examine false the scan is used unchanged",
+            )
+    return tuple(findings)
