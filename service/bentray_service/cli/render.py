@@ -176,9 +176,9 @@ def _joined(strips: list[Tile]) -> tuple[Colours, Any]:
 def _save(path: Path, position_m: Any) -> None:
     import numpy as np
 
-    from bentray_workers.files.atomic import replacing
+    from bentray_workers.files.atomic import atomic_replace
 
-    with replacing(path) as partial, partial.open("wb") as file:
+    with atomic_replace(path) as partial, partial.open("wb") as file:
         np.save(file, position_m, allow_pickle=False)
 
 

@@ -9,8 +9,15 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.images.look import COLORMAPS, COLOUR_VALUE, LEAST_FRAMED, LEAST_SIZE, MOST_SIZE, Look
 from bentray_workers.images.plane import check_plane
+from bentray_workers.images.slice_style import (
+    COLORMAPS,
+    COLOUR_VALUE,
+    LEAST_FRAMED,
+    LEAST_SIZE,
+    MOST_SIZE,
+    SliceStyle,
+)
 
 from ..wiring import CallerTenant, Service
 from .pictures import PICTURE, picture
@@ -43,9 +50,9 @@ async def asked_look(
     frame: Annotated[
         bool, Query(description="Title, axes in mm and notes; without it there is the image alone.")
     ] = True,
-) -> Look:
+) -> SliceStyle:
     """How a picture shall look."""
-    return Look(colormap, size, interpolation, scale_bar, colour_bar, frame)
+    return SliceStyle(colormap, size, interpolation, scale_bar, colour_bar, frame)
 
 
 @router.head("/{volume_id}/slice.png", include_in_schema=False)
@@ -55,7 +62,7 @@ async def slice_png(
     request: Request,
     service: Service,
     tenant: CallerTenant,
-    look: Annotated[Look, Depends(asked_look)],
+    look: Annotated[SliceStyle, Depends(asked_look)],
     axis: Annotated[Literal["x", "y", "z"], Query(description="The axis that the slice cuts across.")] = "z",
     index: Annotated[
         int | None, Query(ge=0, description="Along this axis; the middle slice without it.")

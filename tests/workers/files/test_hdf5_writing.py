@@ -13,16 +13,16 @@ import h5py
 import numpy as np
 import pytest
 
-from bentray_workers.files.hdf5_writing import creating
+from bentray_workers.files.hdf5_writing import atomic_hdf5
 
 # A file-size limit refuses writes half-way through a file, as a full disk does.
 WRITER = """
 import sys
 from pathlib import Path
 import numpy as np
-from bentray_workers.files.hdf5_writing import creating
+from bentray_workers.files.hdf5_writing import atomic_hdf5
 try:
-    with creating(Path(sys.argv[1])) as file:
+    with atomic_hdf5(Path(sys.argv[1])) as file:
         for k in range(20):
             data = np.random.default_rng(k).random(4000)
             file.create_dataset(f"a{k}", data=data, chunks=True, compression="gzip")
@@ -32,7 +32,7 @@ except OSError as error:
 
 
 def test_what_is_written_is_there(tmp_path: Path) -> None:
-    with creating(tmp_path / "a.h5") as file:
+    with atomic_hdf5(tmp_path / "a.h5") as file:
         file["x"] = np.arange(5)
     with h5py.File(tmp_path / "a.h5") as file:
         assert file["x"][()].tolist() == [0, 1, 2, 3, 4]
@@ -56,7 +56,7 @@ def test_a_write_that_is_refused_is_an_error_and_leaves_nothing(tmp_path: Path, 
 def test_an_error_of_the_writer_leaves_the_old_file(tmp_path: Path) -> None:
     target = tmp_path / "a.h5"
     target.write_bytes(b"old")
-    with pytest.raises(TypeError), creating(target) as file:
+    with pytest.raises(TypeError), atomic_hdf5(target) as file:
         file["x"] = object()
     assert target.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [target]

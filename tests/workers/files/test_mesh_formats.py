@@ -139,7 +139,7 @@ def lone(place, accepted="three"):
         (b"", "file: found an empty file"),
         (b"\x00\x01\x02 something else", "a file of another kind .it begins with"),
         (b"PK\x03\x04" + b"v 0 0 0" * 9, "a file of another kind"),
-        (lone("0 1 0", "9"), "file: found OBJ data that are cut short, damaged"),
+        (lone("0 1 0", "9"), "file: found OBJ data that are truncated, damaged"),
         (lone("nan 1 0", "3"), "not finite"),
         (lone("inf 1 0", "3"), "not finite"),
         (lone("2 0 0", "3"), "1 without area"),

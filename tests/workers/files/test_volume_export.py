@@ -28,7 +28,7 @@ def test_a_volume_deleted_during_its_export_is_named(
     whole = FORMATS["npy"]
 
     def write(target: Path, content: volume_export.Content) -> None:
-        with volume_export.replacing(target) as partial:
+        with volume_export.atomic_replace(target) as partial:
             partial.write_bytes(b"begun")
             for path in tmp_path.iterdir():
                 path.unlink()

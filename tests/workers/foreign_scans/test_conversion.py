@@ -71,7 +71,7 @@ def test_travel_times_of_matlab_come_through(tmp_path, write):
     np.testing.assert_array_equal(dataset.element_position_m, positions())
     assert dataset.tx.tolist() == dataset.rx.tolist() == list(range(ELEMENTS))
     assert dataset.water_speed_mps == pytest.approx(speed_from_temperature(20.0))
-    assert "20 °C is assumed" in dataset.source
+    assert "20 °C assumed" in dataset.source
     assert told.picked
     assert told.waveform is None
 

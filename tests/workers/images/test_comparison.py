@@ -33,7 +33,7 @@ def test_the_titles_tell_the_errors_of_compare_in_the_region_of_the_file(drawn):
         for name, result in two().items():
             assert f"{name.capitalize()}: {compare(result, known, given)}" in drawn.words()
         choice = compare(made(), known, given).region_choice
-        assert f"Errors read: {choice}" in drawn.words()
+        assert f"Errors in: {choice}" in drawn.words()
 
 
 def test_speeds_share_one_bar_and_differences_another(drawn):

@@ -35,12 +35,12 @@ def test_without_an_index_the_middle_one_is_taken():
 def test_a_plain_image_is_its_own_slice():
     plane = plane_of(VALUES[0], (1e-3, 1e-3), (0.0, 0.0))
     np.testing.assert_array_equal(plane.image, VALUES[0])
-    assert (plane.names, plane.where()) == ("xy", "")
+    assert (plane.names, plane.caption()) == ("xy", "")
 
 
 def test_uneven_heights_have_no_place():
     plane = plane_of(VALUES, (1e-3, 1e-3, math.nan), GRID[1], "z", 1)
-    assert plane.where() == "slice index 1 (0 to 4)"
+    assert plane.caption() == "slice index 1 (0 to 4)"
 
 
 @pytest.mark.parametrize(

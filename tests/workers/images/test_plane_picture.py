@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.images.look import Look
 from bentray_workers.images.plane import plane_of
 from bentray_workers.images.plane_picture import MOST_OF_WIDTH, plane_png, scale_of
+from bentray_workers.images.slice_style import SliceStyle
 
 from .pixels import near, pixels
 
@@ -22,7 +22,7 @@ WHITE = (255, 255, 255)
 
 
 def drawn_with(**look):
-    return plane_png(PLANE, (20.0, 39.0), Look(**look), **WORDS)
+    return plane_png(PLANE, (20.0, 39.0), SliceStyle(**look), **WORDS)
 
 
 def size_of(picture):
@@ -96,5 +96,5 @@ def test_scales_are_round_and_short_enough(width):
 )
 def test_refusals(how, field):
     with pytest.raises(InvalidInput) as caught:
-        Look(**how)
+        SliceStyle(**how)
     assert caught.value.field == field

@@ -10,8 +10,8 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.reconstruction import write_reconstruction
-from bentray_workers.images.look import COLORMAPS
 from bentray_workers.images.slice import slice_png
+from bentray_workers.images.slice_style import COLORMAPS
 
 from ..files.reconstructions import made
 from .pixels import near, pixels

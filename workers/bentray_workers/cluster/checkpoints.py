@@ -16,7 +16,7 @@ from bentray_kernels.task_graph import Checkpoint
 from bentray_kernels.tomography.checkpoint import pack, unpack
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
-from ..files.atomic import replacing
+from ..files.atomic import atomic_replace
 from ..files.npy_headers import PARSING
 
 log = logging.getLogger("bentray.checkpoints")
@@ -87,7 +87,7 @@ class Checkpoints:
         tree, arrays = pack(checkpoint)
         text = json.dumps({"kernels": _kernels(), "state": tree}).encode()
         parts = {str(k): array for k, array in enumerate(arrays)}
-        with replacing(self._folder / f"{name}-{number:06d}.npz") as partial, partial.open("wb") as file:
+        with atomic_replace(self._folder / f"{name}-{number:06d}.npz") as partial, partial.open("wb") as file:
             np.savez(file, allow_pickle=False, json=np.frombuffer(text, np.uint8), **parts)
         for old in files[: 1 - KEPT]:
             old.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Atomic writing of files."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from pathlib import Path
 
 
 @contextmanager
-def replacing(target: Path) -> Iterator[Path]:
-    """A path beside ``target`` to write to; on leaving, what lies there takes the target's place.
+def atomic_replace(target: Path) -> Iterator[Path]:
+    """A temporary path beside ``target`` to write to; renamed to the target at the end of the context.
 
-    The content reaches the disk before the name does, and the folder after it, so that a crash leaves
-    the old file or the new one. On any error the target stays as it was and the partial file goes.
-    Each use has its own partial file: of two writers at once, the last to finish wins.
+    The content is synchronised to the disk before the name, and then the folder, so that a crash leaves
+    the old file or the new one. On any error the target is unchanged and the temporary file is removed.
+    Each use has its own temporary file: of two concurrent writers, the last to finish wins.
 
     Raises:
         OSError: where the folder cannot be written to.
@@ -33,13 +33,13 @@ def replacing(target: Path) -> Iterator[Path]:
 
 
 def write_bytes(target: Path, content: bytes) -> None:
-    """Write ``content`` to ``target`` whole or not at all; see ``replacing``."""
-    with replacing(target) as partial:
+    """Write ``content`` to ``target`` atomically."""
+    with atomic_replace(target) as partial:
         partial.write_bytes(content)
 
 
 def sync(path: Path) -> None:
-    """Let the content of a file, or the names in a folder, survive a power cut."""
+    """Synchronise the content of a file, or the names in a folder, to the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -1,4 +1,4 @@
-"""Reading foreign volumes: what a file declares is checked first, and no more than that is read."""
+"""Bounded reading of foreign volumes: declared sizes are checked first, and no more is read."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from bentray_kernels.errors import InvalidInput
 
 from .volume import check_shape, check_type
 
-# Of the values of one volume, as the file declares them, unpacked.
+# Declared values of one volume, uncompressed.
 LARGEST_BYTES = 2 * 2**30
-# Before the values of a file; longer ones are no honest headers.
+# Header before the values of a file.
 LONGEST_HEADER = 2**20
 
-# After the values, of a file that is packed: some writers align its end, none adds much.
+# Padding after the values of a compressed file: some writers align its end.
 LONGEST_TAIL = 2**16
 
 # Units of length in headers.
 UNITS_M = {"m": 1.0, "meter": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "micron": 1e-6}
 
 
-# Raises InvalidInput for a shape that the one who asks for the volume has no use for.
+# Raises InvalidInput for a shape that the caller cannot use.
 ShapeCheck = Callable[[Sequence[int]], None]
 
 
 def any_shape(shape: Sequence[int]) -> None:
-    """The shape check of those who can use every volume."""
+    """Accepts every shape."""
 
 
 def declared(field: str, shape: Sequence[int], dtype: np.dtype[Any], check: ShapeCheck = any_shape) -> int:
-    """Bytes of the values, once shape and type are ones that are taken."""
+    """Check shape and type; returns the size of the values, bytes."""
     check_type(field, dtype)
     check_shape(field, shape)
     check(shape)
@@ -45,7 +45,7 @@ def declared(field: str, shape: Sequence[int], dtype: np.dtype[Any], check: Shap
 
 
 def whole(file: Any, count: int) -> bytes:
-    """So many bytes and no more, however many a packed file would give."""
+    """Read exactly so many bytes, also of a compressed file with more."""
     data: bytes = file.read(count)
     if len(data) < count:
         raise InvalidInput("file", f"{len(data)} bytes of values", f"{count}, as its header says")
@@ -53,14 +53,14 @@ def whole(file: Any, count: int) -> bytes:
 
 
 def at_end(file: Any, tail: int = 0) -> None:
-    """See that an unpacked file ends here, which makes its reader verify the check sum and the length.
+    """Check that an uncompressed file ends here; its reader then verifies check sum and length.
 
     Args:
-        file: all of whose values have been read.
+        file: with all values read.
         tail: bytes that may follow.
 
     Raises:
-        InvalidInput: where more follows. The reader itself raises where the check sum is another.
+        InvalidInput: for more data. The reader itself raises for a wrong check sum.
     """
     if len(file.read(tail + 1)) > tail:
         found = "more data after the values than its header declares"
@@ -69,12 +69,12 @@ def at_end(file: Any, tail: int = 0) -> None:
 
 @contextmanager
 def rejecting_damage(field: str, accepted: str) -> Iterator[None]:
-    """Turn what readers raise on damage into InvalidInput for this field."""
+    """Convert exceptions of readers on damaged data to InvalidInput for this field."""
     try:
         yield
     except (InvalidInput, MemoryError):
         raise
     except Exception as error:
-        # Foreign readers raise anything at all on a damaged header: a tokenizer's errors, a unit's, a bit's.
+        # Readers raise exceptions of any type on a damaged header.
         reason = next(iter(str(error).splitlines()), "") or type(error).__name__
         raise InvalidInput(field, f"damaged data ({reason[:120]})", accepted) from None

@@ -1,4 +1,4 @@
-"""What the examination of a job's scan found, as a JSON file beside its other working files."""
+"""Findings of the examination of a scan, as a JSON file in the folder of its job."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from .atomic import write_bytes
 
 
 class ScanFindings(NamedTuple):
-    """What was found.
+    """Findings in a scan.
 
     Attributes:
         findings: of all slices.
-        examined: whether it was sought.
-        changed: whether what goes on differs from the dataset's own file.
+        examined: whether the scan was examined.
+        changed: whether the picked dataset differs from the file of the scan.
     """
 
     findings: tuple[Finding, ...]
@@ -33,24 +33,24 @@ class ScanFindings(NamedTuple):
     changed: bool
 
     def of_traces(self, index: int) -> tuple[Finding, ...]:
-        """Those of the traces of a slice, not of times read from them."""
+        """Findings in the traces of a slice, without those in picked times."""
         known = OF_TRACES + OF_WATER
         return tuple(one for one in self.findings if one.slice == index and one.check in known)
 
     def words(self, *, stacked: bool) -> str:
-        """All of it in one line; see ``finding.words``."""
+        """Summary in one line; see ``finding.words``."""
         if not self.examined:
-            return "not examined, for the scan brought its times and no centre frequency"
+            return "not examined, since the scan has travel times and no centre frequency"
         return words(self.findings, stacked=stacked)
 
 
 def write_findings(path: Path, found: ScanFindings, picked: Path | None = None) -> None:
-    """Write them; ``path`` is replaced whole or not touched.
+    """Write findings; ``path`` is replaced atomically.
 
     Args:
         path: of the file.
-        found: what was found.
-        picked: the file that goes on in place of the dataset's own, whose SHA-256 is kept with them.
+        found: the findings.
+        picked: the picked dataset, if it differs from the scan; its SHA-256 is stored.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
@@ -61,14 +61,14 @@ def write_findings(path: Path, found: ScanFindings, picked: Path | None = None) 
 
 
 def read_findings(path: Path, picked: Path | None = None) -> ScanFindings:
-    """What ``write_findings`` wrote.
+    """Read findings.
 
     Args:
         path: of the file.
-        picked: compared with what it was then, where it goes on and is given.
+        picked: the picked dataset; None: its SHA-256 is not compared.
 
     Raises:
-        OSError, ValueError, KeyError, TypeError: for a file that is absent or damaged, either of them.
+        OSError, ValueError, KeyError, TypeError: for an absent or damaged file.
     """
     whole = json.loads(path.read_bytes())
     content = whole["content"]
@@ -90,7 +90,7 @@ def _digest_of(path: Path) -> str:
 
 
 def _plain(finding: Finding) -> dict[str, Any]:
-    """A bit a pair, for there may be a million of them."""
+    """Plain values, with one bit per pair."""
     pairs = None
     if finding.pairs is not None:
         packed = base64.b64encode(np.packbits(finding.pairs).tobytes()).decode()
@@ -101,8 +101,10 @@ def _plain(finding: Finding) -> dict[str, Any]:
 
 def _finding(plain: dict[str, Any]) -> Finding:
     value = math.nan if plain["value"] is None else plain["value"]
-    told = {name: plain[name] for name in _NAMES}
-    return Finding(**{**told, "elements": tuple(told["elements"])}, value=value, pairs=_pairs(plain["pairs"]))
+    fields = {name: plain[name] for name in _NAMES}
+    return Finding(
+        **{**fields, "elements": tuple(fields["elements"])}, value=value, pairs=_pairs(plain["pairs"])
+    )
 
 
 _NAMES = ("check", "found", "accepted", "action", "elements", "role", "unit", "slice")

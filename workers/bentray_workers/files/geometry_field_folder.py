@@ -1,4 +1,4 @@
-"""The files of a geometry field in its folder: chart, geometry image, and tables to be mapped into memory."""
+"""Files of a geometry field in a folder: chart, geometry image, and memory-mapped tables."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from numpy.typing import DTypeLike, NDArray
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.mesh import Chart, TriangleMesh
 
-from .atomic import replacing, write_bytes
+from .atomic import atomic_replace, write_bytes
 from .hdf5_reading import Limits, opened
-from .hdf5_writing import creating
+from .hdf5_writing import atomic_hdf5
 from .npy_headers import PARSING
 
 
 class FieldFiles(NamedTuple):
     """Paths in one folder.
 
-    ``layout`` is written once all files are there with their sizes, ``figures`` once all are filled.
+    ``layout`` is written when all files have their sizes, ``figures`` when all are filled.
     """
 
     folder: Path
@@ -63,8 +63,8 @@ class FieldFiles(NamedTuple):
 
 
 def write_chart(path: Path, chart: Chart) -> None:
-    """Write a chart; ``path`` is replaced whole or not touched."""
-    with creating(path) as file:
+    """Write a chart; ``path`` is replaced atomically."""
+    with atomic_hdf5(path) as file:
         for name, values in (
             ("vertices", chart.mesh.vertices),
             ("faces", chart.mesh.faces),
@@ -74,10 +74,10 @@ def write_chart(path: Path, chart: Chart) -> None:
 
 
 def read_chart(path: Path) -> Chart:
-    """Read what ``write_chart`` wrote.
+    """Read a chart.
 
     Raises:
-        InvalidInput: naming what is missing.
+        InvalidInput: naming the missing array.
     """
     with opened(path, Limits()) as reader:
         found = {name: reader.array(name, "fi", "an array") for name in ("vertices", "faces", "uv")}
@@ -88,31 +88,31 @@ def read_chart(path: Path) -> Chart:
 
 
 def write_array(path: Path, values: NDArray[Any]) -> None:
-    """A whole table, replaced whole or not touched."""
-    with replacing(path) as partial, partial.open("wb") as file:
+    """Write a table; ``path`` is replaced atomically."""
+    with atomic_replace(path) as partial, partial.open("wb") as file:
         np.save(file, values, allow_pickle=False)
 
 
 def make_table(path: Path, shape: tuple[int, int], kind: DTypeLike) -> None:
-    """A table of that shape with nothing in it, for ``fill_rows``."""
-    with replacing(path) as partial:
+    """Create an empty table for ``fill_rows``."""
+    with atomic_replace(path) as partial:
         np.lib.format.open_memmap(partial, "w+", kind, shape).flush()
 
 
 def mapped(path: Path, mode: Literal["c", "r+"] = "c") -> NDArray[Any]:
-    """A table in memory as it is read; with mode "c" changes stay in this process, with "r+" they do not."""
-    # As a plain array, so that compiled functions take it for one that is in memory.
+    """A memory map of a table; with mode "c" changes stay in this process, with "r+" they are written."""
+    # A plain array, so that compiled functions accept it.
     with PARSING:
         return np.asarray(np.load(path, mmap_mode=mode, allow_pickle=False))
 
 
 def fill_rows(path: Path, first: int, rows: NDArray[Any]) -> None:
-    """Write rows into a table, durably; other processes may be writing others."""
+    """Write rows into a table and synchronise them; other processes may write other rows."""
     with path.open("r+b") as file:
         with PARSING:
             np.lib.format.read_magic(file)
             np.lib.format.read_array_header_1_0(file)
-        # Written in place, not through a map: hosts that share a folder share no pages of memory.
+        # Written in place, not through a map: hosts that share a folder do not share memory.
         file.seek(file.tell() + first * rows[0].nbytes)
         file.write(np.ascontiguousarray(rows).tobytes())
         file.flush()
@@ -120,11 +120,11 @@ def fill_rows(path: Path, first: int, rows: NDArray[Any]) -> None:
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
-    """A few figures, replaced whole or not touched."""
+    """Write figures; ``path`` is replaced atomically."""
     write_bytes(path, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read what ``write_json`` wrote."""
+    """Read figures."""
     found: dict[str, Any] = json.loads(path.read_text())
     return found

@@ -15,7 +15,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.image.geometry_image import GeometryImage
 
 from .hdf5_reading import Limits, Reader, opened
-from .hdf5_writing import creating
+from .hdf5_writing import atomic_hdf5
 
 FORMAT = "bentray-geometry-image"
 VERSION = "1.0"
@@ -25,12 +25,12 @@ Pixels = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class GeometryMaps:
-    """What a geometry image holds; pixel (i, j) of n² lies at (u, v) = (i, j)/(n − 1).
+    """Arrays of a geometry image; pixel (i, j) of n² lies at (u, v) = (i, j)/(n − 1).
 
     Attributes:
         positions: (n, n, 3) in the unit cube.
         normals: (n, n, 3) unit vectors.
-        valid: (n, n) whether a pixel stands for a point of the surface; the others are 0.
+        valid: (n, n) whether a pixel represents a point of the surface; the others are 0.
         colours: (n, n, 3) in [0, 1], or None.
     """
 
@@ -41,7 +41,7 @@ class GeometryMaps:
 
     @classmethod
     def of(cls, image: GeometryImage, colours: Floats | None = None) -> GeometryMaps:
-        """Of an image, with the colours, (vertices, 3), of its mesh where it has them."""
+        """Arrays of an image, with the colours of its mesh, (vertices, 3), if any."""
         return cls(
             image.positions.astype(np.float32),
             image.normals.astype(np.float32),
@@ -51,12 +51,12 @@ class GeometryMaps:
 
 
 def write_geometry_image(path: Path, maps: GeometryMaps) -> None:
-    """Write the maps, float32 and bytes; ``path`` is replaced whole or not touched.
+    """Write the arrays, float32 and bytes; ``path`` is replaced atomically.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
-    with creating(path) as file:
+    with atomic_hdf5(path) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = VERSION
         for name, values in _named(maps).items():
@@ -102,7 +102,7 @@ def _map(reader: Reader, name: str) -> Pixels:
 
 
 def position_png(maps: GeometryMaps) -> bytes:
-    """The positions as red, green and blue, u to the right and v up; clear where not valid."""
+    """The positions as red, green and blue, u to the right and v up; transparent where not valid."""
     return _png(maps.positions, maps.valid)
 
 
@@ -115,7 +115,7 @@ def colour_png(maps: GeometryMaps) -> bytes:
     """The colours likewise.
 
     Raises:
-        InvalidInput: for an image without.
+        InvalidInput: for an image without colours.
     """
     if maps.colours is None:
         raise InvalidInput("colours", "none", "the image of a mesh with colours")
@@ -125,7 +125,7 @@ def colour_png(maps: GeometryMaps) -> bytes:
 def _png(values: Pixels, valid: Flags) -> bytes:
     shades = np.rint(np.clip(np.where(valid[..., np.newaxis], values, 0.0), 0.0, 1.0) * 255.0)
     pixels = np.dstack((shades, 255.0 * valid)).astype(np.uint8)
-    # An image has its rows from the top down.
+    # Images have their rows from top to bottom.
     upright = np.ascontiguousarray(pixels.transpose(1, 0, 2)[::-1])
     buffer = io.BytesIO()
     Image.fromarray(upright).save(buffer, "png", optimize=True)

@@ -1,4 +1,4 @@
-"""glTF held against its own rules before anything of it is made: a tree of nodes, and data that are there."""
+"""Checks of glTF files: a tree of nodes, and data within the file."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ NUMBERS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "
 
 # Of nodes, meshes, primitives, accessors, views and buffers.
 MOST_PARTS = 100_000
-# Ways to draw corners: triangles apart, and a strip of them; points, lines and fans are no mesh that is read.
+# Primitives: separate triangles, and a strip of them; points, lines and fans are not read.
 TRIANGLES, STRIP = 4, 5
 
-# Extensions that pack the values of a mesh: what is read without them is another mesh.
+# Extensions that compress the mesh: without them another mesh would be read.
 PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
 Json = Mapping[str, Any]
 
 
 def check_gltf(scene: Any, data_bytes: int, most_faces: int) -> None:
-    """Refuse a glTF that a reader would go round in, fill its memory with, or read wrongly.
+    """Reject a glTF with cycles, too much data, or data that would be read wrongly.
 
     Args:
         scene: the JSON of the file.
         data_bytes: of the whole file; no buffer in it can be larger.
-        most_faces: that all of its instances may have together.
+        most_faces: of all instances together.
 
     Raises:
-        InvalidInput: naming the list with the place in it, as ``nodes/3``.
+        InvalidInput: naming the list and the index, as ``nodes/3``.
     """
     if not isinstance(scene, dict):
         raise InvalidInput("file", "JSON that is no object", "a glTF scene")
@@ -68,7 +68,7 @@ def _count(place: str, one: Json, key: str, default: int | None = None, most: fl
 
 
 def _member(place: str, one: Json, key: str, many: Sequence[Any]) -> Any:
-    """What an index names."""
+    """The member with an index."""
     if not many:
         raise InvalidInput(f"{place}/{key}", repr(one.get(key))[:40], "nothing: there is none in the file")
     return many[_count(place, one, key, most=len(many) - 1)]
@@ -79,9 +79,9 @@ def _check_data(lists: Mapping[str, Sequence[Json]], data_bytes: int) -> None:
         _count(f"buffers/{number}", buffer, "byteLength", most=data_bytes)
     for number, view in enumerate(lists["bufferViews"]):
         place = f"bufferViews/{number}"
-        room = _member(place, view, "buffer", lists["buffers"])["byteLength"]
-        begin = _count(place, view, "byteOffset", 0, most=room)
-        _count(place, view, "byteLength", most=room - begin)
+        size = _member(place, view, "buffer", lists["buffers"])["byteLength"]
+        begin = _count(place, view, "byteOffset", 0, most=size)
+        _count(place, view, "byteLength", most=size - begin)
     for number, accessor in enumerate(lists["accessors"]):
         place = f"accessors/{number}"
         if "sparse" in accessor or "bufferView" not in accessor:
@@ -105,7 +105,7 @@ def _check_data(lists: Mapping[str, Sequence[Json]], data_bytes: int) -> None:
 
 
 def _mesh_faces(number: int, mesh: Json, lists: Mapping[str, Sequence[Json]]) -> int:
-    """Triangles of a mesh, once its primitives are ones that can be read."""
+    """Check the primitives of a mesh; returns its number of triangles."""
     faces = 0
     for which, primitive in enumerate(_objects(mesh, "primitives")):
         place = f"meshes/{number}/primitives/{which}"
@@ -129,7 +129,7 @@ def _mesh_faces(number: int, mesh: Json, lists: Mapping[str, Sequence[Json]]) ->
 
 
 def _check_tree(nodes: Sequence[Json], faces: Sequence[int], most_faces: int) -> None:
-    """Each node has one parent at most, and none is below itself, so that nothing is met more than once."""
+    """Check that each node has at most one parent and that there are no cycles."""
     parent: dict[int, int] = {}
     total = 0
     for number, node in enumerate(nodes):
@@ -149,7 +149,7 @@ def _check_tree(nodes: Sequence[Json], faces: Sequence[int], most_faces: int) ->
         _check_transform(place, node)
     if total > most_faces:
         raise InvalidInput("nodes", f"{total} faces in all instances of meshes", f"at most {most_faces}")
-    # With one parent each, whoever is not reached from a root is in a circle.
+    # With one parent each, nodes that are not reached from a root are in a cycle.
     waiting = [number for number in range(len(nodes)) if number not in parent]
     reached = 0
     while waiting:
@@ -165,6 +165,6 @@ def _check_transform(place: str, node: Json) -> None:
         if found is None:
             continue
         plain = isinstance(found, list) and len(found) == count
-        # A number of 400 digits compares, where a float of it would overflow.
+        # Integers of many digits can be compared, but not converted to floats.
         if not plain or not all(isinstance(one, int | float) and -1e30 <= one <= 1e30 for one in found):
             raise InvalidInput(f"{place}/{key}", repr(found)[:80], f"{count} numbers from -1e30 to 1e30")

@@ -1,4 +1,4 @@
-"""What an array in a stranger's HDF5 file may be: type, place of its data, filters and size."""
+"""Checks of arrays in untrusted HDF5 files: type, storage, filters and size."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ OTHER_TYPES = {
     h5py.h5t.TIME: "times",
 }
 
-# What cannot be packed may grow by so much, and by a few bytes a chunk.
+# Incompressible data may grow by this factor, and by a few bytes per chunk.
 GROWN = 1.01
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How much a file may make its reader do.
+    """Limits of reading a file.
 
     Attributes:
-        total_bytes: of all arrays read from one file, unpacked.
-        chunk_bytes: of one chunk, unpacked: HDF5 holds it in memory as a whole.
-        packing: unpacked over stored bytes; gzip cannot do better than 1032.
-        small_bytes: an array below this may be packed as well as it likes.
+        total_bytes: of all arrays read from one file, uncompressed.
+        chunk_bytes: of one chunk, uncompressed: HDF5 holds it in memory as a whole.
+        packing: compression ratio; gzip reaches at most 1032.
+        small_bytes: arrays below this may have any compression ratio.
         text: characters of an attribute.
     """
 
@@ -51,14 +51,14 @@ class Limits:
 
 
 def check_storage(path: str, found: h5py.Dataset, accepted: str, limits: Limits, read_bytes: int) -> None:
-    """Refuse an array that is not plain numbers in this file, of a size that can be read.
+    """Reject an array that is not plain numbers stored in this file within the limits.
 
     Args:
         path: of the array.
-        found: it, opened but not read.
-        accepted: what it should be, in words.
-        limits: what it may ask for.
-        read_bytes: of the arrays of the file that have been read.
+        found: the array, opened but not read.
+        accepted: the accepted array, in words.
+        limits: of reading.
+        read_bytes: of the arrays already read from the file.
 
     Raises:
         InvalidInput: naming ``path``.
@@ -91,7 +91,7 @@ def _check_sizes(path: str, found: h5py.Dataset, limits: Limits, read_bytes: int
         chunk = math.prod(found.chunks) * found.dtype.itemsize
         if chunk > limits.chunk_bytes:
             raise InvalidInput(path, f"chunks of {chunk} bytes", f"at most {limits.chunk_bytes} bytes")
-        # Packing makes nothing much larger: chunks that hold more unpack far beyond their size.
+        # Compression makes data hardly larger: chunks that store more would expand beyond their size.
         chunks = math.prod(-(-n // c) for n, c in zip(found.shape, found.chunks, strict=True))
         if stored > chunks * (GROWN * chunk + 64):
             raise InvalidInput(path, f"{stored} bytes in {chunks} chunks of {chunk}", "no more than these")

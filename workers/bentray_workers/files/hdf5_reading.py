@@ -1,4 +1,4 @@
-"""Reading HDF5 that a stranger wrote: every object is checked for what it is before its data are touched."""
+"""Reading untrusted HDF5 files: every object is checked before its data are read."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["SIGNATURE", "Limits", "Reader", "opened", "printable", "rejecting_da
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
-# What HDF5 and h5py raise on damaged files.
+# Exceptions of HDF5 and h5py on damaged files.
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError)
 
 
@@ -29,7 +29,7 @@ def opened(path: Path, limits: Limits) -> Iterator[Reader]:
     """A reader of the file.
 
     Raises:
-        InvalidInput: for a file that is absent, empty, not HDF5, cut short or damaged.
+        InvalidInput: for a file that is absent, empty, not HDF5, truncated or damaged.
     """
     accepted = "a whole HDF5 file"
     try:
@@ -62,24 +62,24 @@ class Reader:
         self._read_bytes = 0
 
     def has(self, path: str) -> bool:
-        """Whether a group or array of that path is there."""
+        """Whether a group or array of that path exists."""
         return self._object(path) is not None
 
     def names(self) -> tuple[str, ...]:
-        """Names of what lies in the root."""
+        """Names in the root group."""
         with rejecting_damage("file", "a whole HDF5 file"):
             return tuple(self._file)
 
     def array(self, path: str, kinds: str, accepted: str) -> NDArray[Any] | None:
-        """An array, or None where it is absent.
+        """An array, or None if it is absent.
 
         Args:
             path: of the array.
-            kinds: numpy kinds that will do: of ``i``, ``u``, ``f``, ``b``.
+            kinds: accepted NumPy kinds: of ``i``, ``u``, ``f``, ``b``.
             accepted: these in words, with the shape.
 
         Raises:
-            InvalidInput: for anything else in that place.
+            InvalidInput: for anything else of that path.
         """
         found = self.checked(path, kinds, accepted)
         if found is None:
@@ -89,7 +89,7 @@ class Reader:
             return np.asarray(found[()])
 
     def checked(self, path: str, kinds: str, accepted: str) -> h5py.Dataset | None:
-        """As ``array``, with every check done and nothing read."""
+        """As ``array``: checked, but not read."""
         found = self._object(path)
         if found is None:
             return None
@@ -104,7 +104,7 @@ class Reader:
         return found
 
     def attribute(self, path: str, name: str) -> Any:
-        """Value of an attribute: str, or an array of numbers; None where it or its owner is absent.
+        """Value of an attribute: str, or an array of numbers; None if it or its owner is absent.
 
         Raises:
             InvalidInput: for any other type, or more than the limits allow.
@@ -162,7 +162,7 @@ class Reader:
         return values[0]
 
     def _object(self, path: str) -> Any:
-        """The group or array at a path, reached over hard links alone."""
+        """The group or array at a path, reached by hard links only."""
         here: Any = self._file
         walked = ""
         for name in filter(None, path.split("/")):
@@ -182,7 +182,7 @@ class Reader:
 
 @contextmanager
 def rejecting_damage(field: str, accepted: str) -> Iterator[None]:
-    """Turn what HDF5 raises on damage into InvalidInput for this field."""
+    """Convert exceptions of HDF5 on damaged data to InvalidInput for this field."""
     try:
         yield
     except InvalidInput:
@@ -193,5 +193,5 @@ def rejecting_damage(field: str, accepted: str) -> Iterator[None]:
 
 
 def printable(text: str) -> str:
-    """Text without control characters and half characters, which HDF5 and JSON cannot carry."""
+    """Text without control characters and unpaired surrogates, which HDF5 and JSON cannot store."""
     return "".join(c for c in text if c.isprintable() or c in "\n\t")

@@ -1,4 +1,4 @@
-"""Writing HDF5 files, atomically, and so that a full disk is an ordinary error: HDF5 itself crashes on it."""
+"""Atomic writing of HDF5 files, with an ordinary error on a full disk, on which HDF5 itself crashes."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from typing import Any, cast
 
 import h5py
 
-from .atomic import replacing
+from .atomic import atomic_replace
 
 
 @contextmanager
-def creating(target: Path) -> Iterator[h5py.File]:
-    """An HDF5 file to fill; on leaving it takes the target's place, whole or not at all.
+def atomic_hdf5(target: Path) -> Iterator[h5py.File]:
+    """A new HDF5 file that atomically replaces the target at the end of the context.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
-    with replacing(target) as partial, io.FileIO(partial, "x+") as raw:
+    with atomic_replace(target) as partial, io.FileIO(partial, "x+") as raw:
         sink = _Sink(raw)
         try:
             with h5py.File(sink, "w") as file:
                 yield file
         finally:
             if sink.failure is not None:
-                # It is the cause of whatever else HDF5 may have said.
+                # The cause of any further error of HDF5.
                 raise OSError(sink.failure.errno, sink.failure.strerror, str(target)) from sink.failure
 
 
 class _Sink(io.RawIOBase):
-    """A file for HDF5 that keeps its first failure and from then on only pretends to write.
+    """A file for HDF5 that stores its first failure and ignores later writes.
 
-    HDF5 cannot close a file that refuses its writes: it frees what it still uses.
+    HDF5 cannot close a file whose writes fail: it frees memory that it still uses.
     """
 
     def __init__(self, raw: io.FileIO) -> None:

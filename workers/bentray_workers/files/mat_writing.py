@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .atomic import replacing
+from .atomic import atomic_replace
 
-# Of one array: more than MATLAB reads from a file of this version.
+# Of one array: the limit of this version of the format.
 LARGEST_BYTES = 2**31 - 1
-# SciPy writes the time there; without it the same arrays give the same bytes.
+# SciPy writes the time there; a fixed header gives the same bytes for the same arrays.
 ABOUT = b"MATLAB 5.0 MAT-file, written by Bentray".ljust(116)
 
 
 def write_mat(path: Path, arrays: Mapping[str, NDArray[Any] | str]) -> None:
-    """Write arrays and texts by name; ``path`` is replaced whole.
+    """Write arrays and texts by name; ``path`` is replaced atomically.
 
     Lists become rows; the axes of an array keep their order.
 
@@ -35,7 +35,7 @@ def write_mat(path: Path, arrays: Mapping[str, NDArray[Any] | str]) -> None:
         if size > LARGEST_BYTES:
             accepted = f"at most {LARGEST_BYTES} bytes for MATLAB; hdf5 holds any, and MATLAB reads it"
             raise InvalidInput("volume", f"{name} of {size} bytes", accepted)
-    with replacing(path) as partial, partial.open("wb") as file:
+    with atomic_replace(path) as partial, partial.open("wb") as file:
         savemat(file, dict(arrays), oned_as="row")
         file.seek(0)
         file.write(ABOUT)

@@ -1,4 +1,4 @@
-"""Meshes as files: ``bentray-mesh`` in HDF5, and what a service remembers of one."""
+"""Mesh files: ``bentray-mesh`` in HDF5, and the summary of a mesh."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bentray_kernels.meshes.defects import SoundMesh
 from bentray_kernels.meshes.mesh import TriangleMesh
 
 from .hdf5_reading import Limits, opened
-from .hdf5_writing import creating
+from .hdf5_writing import atomic_hdf5
 
 FORMAT = "bentray-mesh"
 VERSION = "1.0"
@@ -23,7 +23,7 @@ VERSION = "1.0"
 
 @dataclass(frozen=True)
 class StoredMesh:
-    """A sound mesh, as ``defects.sound`` leaves it.
+    """A mesh without defects, see ``defects.sound``.
 
     Attributes:
         mesh: vertices in any unit.
@@ -35,7 +35,7 @@ class StoredMesh:
 
     @property
     def nbytes(self) -> int:
-        """Of its arrays; a file packs them."""
+        """Size of its arrays, uncompressed."""
         parts = (self.mesh.vertices, self.mesh.faces, self.colours)
         return sum(part.nbytes for part in parts if part is not None)
 
@@ -51,13 +51,13 @@ class StoredMesh:
 
 
 def summary_of(stored: StoredMesh, surface: SoundMesh, kind: str, pieces: int = 1) -> dict[str, Any]:
-    """What a service remembers of a mesh, in plain values.
+    """Summary of a mesh in plain values.
 
     Args:
         stored: the mesh.
-        surface: what was done to make it sound.
-        kind: the format of the file that it came in, or "isosurface".
-        pieces: of which it is one.
+        surface: with the repairs.
+        kind: format of the uploaded file, or "isosurface".
+        pieces: number of connected pieces, of which it is one.
     """
     repairs = {
         "merged_vertices": surface.merged,
@@ -79,12 +79,12 @@ def summary_of(stored: StoredMesh, surface: SoundMesh, kind: str, pieces: int = 
 
 
 def write_mesh(path: Path, stored: StoredMesh) -> None:
-    """Write a mesh; ``path`` is replaced whole or not touched.
+    """Write a mesh; ``path`` is replaced atomically.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
-    with creating(path) as file:
+    with atomic_hdf5(path) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = VERSION
         arrays = {"vertices": stored.mesh.vertices, "faces": stored.mesh.faces, "colours": stored.colours}
@@ -94,7 +94,7 @@ def write_mesh(path: Path, stored: StoredMesh) -> None:
 
 
 def load_mesh(path: Path) -> StoredMesh:
-    """Read what ``write_mesh`` wrote.
+    """Read a mesh.
 
     Raises:
         InvalidInput: naming the first field that is missing or wrong.

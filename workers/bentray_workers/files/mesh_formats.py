@@ -37,7 +37,7 @@ GLB_HEADER = struct.Struct("<4sII")
 GLB_CHUNK = struct.Struct("<I4s")
 
 # What glTF says of looks; images would have to be decoded, and nothing here asks for them.
-LOOKS = ("images", "textures", "samplers", "materials", "animations", "skins", "cameras")
+MATERIALS = ("images", "textures", "samplers", "materials", "animations", "skins", "cameras")
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,8 @@ class ReadMesh:
 
     Attributes:
         format: as ``trimesh`` names it.
-        surface: the mesh, and what was done to make it sound.
-        colours: (vertices, 3) in [0, 1], or None where the file gives none for vertices.
+        surface: the mesh with its repairs.
+        colours: (vertices, 3) in [0, 1], or None without colours of vertices.
     """
 
     format: str
@@ -56,24 +56,24 @@ class ReadMesh:
 
 
 def read_mesh(data: bytes) -> ReadMesh:
-    """Read a mesh in any of the formats; nothing outside of the bytes is looked at.
+    """Read a mesh in any of the formats; other files are never read.
 
-    Faces of more corners become triangles, the parts of a glTF scene one mesh. Vertices in one place are
-    merged (STL has each of them once a face), and faces that run against the others are turned.
+    Polygons become triangles, the parts of a glTF scene one mesh. Coincident vertices are merged (STL repeats
+    them for each face), and faces of inconsistent orientation are flipped.
 
     Args:
         data: the whole file.
 
     Raises:
-        InvalidInput: for anything else, for more than ``LARGEST_BYTES`` or ``MOST_FACES``, for damage, for
-            glTF that refers to other files, and as ``meshes.defects.sound``.
+        InvalidInput: for other formats, more than ``LARGEST_BYTES`` or ``MOST_FACES``, damaged data, glTF
+            that refers to other files, and as ``meshes.defects.sound``.
     """
     if len(data) > LARGEST_BYTES:
         raise InvalidInput("file", f"{len(data)} bytes", f"at most {LARGEST_BYTES} bytes")
     data = data.removeprefix(BYTE_ORDER_MARK)
     kind = _kind(data)
     if kind in ("gltf", "glb"):
-        data = _without_looks(data, kind)
+        data = _without_materials(data, kind)
     if kind == "off":
         check_off(data)
     if kind == "obj":
@@ -98,7 +98,7 @@ def _kind(data: bytes) -> str:
         return "ply"
     if start.split(maxsplit=1)[:1] and start.split(maxsplit=1)[0] in HEADERS:
         return "off"
-    # Binary STL begins with any 80 bytes, even with "solid"; its length tells.
+    # Binary STL begins with any 80 bytes, even with "solid"; it is detected by its length.
     as_stl = 84 + 50 * struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else 0
     if as_stl and as_stl == len(data):
         return "stl"
@@ -119,19 +119,19 @@ def _kind(data: bytes) -> str:
 
 @contextmanager
 def _whole(kind: str) -> Iterator[None]:
-    """What trimesh raises on damage in words of ours: its own are those of the arrays that it makes."""
+    """Convert errors of trimesh on damaged data to messages about the file."""
     try:
         with rejecting_damage("file", f"a whole {kind.upper()} file"):
             yield
     except InvalidInput as error:
         if not error.value.startswith("damaged data"):
             raise
-        found = f"{kind.upper()} data that are cut short, damaged, or not what the file itself says of them"
+        found = f"{kind.upper()} data that are truncated, damaged, or inconsistent with the header"
         raise InvalidInput("file", found, error.accepted) from None
 
 
-def _without_looks(data: bytes, kind: str) -> bytes:
-    """The same glTF without images and materials, once it is sure that it refers to no other file."""
+def _without_materials(data: bytes, kind: str) -> bytes:
+    """The same glTF without images and materials, after checking that it refers to no other file."""
     with _whole(kind):
         rest = b""
         text = data
@@ -144,7 +144,7 @@ def _without_looks(data: bytes, kind: str) -> bytes:
         scene = json.loads(text)
         outside = [buffer["uri"] for buffer in scene.get("buffers", []) if not _inside(buffer)]
         if outside:
-            # Its name could be that of any file of this machine; it is not repeated.
+            # The name may be that of any file of this machine; it is not repeated.
             raise InvalidInput("buffers/uri", "data in another file", "data within the file")
         check_gltf(scene, len(data), MOST_FACES)
         kept = json.dumps(_stripped(scene)).encode()
@@ -163,7 +163,7 @@ def _stripped(scene: dict[str, Any]) -> dict[str, Any]:
     for mesh in scene.get("meshes", []):
         for primitive in mesh["primitives"]:
             primitive.pop("material", None)
-    return {name: value for name, value in scene.items() if name not in LOOKS}
+    return {name: value for name, value in scene.items() if name not in MATERIALS}
 
 
 def _colours(mesh: trimesh.Trimesh, surface: SoundMesh) -> Floats | None:

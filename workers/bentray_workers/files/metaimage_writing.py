@@ -1,4 +1,4 @@
-"""MetaImage files (.mha) of volumes: a few lines of text, then the values; lengths in mm."""
+"""Writing volumes as MetaImage files (.mha): a text header, then the values; lengths in mm."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .atomic import replacing
+from .atomic import atomic_replace
 from .bounded_reading import UNITS_M
 
-# Names of the types that volumes have.
+# Names of the types of volumes.
 ELEMENTS = {"u1": "MET_UCHAR", "u2": "MET_USHORT", "f4": "MET_FLOAT", "f8": "MET_DOUBLE"}
 
 
@@ -25,20 +25,20 @@ def write_metaimage(
     origin_m: Sequence[float],
     title: str,
 ) -> None:
-    """Write a volume as MetaImage, header and values in one file; ``path`` is replaced whole.
+    """Write a volume as MetaImage, header and values in one file; ``path`` is replaced atomically.
 
-    Places are those of our axes, without a claim of how they lie in the body: ITK, which gives them to the
-    left, back and up, shows the numbers as they are here.
+    Positions are in the axes of the volume, without an orientation in the body: ITK, whose axes go to the
+    left, back and up, shows the same numbers.
 
     Args:
-        path: the file to make.
+        path: of the file.
         values: (nx, ny[, nz]), of a type of ``ELEMENTS``.
-        spacing_m: between nodes, one an axis, m.
-        origin_m: place of node 0, one an axis, m.
-        title: becomes the comment.
+        spacing_m: per axis, m.
+        origin_m: position of node 0, per axis, m.
+        title: for the comment.
 
     Raises:
-        InvalidInput: for spacing that is not even, which MetaImage cannot tell.
+        InvalidInput: for uneven spacing, which MetaImage cannot store.
         OSError: where the folder cannot be written to or the disk is full.
 
     Source:
@@ -62,15 +62,15 @@ def write_metaimage(
         "ElementSpacing": _row(np.divide(spacing_m, UNITS_M["mm"])),
         "DimSize": _row(values.shape),
         "ElementType": ELEMENTS[stored.dtype.str[1:]],
-        # What follows this line are the values.
+        # The values follow this line.
         "ElementDataFile": "LOCAL",
     }
     if not tags["Comment"]:
         del tags["Comment"]
     header = "".join(f"{name} = {value}\n" for name, value in tags.items())
-    with replacing(path) as partial, partial.open("wb") as file:
+    with atomic_replace(path) as partial, partial.open("wb") as file:
         file.write(header.encode())
-        # x runs fastest; a slice at a time, since turning the whole would need as much memory again.
+        # x varies fastest; one slice at a time, since transposing the whole would double the memory.
         for k in range(stored.shape[-1]):
             file.write(stored[..., k].tobytes(order="F"))
 

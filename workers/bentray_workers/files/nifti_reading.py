@@ -1,4 +1,4 @@
-"""NIfTI-1 and -2 of one part: nibabel reads the header, the values are read here, within bounds."""
+"""Reading single-file NIfTI-1 and -2: the header by nibabel, the values here, within bounds."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from .bounded_reading import (
     whole,
 )
 from .volume import Volume
-from .volume_axes import turned
+from .volume_axes import reorient
 
-# Takes what nibabel says of a header while it checks it: the refusal says the same in one line.
-_unheard = logging.Logger("nibabel's checks, unheard", logging.CRITICAL + 1)
+# Discards messages of nibabel about a header: the exception has the same text.
+_silent = logging.Logger("nibabel checks, silent", logging.CRITICAL + 1)
 
 
 def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
-    """The volume in an open file, unpacked, its axes turned to the right, front and up of the body.
+    """The volume in an open, uncompressed file, with axes to the right, front and up of the body.
 
-    Axes change places and sense so that they come nearest to these; values are never resampled, so what is
-    left of a tilt is not kept. A file that says nothing of directions (both codes 0) stays as it is stored.
+    Axes are permuted and flipped to the nearest orientation; values are never resampled, so a remaining tilt
+    is lost. A file without directions (both codes 0) is read as it is stored.
 
     Args:
-        file: at its beginning. It is read to its end, so that one that was packed verifies its check sum.
+        file: at its beginning. It is read to its end, so that the check sum of a compressed file is verified.
         check: called with the shape in the file before the values are read.
 
     Raises:
-        InvalidInput: for anything else, and for axes that are not at right angles.
+        InvalidInput: for other files, and for axes that are not orthogonal.
     """
     from nibabel.nifti1 import Nifti1Header
     from nibabel.nifti2 import Nifti2Header
@@ -54,13 +54,13 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
         try:
             header: Any = kind(start[:size], check=False)
             _check_numbers(header)
-            header.check_fix(_unheard)
+            header.check_fix(_silent)
             dtype, shape = header.get_data_dtype(), tuple(int(n) for n in header.get_data_shape())
             slope, intercept = header.get_slope_inter()
             affine, unit = _affine(header), header.get_xyzt_units()[0]
         except HeaderDataError as error:
             raise InvalidInput("file", f"a damaged NIfTI header ({error})", "a whole NIfTI file") from None
-        # A volume of one moment often has a fourth axis of length 1.
+        # A single volume often has a fourth axis of length 1.
         while len(shape) > 3 and shape[-1] == 1:
             shape = shape[:-1]
         count = declared("dim", shape, dtype, check)
@@ -73,7 +73,7 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
         if (slope or 1.0, intercept or 0.0) != (1.0, 0.0):
             with np.errstate(over="ignore", invalid="ignore"):
                 values = values * np.float32(slope) + np.float32(intercept)
-        values, affine = turned(values, affine, "affine")
+        values, affine = reorient(values, affine, "affine")
         scale = UNITS_M["mm" if unit == "unknown" else unit]
         with np.errstate(over="ignore"):
             spacing = scale * np.linalg.norm(affine[:3, :3], axis=0)
@@ -81,9 +81,9 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
 
 
 def _check_numbers(header: Any) -> None:
-    """Refuse numbers that nibabel would put right by guesses of its own."""
+    """Reject numbers that nibabel would correct by guesses."""
     for name in ("scl_slope", "scl_inter"):
-        # NaN is how nibabel itself writes that there is none.
+        # Nibabel writes NaN for an absent value.
         if np.isinf(header[name]):
             raise InvalidInput(name, float(header[name]), "a finite number")
     steps = header["pixdim"][1:4]
@@ -93,9 +93,9 @@ def _check_numbers(header: Any) -> None:
 
 
 def _affine(header: Any) -> Floats:
-    """(4, 4) from nodes to places, unit of the file, x to the right, y to the front, z up."""
+    """(4, 4) from nodes to positions, unit of the file, x to the right, y to the front, z up."""
     if header["sform_code"] == 0 and header["qform_code"] == 0:
-        # Nibabel would mirror x, as another format has it.
+        # Nibabel would flip x, as another format does.
         return np.diag([*np.asarray(header["pixdim"][1:4], dtype=np.float64), 1.0])
     return np.asarray(header.get_best_affine(), dtype=np.float64)
 

@@ -1,4 +1,4 @@
-"""NIfTI files of volumes: lengths in mm, axes to the right, front and up."""
+"""Writing volumes as NIfTI files: lengths in mm, axes to the right, front and up."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .atomic import replacing
+from .atomic import atomic_replace
 from .bounded_reading import UNITS_M
 
-# Nodes along an axis that the header of NIfTI-1 can tell.
+# Largest number of nodes along an axis in the header of NIfTI-1.
 MOST_NODES = 2**15 - 1
-# Of nibabel's codes: places are those of the scanner.
+# Code for coordinates of the scanner.
 SCANNER = 1
 
 
@@ -27,17 +27,17 @@ def write_nifti(
     origin_m: Sequence[float],
     title: str,
 ) -> None:
-    """Write a volume as NIfTI-1, or as NIfTI-2 where an axis is too long; ``path`` is replaced whole.
+    """Write a volume as NIfTI-1, or as NIfTI-2 where an axis is too long; ``path`` is replaced atomically.
 
     Args:
-        path: the file to make.
-        values: (nx, ny[, nz]), of a type that NIfTI has.
-        spacing_m: between nodes, one an axis, m.
-        origin_m: place of node 0, one an axis, m.
-        title: as much of it as fits becomes the description.
+        path: of the file.
+        values: (nx, ny[, nz]), of a type of NIfTI.
+        spacing_m: per axis, m.
+        origin_m: position of node 0, per axis, m.
+        title: for the description, truncated.
 
     Raises:
-        InvalidInput: for spacing that is not even, which NIfTI cannot tell.
+        InvalidInput: for uneven spacing, which NIfTI cannot store.
         OSError: where the folder cannot be written to or the disk is full.
     """
     from nibabel.nifti1 import Nifti1Image
@@ -54,7 +54,7 @@ def write_nifti(
     image.set_sform(affine, SCANNER)
     image.set_qform(affine, SCANNER)
     image.header.set_xyzt_units("mm")
-    room = image.header["descrip"].dtype.itemsize
-    image.header["descrip"] = title.encode()[:room].decode(errors="ignore").encode()
-    with replacing(path) as partial, partial.open("wb") as file:
+    length = image.header["descrip"].dtype.itemsize
+    image.header["descrip"] = title.encode()[:length].decode(errors="ignore").encode()
+    with atomic_replace(path) as partial, partial.open("wb") as file:
         image.to_stream(file)

@@ -1,4 +1,4 @@
-"""NRRD: pynrrd reads the header, the values are read here, since pynrrd unpacks without bound."""
+"""Reading NRRD: the header by pynrrd, the values here, since pynrrd decompresses without bound."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .bounded_reading import (
     whole,
 )
 from .volume import Volume
-from .volume_axes import turned
+from .volume_axes import reorient
 
 NRRD_TYPES = {
     "i1": ("signed char", "int8", "int8_t"),
@@ -39,15 +39,15 @@ NRRD_TYPES = {
 }
 
 
-# What a header says of values that do not follow it.
+# Header fields of values stored elsewhere.
 ELSEWHERE = ("data file", "datafile", "byte skip", "byteskip", "line skip", "lineskip")
 
 
 def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
-    """The volume in an NRRD file with its values after the header; raises InvalidInput for anything else.
+    """The volume in an NRRD file with attached values; raises InvalidInput for other files.
 
-    Its axes go to the right, the front and the head where the file's space tells of them, as ``LPS`` does;
-    else they come in the order and the sense of that space.
+    Its axes go to the right, front and head if the space of the file is anatomical, as ``LPS``; otherwise
+    they are in the order and direction of that space.
 
     ``check`` is called with the shape before the values are read.
     """
@@ -61,7 +61,7 @@ def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
     accepted = "a whole NRRD file in three dimensions"
     with rejecting_damage("file", accepted):
         header: Any = nrrd.read_header(start[: min(ends)].splitlines(keepends=True))
-        # A data file beside the header could be any file of this machine; its name is not repeated.
+        # A detached data file could be any file of this machine; its name is not repeated.
         for field in ELSEWHERE:
             if field in header:
                 raise InvalidInput(field, "values elsewhere", "values in the same file, after the header")
@@ -88,15 +88,15 @@ def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
         else:
             raise InvalidInput("encoding", repr(encoding), "raw or gzip")
         values = np.frombuffer(data, dtype).reshape(shape, order="F")
-        values, affine = turned(values, _affine(header), "space directions")
+        values, affine = reorient(values, _affine(header), "space directions")
         with np.errstate(over="ignore"):
             steps = np.linalg.norm(affine[:3, :3], axis=0)
         return Volume.of(values, steps.tolist(), affine[:3, 3].tolist(), str(header.get("content", "")))
 
 
 def _affine(header: Any) -> Floats:
-    """(4, 4) from nodes to places in the space of the file, m."""
-    # Spacings are told in the units of the array's axes, directions and origin in those of space.
+    """(4, 4) from nodes to positions in the space of the file, m."""
+    # Spacings are in units of the axes, directions and origin in those of the space.
     own, space = header.get("units"), header.get("space units")
     around = _metres(space or own)
     affine = np.eye(4)
@@ -115,9 +115,9 @@ def _affine(header: Any) -> Floats:
 
 
 def _to_right_front_up(space: Any) -> tuple[float, float, float]:
-    """What the axes of a space are times those to the right, the front and the head, as NIfTI's are.
+    """Signs of the axes of a space relative to right, front and head.
 
-    One that names no patient, as ``3D-right-handed`` or none, stays as it is.
+    Spaces without anatomical directions, as ``3D-right-handed``, are unchanged.
     """
     words = str(space or "").lower().removesuffix("-time")
     words = {"ras": "right-anterior-superior", "las": "left-anterior-superior"}.get(words, words)
@@ -127,7 +127,7 @@ def _to_right_front_up(space: Any) -> tuple[float, float, float]:
 
 
 def _metres(names: Sequence[str] | None) -> NDArray[np.float64]:
-    """What each of three axes is measured in, m; mm where the header does not tell."""
+    """Units of the three axes, m; mm by default."""
     units = [str(name).strip('" ') or "mm" for name in names or ["mm"] * 3]
     for unit in units:
         if unit not in UNITS_M:

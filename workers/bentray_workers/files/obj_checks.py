@@ -1,4 +1,4 @@
-"""OBJ held against what a face and a vertex are; the first line that is neither is told by its number."""
+"""Checks of OBJ files: faces and vertices, with the line number of the first error."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import re
 
 from bentray_kernels.errors import InvalidInput
 
-# A line that is shown in a refusal is cut to this.
+# Length of a line in an error message.
 SHOWN = 60
 
-# Lines that go on after a backslash; faces of fewer than three corners; vertices of fewer than three numbers.
+# Continued lines; faces of fewer than three corners; vertices of fewer than three numbers.
 CONTINUED = re.compile(rb"\\[ \t]*\r?\n")
 SHORT_FACE = re.compile(rb"^[ \t]*f(?:[ \t]+[^\s#]+){0,2}[ \t]*(?:#.*)?\r?$", re.MULTILINE)
 SHORT_VERTEX = re.compile(rb"^[ \t]*v(?:[ \t]+[^\s#]+){0,2}[ \t]*(?:#.*)?\r?$", re.MULTILINE)
 
 
 def check_obj(data: bytes) -> None:
-    """Refuse an OBJ with a face of fewer than three corners, which readers leave out, or with half a vertex.
+    """Reject an OBJ with an incomplete face, which readers skip, or an incomplete vertex.
 
     Args:
         data: the whole file.

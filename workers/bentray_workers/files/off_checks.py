@@ -1,4 +1,4 @@
-"""OFF held against its own counts: what is missing or no number is told by line."""
+"""Checks of OFF files against their counts, with the first wrong vertex or face."""
 
 from __future__ import annotations
 
@@ -8,33 +8,33 @@ from bentray_kernels.errors import InvalidInput
 
 HEADERS = (b"OFF", b"COFF", b"NOFF", b"CNOFF")
 
-# A line that is shown in a refusal is cut to this.
+# Length of a line in an error message.
 SHOWN = 60
 
 
 def check_off(data: bytes) -> None:
-    """Refuse an OFF that has not the lines that its counts say.
+    """Reject an OFF whose lines do not match its counts.
 
     Args:
         data: the whole file, which begins with one of ``HEADERS``.
 
     Raises:
-        InvalidInput: ``file`` for counts that are none, and for fewer lines than they say; ``vertices`` and
-            ``faces`` for the first line that is wrong.
+        InvalidInput: ``file`` for invalid counts and for missing lines; ``vertices`` and ``faces`` for the
+            first invalid line.
     """
     plain = re.sub(rb"#[^\n]*", b"", data)
     lines = [line for line in (one.strip() for one in plain.splitlines()) if line]
     rest = lines[0].split(maxsplit=1)[1:] + lines[1:]
     vertices, faces = _counts(rest[0] if rest else b"")
     if len(rest) - 1 < vertices + faces:
-        found = f"{len(rest) - 1} lines of the {vertices} vertices and {faces} faces that its counts say"
+        found = f"{len(rest) - 1} lines of the {vertices} vertices and {faces} faces of its counts"
         raise InvalidInput("file", f"an OFF file that ends too soon: {found}", "a whole OFF file")
     for k, line in enumerate(rest[1 : 1 + vertices]):
         if not _numbers(line.split()[:3]):
             raise InvalidInput("vertices", f"{_shown(line)} as vertex {k}", "three numbers, x y z")
     for k, line in enumerate(rest[1 + vertices : 1 + vertices + faces]):
         if not _face(line.split(), vertices):
-            accepted = f"how many corners, 3 or more, and which vertices they are, from 0 to {vertices - 1}"
+            accepted = f"the number of corners, 3 or more, and their vertices, from 0 to {vertices - 1}"
             raise InvalidInput("faces", f"{_shown(line)} as face {k}", accepted)
 
 

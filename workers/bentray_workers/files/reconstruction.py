@@ -1,4 +1,4 @@
-"""Reconstructions as files: ``reconstruction.h5``, written atomically and read back exactly."""
+"""Reconstruction files (``reconstruction.h5``): written atomically, read exactly."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from bentray_kernels.tomography.stored_settings import from_stored
 
 from .dataset.write import write_array
 from .hdf5_reading import Limits, Reader, opened
-from .hdf5_writing import creating
+from .hdf5_writing import atomic_hdf5
 from .reconstruction_format import FORMAT, VERSION
 
 HISTORY = {
@@ -29,7 +29,7 @@ HISTORY = {
     "given": np.bool_,
 }
 
-# Columns of refinements by waveforms; NaN where there is none. Files of before them have none of these.
+# Columns of full-waveform refinements; NaN for other stages. Absent in older files.
 WAVES = ("band_low_hz", "band_high_hz", "misfit", "held_out_misfit", "of_attenuation")
 IMAGES = {
     "speed": "speed_mps",
@@ -40,17 +40,17 @@ IMAGES = {
 
 
 def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
-    """Write a reconstruction; ``path`` is replaced whole or not touched.
+    """Write a reconstruction; ``path`` is replaced atomically.
 
-    The file holds ``speed_mps``, ``coverage_m`` and, where there are such, ``attenuation_np_m`` and
-    ``recovery``, each (nx, ny) or (nx, ny, nz); ``history`` with a column a field of ``Sweep``; ``residuals``
+    The file holds ``speed_mps``, ``coverage_m`` and, if present, ``attenuation_np_m`` and ``recovery``,
+    each (nx, ny) or (nx, ny, nz); ``history`` with a column for each field of ``Sweep``; ``residuals``
     with ``count`` and the ``edge_s`` of its bins; and root attributes ``spacing_m``, ``origin_m``, ``axes``,
     ``water_speed_mps``, ``settings``, ``trials`` and ``provenance``, the last three JSON.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
-    with creating(Path(path)) as file:
+    with atomic_hdf5(Path(path)) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = VERSION
         file.attrs["axes"] = "x,y" if reconstruction.speed.ndim == 2 else "x,y,z"
@@ -79,7 +79,7 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
 
 
 def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstruction:
-    """Read what ``write_reconstruction`` wrote.
+    """Read a reconstruction.
 
     Raises:
         InvalidInput: naming the first field that is missing or wrong, as ``read_dataset`` does.

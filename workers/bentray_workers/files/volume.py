@@ -16,7 +16,7 @@ from bentray_kernels.limits import SPACING_M
 from bentray_kernels.ranges import Range
 
 from .hdf5_reading import Limits, Reader, opened, printable
-from .hdf5_writing import creating
+from .hdf5_writing import atomic_hdf5
 
 FORMAT = "bentray-volume"
 VERSION = "1.0"
@@ -133,15 +133,15 @@ def check_type(field: str, dtype: np.dtype[Any]) -> None:
 
 
 def write_volume(path: Path, volume: Volume) -> None:
-    """Write a volume; ``path`` is replaced whole or not touched.
+    """Write a volume; ``path`` is replaced atomically.
 
-    The file holds ``values``, not packed, since every picture reads them whole, and the root attributes
+    The file holds ``values``, uncompressed, since every picture reads all of them, and the root attributes
     ``format``, ``format_version``, ``spacing_m``, ``origin_m`` and ``title``.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
-    with creating(Path(path)) as file:
+    with atomic_hdf5(Path(path)) as file:
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = VERSION
         file.attrs["spacing_m"] = volume.spacing_m
@@ -151,7 +151,7 @@ def write_volume(path: Path, volume: Volume) -> None:
 
 
 def volume_in(reader: Reader) -> Volume:
-    """The volume in an open file that says it is one; raises InvalidInput as ``read_volume`` does."""
+    """The volume in an open file of this format; raises InvalidInput as ``read_volume``."""
     if (version := reader.text("", "format_version")) != VERSION:
         raise InvalidInput("@format_version", repr(version), f'"{VERSION}"')
     values = reader.array("values", "buif", "(nx, ny, nz) numbers")
@@ -162,7 +162,7 @@ def volume_in(reader: Reader) -> Volume:
 
 
 def read_volume(path: Path, limits: Limits | None = None) -> Volume:
-    """Read what ``write_volume`` wrote.
+    """Read a volume.
 
     Raises:
         InvalidInput: naming the first field that is missing or wrong, as ``read_dataset`` does.

@@ -1,4 +1,4 @@
-"""A volume in other file formats: what each holds, and the task that writes one."""
+"""Export of volumes to other file formats."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .atomic import replacing
+from .atomic import atomic_replace
 from .hdf5_reading import Limits, opened
 from .mat_writing import write_mat
 from .metaimage_writing import write_metaimage
@@ -25,13 +25,13 @@ from .volume import FORMAT, read_volume
 
 @dataclass(frozen=True)
 class Content:
-    """What is in the file of a volume.
+    """Content of the file of a volume.
 
     Attributes:
         values: (nx, ny[, nz]): the speed of a reconstruction, m/s, or the values of an upload.
-        spacing_m, origin_m: one an axis, m; NaN where heights are uneven.
-        title: what it is.
-        images: every array of it by its name, these values among them.
+        spacing_m, origin_m: per axis, m; NaN for uneven heights.
+        title: of the volume.
+        images: all arrays by name, including the values.
     """
 
     values: NDArray[Any]
@@ -43,19 +43,19 @@ class Content:
 
 @dataclass(frozen=True)
 class Format:
-    """A format: the end of its files' names, their media type, and what writes one."""
+    """A file format: extension, media type and writer."""
 
     extension: str
     media_type: str
     write: Callable[[Path, Content], None]
 
 
-# Of the numbers of a volume, and of what a file says beside them.
+# Size of a number, and of headers.
 NUMBER_BYTES, HEADER_BYTES = 8, 64 * 2**10
 
 
 def largest_bytes(shape: Sequence[int], *, uploaded: bool) -> int:
-    """Bytes that a volume of this shape takes in any of the formats, at most."""
+    """Largest size of a volume of this shape in any of the formats, bytes."""
     images = 1 if uploaded else len(IMAGES)
     return images * NUMBER_BYTES * math.prod(shape) + HEADER_BYTES
 
@@ -65,11 +65,11 @@ def export_volume(volume: Path, *, target: Path, name: str) -> None:
 
     Args:
         volume: its file.
-        target: the file to make, replaced whole.
+        target: the exported file, replaced atomically.
         name: a key of ``FORMATS``.
 
     Raises:
-        InvalidInput: naming ``volume``, for what the format cannot tell, or one that is deleted meanwhile.
+        InvalidInput: naming ``volume``, for content that the format cannot store, or a deleted volume.
         OSError: where the folder cannot be written to or the disk is full.
     """
     with opened(volume, Limits()) as reader:
@@ -77,7 +77,7 @@ def export_volume(volume: Path, *, target: Path, name: str) -> None:
     try:
         FORMATS[name].write(target, _uploaded(volume) if uploaded else _reconstructed(volume))
     except FileNotFoundError:
-        # Deleting a volume takes its exports along, unfinished ones too.
+        # Deleting a volume removes its exports, also unfinished ones.
         if not target.parent.is_dir():
             raise
         raise InvalidInput("volume", "one that was deleted during its export", "one that stays") from None
@@ -96,7 +96,7 @@ def _reconstructed(volume: Path) -> Content:
 
 
 def _npy(target: Path, content: Content) -> None:
-    with replacing(target) as partial, partial.open("wb") as file:
+    with atomic_replace(target) as partial, partial.open("wb") as file:
         np.save(file, np.ascontiguousarray(content.values), allow_pickle=False)
 
 

@@ -1,4 +1,4 @@
-"""Volumes that a stranger wrote, in any of the formats, told apart by content and not by name."""
+"""Import of untrusted volumes in all accepted formats, detected by content."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .volume import FORMAT, Volume, volume_in
 
 ACCEPTED = "a volume as NumPy (.npy), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype"
 
-# Where neither the file nor the user tells, m.
+# Default spacing, m.
 SPACING_M = 1e-3
 
 # Little-endian, and with "-be" big-endian.
@@ -35,12 +35,12 @@ RAW_TYPES = {"uint8": np.dtype("u1"), "int8": np.dtype("i1")} | {
 
 @dataclass(frozen=True)
 class Given:
-    """What the user says of a file that does not say it itself.
+    """Properties given by the user that are not in the file.
 
     Attributes:
-        title: in place of the file's own.
+        title: replaces that of the file.
         spacing_m: one distance or three, m; for NumPy and raw files only.
-        shape: (nx, ny, nz) of raw bytes, in which x runs fastest.
+        shape: (nx, ny, nz) of raw bytes, x varies fastest.
         dtype: of raw bytes, a key of ``RAW_TYPES``.
     """
 
@@ -53,18 +53,17 @@ class Given:
 def import_volume(path: Path, given: Given | None = None, check: ShapeCheck = any_shape) -> Volume:
     """Read a volume in any of the formats.
 
-    Axes stay in the order of the file, x first; how an NRRD is turned in space is not kept. Those of a NIfTI
-    are put in the order right, front, up (``read_nifti``). What both give in mm becomes m. A reconstruction
-    of ours becomes its speed, m/s.
+    Axes keep the order of the file, x first; those of NIfTI and anatomical NRRD go to the right, front and
+    up (``read_nifti``, ``read_nrrd``). Lengths in mm become m. A reconstruction becomes its speed, m/s.
 
     Args:
         path: of the file.
-        given: what it does not say.
+        given: properties that are not in the file.
         check: of the shape, called before the values are read.
 
     Raises:
-        InvalidInput: from ``check``, for anything else, for more than ``LARGEST_BYTES``, for values that are
-            not real and finite or that float32 cannot tell apart, and for uneven slices.
+        InvalidInput: from ``check``, for other formats, more than ``LARGEST_BYTES``, values that are not real
+            and finite or that float32 cannot distinguish, and uneven slices.
     """
     given = given or Given()
     try:
@@ -84,7 +83,7 @@ def _read(path: Path, file: IO[bytes], start: bytes, given: Given, check: ShapeC
         return _numpy(path, file, given, check)
     if given.spacing_m is not None:
         raise InvalidInput(
-            "spacing_m", given.spacing_m, "nothing: this file tells it, or is of no known format"
+            "spacing_m", given.spacing_m, "nothing: this file contains it, or has no known format"
         )
     if start.startswith(SIGNATURE):
         return _hdf5(path, check)
@@ -145,7 +144,7 @@ def _hdf5(path: Path, check: ShapeCheck) -> Volume:
             return volume_in(reader)
     if kind != RECONSTRUCTION:
         raise InvalidInput("@format", repr(kind), f'"{FORMAT}" or "{RECONSTRUCTION}"')
-    # It loads compiled code, and each upload starts a process.
+    # Imported here, since it loads compiled code and each upload starts a process.
     from .reconstruction import read_reconstruction
 
     result = read_reconstruction(path, limits=limits)

@@ -1,4 +1,4 @@
-"""Scans in the formats of others: MATLAB 5 and 7.3, NumPy archives, k-Wave; told apart by their content."""
+"""Scans in foreign formats: MATLAB 5 and 7.3, NumPy archives, k-Wave; detected by content."""
 
 from .conversion import convert_dataset
 

@@ -1,4 +1,4 @@
-"""What every foreign file gives: arrays of numbers by name, whole where small, row by row where large."""
+"""Arrays of foreign files by name: small ones read whole, large ones by rows."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import COUNTED, OVER_PAIRS, check_size
 
-# Of an array that is read whole, and of one row of an array that is read in rows.
+# Of an array that is read whole, and of one row of an array that is read by rows.
 LARGEST_WHOLE = 256 * 2**20
 LARGEST_ROW = 256 * 2**20
 
-# Of all the arrays of a file, as it declares them.
+# Of all declared arrays of a file.
 LARGEST_TOTAL = 32 * 2**30
 
 MOST_AXES = 4
 
-# What stands where in the upload format, by names without their groups and by those of others.
+# Fields of the upload format by names without groups, and by foreign names.
 PLACES = {place.rpartition("/")[2]: place for place in (*COUNTED, *OVER_PAIRS)} | {
     "element_positions": "geometry/element_position_m",
     "delta_tof": "traveltime/delta_tof_s",
@@ -29,11 +29,11 @@ PLACES = {place.rpartition("/")[2]: place for place in (*COUNTED, *OVER_PAIRS)} 
 
 
 class Arrays(Protocol):
-    """The arrays of one open file, all in C order; those of MATLAB with their axes reversed, as stored.
+    """The arrays of one open file in C order; those of MATLAB have reversed axes, as stored.
 
     Attributes:
         kind: of file, in words.
-        reversed_axes: whether axes are those of the user's program in reverse.
+        reversed_axes: whether axes are reversed relative to the program of the user.
     """
 
     kind: str
@@ -43,24 +43,24 @@ class Arrays(Protocol):
         """Names of the variables, readable or not."""
 
     def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
-        """Shape and type of an array of numbers, which has been checked; None where it is absent.
+        """Checked shape and type of an array of numbers; None if it is absent.
 
         Raises:
-            InvalidInput: naming it, for anything that is no plain array of numbers.
+            InvalidInput: naming it, for anything but a plain array of numbers.
         """
 
     def whole(self, name: str) -> NDArray[Any]:
-        """An array that ``declared`` knows."""
+        """Read an array that is present."""
 
     def rows(self, name: str) -> Iterator[NDArray[Any]]:
-        """Its parts along the first axis, one after the other."""
+        """Its rows along the first axis, one after the other."""
 
 
-def small(arrays: Arrays, name: str, accepted: str) -> NDArray[Any] | None:
-    """An array as its user wrote it, axes in the user's order; None where it is absent.
+def read_small(arrays: Arrays, name: str, accepted: str) -> NDArray[Any] | None:
+    """An array with axes in the order of the user; None if it is absent.
 
     Raises:
-        InvalidInput: naming it, where it is not numbers, or larger than any scan's.
+        InvalidInput: naming it, for other content than numbers, or too large an array.
     """
     found = arrays.declared(name)
     if found is None:
@@ -77,13 +77,13 @@ def small(arrays: Arrays, name: str, accepted: str) -> NDArray[Any] | None:
 def check_declared(
     name: str, shape: Sequence[int], dtype: np.dtype[Any], stored: int, packing: float
 ) -> None:
-    """Refuse what cannot be read: other than numbers, of many axes, larger than is stored.
+    """Reject arrays of other types, with many axes, or larger than their stored data.
 
     Args:
         name: of the array.
         shape, dtype: as declared.
-        stored: bytes that are there for it, packed.
-        packing: how many times that they may unpack to.
+        stored: size of the stored data, compressed, bytes.
+        packing: largest compression ratio.
 
     Raises:
         InvalidInput: naming it.
@@ -100,7 +100,7 @@ def check_declared(
 
 
 def check_row(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
-    """Refuse rows that are too large to hold one of.
+    """Reject rows that are too large for the memory.
 
     Raises:
         InvalidInput: naming the array.

@@ -1,4 +1,4 @@
-"""A scan of any accepted format into a canonical file: told by its content, an emission at a time."""
+"""Conversion of scans of all accepted formats to a canonical file, one emission at a time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .kwave import KWave, is_kwave
 from .layouts import layout_of
 from .matlab73 import Matlab73
 
-# HDF5 may begin after a block of the user's; that of MATLAB 7.3 has 512 bytes.
+# HDF5 may begin after a user block; that of MATLAB 7.3 has 512 bytes.
 USER_BLOCK = 512
 MATLAB73 = b"MATLAB 7.3 MAT-file"
 
@@ -30,22 +30,22 @@ def convert_dataset(
     limits: Limits | None = None,
     on_size: Callable[[int], None] = lambda size: None,
 ) -> Dataset:
-    """Check a scan and write it as a canonical file, with no more than one emission in memory.
+    """Check a scan and write it as a canonical file, with one emission in memory at a time.
 
-    Taken are the upload format itself, MATLAB 5 and 7.3, NumPy archives, and zips of k-Wave outputs; the name
-    of the file says nothing. What is neither is treated as the upload format, and refused as such.
+    Accepted are the upload format, MATLAB 5 and 7.3, NumPy archives, and zips of k-Wave outputs, detected by
+    content. Other files are rejected as the upload format.
 
     Args:
         source: of the scan.
-        target: replaced whole or not touched.
+        target: replaced atomically.
         limits: of HDF5 files; None: the defaults of ``Limits``.
-        on_size: told before ``target`` is written how many bytes it will have at most, but for its headers.
+        on_size: called before writing with the largest size of ``target`` without headers, bytes.
 
     Returns:
-        What it holds, with stand-ins for traces.
+        The dataset, with placeholders for traces.
 
     Raises:
-        InvalidInput: naming the first field that is missing or wrong, what was found and what is accepted.
+        InvalidInput: naming the first missing or wrong field, the value found and the accepted values.
         OSError: where the folder cannot be written to or the disk is full.
     """
     with source.open("rb") as file:
@@ -63,7 +63,7 @@ def convert_dataset(
             return _converted(Matlab73(reader), target, on_size)
     if start.startswith(SIGNATURE):
         with opened(source, limits or Limits()) as reader:
-            # Written by h5py or another tool, for MATLAB users: no user block, and no format of ours.
+            # Written by h5py or another tool for MATLAB users: without a user block or our format.
             if reader.attribute("", "format") is None and _foreign(reader.names()):
                 return _converted(Matlab73(reader), target, on_size)
     return copy_dataset(source, target, limits, on_size)

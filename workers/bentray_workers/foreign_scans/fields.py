@@ -1,4 +1,4 @@
-"""Single fields of a scan from foreign arrays: numbers, indices, water, truth, and where they are."""
+"""Fields of a scan in foreign arrays: numbers, indices, water and truth."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from bentray_kernels.acquisition import Truth, speed_from_temperature
 from bentray_kernels.errors import InvalidInput
 
 from ..files.dataset.read import trace_type
-from .arrays import Arrays, small
+from .arrays import Arrays, read_small
 
-# Where a file does not say how warm the water is; what is made of it says so.
+# Assumed temperature of water if the file has none; noted in the dataset.
 USUAL_C = 20.0
 
 
 def water(arrays: Arrays) -> tuple[float, float | None, str]:
-    """Speed and temperature of the water, and a word on where they come from if not from the file."""
+    """Speed and temperature of water, and a note if they are assumed."""
     speed, temperature = (number(arrays, f"water/{name}") for name in ("sound_speed_mps", "temperature_c"))
     if speed is not None:
         return speed, temperature, ""
     if temperature is not None:
         return speed_from_temperature(temperature), temperature, ""
-    assumed = f"; it does not say how warm the water was, {USUAL_C:g} °C is assumed"
+    assumed = f"; water temperature not given, {USUAL_C:g} °C assumed"
     return speed_from_temperature(USUAL_C), USUAL_C, assumed
 
 
 def truth(arrays: Arrays) -> Truth | None:
-    """Under its own group alone: its speed has the name of the water's."""
-    speed = small(arrays, "truth/sound_speed_mps", "numbers in m/s")
+    """The truth; only with its group, since its speed has the same name as that of water."""
+    speed = read_small(arrays, "truth/sound_speed_mps", "numbers in m/s")
     if speed is None:
         return None
     spacing, origin = (
-        wanted(arrays, f"truth/{name}", "a number in m for each axis").ravel()
+        required(arrays, f"truth/{name}", "a number in m for each axis").ravel()
         for name in ("spacing_m", "origin_m")
     )
-    losses = small(arrays, "truth/attenuation_np_m", "numbers in Np/m")
+    losses = read_small(arrays, "truth/attenuation_np_m", "numbers in Np/m")
     return Truth(
         np.asarray(speed, dtype=np.float64),
         tuple(float(v) for v in (np.repeat(spacing, speed.ndim) if spacing.size == 1 else spacing)),
@@ -48,20 +48,22 @@ def truth(arrays: Arrays) -> Truth | None:
     )
 
 
-def there(arrays: Arrays, place: str) -> str:
-    """The name that an array of the upload format has in this file: with its group or without."""
+def name_in_file(arrays: Arrays, place: str) -> str:
+    """The name of an array of the upload format in this file: with or without its group."""
     leaf = place.rpartition("/")[2]
     return place if place in arrays.names() or leaf not in arrays.names() else leaf
 
 
-def wanted(arrays: Arrays, name: str, accepted: str) -> NDArray[np.float64]:
-    array = small(arrays, name, accepted)
+def required(arrays: Arrays, name: str, accepted: str) -> NDArray[np.float64]:
+    """A small array of numbers that must be present."""
+    array = read_small(arrays, name, accepted)
     if array is None:
         raise InvalidInput(name, "nothing", accepted)
     return np.asarray(array, dtype=np.float64)
 
 
 def declared(arrays: Arrays, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of an array that must be present."""
     found = arrays.declared(name)
     if found is None:
         raise InvalidInput(name, "nothing", "an array")
@@ -69,8 +71,9 @@ def declared(arrays: Arrays, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]
 
 
 def indices(arrays: Arrays, name: str) -> NDArray[np.int64]:
+    """Indices of elements."""
     accepted = "(n,) integers that count elements from 0"
-    array = small(arrays, name, accepted)
+    array = read_small(arrays, name, accepted)
     if array is None or array.dtype.kind not in "iu":
         raise InvalidInput(name, "nothing" if array is None else f"{array.dtype}", accepted)
     if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
@@ -79,12 +82,13 @@ def indices(arrays: Arrays, name: str) -> NDArray[np.int64]:
 
 
 def number(arrays: Arrays, place: str) -> float | None:
-    name = there(arrays, place)
+    """A finite number, or None."""
+    name = name_in_file(arrays, place)
     found = arrays.declared(name)
-    # Before it is read, for it may be large.
+    # Checked before reading, since it may be large.
     if found is not None and math.prod(found[0]) != 1:
         raise InvalidInput(name, f"shape {found[0]}", "one finite number")
-    array = small(arrays, name, "one number")
+    array = read_small(arrays, name, "one number")
     if array is None:
         return None
     if not np.isfinite(array).all():
@@ -92,8 +96,8 @@ def number(arrays: Arrays, place: str) -> float | None:
     return float(array.ravel()[0])
 
 
-def stand_in(arrays: Arrays, name: str) -> NDArray[Any]:
-    """The traces' shape and type in an array that takes no memory."""
+def placeholder(arrays: Arrays, name: str) -> NDArray[Any]:
+    """An array of the shape and type of the traces that takes no memory."""
     shape, dtype = declared(arrays, name)
     if len(shape) != 3:
         raise InvalidInput(name, f"shape {shape}", "(ntx, nrx, nt)")

@@ -1,9 +1,9 @@
-"""A scan simulated with k-Wave: a zip of its output files, one an emission, and of the geometry beside them.
+"""A scan simulated with k-Wave: a zip of its output files, one per emission, and of the geometry.
 
-In the zip lie ``geometry.npz``, with positions, emitters and receivers under the names of the upload format,
-``object/*.h5`` and, where there was a second run without the object, ``water/*.h5``: outputs in the order of
+The zip holds ``geometry.npz``, with positions, emitters and receivers under the names of the upload format,
+``object/*.h5`` and optionally ``water/*.h5`` of a second run without the object: outputs in the order of
 ``tx`` by name, each with the pressure ``p`` of a sensor mask (1, Nt, receivers) and the time step ``dt``.
-k-Wave records in the order of its grid; ``rx`` says which element each receiver is.
+k-Wave records in the order of its grid; ``rx`` lists the element of each receiver.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class KWave:
         scratch: folder for one output at a time.
 
     Raises:
-        InvalidInput: for a zip without geometry, or outputs that are not alike.
+        InvalidInput: for a zip without geometry, or different outputs.
     """
 
     kind = "outputs of k-Wave"
@@ -76,8 +76,8 @@ class KWave:
             self._step = self._time_step(first[0], reader)
 
     def names(self) -> tuple[str, ...]:
-        there = [name for name, outputs in self._outputs.items() if outputs]
-        return (*self._geometry.names(), *there, RATE)
+        traces = [name for name, outputs in self._outputs.items() if outputs]
+        return (*self._geometry.names(), *traces, RATE)
 
     def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
         if name == RATE:
@@ -134,20 +134,20 @@ class KWave:
                 yield reader
 
     def _bytes(self, name: str, most: int) -> bytes:
-        """A member unpacked, read no further than ``most``."""
+        """A member, decompressed up to ``most`` bytes."""
         with refusing_zip(name, "a whole zip"), self._zip.open(name) as file:
             data = file.read(most + 1)
         if len(data) > most:
             raise InvalidInput(name, f"more than {most} bytes unpacked", f"at most {most}")
-        told = self._zip.getinfo(name).file_size
-        if len(data) != told:
-            raise InvalidInput(name, f"{len(data)} bytes, of which the directory says {told}", WHOLE)
+        declared = self._zip.getinfo(name).file_size
+        if len(data) != declared:
+            raise InvalidInput(name, f"{len(data)} bytes, {declared} in the directory", WHOLE)
         return data
 
 
 @contextmanager
 def _of(output: str) -> Iterator[None]:
-    """Say in which output a field was wrong."""
+    """Add the name of the output to errors."""
     try:
         with rejecting_damage(output, "an output of k-Wave"):
             yield

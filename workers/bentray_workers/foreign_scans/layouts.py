@@ -1,4 +1,4 @@
-"""From arrays by name to a dataset: the layouts that foreign files are known to have."""
+"""Layouts of foreign files: from arrays by name to a dataset."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import check_size
 
 from ..files.dataset.format import NUMBERS, PAIR_ARRAYS
-from .arrays import Arrays, small
-from .fields import declared, indices, number, stand_in, there, truth, wanted, water
+from .arrays import Arrays, read_small
+from .fields import declared, indices, name_in_file, number, placeholder, required, truth, water
 from .zip_checks import plain_name
 
-# Samples of a time axis may be off even steps by this part of a step.
+# Tolerance of the time axis, relative to its step.
 UNEVEN = 0.01
 
 
 @dataclass(frozen=True)
 class Layout:
-    """A dataset, and which arrays of the file hold its traces; in it stand-ins have their place."""
+    """A dataset with placeholders for traces, and the names of the arrays with the traces."""
 
     dataset: Dataset
     traces: Mapping[str, str]
 
 
 def layout_of(arrays: Arrays) -> Layout:
-    """The dataset that the arrays make up.
+    """The dataset in the arrays.
 
     Raises:
-        InvalidInput: naming the first array that is missing or wrong, and for a file of no known layout.
+        InvalidInput: naming the first missing or wrong array, and for an unknown layout.
     """
     names = set(arrays.names())
     for marks, layout in LAYOUTS:
@@ -52,28 +52,28 @@ def layout_of(arrays: Arrays) -> Layout:
 
 def _delta_tof(arrays: Arrays) -> Layout:
     """``delta_tof`` (N×N, NaN) and ``element_positions`` (N×2), as of open-UST."""
-    position = wanted(arrays, "element_positions", "(N, 2) numbers in m")
+    position = required(arrays, "element_positions", "(N, 2) numbers in m")
     if position.ndim != 2 or position.shape[1] != 2:
         raise InvalidInput("element_positions", f"shape {position.shape}", "(N, 2) numbers in m")
-    delta = wanted(arrays, "delta_tof", "(N, N) numbers in s")
+    delta = required(arrays, "delta_tof", "(N, N) numbers in s")
     count = len(position)
     if delta.shape != (count, count):
         raise InvalidInput(
             "delta_tof", f"shape {delta.shape}", f"({count}, {count}), N by N of element_positions"
         )
     every = np.arange(count)
-    return Layout(_made(arrays, position, every, every, {"delta_tof_s": delta}), {})
+    return Layout(_dataset(arrays, position, every, every, {"delta_tof_s": delta}), {})
 
 
 def _full_dataset(arrays: Arrays) -> Layout:
-    """``time``, ``transducerPositionsXY`` (2×N) and ``full_dataset`` (Nt×Nrx×Ntx), all emitting in turn."""
+    """``time``, ``transducerPositionsXY`` (2×N) and ``full_dataset`` (Nt×Nrx×Ntx), all elements emit."""
     count = max(declared(arrays, "transducerPositionsXY")[0], default=0)
     check_size("geometry/element_position_m", (count, 2), "transducerPositionsXY")
-    position = wanted(arrays, "transducerPositionsXY", "(2, N) numbers in m")
+    position = required(arrays, "transducerPositionsXY", "(2, N) numbers in m")
     if position.ndim != 2 or position.shape[0] != 2:
         raise InvalidInput("transducerPositionsXY", f"shape {position.shape}", "(2, N) numbers in m")
     position, count = position.T, position.shape[1]
-    time = wanted(arrays, "time", "(Nt,) times of the samples in s").ravel()
+    time = required(arrays, "time", "(Nt,) times of the samples in s").ravel()
     steps = np.diff(time)
     if (
         time.size < 2
@@ -95,29 +95,31 @@ def _full_dataset(arrays: Arrays) -> Layout:
             raise InvalidInput(name, f"shape {shape[::-1]}", accepted)
     every = np.arange(count)
     rate = {"sampling_rate_hz": 1.0 / float(steps.mean()), "t0_s": float(time[0])}
-    return Layout(_made(arrays, position, every, every, rate, traces), traces)
+    return Layout(_dataset(arrays, position, every, every, rate, traces), traces)
 
 
 def _named(arrays: Arrays) -> Layout:
     """The names of the upload format, with their groups (``acquisition/tx``) or without (``tx``)."""
-    position = wanted(arrays, there(arrays, "geometry/element_position_m"), "(elements, 2 or 3) numbers in m")
-    tx, rx = (indices(arrays, there(arrays, f"acquisition/{name}")) for name in ("tx", "rx"))
+    position = required(
+        arrays, name_in_file(arrays, "geometry/element_position_m"), "(elements, 2 or 3) numbers in m"
+    )
+    tx, rx = (indices(arrays, name_in_file(arrays, f"acquisition/{name}")) for name in ("tx", "rx"))
     fields: dict[str, Any] = {}
     for place, name in (*PAIR_ARRAYS.items(), *FURTHER.items()):
-        array = small(arrays, there(arrays, place), "numbers")
+        array = read_small(arrays, name_in_file(arrays, place), "numbers")
         fields[name] = None if array is None else np.asarray(array, dtype=np.float64)
     for place, name in FLAGS.items():
-        array = small(arrays, there(arrays, place), "booleans")
+        array = read_small(arrays, name_in_file(arrays, place), "booleans")
         fields[name] = None if array is None else np.asarray(array != 0)
     traces = {
-        name: there(arrays, f"waveform/{name}")
+        name: name_in_file(arrays, f"waveform/{name}")
         for name in ("object", "water")
-        if arrays.declared(there(arrays, f"waveform/{name}")) is not None
+        if arrays.declared(name_in_file(arrays, f"waveform/{name}")) is not None
     }
     if "object" not in traces and fields["tof_s"] is None and fields["delta_tof_s"] is None:
         raise InvalidInput("traveltime", "neither travel times nor traces", "delta_tof_s, tof_s or object")
     fields["t0_s"] = number(arrays, "acquisition/t0_s") or 0.0
-    return Layout(_made(arrays, position, tx, rx, fields, traces), traces)
+    return Layout(_dataset(arrays, position, tx, rx, fields, traces), traces)
 
 
 FURTHER = {
@@ -127,7 +129,7 @@ FURTHER = {
 }
 FLAGS = {"mask/valid": "valid", "mask/roi": "roi"}
 
-# What marks a layout, tried in this order.
+# Arrays that identify a layout, in this order.
 LAYOUTS: tuple[tuple[set[str], Callable[[Arrays], Layout]], ...] = (
     ({"delta_tof", "element_positions"}, _delta_tof),
     ({"transducerPositionsXY", "full_dataset"}, _full_dataset),
@@ -135,7 +137,7 @@ LAYOUTS: tuple[tuple[set[str], Callable[[Arrays], Layout]], ...] = (
 )
 
 
-def _made(
+def _dataset(
     arrays: Arrays,
     position: NDArray[Any],
     tx: NDArray[np.int64],
@@ -143,13 +145,13 @@ def _made(
     fields: dict[str, Any],
     traces: Mapping[str, str] | None = None,
 ) -> Dataset:
-    """The dataset, with what the file says of water, frequency and truth."""
+    """The dataset with water, frequency and truth of the file."""
     position = np.ascontiguousarray(position, dtype=np.float64)
     speed, temperature, assumed = water(arrays)
     numbers = {name: number(arrays, f"{place}/{leaf}") for place, leaf, _, name in NUMBERS}
     waveform = None
     if traces:
-        empty = {name: stand_in(arrays, place) for name, place in traces.items()}
+        empty = {name: placeholder(arrays, place) for name, place in traces.items()}
         scale = number(arrays, "waveform/scale")
         waveform = Waveform(
             empty["object"],
@@ -157,7 +159,7 @@ def _made(
             1.0 if scale is None else scale,
             *(
                 None
-                if (found := small(arrays, there(arrays, f"waveform/{name}"), "numbers")) is None
+                if (found := read_small(arrays, name_in_file(arrays, f"waveform/{name}"), "numbers")) is None
                 else np.asarray(found, dtype=np.float64)
                 for name in ("object_scale", "water_scale")
             ),

@@ -1,7 +1,7 @@
-"""MATLAB files of version 5 (6, 7): plain arrays of numbers, read without unpacking more than is asked for.
+"""MATLAB files of version 5 (6, 7): plain arrays of numbers, decompressed only as far as they are read.
 
 The format is that of "MAT-File Format", The MathWorks, chapter 1. Cells, structures, objects, functions and
-what is opaque are never looked into.
+opaque data are never read.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ HEADER_BYTES = 128
 
 MATRIX, COMPRESSED = 14, 15
 
-# Types of data in the file, by their number.
+# Types of data in the file, by number.
 STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-# Classes of arrays that are numbers, by their number, and what the others are.
+# Classes of numeric arrays, by number, and of other arrays.
 NUMBERS = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
 OTHERS = {
     1: "a cell",
@@ -43,22 +43,22 @@ COMPLEX = 0x0800
 
 MOST_VARIABLES = 1000
 LONGEST_NAME = 200
-# After the numbers of an array, whose size is a multiple of it.
+# Alignment after the numbers of an array.
 PADDING_BYTES = 8
-# zlib packs at best 1032 times.
+# Largest compression ratio of zlib is 1032.
 PACKING = 1100.0
 
 
 @dataclass(frozen=True)
 class _Variable:
-    """Where an array's numbers are.
+    """Position of the numbers of an array.
 
     Attributes:
-        offset: of its element's content in the file.
-        stored: bytes of that.
+        offset: of the content of its element in the file.
+        stored: size of the content, bytes.
         packed: whether it is compressed.
-        begin: of the numbers in the content, unpacked.
-        found: shape in the user's order, type of the array, and type that it is stored in; or what it is.
+        begin: of the numbers in the decompressed content.
+        found: shape in the order of the user, type of the array, and stored type; or its kind in words.
     """
 
     offset: int
@@ -69,10 +69,10 @@ class _Variable:
 
 
 class Matlab5:
-    """The arrays of one file; see ``Arrays``. Axes are reversed, as the numbers lie in the file.
+    """The arrays of one file; see ``Arrays``. Axes are reversed, as stored.
 
     Raises:
-        InvalidInput: for a file that is damaged.
+        InvalidInput: for a damaged file.
     """
 
     kind = "a MATLAB 5 file"
@@ -121,7 +121,7 @@ class Matlab5:
         return found
 
     def _parts(self, name: str, count: int, size: int) -> Iterator[NDArray[Any]]:
-        """So many parts of so many numbers, one after the other."""
+        """Read parts of equal size, one after the other."""
         variable = self._variables[name]
         assert not isinstance(variable.found, str)
         _, dtype, stored = variable.found
@@ -183,7 +183,7 @@ class Matlab5:
         return name, _Variable(offset, length, packed, begin, (shape, dtype, stored))
 
     def _small(self, stream: Stream, most: int) -> bytes:
-        """Content of a short element, its padding passed."""
+        """Content of a short element; skips its padding."""
         _, count, inline = self._tag(stream)
         if count > most:
             raise InvalidInput("file", f"{count} bytes in a header", "a whole MATLAB file")
@@ -195,7 +195,7 @@ class Matlab5:
         return data
 
     def _tag(self, stream: Stream) -> tuple[int, int, bool]:
-        """Type, bytes, and whether these lie in the tag itself."""
+        """Type, size, and whether the data are in the tag itself."""
         kind, count = struct.unpack(self._order + "II", stream.read(8))
         if kind >> 16:
             return kind & 0xFFFF, min(kind >> 16, 4), True

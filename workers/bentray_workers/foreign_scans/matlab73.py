@@ -17,7 +17,7 @@ NUMBERS = "a plain array of real numbers"
 
 
 class Matlab73:
-    """The arrays of one file; see ``Arrays``. HDF5 holds them with their axes reversed."""
+    """The arrays of one file; see ``Arrays``. HDF5 stores them with reversed axes."""
 
     kind = "a MATLAB 7.3 file"
     reversed_axes = True
@@ -32,7 +32,7 @@ class Matlab73:
         found = self._reader.checked(name, "iuf", NUMBERS)
         if found is None:
             return None
-        # MATLAB marks an array without elements, whose numbers are its shape.
+        # MATLAB marks empty arrays and stores their shape as numbers.
         if self._reader.attribute(name, "MATLAB_empty") is not None:
             raise InvalidInput(name, "an empty array", NUMBERS)
         return found.shape, found.dtype

@@ -1,4 +1,4 @@
-"""NumPy archives of plain arrays: a zip of .npy files, none of which is ever unpickled."""
+"""NumPy archives of plain arrays: a zip of .npy files; nothing is unpickled."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class Npz:
     """The arrays of one archive; see ``Arrays``.
 
     Args:
-        archive: open, or a file that holds one.
+        archive: open archive, or a file with one.
 
     Raises:
-        InvalidInput: for an archive that is damaged.
+        InvalidInput: for a damaged archive.
     """
 
     kind = "a NumPy archive"
@@ -84,11 +84,11 @@ class Npz:
             return self._zip.open(self._members[name])
 
     def _check_end(self, name: str, file: IO[bytes]) -> None:
-        """See that the values end where the member does, by its bytes and by the directory."""
+        """Check that the values end with the member, by its bytes and by the directory."""
         at_end(file)
-        told = self._members[name].file_size
-        if file.tell() != told:
-            raise InvalidInput(name, f"{file.tell()} bytes, of which the directory says {told}", WHOLE)
+        declared = self._members[name].file_size
+        if file.tell() != declared:
+            raise InvalidInput(name, f"{file.tell()} bytes, {declared} in the directory", WHOLE)
 
     def _header(self, name: str, file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
         version = np.lib.format.read_magic(file)
@@ -100,7 +100,7 @@ class Npz:
             )
             shape, fortran, dtype = read(file, max_header_size=LONGEST_HEADER)
         if dtype.hasobject:
-            raise InvalidInput(name, "Python objects", "plain numbers; nothing is ever unpickled")
+            raise InvalidInput(name, "Python objects", "plain numbers; nothing is unpickled")
         check_declared(name, shape, dtype, self._members[name].compress_size, PACKING)
         return tuple(int(n) for n in shape), bool(fortran), dtype
 

@@ -1,4 +1,4 @@
-"""Part of a file from its beginning, unpacked no further than it is read."""
+"""Incremental decompression of a part of a file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ PIECE_BYTES = 1 << 20
 
 
 class Stream:
-    """The content of one element from its beginning, unpacked as it is read."""
+    """The content of one element, decompressed as it is read."""
 
     def __init__(self, file: IO[bytes], offset: int, stored: int, packed: bool, name: str) -> None:
         self._file = file
@@ -23,39 +23,39 @@ class Stream:
         self.last = b""
 
     def read(self, count: int) -> bytes:
-        """Exactly so many bytes.
+        """Read exactly so many bytes.
 
         Raises:
-            InvalidInput: where the file holds fewer.
+            InvalidInput: for fewer bytes in the file.
         """
-        parts, wanted = [], count
-        while wanted:
-            part = self._some(min(wanted, PIECE_BYTES))
+        parts, left = [], count
+        while left:
+            part = self._some(min(left, PIECE_BYTES))
             if not part:
                 raise InvalidInput(
-                    self._name, f"{count - wanted} bytes of data", f"{count}, as its header says"
+                    self._name, f"{count - left} bytes of data", f"{count}, as its header says"
                 )
             parts.append(part)
-            wanted -= len(part)
+            left -= len(part)
         self.last = b"".join(parts)
         self.position += count
         return self.last
 
     def skip(self, count: int) -> None:
-        """Pass over bytes."""
+        """Skip bytes."""
         while count:
             part = min(count, PIECE_BYTES)
             self.read(part)
             count -= part
 
     def end(self, tail: int) -> None:
-        """See that a packed element ends here, which makes zlib verify its check sum.
+        """Check that a compressed element ends here; zlib then verifies its check sum.
 
         Args:
             tail: bytes of padding that may follow.
 
         Raises:
-            InvalidInput: where more follows, where the end is missing, and for another check sum.
+            InvalidInput: for more data, a missing end, or a wrong check sum.
         """
         if self._unpack is None:
             return

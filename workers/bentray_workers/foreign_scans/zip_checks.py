@@ -1,4 +1,4 @@
-"""What a stranger's zip says of itself, held against its bytes before any member is unpacked."""
+"""Checks of untrusted zips: directory against contents, before any member is decompressed."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from .arrays import LARGEST_TOTAL
 
 WHOLE = "a zip as numpy.savez or savez_compressed writes it"
 
-# Deflate packs at best 1032 times.
+# Largest compression ratio of deflate is 1032.
 PACKING = 1100.0
 
-# Encrypted; patched; strongly encrypted; with a masked directory.
+# Flags: encrypted; patched; strongly encrypted; masked directory.
 SECRET = 1 << 0 | 1 << 5 | 1 << 6 | 1 << 13
-# Its sizes follow the data.
+# Flag: sizes follow the data.
 DESCRIPTOR = 1 << 3
 LOCAL = struct.Struct("<4s5H3I2H")
 IN_64_BITS = 0xFFFFFFFF
 
-# Names of arrays, with their groups: nothing that could be taken for a path of a machine.
+# Names of arrays with groups; never a path of this machine.
 PART = r"(?!\.\.?(?:/|$))[\w. -]+"
 NAME = re.compile(f"{PART}(?:/{PART})*/?")
 LONGEST_NAME = 200
 
 
 def check_zip(archive: zipfile.ZipFile, most_members: int) -> None:
-    """Refuse a zip whose directory cannot be true.
+    """Reject a zip with an inconsistent directory.
 
-    Names that are refused are not repeated: they are a stranger's, and may be anything.
+    Rejected names are not repeated: they are untrusted.
 
     Args:
         archive: open.
-        most_members: that it may have.
+        most_members: largest number of members.
 
     Raises:
         InvalidInput: naming ``file``.
@@ -55,7 +55,7 @@ def check_zip(archive: zipfile.ZipFile, most_members: int) -> None:
 
 
 def plain_name(name: str) -> bool:
-    """Whether a name is one that an array may have, and that a message may repeat."""
+    """Whether a name is valid for an array, and safe for a message."""
     return len(name) <= LONGEST_NAME and NAME.fullmatch(name) is not None
 
 
@@ -74,7 +74,7 @@ def _check_member(number: int, member: zipfile.ZipInfo) -> None:
 
 
 def _check_places(archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> None:
-    """Each member lies where the directory says, as it says, and beside the others."""
+    """Check that members match the directory and do not overlap."""
     raw = archive.fp
     assert raw is not None
     end = 0
@@ -86,11 +86,11 @@ def _check_places(archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> N
             raise InvalidInput("file", f"member {number} at byte {at}, in another or beyond the end", WHOLE)
         mark, _, flags, packing, _, _, crc, packed, size, name_bytes, extra_bytes = LOCAL.unpack(head)
         same = mark == b"PK\x03\x04" and packing == member.compress_type and not flags & SECRET
-        told = ((crc, member.CRC), (packed, member.compress_size), (size, member.file_size))
+        pairs = ((crc, member.CRC), (packed, member.compress_size), (size, member.file_size))
         if not flags & DESCRIPTOR:
-            same &= all(mine in (theirs, IN_64_BITS) for mine, theirs in told)
+            same &= all(mine in (theirs, IN_64_BITS) for mine, theirs in pairs)
         if not same:
-            raise InvalidInput("file", f"member {number}, of which the directory says otherwise", WHOLE)
+            raise InvalidInput("file", f"member {number}, which differs from the directory", WHOLE)
         end = at + LOCAL.size + name_bytes + extra_bytes + member.compress_size
     if end > archive.start_dir:
         raise InvalidInput("file", f"members up to byte {end} of {archive.start_dir}", WHOLE)

@@ -1,4 +1,4 @@
-"""The picture that is put behind glass: lines, circles, colours and words, so that every bend shows."""
+"""Test card for the backdrop of refractive rendering: lines, circles, colours and text."""
 
 from __future__ import annotations
 

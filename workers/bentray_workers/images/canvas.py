@@ -1,4 +1,4 @@
-"""The sheet that every picture is drawn on: style, figure, PNG bytes; one picture at a time."""
+"""Figures of Matplotlib: style, layout and PNG; one picture at a time."""
 
 from __future__ import annotations
 
@@ -32,26 +32,26 @@ STYLE = {
     "figure.titleweight": "bold",
     "legend.frameon": False,
     "legend.fontsize": 8,
-    # Names from files are shown as they are: a $ in them is no formula.
+    # Names from files are shown unchanged: $ does not start a formula.
     "text.parse_math": False,
 }
 DOTS_PER_INCH = 130
-# Around what is drawn.
+# Margin around the drawing.
 MARGIN_IN = 0.12
 
-# Matplotlib is not safe in threads, and its style is one for the process: pictures are drawn in turns.
+# Matplotlib is not thread-safe, and its style is global: one picture is drawn at a time.
 DRAWING = Lock()
 
 
 @contextmanager
 def drawing() -> Iterator[None]:
-    """Hold Matplotlib, in our style, for one picture."""
+    """Lock Matplotlib, with our style, for one picture."""
     with DRAWING, rc_context(STYLE):
         yield
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
-    """A figure on white, without a window; its panels are drawn together as far as they go."""
+    """A white figure without a window, with panels in a compressed layout."""
     layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.06, wspace=0.0, hspace=0.0, compress=True)
     figure = Figure(figsize=(width_in, height_in), layout=layout, facecolor="white")
     FigureCanvasAgg(figure)
@@ -59,19 +59,19 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 
 def open_figure(width_in: float, height_in: float) -> Figure:
-    """A figure on white, for axes that are put in their places; ``fit`` it when all is drawn."""
+    """A white figure for axes at given positions; to be resized by ``fit`` after drawing."""
     figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
 
 def fit(figure: Figure) -> None:
-    """Make a figure just as large as what is drawn, with a margin; its axes keep their sizes.
+    """Resize a figure to its drawing and a margin; its axes keep their sizes.
 
-    What is drawn is measured once, which takes a third of the time of a layout and a second drawing.
+    The drawing is measured once, which takes a third of the time of a layout and a second drawing.
     """
     drawn = figure.get_tightbbox(figure.canvas.get_renderer()).padded(MARGIN_IN)  # type: ignore[attr-defined]
-    # From parts of the figure as it was to parts of what is drawn.
+    # From fractions of the old figure to fractions of the drawing.
     change = BboxTransformTo(figure.bbox_inches) + BboxTransformFrom(drawn)
     for axes in figure.axes:
         axes.set_position(axes.get_position().transformed(change))
@@ -79,7 +79,7 @@ def fit(figure: Figure) -> None:
 
 
 def bare_figure(width: int, height: int) -> Figure:
-    """A figure of so many pixels, for axes that fill it."""
+    """A figure of given size in pixels, for axes that fill it."""
     figure = Figure(figsize=(width / DOTS_PER_INCH, height / DOTS_PER_INCH), dpi=DOTS_PER_INCH)
     FigureCanvasAgg(figure)
     return figure
@@ -89,16 +89,15 @@ def to_png(figure: Figure, longest: int | None = None, *, cropped: bool = True) 
     """The figure as PNG; the same figure gives the same bytes.
 
     Args:
-        figure: what is drawn.
-        longest: its longest side in pixels, of one that is not cropped; text grows and shrinks with it.
-            None: text keeps its size.
-        cropped: to what is drawn, with a margin.
+        figure: to save.
+        longest: longest side in pixels, without cropping; text is scaled too. None: no scaling.
+        cropped: crop to the drawing with a margin.
     """
     how: dict[str, Any] = {"dpi": DOTS_PER_INCH}
     if cropped:
         how |= {"bbox_inches": "tight", "pad_inches": MARGIN_IN}
     if longest is not None:
-        # Matplotlib cuts fractions of a pixel off.
+        # Matplotlib truncates fractions of a pixel.
         how["dpi"] = (longest + 0.5) / max(figure.get_size_inches())
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None}, **how)

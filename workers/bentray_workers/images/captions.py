@@ -1,4 +1,4 @@
-"""The words of the pictures: quantities, which slice is shown, how it was made."""
+"""Captions: quantities, slice, and method of a reconstruction."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ NAMES = {
 }
 
 
-def which_slice(result: Reconstruction, index: int) -> str:
-    """``, slice index 2 (0 to 4), z = 6.0 mm``; nothing for a plain image."""
+def slice_caption(result: Reconstruction, index: int) -> str:
+    """``, slice index 2 (0 to 4), z = 6.0 mm``; empty for a 2-D image."""
     if result.speed.ndim == 2:
         return ""
     text = f", slice index {index} (0 to {result.speed.shape[2] - 1})"
@@ -51,14 +51,14 @@ def facts(result: Reconstruction) -> str:
 
 
 def _of_rays(result: Reconstruction) -> Settings:
-    """Settings of the rays, which waveforms leave to the first of the trials."""
+    """Settings of the ray-based image; after a full-waveform refinement those of the first trial."""
     if result.settings.method != "waveform" or not result.trials:
         return result.settings
     return replace(result.settings, **result.trials[0].settings)
 
 
 def stage_names(result: Reconstruction) -> tuple[str, ...]:
-    """What tells the stages apart: those of ``tomography.grid_schedule``, bands; nothing for one."""
+    """Names of the stages of ``tomography.grid_schedule`` and of frequency bands; empty for one stage."""
     settings = _of_rays(result)
     grids = [-(-settings.nodes // 2**k) for k in range(settings.numerics.coarser_grids, -1, -1)]
     names = [f"{nodes} nodes" for nodes in grids]

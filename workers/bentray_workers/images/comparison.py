@@ -1,4 +1,4 @@
-"""The picture of several reconstructions against one truth, their differences and their convergence."""
+"""Comparison of several reconstructions with one truth: images, differences, convergence."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction
 
 from .canvas import drawing, new_figure, to_png
-from .captions import LABELS, which_slice
+from .captions import LABELS, slice_caption
 from .curves import draw_history
 from .cut import cut, slice_index
 from .maps import DIFFERENCE, SPEED, Limits, draw_bar, draw_map, robust_limits, symmetric_limits
@@ -33,11 +33,11 @@ def comparison_png(truth: Truth, results: Mapping[str, Reconstruction], roi: Boo
 
     Args:
         truth: on axes x, y[, z].
-        results: by the name to show, at least one; several slices are shown by the middle one.
-        roi: the nodes that count for the errors, on the truth's grid.
+        results: by the name to show, at least one; of several slices the middle one is shown.
+        roi: region for the errors, on the grid of the truth.
 
     Raises:
-        InvalidInput: for no result, or a truth that cannot be laid on the results' grid.
+        InvalidInput: without results, or for a truth that does not match their grid.
     """
     if not results:
         raise InvalidInput("results", "none", "at least one reconstruction")
@@ -51,8 +51,8 @@ def comparison_png(truth: Truth, results: Mapping[str, Reconstruction], roi: Boo
         columns = 1 + len(results)
         figure = new_figure(PANEL_IN[0] * columns + 0.6, 2.0 * PANEL_IN[1] + 0.6)
         water = f"Rays through a phantom in water of {first.water_speed_mps:.0f} m/s"
-        figure.suptitle(water + which_slice(first, slice_index(first)))
-        figure.supxlabel(f"Errors read: {compared.region_choice}", fontsize=8, color="#666666")
+        figure.suptitle(water + slice_caption(first, slice_index(first)))
+        figure.supxlabel(f"Errors in: {compared.region_choice}", fontsize=8, color="#666666")
         top, bottom = figure.subplots(2, columns)
         phantom = _panel(top[0], first, compared, compared.true_speed_mps, limits, SPEED, "Phantom")
         speeds, differences = [phantom], []

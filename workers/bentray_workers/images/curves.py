@@ -1,4 +1,4 @@
-"""Curves: the residual against the sweep, speeds along a line."""
+"""Curves: residual by iteration, speeds along a line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 LINES = ("#d1495b", "#00798c", "#edae49", "#30638e", "#66a182")
 
-# From this ratio of the highest to the lowest residual on, the axis is logarithmic.
+# Ratio of the highest to the lowest residual above which the axis is logarithmic.
 WIDE = 20.0
 
 
@@ -34,7 +34,7 @@ def draw_history(axes: Axes, histories: Mapping[str, tuple[Sweep, ...]], stages:
         begun = 0
         for number, rms in enumerate(_courses(history)):
             places = begun + np.arange(1, len(rms) + 1)
-            # Matplotlib keeps names with an underscore out of the legend.
+            # Matplotlib omits labels with an underscore from the legend.
             label = name if number == 0 else f"_{name}"
             axes.plot(places, rms, "o-", color=colour, linewidth=1.6, markersize=4, label=label)
             if number:
@@ -48,7 +48,7 @@ def draw_history(axes: Axes, histories: Mapping[str, tuple[Sweep, ...]], stages:
     axes.set_xlabel("sweep")
     axes.set_ylabel("residual rms (ns)", labelpad=1)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    _scale(axes, every, room=bool(stages))
+    _scale(axes, every, margin=bool(stages))
     _dress(axes)
     if len(histories) > 1:
         axes.legend()
@@ -78,17 +78,17 @@ def _name_stage(axes: Axes, place: float, name: str) -> None:
     )
 
 
-def _scale(axes: Axes, every: list[float], *, room: bool) -> None:
-    """From zero, or logarithmic where the range is wide; with room for names above."""
+def _scale(axes: Axes, every: list[float], *, margin: bool) -> None:
+    """From zero, or logarithmic for a wide range; with a margin for names of stages."""
     if every and min(every) > 0.0 and max(every) > WIDE * min(every):
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_minor_locator(NullLocator())
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
-        if room:
+        if margin:
             axes.set_ylim(top=max(every) * (max(every) / min(every)) ** 0.2)
     else:
-        axes.set_ylim(0.0, (1.25 if room else 1.08) * max(every, default=0.0) or 1.0)
+        axes.set_ylim(0.0, (1.25 if margin else 1.08) * max(every, default=0.0) or 1.0)
 
 
 def draw_profiles(axes: Axes, place_m: Floats, profiles: Mapping[str, Floats], title: str) -> None:

@@ -1,4 +1,4 @@
-"""Slices of a volume: which one, its image, and the section across all of them."""
+"""Slices of a volume: index, image, and whether to show a vertical section."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction
 
-# Heights from which on a section across them shows more than a line.
+# Smallest number of slices for a vertical section.
 LEAST_HEIGHTS = 4
 
 Kind = TypeVar("Kind", bound=np.generic)
 
 
 def slice_index(result: Reconstruction, index: int | None = None) -> int:
-    """``index``, or the middle slice for None; 0 for a plain image.
+    """``index``, or the middle slice for None; 0 for a 2-D image.
 
     Raises:
         InvalidInput: for an index beyond the slices.
@@ -32,12 +32,12 @@ def slice_index(result: Reconstruction, index: int | None = None) -> int:
 
 
 def cut(volume: NDArray[Kind], index: int) -> NDArray[Kind]:
-    """The slice (nx, ny) of a volume (nx, ny, nz); a plain image is its own slice."""
+    """A slice (nx, ny) of a volume (nx, ny, nz); a 2-D image is returned unchanged."""
     return volume if volume.ndim == 2 else volume[..., index]
 
 
 def has_section(result: Reconstruction) -> bool:
-    """Whether there are enough evenly spaced slices to show them from the side."""
+    """Whether there are enough evenly spaced slices for a vertical section."""
     return (
         result.speed.ndim == 3
         and result.speed.shape[2] >= LEAST_HEIGHTS

@@ -1,4 +1,4 @@
-"""Tasks that draw: who hands them out need not hold Matplotlib, which takes 30 MB."""
+"""Drawing tasks; they load Matplotlib, which takes 30 MB, only where they run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A landscape made by code, all around: sky, a sun, hills and striped fields."""
+"""A procedural panorama: sky, sun, hills and striped fields."""
 
 from __future__ import annotations
 
@@ -43,6 +43,6 @@ def landscape() -> Colours:
 
 
 def _over(picture: Pixels, inside: Pixels, colour: Pixels) -> Colours:
-    """A colour where ``inside`` is above 0, with an edge one pixel wide."""
+    """Blend a colour where ``inside`` is above 0, with an edge one pixel wide."""
     cover = np.clip(inside * ROWS + 0.5, 0.0, 1.0)[..., np.newaxis]
     return np.asarray((1.0 - cover) * picture + cover * colour, dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Maps: an image in mm with the outline of a region, colour limits, a colour bar for one map or several."""
+"""Maps: images in mm with the outline of a region, colour limits and colour bars."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ MISSING = "#e4e4e4"
 
 RECOVERY_LIMITS = (0.0, 1.0)
 
-# Parts of the nodes that robust limits leave outside, at each end, per cent.
+# Nodes outside robust limits at each end, per cent.
 OUTSIDE_PERCENT = 0.1
 
 
 def robust_limits(images: Iterable[Floats], region: Bools | None = None) -> Limits:
-    """Lowest and highest value but for a few outliers; never one and the same."""
+    """Lowest and highest value without outliers; never equal."""
     values = np.concatenate(
         [image[np.isfinite(image) if region is None else region & np.isfinite(image)] for image in images]
     )
@@ -62,7 +62,7 @@ def draw_map(
 ) -> AxesImage:
     """An image (nx, ny) with x to the right and y up, in mm, and the outline of a region of that shape.
 
-    ``up`` names another axis in place of y; spacing and origin are then those of x and it.
+    ``up`` replaces y by another axis, with its spacing and origin.
     """
     places = [1e3 * (o + h * np.arange(n)) for o, h, n in zip(origin_m, spacing_m, image.shape, strict=False)]
     half = [0.5e3 * h for h in spacing_m]
@@ -93,9 +93,9 @@ def draw_map(
 
 
 def draw_bar(maps: Sequence[AxesImage], label: str, place: Axes | None = None) -> None:
-    """One colour bar for maps of the same limits; pointed where values lie beyond it.
+    """One colour bar for maps of the same limits; pointed if values exceed it.
 
-    It goes where it is told, else beside the last map and takes room from all.
+    It is drawn at ``place``, by default beside the last map, which shrinks all maps.
     """
     low, high = maps[0].get_clim()
     values: list[Floats] = [
@@ -107,9 +107,9 @@ def draw_bar(maps: Sequence[AxesImage], label: str, place: Axes | None = None) -
         (below, above), "both"
     )
     axes = [shown.axes for shown in maps]
-    room: dict[str, Any] = (
+    layout: dict[str, Any] = (
         {"ax": axes, "fraction": 0.046, "pad": 0.015, "aspect": 26} if place is None else {"cax": place}
     )
-    bar = axes[0].figure.colorbar(maps[0], extend=extend, **room)
+    bar = axes[0].figure.colorbar(maps[0], extend=extend, **layout)
     bar.set_label(label)
     bar.outline.set_linewidth(0.4)

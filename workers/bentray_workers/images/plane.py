@@ -1,4 +1,4 @@
-"""One slice of numbers on a grid, across any of its axes, with its place."""
+"""A slice of a volume across any axis, with its position."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ UPRIGHT = "z"
 
 @dataclass(frozen=True)
 class Plane:
-    """A slice, its first axis to be shown to the right and its second upwards.
+    """A slice, with its first axis to the right and its second axis up.
 
     Attributes:
         image: (na, nb).
         names: of its two axes.
         spacing_m, origin_m: of these, m.
-        across: the name of the axis that it cuts; empty for a plain image.
-        index, count: which slice it is, and of how many.
-        place_m: where it cuts, m; NaN where heights are uneven.
+        across: name of the axis across the slice; empty for a 2-D image.
+        index, count: index of the slice, and number of slices.
+        place_m: position along that axis, m; NaN for uneven heights.
     """
 
     image: Floats
@@ -39,8 +39,8 @@ class Plane:
     count: int = 1
     place_m: float = math.nan
 
-    def where(self) -> str:
-        """``slice index 2 (0 to 4), z = 6 mm``; nothing for a plain image."""
+    def caption(self) -> str:
+        """``slice index 2 (0 to 4), z = 6 mm``; empty for a 2-D image."""
         if not self.across:
             return ""
         place = "" if math.isnan(self.place_m) else f", {self.across} = {1e3 * self.place_m:.4g} mm"
@@ -54,13 +54,13 @@ def plane_of(
     axis: str = UPRIGHT,
     index: int | None = None,
 ) -> Plane:
-    """A slice of a volume, or a plain image as it is.
+    """A slice of a volume, or a 2-D image.
 
     Args:
         values: (nx, ny[, nz]).
-        spacing_m, origin_m: one an axis, m; NaN where heights are uneven.
-        axis: the one to cut across: x, y or z; of a plain image z.
-        index: along it; None: the middle one.
+        spacing_m, origin_m: per axis, m; NaN for uneven heights.
+        axis: across the slice: x, y or z; z for a 2-D image.
+        index: along the axis; None: the middle.
 
     Raises:
         InvalidInput: naming ``axis`` or ``index``.
@@ -87,10 +87,10 @@ def plane_of(
 def check_plane(
     shape: Sequence[int], spacing_m: Sequence[float | None], axis: str, index: int | None
 ) -> None:
-    """Refuse a slice that is not there, or that cannot be drawn to scale; arguments as of ``plane_of``."""
+    """Reject a slice that does not exist, or cannot be drawn to scale; arguments as for ``plane_of``."""
     accepted = AXES if len(shape) == 3 else UPRIGHT
     if len(axis) != 1 or axis not in accepted:
-        found = repr(axis) if len(shape) == 3 or axis not in AXES else f"{axis!r} of a plain image"
+        found = repr(axis) if len(shape) == 3 or axis not in AXES else f"{axis!r} of a 2-D image"
         raise InvalidInput("axis", found, " or ".join(accepted))
     uneven = spacing_m[-1] is None or not math.isfinite(spacing_m[-1])
     if axis != UPRIGHT and uneven:

@@ -13,28 +13,28 @@ from bentray_kernels.errors import InvalidInput
 
 Colours = NDArray[np.uint8]
 
-# Packs a picture of squares nearly as well as the highest level, in a fraction of its time.
+# Compresses nearly as well as the highest level, in a fraction of its time.
 PACKING = 4
 
 
 def png_of(image: Colours) -> bytes:
-    """A picture (rows, columns, 3), 8-bit RGB, as PNG; the same one gives the same bytes."""
+    """A picture (rows, columns, 3), 8-bit RGB, as PNG; the same picture gives the same bytes."""
     buffer = io.BytesIO()
     Image.fromarray(np.ascontiguousarray(image)).save(buffer, "PNG", compress_level=PACKING)
     return buffer.getvalue()
 
 
 def colours_of(png: bytes) -> Colours:
-    """The picture in a PNG of ours, (rows, columns, 3)."""
+    """The picture in a PNG, (rows, columns, 3)."""
     with Image.open(io.BytesIO(png), formats=["PNG"]) as image:
         return np.asarray(image.convert("RGB"))
 
 
 def read_picture(path: Path) -> Colours:
-    """A picture file of any kind that Pillow reads, (rows, columns, 3) 8-bit RGB.
+    """Read a picture file of any format of Pillow, (rows, columns, 3) 8-bit RGB.
 
     Raises:
-        InvalidInput: for what is absent, no picture, or beyond Pillow's limit.
+        InvalidInput: for an absent file, another format, or a picture beyond the limit of Pillow.
     """
     try:
         with Image.open(path) as image:

@@ -1,4 +1,4 @@
-"""The quality page of a scan: gathers with their picks, the matrix of times, what was left out, and why."""
+"""Quality page of a scan: gathers with picks, matrix of times, excluded pairs with reasons, findings."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from .canvas import drawing, new_figure, to_png
 from .curves import LINES
 from .maps import DIFFERENCE, MISSING, draw_bar, symmetric_limits
 
-# Inches of the page, and letters in a line of the list of findings.
+# Size of the page, inches, and line length of the list of findings.
 PAGE_IN = (13.0, 8.4)
 LETTERS = 62
 
-# Findings that are spelled out; the number of the others is given.
+# Findings in the list; further ones are counted.
 MOST_FINDINGS = 14
 
-# A gather shows this share of the trace's loudest sample in full black or white.
+# Part of the peak of a trace that is shown as full black or white.
 GATHER_FULL = 0.5
 
 LEFT_OUT = "#f2f2f2"
@@ -39,8 +39,8 @@ def quality_png(one: Dataset, examined: Examined, index: int | None = None) -> b
 
     Args:
         one: the slice as it was examined; its traces may be ``Emissions``.
-        examined: report of the scan and what goes on.
-        index: of the slice among several; None: there is no other.
+        examined: report of the scan, and the picked dataset.
+        index: of the slice; None: a scan without slices.
     """
     picked = None if examined.picked is None else examined.picked.slice(index or 0)
     findings = [f for f in examined.report.findings if f.slice == (index or 0)]
@@ -50,7 +50,7 @@ def quality_png(one: Dataset, examined: Examined, index: int | None = None) -> b
         which = "" if index is None else f", slice {index}"
         figure.suptitle(f"Quality of {textwrap.shorten(title, 80)}{which}: {examined.report.verdict}")
         panels = figure.subplots(2, 3)
-        emission = _loudest(one, picked)
+        emission = _best_emission(one, picked)
         _gather(panels[0, 0], one, picked, emission, "object")
         _gather(panels[0, 1], one, picked, emission, "water")
         _matrix(panels[0, 2], picked)
@@ -60,8 +60,8 @@ def quality_png(one: Dataset, examined: Examined, index: int | None = None) -> b
         return to_png(figure)
 
 
-def _loudest(dataset: Dataset, picked: Dataset | None) -> int:
-    """The emission with the most picks, for it shows most."""
+def _best_emission(dataset: Dataset, picked: Dataset | None) -> int:
+    """The emission with the most picks."""
     if picked is None:
         return len(dataset.tx) // 2
     return int(np.isfinite(picked.differential_tof()).sum(axis=1).argmax())
@@ -76,8 +76,8 @@ def _gather(axes: Axes, dataset: Dataset, picked: Dataset | None, emission: int,
     shot = np.asarray(traces[emission], dtype=np.float64)
     shot = np.where(np.isfinite(shot), shot, 0.0)
     shot -= np.median(shot, axis=1, keepdims=True)
-    loud = np.abs(shot).max(axis=1, keepdims=True)
-    shot = np.divide(shot, loud, out=np.zeros_like(shot), where=loud > 0.0)
+    peak = np.abs(shot).max(axis=1, keepdims=True)
+    shot = np.divide(shot, peak, out=np.zeros_like(shot), where=peak > 0.0)
     t0, step = 1e6 * dataset.t0_s, 1e6 / dataset.sampling_rate_hz
     extent = (-0.5, shot.shape[0] - 0.5, t0 + step * (shot.shape[1] - 0.5), t0 - 0.5 * step)
     axes.imshow(shot.T, cmap="gray", vmin=-GATHER_FULL, vmax=GATHER_FULL, aspect="auto", extent=extent)
@@ -97,7 +97,7 @@ def _gather(axes: Axes, dataset: Dataset, picked: Dataset | None, emission: int,
 def _matrix(axes: Axes, picked: Dataset | None) -> None:
     axes.set_title("Object minus water")
     if picked is None:
-        _absent(axes, "refused before times were read")
+        _absent(axes, "rejected before picking")
         return
     delta = 1e6 * picked.differential_tof()
     low, high = symmetric_limits([delta])
@@ -131,7 +131,7 @@ def _histogram(axes: Axes, picked: Dataset | None) -> None:
 
 
 def _reasons(axes: Axes, dataset: Dataset, picked: Dataset | None, findings: list[Finding]) -> None:
-    """Pairs that do not go on, each in the colour of its first reason."""
+    """Excluded pairs, coloured by their first reason."""
     axes.set_title("Pairs left out")
     found = [f for f in findings if f.action == "left out" and f.pairs is not None]
     names = list(dict.fromkeys(f.check for f in found))
@@ -179,7 +179,7 @@ def _list(axes: Axes, examined: Examined, findings: list[Finding]) -> None:
     if len(findings) > MOST_FINDINGS:
         lines.append(f"and {len(findings) - MOST_FINDINGS} more")
     if not findings:
-        lines.append("Nothing was found by: " + ", ".join(report.checked) + ".")
+        lines.append("No findings by: " + ", ".join(report.checked) + ".")
         lines[-1:] = textwrap.wrap(lines[-1], LETTERS)
     axes.set_title("Findings")
     axes.set_axis_off()

@@ -1,4 +1,4 @@
-"""The picture of one reconstruction: its images, convergence and residuals and, with a truth, the errors."""
+"""Report of one reconstruction: images, convergence, residuals and, with a truth, errors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bentray_kernels.tomography import Reconstruction
 from bentray_kernels.tomography.model_selection.selection import advice_of
 
 from .canvas import drawing, new_figure, to_png
-from .captions import LABELS, NAMES, facts, stage_names, which_slice
+from .captions import LABELS, NAMES, facts, slice_caption, stage_names
 from .curves import draw_history, draw_profiles
 from .cut import cut, has_section, slice_index
 from .maps import (
@@ -39,26 +39,26 @@ Bools = NDArray[np.bool_]
 
 PANEL_IN = (4.4, 3.5)
 
-# Rows and columns for so many panels at most.
+# Rows and columns by the largest number of panels.
 GRIDS = {3: (1, 3), 4: (2, 2), 6: (2, 3), 8: (2, 4), 9: (3, 3)}
 
-# Characters of the line under the panels that fit into an inch.
+# Characters per inch of the line under the panels.
 CHARACTERS_AN_INCH = 15
 
 COLORMAPS = {"coverage": COVERAGE, "attenuation": ATTENUATION, "recovery": RECOVERY}
 
 
 def report_png(result: Reconstruction, truth: Truth | None = None, roi: Bools | None = None) -> bytes:
-    """The images that there are, convergence and residuals; with a truth this, the difference and a profile.
+    """Images, convergence and residuals; with a truth also the truth, the difference and a profile.
 
-    Several slices are shown by the middle one, the title says which, and where they are many and evenly
-    spaced by a section across them, which takes the profile's place. The errors are those of ``compare``,
-    over all slices. A truth that cannot be compared is shown as it is, with the reason under it.
+    Of several slices the middle one is shown, and with many evenly spaced slices a vertical section, which
+    replaces the profile. The errors are those of ``compare``, over all slices. A truth that cannot be
+    compared is shown with the reason.
 
     Args:
-        result: what to show.
-        truth: what is really there.
-        roi: the nodes that count for the errors, on the truth's grid.
+        result: to show.
+        truth: of the scan.
+        roi: region for the errors, on the grid of the truth.
     """
     k = slice_index(result)
     if truth is None:
@@ -66,7 +66,7 @@ def report_png(result: Reconstruction, truth: Truth | None = None, roi: Bools | 
     try:
         return _compared(result, compare(result, truth, roi), k)
     except NotComparable as why:
-        return _beside(result, truth, str(why), k)
+        return _with_truth(result, truth, str(why), k)
 
 
 def _plain(result: Reconstruction, k: int) -> bytes:
@@ -80,7 +80,7 @@ def _plain(result: Reconstruction, k: int) -> bytes:
         return to_png(figure)
 
 
-def _beside(result: Reconstruction, truth: Truth, why: str, k: int) -> bytes:
+def _with_truth(result: Reconstruction, truth: Truth, why: str, k: int) -> bytes:
     with drawing():
         figure, panels = _sheet(result, k, 2)
         _speed(next(panels), result, k)
@@ -99,7 +99,7 @@ def _compared(result: Reconstruction, found: Comparison, k: int) -> bytes:
     region = cut(found.region, k)
     grid = (result.spacing_m, result.origin_m)
     difference = speed - true_speed
-    # A slice may lie beyond the region; it is shown by what the truth covers there.
+    # A slice may lie outside the region; it is then shown where the truth covers it.
     within = region if region.any() else np.isfinite(true_speed)
     limits = robust_limits([speed, true_speed], within)
     with drawing():
@@ -114,7 +114,7 @@ def _compared(result: Reconstruction, found: Comparison, k: int) -> bytes:
         title = f"Difference: {found}"
         shown = draw_map(axes, difference, *grid, spread, colormap=DIFFERENCE, title=title, outline=region)
         draw_bar([shown], "reconstruction minus truth (m/s)")
-        axes.set_xlabel(f"x (mm)\nerrors read: {found.region_choice}")
+        axes.set_xlabel(f"x (mm)\nerrors in: {found.region_choice}")
         if has_section(result):
             _section(next(panels), result, limits)
         else:
@@ -132,12 +132,12 @@ def _profile(axes: Axes, result: Reconstruction, speed: Floats, true_speed: Floa
 
 
 def _section(axes: Axes, result: Reconstruction, limits: Limits) -> None:
-    """The speed across all heights, seen along y."""
+    """Vertical section of the speed, across y."""
     row = result.speed.shape[1] // 2
     grid = result.spacing_m[::2], result.origin_m[::2]
     title = f"Reconstruction, y = {_y_mm(result, row):.1f} mm"
     shown = draw_map(axes, result.speed[:, row], *grid, limits, colormap=SPEED, title=title, up="z")
-    # Square like the other panels, so that they stay aligned.
+    # Square like the other panels, so that they are aligned.
     left, right, bottom, top = shown.get_extent()
     reach = 0.5 * max(right - left, top - bottom)
     axes.set_xlim(0.5 * (left + right) - reach, 0.5 * (left + right) + reach)
@@ -151,10 +151,10 @@ def _y_mm(result: Reconstruction, row: int) -> float:
 
 def _sheet(result: Reconstruction, k: int, own: int) -> tuple[Figure, Iterator[Axes]]:
     """A sheet for ``own`` panels and for those of ``_maps`` and ``_curves``."""
-    count = own + len(_held(result)) + 1 + (result.residuals is not None)
+    count = own + len(_quantities(result)) + 1 + (result.residuals is not None)
     rows, columns = next(grid for most, grid in GRIDS.items() if count <= most)
     figure = new_figure(PANEL_IN[0] * columns, PANEL_IN[1] * rows + 0.6)
-    figure.suptitle(f"Sound speed{which_slice(result, k)}")
+    figure.suptitle(f"Sound speed{slice_caption(result, k)}")
     words = textwrap.wrap(advice_of(result), int(CHARACTERS_AN_INCH * figure.get_figwidth()))
     figure.supxlabel("\n".join([facts(result), *words]), fontsize=8, color="#666666")
     panels = figure.subplots(rows, columns).ravel()
@@ -163,8 +163,8 @@ def _sheet(result: Reconstruction, k: int, own: int) -> tuple[Figure, Iterator[A
     return figure, iter(panels)
 
 
-def _held(result: Reconstruction) -> list[str]:
-    """The images beside the speed."""
+def _quantities(result: Reconstruction) -> list[str]:
+    """Quantities of the result other than the speed."""
     return [name for name in COLORMAPS if getattr(result, name) is not None]
 
 
@@ -175,13 +175,13 @@ def _speed(axes: Axes, result: Reconstruction, k: int) -> None:
 
 
 def _limits(image: Floats, coverage: Floats) -> Limits:
-    """From the nodes that rays have passed, where any have."""
+    """Limits from the nodes with rays, if any."""
     passed = coverage > 0.0
     return robust_limits([image], passed if passed.any() else None)
 
 
 def _maps(panels: Iterator[Axes], result: Reconstruction, k: int) -> None:
-    for name in _held(result):
+    for name in _quantities(result):
         image = cut(getattr(result, name), k)
         limits = _limits(image, cut(result.coverage, k))
         if name == "coverage":

@@ -1,4 +1,4 @@
-"""The residuals of the last sweep: how many lie within what size, and their histogram as a panel."""
+"""Histogram panel of the residuals of the last iteration, and their quantiles."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ Floats = NDArray[np.float64]
 # Bins closer to zero than this part of the linear range are drawn as one.
 FINEST = 0.25
 
-# Part of the residuals at each end that the panel does not show.
+# Part of the residuals at each end outside the panel.
 CUT_OFF = 0.0005
 
 BAR = "#7fa6b8"
 
 
 def within(counts: Counts, share: float) -> float:
-    """The size, s, that this share of the residuals does not exceed; 0 where there are none.
+    """The absolute residual, s, that this share does not exceed; 0 without residuals.
 
     Args:
         counts: of the bins between ``RESIDUAL_EDGES_S``.
-        share: in (0, 1]; in a bin the residuals are taken to lie evenly.
+        share: in (0, 1]; residuals are assumed uniform in a bin.
     """
     if not counts.sum():
         return 0.0
@@ -41,14 +41,14 @@ def within(counts: Counts, share: float) -> float:
 
 
 def draw_residuals(axes: Axes, counts: Counts, rms_s: float | None) -> None:
-    """The histogram on an axis in ns that is linear where two thirds lie and logarithmic beyond.
+    """Histogram on an axis in ns, linear for two thirds of the residuals and logarithmic beyond.
 
-    The height of a bar is the count over the bar's width on this axis, so that areas can be compared.
+    The height of a bar is the count over its width on this axis, so that areas are comparable.
     """
     linear = within(counts, 0.68) or RESIDUAL_EDGES_S[-1]
     edges, merged = _merged(counts, linear)
     axes.stairs(merged / np.diff(_place(edges, linear)), 1e9 * edges, fill=True, color=BAR)
-    # With this scale the axis has no kink where its linear part ends.
+    # With this scale the axis is smooth at the end of its linear part.
     axes.set_xscale("symlog", linthresh=1e9 * linear, linscale=0.9 / np.log(10.0))
     reach = 1e9 * max(within(counts, 1.0 - CUT_OFF), 2.0 * linear)
     axes.set_xlim(-reach, reach)
@@ -68,7 +68,7 @@ def draw_residuals(axes: Axes, counts: Counts, rms_s: float | None) -> None:
 
 
 def _merged(counts: Counts, linear: float) -> tuple[Floats, Counts]:
-    """Edges and counts with the fine bins around zero made one."""
+    """Edges and counts with the fine bins around zero merged."""
     kept = np.abs(RESIDUAL_EDGES_S) >= FINEST * linear
     kept[[0, -1]] = True
     before = np.concatenate(([0], np.cumsum(counts)))
@@ -76,15 +76,15 @@ def _merged(counts: Counts, linear: float) -> tuple[Floats, Counts]:
 
 
 def _place(value: Floats, linear: float) -> Floats:
-    """Where the axis shows a value: itself up to ``linear``, beyond it its logarithm, without a kink."""
+    """Position of a value on the axis: linear up to ``linear``, logarithmic beyond, and smooth."""
     size = np.abs(value) / linear
     return np.sign(value) * linear * np.where(size <= 1.0, size, 1.0 + np.log(np.maximum(size, 1.0)))
 
 
 def _ticks(linear: float, reach: float) -> list[float]:
-    """0 and round numbers on both sides, from near the middle of the linear range on."""
+    """0 and round numbers on both sides, from the middle of the linear range."""
     round_numbers = [step * 10.0**power for power in range(-2, 6) for step in (1.0, 3.0)]
-    wanted = [value for value in round_numbers if 0.4 * linear <= value <= reach]
-    while len(wanted) > 3:
-        wanted = wanted[1::2]
-    return [*(-value for value in reversed(wanted)), 0.0, *wanted]
+    ticks = [value for value in round_numbers if 0.4 * linear <= value <= reach]
+    while len(ticks) > 3:
+        ticks = ticks[1::2]
+    return [*(-value for value in reversed(ticks)), 0.0, *ticks]

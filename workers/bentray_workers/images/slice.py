@@ -10,12 +10,12 @@ from bentray_kernels.errors import InvalidInput
 
 from ..files.reconstruction import read_reconstruction
 from .captions import LABELS, NAMES, facts
-from .look import COLOUR_VALUE, Look
 from .maps import RECOVERY_LIMITS, Limits, robust_limits
 from .plane import UPRIGHT, plane_of
 from .plane_picture import plane_png
+from .slice_style import COLOUR_VALUE, SliceStyle
 
-# Of the larger of two limits, so much lies between them at least.
+# Smallest distance of the limits, relative to the larger of them.
 LEAST_SPAN = 1e-9
 
 
@@ -27,23 +27,23 @@ def slice_png(
     index: int | None = None,
     low: float | None = None,
     high: float | None = None,
-    **look: Any,
+    **style: Any,
 ) -> bytes:
     """One slice of a reconstruction file.
 
     Args:
         path: of ``reconstruction.h5``.
-        quantity: ``speed``, ``coverage``, or ``attenuation`` or ``recovery`` where the file has it.
-        axis: the one that the slice cuts across: x, y or z.
-        index: along it; None: the middle one.
-        low, high: values of the first and the last colour, in the quantity's unit; None: from the nodes
-            that rays have passed, but for a few outliers; of the recovery 0 and 1.
-        look: as the fields of ``Look``.
+        quantity: ``speed``, ``coverage``, or ``attenuation`` or ``recovery`` if present.
+        axis: across the slice: x, y or z.
+        index: along the axis; None: the middle.
+        low, high: values of the first and the last colour, in the unit of the quantity; None: the range
+            of nodes with rays, without outliers; 0 and 1 for the recovery.
+        style: fields of ``SliceStyle``.
 
     Raises:
         InvalidInput: naming the argument, or the field of the file.
     """
-    chosen = Look(**look)
+    chosen = SliceStyle(**style)
     if quantity not in LABELS:
         raise InvalidInput("quantity", repr(quantity), "one of " + ", ".join(LABELS))
     result = read_reconstruction(path)
@@ -60,22 +60,22 @@ def slice_png(
         limits = (0.0, limits[1])
     elif quantity == "recovery":
         limits = RECOVERY_LIMITS
-    title = ", ".join(filter(None, (NAMES[quantity], plane.where())))
+    title = ", ".join(filter(None, (NAMES[quantity], plane.caption())))
     limits = given_limits(limits, low, high)
     return plane_png(plane, limits, chosen, title=title, unit=LABELS[quantity], note=facts(result))
 
 
 def given_limits(limits: Limits, low: float | None, high: float | None) -> Limits:
-    """The limits with what was asked for in their place.
+    """The limits, replaced by requested ones.
 
     Raises:
-        InvalidInput: for what no volume can hold, or is not clearly lower than the other.
+        InvalidInput: for values out of range, or a low that is not below the high.
     """
     for name, value in (("low", low), ("high", high)):
         if value is not None:
             COLOUR_VALUE.check(name, value)
     chosen = (limits[0] if low is None else low, limits[1] if high is None else high)
-    # Colours need steps between the two that numbers of this size can tell apart.
+    # Colours need distinguishable steps between the limits.
     least = max(LEAST_SPAN * max(map(abs, chosen)), sys.float_info.min)
     if not chosen[1] - chosen[0] > least:
         if low is None:

@@ -1,4 +1,4 @@
-"""A reconstruction against the truth: region, true speed and errors, as tables and pictures show them."""
+"""Comparison of a reconstruction with the truth: region, true speed and errors."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ __all__ = ["Comparison", "NotComparable", "compare"]
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-# A true speed within this of the water's is water, m/s.
+# True speeds within this of that of water are water, m/s.
 WATER_TOLERANCE_MPS = 1.0
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """How far an image is from the truth, over all its slices.
+    """Errors of an image against the truth, over all slices.
 
     Attributes:
-        true_speed_mps: at the image's nodes, of the image's shape; NaN beyond the truth.
-        region: the nodes that count, of that shape, at least one.
-        region_choice: in words, how the region was chosen.
+        true_speed_mps: at the nodes of the image; NaN outside the truth.
+        region: nodes for the errors, at least one.
+        region_choice: description of the region.
         true_range_mps: lowest and highest true speed in the region.
-        mean_absolute_error_of_range: as a part of that range (chapter 6.4); None where it is 0.
+        mean_absolute_error_of_range: relative to that range (chapter 6.4); None if the range is 0.
         rmse_mps: root mean square error.
     """
 
@@ -51,18 +51,18 @@ class Comparison:
 
 
 def compare(result: Reconstruction, truth: Truth, roi: Bools | None = None) -> Comparison:
-    """Read the errors at the image's own nodes, without any registration.
+    """Compute errors at the nodes of the image, without registration.
 
-    The region is ``roi`` where it is on the truth's grid and marks a node; else the outline of what is
-    not water in the truth; else every node that the truth covers.
+    The region is ``roi`` if it is on the grid of the truth and not empty; otherwise the object, where the
+    truth is not water, with everything inside; otherwise all nodes covered by the truth.
 
     Args:
         result: the image.
-        truth: what is really there.
-        roi: the nodes that count, on the truth's grid.
+        truth: of the scan.
+        roi: region on the grid of the truth.
 
     Raises:
-        NotComparable: where the truth cannot be laid on the image, or lies beside it.
+        NotComparable: if the truth cannot be interpolated on the image, or does not overlap it.
     """
     true_speed = on_grid(truth.sound_speed_mps, truth, result)
     covered = np.isfinite(true_speed)
@@ -95,7 +95,7 @@ def _marked(roi: Bools | None, truth: Truth, result: Reconstruction) -> Bools:
 
 
 def _outline(true_speed: Floats, covered: Bools, water_speed_mps: float) -> Bools:
-    """What is not water and, slice by slice, what it encloses."""
+    """The object, where the speed is not that of water, with enclosed nodes, slice by slice."""
     off = np.abs(np.where(covered, true_speed, water_speed_mps) - water_speed_mps)
     other = np.atleast_3d(off > WATER_TOLERANCE_MPS)
     filled = [binary_fill_holes(other[..., k]) for k in range(other.shape[2])]

@@ -1,4 +1,4 @@
-"""What is known on the nodes of the truth, read at the nodes of a reconstruction."""
+"""Interpolation of the truth at the nodes of a reconstruction."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from bentray_kernels.tomography import Reconstruction
 
 Floats = NDArray[np.float64]
 
-# Orders of axes that can be brought to x, y[, z]; any other text means that the truth needs registration.
+# Axis orders that can be permuted to x, y[, z]; any other text requires registration of the truth.
 ORDERS = {"x,y": (0, 1), "y,x": (1, 0), "x,y,z": (0, 1, 2), "z,y,x": (2, 1, 0), "y,x,z": (1, 0, 2)}
 
 
-class NotComparable(Exception):  # noqa: N818 - a fact about the truth, not a fault of the input
-    """The truth cannot be laid on the image; the text says why, in words to show."""
+class NotComparable(Exception):  # noqa: N818 - a property of the truth, not an error of the input
+    """The truth cannot be interpolated on the image; the text is the reason to display."""
 
 
 def on_grid(values: ArrayLike, truth: Truth, result: Reconstruction) -> Floats:
-    """Values known at the truth's nodes, at the image's nodes, by linear interpolation.
+    """Linear interpolation of values on the grid of the truth at the nodes of the image.
 
     Args:
         values: of the shape of ``truth.sound_speed_mps``.
-        truth: says where the values lie.
-        result: says where to read them.
+        truth: with the grid of the values.
+        result: with the grid of the image.
 
     Returns:
-        An array of the shape of ``result.speed``; NaN beyond the truth.
+        An array of the shape of ``result.speed``; NaN outside the truth.
 
     Raises:
-        NotComparable: where the axes of the two do not tell how they lie on each other.
+        NotComparable: for axes that do not match.
     """
     order = ORDERS.get(truth.axes.replace(" ", ""))
     if order is None:

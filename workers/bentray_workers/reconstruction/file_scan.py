@@ -18,7 +18,7 @@ from bentray_kernels.tomography.waveform.waveform_settings import WaveSettings
 
 from ..cluster.job_cancellation import check_job_active
 from ..files.dataset import read_dataset
-from ..files.dataset.traces import slice_opened
+from ..files.dataset.traces import open_slice
 from ..files.findings import read_findings
 
 
@@ -80,5 +80,5 @@ def read_once(path: Path, stamp: int) -> Dataset:
 def _wave_problem(scan: FileWaveScan, number: int) -> WaveProblem:
     faults = read_findings(scan.findings).of_traces(scan.slice)
     poll = partial(check_job_active, scan.findings.parent)
-    with slice_opened(scan.path, read_once(scan.path, scan.stamp), scan.slice, poll) as one:
+    with open_slice(scan.path, read_once(scan.path, scan.stamp), scan.slice, poll) as one:
         return prepare(apply(one, faults), scan.plan, number, poll=poll)

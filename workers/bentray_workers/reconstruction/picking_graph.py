@@ -26,7 +26,7 @@ from bentray_kernels.tomography import Progress
 from bentray_kernels.tomography.guided_picking import predicted_delta
 
 from ..cluster.job_cancellation import check_job_active
-from ..files.dataset.traces import slice_opened, trace_samples
+from ..files.dataset.traces import open_slice, trace_samples
 from ..files.dataset.write import write_dataset
 from ..files.findings import ScanFindings, read_findings, write_findings
 from ..files.reconstruction import read_reconstruction
@@ -121,7 +121,7 @@ class PickingSource(NamedTuple):
     @contextmanager
     def slice(self, index: int, findings: Sequence[Finding] = ()) -> Iterator[Dataset]:
         """One slice with traces that are read on access, with the findings corrected."""
-        with slice_opened(self.path, self.dataset, index, partial(check_job_active, self.folder)) as one:
+        with open_slice(self.path, self.dataset, index, partial(check_job_active, self.folder)) as one:
             yield apply(one, findings)
 
 

@@ -17,7 +17,7 @@ from bentray_kernels.errors import InvalidInput
 from ..cluster.task_cancellation import cancellation_check
 from ..files.dataset import Limits, read_dataset
 from ..files.dataset.read import NUMERIC, TRACES
-from ..files.dataset.traces import slice_opened
+from ..files.dataset.traces import open_slice
 from ..files.hdf5_reading import opened
 
 # Called with the number of examined emissions, and of all.
@@ -67,7 +67,7 @@ def calibrate_file(
     quality = _examined(path, whole, picker, progress)
     if quality.picked is None:
         return quality, None
-    with slice_opened(path, whole, 0) as one:
+    with open_slice(path, whole, 0) as one:
         right = apply(one, [finding for finding in quality.examined.findings if finding.slice == 0])
         found = calibrate(right, water_times(right), fit_speed=fit_speed)
     return replace(quality, picked=found.applied(quality.picked)), found
@@ -99,7 +99,7 @@ def _examined(path: Path, whole: Dataset, picker: str, progress: OnEmission | No
     examined = examine_slices(whole, _slices(path, whole), picker, progress)
     of_slices = [f.slice for f in examined.report.findings]
     worst = max(set(of_slices), key=of_slices.count, default=0)
-    with slice_opened(path, whole, worst) as one:
+    with open_slice(path, whole, worst) as one:
         page = quality_png(one, examined, worst if whole.slice_z_m is not None else None)
     return Quality(examined.report.to_dict(), page, examined.picked, examined.report)
 
@@ -107,7 +107,7 @@ def _examined(path: Path, whole: Dataset, picker: str, progress: OnEmission | No
 def _slices(path: Path, whole: Dataset) -> Iterator[Dataset]:
     """Each slice, with traces that are readable until the next one."""
     for index in range(whole.slices):
-        with slice_opened(path, whole, index) as one:
+        with open_slice(path, whole, index) as one:
             yield one
 
 

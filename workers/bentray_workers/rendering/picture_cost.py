@@ -70,7 +70,7 @@ class Cost:
 
 
 def slice_cost(stored: VolumeFile, size: int | None) -> Cost:
-    """Cost of a slice of a volume; ``size`` as in ``images.look.Look``."""
+    """Cost of a slice of a volume; ``size`` as in ``images.slice_style.SliceStyle``."""
     pixels = (size or USUAL_SIZE) ** 2
     seconds = FLOOR_SECONDS + READ_S * stored.read_bytes + DRAWN_S * pixels
     return Cost(seconds, FLOOR_BYTES + stored.read_bytes + DRAWN_BYTES * pixels)

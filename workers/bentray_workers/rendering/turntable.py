@@ -21,7 +21,7 @@ from bentray_kernels.tomography import Progress
 from ..cluster.capacities import capacities_by_address
 from ..cluster.fair_shares import Share
 from ..cluster.task_pool import Placement, open_pool, run_job
-from ..files.atomic import replacing, write_bytes
+from ..files.atomic import atomic_replace, write_bytes
 from ..images.png import Colours
 from .picture_cost import placed, refraction_bytes
 from .refraction import tile_image
@@ -175,14 +175,14 @@ def write_frame(frame: Path, tiles: Sequence[Colours]) -> None:
 
 def write_zip(frames: Sequence[Path], target: Path) -> None:
     """Task: pictures in a zip file; PNG is compressed already."""
-    with replacing(target) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_STORED) as archive:
+    with atomic_replace(target) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_STORED) as archive:
         for frame in frames:
             archive.writestr(zipfile.ZipInfo(frame.name, DATE), frame.read_bytes())
 
 
 def write_apng(frames: Sequence[Path], target: Path) -> None:
     """Task: pictures in an animated PNG that repeats."""
-    with replacing(target) as partial, Image.open(frames[0]) as first:
+    with atomic_replace(target) as partial, Image.open(frames[0]) as first:
         later = _Opened(frames[1:])
         first.save(partial, "PNG", save_all=True, append_images=later, duration=FRAME_MS, loop=0)
 

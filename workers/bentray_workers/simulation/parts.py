@@ -19,7 +19,7 @@ from bentray_kernels.wave.time_blocks import Poll
 from ..cluster.attempts import ResultsLostError
 from ..cluster.checkpoints import UNREADABLE
 from ..cluster.job_cancellation import JobEnded, check_job_active
-from ..files.atomic import replacing
+from ..files.atomic import atomic_replace
 from ..files.npy_headers import PARSING
 from .cost import Timed, emitters_a_task
 from .request import Simulated
@@ -77,7 +77,7 @@ def make_part(settings: Simulated, part: Part, folder: Path) -> None:
     """Task: compute a part into its file. Ends within a second once the folder is gone."""
     try:
         arrays = _computed(settings, part, partial(check_job_active, folder))
-        with replacing(part.path(folder)) as unready, unready.open("wb") as file:
+        with atomic_replace(part.path(folder)) as unready, unready.open("wb") as file:
             np.savez(file, allow_pickle=False, **{str(k): array for k, array in enumerate(arrays)})
     except JobEnded:
         return

@@ -80,7 +80,7 @@ def test_table_and_pictures_tell_the_same_errors(drawn: Any, wide: bool) -> None
     assert scan.truth is not None
     comparison_png(scan.truth, {"bent": image(speed)}, scan.roi)
     assert f"Bent: {shown}" in drawn.words()
-    assert f"Errors read: {rows['errors read']}" in drawn.words()
+    assert f"Errors in: {rows['errors read']}" in drawn.words()
     report_png(image(speed), scan.truth, scan.roi)
     assert f"Difference: {shown}" in drawn.words()
     assert rows["errors read"].startswith("mask/roi" if wide else "the outline")

@@ -12,7 +12,7 @@ from bentray_kernels.acquisition import Waveform
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.files.dataset import traces as trace_reading
-from bentray_workers.files.dataset.traces import slice_opened
+from bentray_workers.files.dataset.traces import open_slice
 
 from ....kernels.acquisition.traces import scan
 
@@ -52,7 +52,7 @@ def test_an_emission_at_a_time_is_the_whole(tmp_path, monkeypatch, stacked, kind
     whole = read_dataset(path, traces=False)
     for index in range(dataset.slices):
         expected = dataset.slice(index).waveform
-        with slice_opened(path, whole, index) as one:
+        with open_slice(path, whole, index) as one:
             for name in ("object", "water"):
                 sought, lazily = getattr(expected, name), getattr(one.waveform, name)
                 assert (lazily.shape, lazily.dtype) == (sought.shape, sought.dtype)
@@ -72,7 +72,7 @@ def test_damaged_traces_are_told_when_they_are_asked_for(tmp_path):
     content = bytearray(path.read_bytes())
     content[at.byte_offset : at.byte_offset + at.size] = bytes(at.size)
     path.write_bytes(content)
-    with slice_opened(path, read_dataset(path, traces=False), 0) as one:
+    with open_slice(path, read_dataset(path, traces=False), 0) as one:
         assert one.waveform.object[2].shape == (8, 50)
         with pytest.raises(InvalidInput, match="waveform/object: found damaged data"):
             one.waveform.object[3]
@@ -81,5 +81,5 @@ def test_damaged_traces_are_told_when_they_are_asked_for(tmp_path):
 def test_without_traces_there_are_none(tmp_path):
     known = replace(scan(elements=8), waveform=None, delta_tof_s=np.zeros((8, 8)))
     write_dataset(tmp_path / "scan.h5", known)
-    with slice_opened(tmp_path / "scan.h5", known, 0) as one:
+    with open_slice(tmp_path / "scan.h5", known, 0) as one:
         assert one.waveform is None

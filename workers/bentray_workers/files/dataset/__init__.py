@@ -1,4 +1,4 @@
-"""Datasets as files in the upload format ``uct-transmission`` 1.0."""
+"""Dataset files in the upload format ``uct-transmission`` 1.0."""
 
 from ..hdf5_reading import Limits
 from .copy import copy_dataset

@@ -1,4 +1,4 @@
-"""Copying a dataset file into canonical form, its traces in pieces: they may be larger than the memory."""
+"""Copying a dataset file to canonical form, with traces in pieces, since they may exceed the memory."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..hdf5_reading import Limits, opened, rejecting_damage
 from .read import NUMERIC, TRACES, dataset_of, placeholder_traces, trace_type
 from .write import Piece, bytes_of, write_dataset
 
-# Of one piece. It takes about three times as much while it is read, converted and packed.
+# Size of one piece; it takes about three times as much while it is read, converted and compressed.
 PIECE_BYTES = 16 * 2**20
 
 
@@ -25,19 +25,19 @@ def copy_dataset(
     limits: Limits | None = None,
     on_size: Callable[[int], None] = lambda size: None,
 ) -> Dataset:
-    """Check a dataset file and write it anew, with no more than a piece of its traces in memory.
+    """Check a dataset file and write it again, with one piece of its traces in memory at a time.
 
     Args:
         source: of the HDF5 file.
-        target: replaced whole or not touched.
-        limits: what the file may ask for; None: the defaults of ``Limits``.
-        on_size: told before ``target`` is written how many bytes it will have at most, but for its headers.
+        target: replaced atomically.
+        limits: of reading; None: the defaults of ``Limits``.
+        on_size: called before writing with the largest size of ``target`` without headers, bytes.
 
     Returns:
-        What it holds. In place of traces there are arrays of their shape and type that take no memory.
+        The dataset, with placeholders of the same shape and type for traces.
 
     Raises:
-        InvalidInput: as ``read_dataset`` does, and for traces that are damaged.
+        InvalidInput: as ``read_dataset``, and for damaged traces.
         OSError: where the folder cannot be written to or the disk is full.
     """
     with opened(source, limits or Limits()) as reader:
@@ -58,11 +58,11 @@ def copy_dataset(
 
 
 def blocks(found: h5py.Dataset, chunk: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
-    """Cut an array into boxes of about ``PIECE_BYTES`` that follow its chunks.
+    """Boxes of an array of about ``PIECE_BYTES``, aligned to its chunks.
 
     Args:
         found: the array.
-        chunk: that of the file to be written, which is followed too as long as the boxes stay small.
+        chunk: of the target file; boxes are aligned to it too if they stay small.
     """
     shape, size = found.shape, found.dtype.itemsize
     own = found.chunks or (1,) * len(shape)

@@ -1,4 +1,4 @@
-"""What a plan needs to know of a dataset: counts and sizes in plain values, kept when it is taken in."""
+"""Counts and sizes of a dataset for plans, in plain values, stored at upload."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ import numpy as np
 
 from bentray_kernels.arrays import Floats, Ints
 
-# What plans are made with loads compiled kernels, which take seconds: the reader of an upload starts without.
+# These load compiled kernels, which takes seconds: the reader of an upload starts without them.
 if TYPE_CHECKING:
     from bentray_kernels.acquisition import Dataset
     from bentray_kernels.tomography.settings import Settings
 
-# Of emissions that lie in the same chunks, at most.
+# Largest size of emissions in the same chunks.
 BLOCK_BYTES = 32 * 2**20
 
 
 @dataclass(frozen=True)
 class Traces:
-    """The traces of a dataset as a plan sees them.
+    """Traces of a dataset for plans.
 
     Attributes:
         emissions, receivers: of one slice.
         samples: of each trace.
         sample_bytes: of one.
         rate_hz: of the samples.
-        frequency_hz: of the middle of the pulse.
-        water_mps: speed of the water.
+        frequency_hz: centre frequency of the pulse.
+        water_mps: speed of sound in water.
     """
 
     emissions: int
@@ -40,30 +40,30 @@ class Traces:
     water_mps: float
 
     def bytes_of(self, emissions: int) -> int:
-        """Of the object's traces of some emissions of one slice, all at most."""
+        """Size of object traces of some emissions of one slice."""
         return min(emissions, self.emissions) * self.receivers * self.samples * self.sample_bytes
 
     @property
     def read_bytes(self) -> int:
-        """Of what is read at once of object or water: an emission, or those that share chunks with it."""
+        """Size of a read of object or water: an emission, or those in the same chunks."""
         return max(self.bytes_of(1), min(self.bytes_of(self.emissions), BLOCK_BYTES))
 
 
 @dataclass(frozen=True)
 class Summary:
-    """A dataset as the plan sees it.
+    """Dataset for plans.
 
     Attributes:
-        emitters, receivers: of one slice, or of the array, once reverses are filled in.
+        emitters, receivers: of one slice, or of the array with reciprocity.
         pairs: in all slices.
         slices: heights of the ring; 1 for a plain scan, and for an array in space.
-        in_space: whether the elements have heights of their own.
+        in_space: whether the elements have 3-D positions.
         height_m: from the lowest height to the highest, m.
         width_m: of the array, m.
-        traces_bytes: of the waveforms, 0 where there are travel times.
-        amplitudes: whether there are any.
-        traces: of object and water, which waves may refine from; None where one of them is not there.
-        period: whether a centre frequency is known, so that times are examined.
+        traces_bytes: of the waveforms, 0 with travel times.
+        amplitudes: whether there are amplitudes.
+        traces: of object and water, for a full-waveform refinement; None if one of them is absent.
+        period: whether the centre frequency is known, so that times are examined.
     """
 
     emitters: int
@@ -81,20 +81,20 @@ class Summary:
 
 @dataclass(frozen=True)
 class DatasetCounts:
-    """A dataset in so many numbers, however many elements it has.
+    """Counts and sizes of a dataset.
 
     Attributes:
         emissions, receivers: of one slice.
-        elements: that send, receive or do both.
+        elements: that emit, receive or both.
         slices: heights of the ring; 1 for a plain scan, and for an array in space.
-        in_space: whether the elements have heights of their own.
+        in_space: whether the elements have 3-D positions.
         height_m, width_m: of the array with all of its heights, m.
         times: whether there are travel times.
-        amplitudes: whether there are recorded ones.
+        amplitudes: whether there are recorded amplitudes.
         traces_bytes: of the traces of object and water.
-        samples, sample_bytes: of each trace, where there are both of object and water; else 0 samples.
-        rate_hz, frequency_hz: of the samples and of the middle of the pulse; None where they are not known.
-        water_mps: speed of the water.
+        samples, sample_bytes: of each trace; 0 samples unless there are traces of object and water.
+        rate_hz, frequency_hz: sampling rate and centre frequency; None if unknown.
+        water_mps: speed of sound in water.
     """
 
     emissions: int
@@ -115,7 +115,7 @@ class DatasetCounts:
 
     @classmethod
     def of(cls, dataset: Dataset) -> DatasetCounts:
-        """Of a dataset whose traces may be stand-ins that take no memory."""
+        """Counts of a dataset; its traces may be placeholders."""
         traces = dataset.waveform
         both = [] if traces is None else [one for one in (traces.object, traces.water) if one is not None]
         return cls(
@@ -131,11 +131,11 @@ class DatasetCounts:
         )
 
     def summary(self, settings: Settings) -> Summary:
-        """The dataset as the plan of a reconstruction sees it.
+        """The dataset for the plan of a reconstruction.
 
         Args:
-            settings: with ``reciprocity``, elements that only send or only receive do both; and whether
-                amplitudes are read from traces.
+            settings: with ``reciprocity``, all elements emit and receive; and whether amplitudes are read
+                from traces.
         """
         both = (self.elements, self.elements)
         emitters, receivers = both if settings.numerics.reciprocity else (self.emissions, self.receivers)
@@ -172,7 +172,7 @@ class DatasetCounts:
 
 
 def array_counts(position: Floats, tx: Ints, rx: Ints, heights: Floats | None) -> dict[str, Any]:
-    """Those of ``DatasetCounts`` that geometry and acquisition tell.
+    """The fields of ``DatasetCounts`` from geometry and acquisition.
 
     Args:
         position: (elements, 2 or 3), m.

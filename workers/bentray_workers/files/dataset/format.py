@@ -1,9 +1,9 @@
-"""What reader and writer of the upload format agree on."""
+"""Fields of the upload format, for reader and writer."""
 
 FORMAT = "uct-transmission"
 VERSION = "1.0"
 
-# Arrays over (ntx, nrx), with a leading nz axis where there are slices: path in the file, field of Dataset.
+# Arrays over (ntx, nrx), with a leading nz axis for slices: path in the file, field of Dataset.
 PAIR_ARRAYS = {
     "traveltime/tof_s": "tof_s",
     "traveltime/delta_tof_s": "delta_tof_s",

@@ -1,4 +1,4 @@
-"""Reading a dataset file: every field by name, each refused with what was found and what is accepted."""
+"""Reading a dataset file: every field is checked; errors name field, value and accepted values."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ..hdf5_reading import Limits, Reader, opened
 from .format import FORMAT, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
 
 NUMERIC = "iuf"
-# Arrays whose number of rows, pairs or nodes is held against its limit before anything is read.
+# Arrays whose number of rows, pairs or nodes is checked before anything is read.
 SIZED = (*(place for place in COUNTED if place not in OVER_PAIRS), *OVER_PAIRS, *OVER_NODES)
 TRACES = "int16 or float32 traces over (ntx, nrx, nt)"
 
@@ -35,20 +35,19 @@ def read_dataset(path: Path, *, traces: bool = True, limits: Limits | None = Non
 
     Args:
         path: of the HDF5 file.
-        traces: false leaves the traces in the file: they may be large, and what was picked is enough to
-            reconstruct. They are checked all the same.
-        limits: what the file may ask for; None: the defaults of ``Limits``.
+        traces: false: leave the traces, which may be large, in the file; they are checked but not read.
+        limits: of reading; None: the defaults of ``Limits``.
 
     Raises:
-        InvalidInput: naming the first field that is missing or wrong by its path in the file (``file``
-            for the file as a whole), what was found and what is accepted; and as ``check_plausible``.
+        InvalidInput: naming the first missing or wrong field by its path in the file (``file`` for the file
+            as a whole), the value found and the accepted values; and as ``check_plausible``.
     """
     with opened(Path(path), limits or Limits()) as reader:
         return dataset_of(reader, _waveform if traces else None)
 
 
 def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) -> Dataset:
-    """What an open file holds; ``waveform`` reads its traces, if there are any. See ``read_dataset``."""
+    """The dataset in an open file; ``waveform`` reads its traces, if any. See ``read_dataset``."""
     _check_format(reader)
     for place in SIZED:
         check_size(place, _shape(reader, place))
@@ -62,9 +61,9 @@ def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) ->
     tx, rx = _indices(reader, "acquisition/tx"), _indices(reader, "acquisition/rx")
     slices = _floats(reader, "slice/z_m", "(nz,) numbers in m")
     pairs = (*(() if slices is None else slices.shape[:1]), *tx.shape[:1], *rx.shape[:1])
-    # Lists that are none are refused below.
+    # Arrays that are not lists are rejected below.
     for place in (*PAIR_ARRAYS, "mask/valid") if tx.ndim == rx.ndim == 1 else ():
-        # Before they are read: they are by far the largest.
+        # Checked before reading: they are by far the largest.
         shape = _shape(reader, place)
         if 0 < math.prod(pairs) < math.prod(shape):
             raise InvalidInput(place, f"shape {shape}", f"shape {pairs}")

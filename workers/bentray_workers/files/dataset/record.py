@@ -1,4 +1,4 @@
-"""What a service remembers of a dataset, in plain values."""
+"""Record of a dataset for the database, in plain values."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LONGEST_TEXT = 200
 
 
 def record_of(dataset: Dataset) -> dict[str, Any]:
-    """By the names that the service keeps it under; ``counts`` is what plans are made of."""
+    """Fields of the record by name; ``counts`` is for plans."""
     return {
         "title": text(dataset.title),
         "source": text(dataset.source),
@@ -32,5 +32,5 @@ def record_of(dataset: Dataset) -> dict[str, Any]:
 
 
 def text(value: str) -> str:
-    """A string from a file, printable and short."""
+    """A text of a file, printable and truncated."""
     return "".join(c for c in value if c.isprintable())[:LONGEST_TEXT]

@@ -1,4 +1,4 @@
-"""The counts of a dataset file, read without the arrays over its pairs."""
+"""Counts of a dataset file, without reading the arrays over its pairs."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from .traces import samples_in
 
 
 def counts_in(path: Path) -> DatasetCounts:
-    """The counts of a dataset that has been read before.
+    """Counts of a dataset file in canonical form.
 
     Args:
         path: of the HDF5 file.
 
     Raises:
-        InvalidInput: for a file without positions, emitters or receivers, or with more than any scan has.
+        InvalidInput: for a file without positions, emitters or receivers, or with too many.
     """
     with opened(path, Limits()) as reader:
         position, tx, rx = (
-            _wanted(reader, place)
+            _required(reader, place)
             for place in ("geometry/element_position_m", "acquisition/tx", "acquisition/rx")
         )
         received = reader.checked("waveform/object", NUMERIC, "traces")
@@ -43,7 +43,7 @@ def counts_in(path: Path) -> DatasetCounts:
             sample_bytes=0 if received is None else 2 if received.dtype.kind != "f" else 4,
             rate_hz=reader.number("acquisition", "sampling_rate_hz", "Hz"),
             frequency_hz=reader.number("acquisition", "center_frequency_hz", "Hz"),
-            # As far as sizes go all waters are alike.
+            # The speed hardly affects sizes.
             water_mps=1500.0 if water is None else water,
         )
 
@@ -53,7 +53,7 @@ def summary_of(path: Path, settings: Settings) -> Summary:
     return counts_in(path).summary(settings)
 
 
-def _wanted(reader: Reader, place: str) -> NDArray[Any]:
+def _required(reader: Reader, place: str) -> NDArray[Any]:
     found = _sized(reader, place)
     if found is None:
         raise InvalidInput(place, "nothing", "numbers")

@@ -1,4 +1,4 @@
-"""The traces of one slice of a dataset file, an emission at a time; how many samples they have."""
+"""Reading the traces of one slice of a dataset file, one emission at a time."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ from .read import NUMERIC, TRACES, trace_type
 
 
 def trace_samples(path: Path) -> int:
-    """Samples of each trace of a dataset file; 0 where there are none of the object or none of the water."""
+    """Samples of each trace of a dataset file; 0 without traces of object and water."""
     with opened(path, Limits()) as reader:
         return samples_in(reader)
 
 
 def samples_in(reader: Reader) -> int:
-    """As ``trace_samples`` of an open file."""
+    """As ``trace_samples`` for an open file."""
     found = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
     return 0 if None in found or found[0] is None else int(found[0].shape[-1])
 
 
 @contextmanager
-def slice_opened(
+def open_slice(
     path: Path, whole: Dataset, index: int, poll: Callable[[], None] = lambda: None
 ) -> Iterator[Dataset]:
-    """One slice with its traces as ``Emissions``: what is asked for is read, as long as the context lasts.
+    """One slice with its traces as ``Emissions``, which are read on access while the context is open.
 
     Args:
         path: of the HDF5 file.
-        whole: the dataset as it was read without its traces.
+        whole: the dataset, read without its traces.
         index: of the slice, from 0.
-        poll: called whenever an emission is asked for; may raise.
+        poll: called at each access to an emission; may raise.
 
     Raises:
-        InvalidInput: as ``read_dataset``; while traces are read for those that are damaged.
+        InvalidInput: as ``read_dataset``; on access for damaged traces.
     """
     with opened(path, Limits()) as reader:
         stacked = whole.slice_z_m is not None
@@ -56,7 +56,7 @@ def slice_opened(
 
 
 def _waveform(reader: Reader, whole: Dataset, index: int, read: Callable[[str], Any]) -> Waveform | None:
-    """The traces of a slice; ``read`` gives those of a path."""
+    """The traces of a slice; ``read`` returns those of a path."""
     received, water = (read(f"waveform/{name}") for name in ("object", "water"))
     if received is None:
         return None
@@ -82,7 +82,7 @@ def _emissions(reader: Reader, path: str, *, poll: Callable[[], None], index: in
     chunks = stored.chunks or (1,) * stored.ndim
     block = max(1, min(chunks[-3], BLOCK_BYTES // (math.prod(stored.shape[-2:]) * stored.dtype.itemsize)))
 
-    # Emissions that share chunks are unpacked together, for they are asked for one after the other.
+    # Emissions in the same chunks are decompressed together, since they are accessed in order.
     @lru_cache(maxsize=1)
     def rows(number: int) -> NDArray[Any]:
         some = slice(number * block, (number + 1) * block)

@@ -1,4 +1,4 @@
-"""Writing a dataset file, atomically; the same dataset gives the same bytes."""
+"""Atomic writing of a dataset file; the same dataset gives the same bytes."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from bentray_kernels.acquisition import Dataset, Truth, Waveform
 from bentray_kernels.errors import InvalidInput
 
 from ..hdf5_reading import printable
-from ..hdf5_writing import creating
+from ..hdf5_writing import atomic_hdf5
 from .format import FORMAT, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
 
-# Below this many bytes a chunk's bookkeeping outweighs what packing saves.
+# Below this many bytes chunks take more than compression saves.
 PACK_FROM_BYTES = 4096
 
 
-# Part of an array, and where it belongs.
+# Part of an array, and its slices.
 Piece = tuple[tuple[slice, ...], NDArray[Any]]
-# The traces of a name, piece by piece; also told the shape of the chunks that they are stored in.
+# The traces of a name in pieces; the second argument is the shape of the chunks in the file.
 Pieces = Callable[[str, tuple[int, ...]], Iterable[Piece]]
 
 
 def write_dataset(path: Path, dataset: Dataset, pieces: Pieces | None = None) -> None:
-    """Write a dataset in the upload format; ``path`` is replaced whole or not touched.
+    """Write a dataset in the upload format; ``path`` is replaced atomically.
 
     Args:
         path: of the file.
         dataset: what to write.
-        pieces: gives the values of the traces in place of ``dataset.waveform``, which tells shape and type.
+        pieces: returns the values of traces; ``dataset.waveform`` then defines shape and type only.
 
     Raises:
         InvalidInput: for a dataset without travel times and traces.
@@ -42,19 +42,19 @@ def write_dataset(path: Path, dataset: Dataset, pieces: Pieces | None = None) ->
     """
     if not dataset.picked and dataset.waveform is None:
         raise InvalidInput("traveltime", "neither travel times nor traces", "at least one of the two")
-    with creating(Path(path)) as file:
+    with atomic_hdf5(Path(path)) as file:
         _write(file, dataset, pieces)
 
 
 def bytes_of(dataset: Dataset) -> int:
-    """Of all arrays of a dataset; its file packs them, and is larger by its headers at most."""
+    """Size of all arrays of a dataset, uncompressed, without headers of its file."""
     parts = [part for part in (dataset, dataset.waveform, dataset.truth) if part is not None]
     arrays = (getattr(part, one.name) for part in parts for one in fields(part))
     return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
 
 def write_array(group: h5py.Group, name: str, array: Any) -> None:
-    """An array, packed with gzip unless it is small."""
+    """Write an array, compressed with gzip unless it is small."""
     array = np.asarray(array)
     group.create_dataset(name, data=array, track_times=False, **_packing(array, True))
 
@@ -62,7 +62,7 @@ def write_array(group: h5py.Group, name: str, array: Any) -> None:
 def _packing(array: NDArray[Any], chunks: tuple[int, ...] | bool) -> dict[str, Any]:
     if array.size * array.dtype.itemsize < PACK_FROM_BYTES:
         return {}
-    # Level 1: on traces higher levels take several times as long for a few per cent.
+    # Level 1: for traces, higher levels take several times as long to save a few per cent.
     return {"chunks": chunks, "compression": "gzip", "compression_opts": 1, "shuffle": True}
 
 
@@ -109,7 +109,7 @@ def _write(file: h5py.File, dataset: Dataset, pieces: Pieces | None) -> None:
 
 def _write_waveform(group: h5py.Group, waveform: Waveform, pieces: Pieces | None) -> None:
     group.attrs["scale"] = waveform.scale
-    # An emission a chunk, which is what the picker reads at a time.
+    # One emission per chunk, as the picker reads them.
     chunks = tuple(
         np.minimum(waveform.object.shape, (1,) * (waveform.object.ndim - 2) + (256, 4096)).tolist()
     )

@@ -1,4 +1,4 @@
-"""How the picture of a slice looks: its size, its bars, with a frame or as the bare image."""
+"""Style of the picture of a slice: size, colours, bars and frame."""
 
 from __future__ import annotations
 
@@ -8,30 +8,29 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range
 
 COLORMAPS = ("viridis", "magma", "inferno", "plasma", "cividis", "gray", "bone", "turbo", "coolwarm")
-# Between the values of nodes, and what Matplotlib calls it.
+# Interpolation between nodes, and its name in Matplotlib.
 INTERPOLATIONS = {"nearest": "nearest", "cubic": "bicubic"}
 LEAST_SIZE, MOST_SIZE = 32, 4096
-# With a frame; below this nobody can read its text.
+# With a frame; text is illegible below this.
 LEAST_FRAMED = 200
-# The values of the darkest and the brightest colour: those that a volume may have (float32).
+# Values of the first and the last colour (float32).
 COLOUR_VALUE = Range(-3.4e38, 3.4e38)
 
 
 @dataclass(frozen=True)
-class Look:
-    """What a picture shows beside the values themselves.
+class SliceStyle:
+    """Style of the picture of a slice.
 
     Attributes:
         colormap: one of ``COLORMAPS``.
-        size: longest side, pixels; None: as large as text of the usual size makes it, or, of the bare image,
-            a pixel a node.
+        size: longest side, pixels; None: the default size, or one pixel per node without a frame.
         interpolation: a key of ``INTERPOLATIONS``.
         scale_bar: a bar of a round length in a corner of the image.
-        colour_bar: the colours with their values and unit; in a frame only.
-        frame: title, axes in mm and notes about the image; without it there is nothing but the image.
+        colour_bar: colours with values and unit; with a frame only.
+        frame: title, axes in mm and notes; otherwise the image alone.
 
     Raises:
-        InvalidInput: naming the first that is wrong.
+        InvalidInput: naming the first wrong field.
     """
 
     colormap: str = "viridis"
