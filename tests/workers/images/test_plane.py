@@ -29,7 +29,7 @@ def test_every_slice_is_the_values_across_its_axis(axis, data):
 
 
 def test_without_an_index_the_middle_one_is_taken():
-    assert plane_of(VALUES, *GRID, "y").where() == "slice index 2 (0 to 3), y = 104 mm"
+    assert plane_of(VALUES, *GRID, "y").caption() == "slice index 2 (0 to 3), y = 104 mm"
 
 
 def test_a_plain_image_is_its_own_slice():
