@@ -78,7 +78,7 @@ def test_a_number_too_large_for_float32_is_named():
     ],
 )
 def test_values_that_float32_cannot_tell_apart_are_refused(values, dtype):
-    with pytest.raises(InvalidInput, match=r"cannot tell apart; accepted: .*subtract an offset first"):
+    with pytest.raises(InvalidInput, match=r"cannot distinguish; accepted: .*subtract an offset first"):
         Volume.of(values.astype(dtype).reshape(2, 2, 2), STEPS)
 
 

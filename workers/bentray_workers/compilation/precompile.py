@@ -1,4 +1,4 @@
-"""Compile the kernels of all kinds of jobs ahead: for an image, and before tests.
+"""Ahead-of-time compilation of the kernels of all kinds of jobs, for an image and before tests.
 
 Run it as ``python -m bentray_workers.compilation.precompile``. Numba compiles at the first call, so each
 kind of job runs once on the smallest scan that has all it needs. A worker's own start (``warmup``) does less:
@@ -60,7 +60,7 @@ WAVES_FILE = "waves.h5"
 WAVES_IN_SPACE = VolumeWaveSettings(frequency_hz=1e5, side_m=0.03, elements=8, emissions=1, nodes=16)
 
 
-def of_times() -> Iterator[dict[str, Any]]:
+def time_settings() -> Iterator[dict[str, Any]]:
     """The settings of reconstructions from travel times and amplitudes."""
     yield {"resolution_check": True}
     yield {"rays": "straight", "reciprocity": False}
@@ -71,14 +71,14 @@ def of_times() -> Iterator[dict[str, Any]]:
     yield {"method": "gauss-newton", "ray_width_m": 5e-3}
 
 
-def of_heights() -> Iterator[dict[str, Any]]:
-    """The same of several slices."""
+def slice_settings() -> Iterator[dict[str, Any]]:
+    """The same for several slices."""
     for method, decomposition in product(("sart", "gauss-newton"), ("slices", "volume")):
         yield {"method": method, "decomposition": decomposition, "attenuation": False}
 
 
-def of_traces() -> Iterator[dict[str, Any]]:
-    """The same of recorded waves."""
+def trace_settings() -> Iterator[dict[str, Any]]:
+    """The same for traces."""
     for picker in PICKERS:
         yield {"picker": picker, "attenuation": False}
     yield {"guided_rounds": 1, "amplitudes": "ratio", "focusing": True}
@@ -87,7 +87,7 @@ def of_traces() -> Iterator[dict[str, Any]]:
 
 
 def digitised(scan: Dataset) -> Dataset:
-    """A scan with traces of 16-bit integers, as scanners have them."""
+    """A scan with traces of 16-bit integers, as from scanners."""
     traces = scan.waveform
     assert traces is not None
     assert traces.water is not None
@@ -102,16 +102,16 @@ def compile_rays(folder: Path) -> None:
     warmup.warm_up()
     for number, (scan, wanted) in enumerate(
         (
-            (simulate(TIMES), of_times()),
-            (simulate(HEIGHTS), of_heights()),
-            (simulate(SPACE), of_heights()),
+            (simulate(TIMES), time_settings()),
+            (simulate(HEIGHTS), slice_settings()),
+            (simulate(SPACE), slice_settings()),
         )
     ):
         _reconstruct(folder / f"times-{number}.h5", scan, wanted)
 
 
 def compile_pictures(folder: Path) -> None:
-    """Render volumes, trace a geometry field, and simulate waves: little of it uses the kernels of rays."""
+    """Render volumes, trace a geometry field, and simulate waves: mostly without the kernels of rays."""
     warmup.warm_up_rendering()
     warmup.warm_up_tracing()
     _refraction()
@@ -124,7 +124,7 @@ def compile_traces(folder: Path) -> None:
     """Reconstruct from the waves of ``compile_pictures``, along the rays of ``compile_rays``."""
     waves = read_dataset(folder / WAVES_FILE)
     for number, scan in enumerate((waves, digitised(waves))):
-        _reconstruct(folder / f"traces-{number}.h5", scan, of_traces())
+        _reconstruct(folder / f"traces-{number}.h5", scan, trace_settings())
 
 
 def _reconstruct(path: Path, scan: Dataset, wanted: Iterator[dict[str, Any]]) -> None:
@@ -135,7 +135,7 @@ def _reconstruct(path: Path, scan: Dataset, wanted: Iterator[dict[str, Any]]) ->
 
 
 def _refraction() -> None:
-    """A ball through every filter, refracted and lit, with both kinds of supersampling."""
+    """Render a ball with every filter, refracted and shaded, with both kinds of supersampling."""
     volume = Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3)
     views = (
         RefractionView(iso=(0.5,), supersampling="prss", degree=2, width=8, height=8),
@@ -150,7 +150,7 @@ def _refraction() -> None:
 
 
 def _field(folder: Path) -> None:
-    """A mesh laid out, its tables and its image."""
+    """Compute a geometry field of a mesh."""
     mesh, work = folder / "mesh.h5", folder / "field-work"
     write_mesh(mesh, StoredMesh(bumpy_ball(320)))
     work.mkdir()

@@ -1,4 +1,4 @@
-"""Meshes that a stranger wrote, in any of the formats, told apart by content and not by name."""
+"""Import of untrusted meshes in all accepted formats, detected by content."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ ACCEPTED = "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB"
 LARGEST_BYTES = 256 * 2**20
 MOST_FACES = 2_000_000
 
-# Some editors put it before text.
+# Written before text by some editors.
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 # Chunks of GLB: JSON, "JSON" in little-endian.
 GLB_HEADER = struct.Struct("<4sII")
 GLB_CHUNK = struct.Struct("<I4s")
 
-# What glTF says of looks; images would have to be decoded, and nothing here asks for them.
+# Fields of glTF for appearance and animation, which are not used; images would have to be decoded.
 MATERIALS = ("images", "textures", "samplers", "materials", "animations", "skins", "cameras")
 
 

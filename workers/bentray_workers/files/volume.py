@@ -1,4 +1,4 @@
-"""Volumes as files: ``bentray-volume`` in HDF5, written atomically and read back exactly."""
+"""Volume files: ``bentray-volume`` in HDF5, written atomically and read exactly."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from .hdf5_writing import atomic_hdf5
 FORMAT = "bentray-volume"
 VERSION = "1.0"
 
-# Types that are kept; every other one becomes float32.
+# Types that are stored; others are converted to float32.
 KEPT = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
 
-# Of node 0: kilometres from where the patient is say nothing, but do no harm either.
+# Position of node 0; large values are harmless.
 ORIGIN_M = Range(-1e6, 1e6, unit="m")
 MOST_FLOAT32 = float(np.finfo(np.float32).max)
-# Parts of its range that a volume must still show when it becomes float32, as many as 8 bits have.
+# Levels of its range that must be distinguishable in float32, as many as in 8 bits.
 LEVELS = 256
 Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Volume:
-    """Numbers on an even grid.
+    """Values on an even grid.
 
     Attributes:
         values: (nx, ny, nz), uint8, uint16 or float32, finite, any unit.
         spacing_m: between nodes along each axis, within ``SPACING_M``.
-        origin_m: place of node 0, m, within ``ORIGIN_M``.
-        title: what it is.
+        origin_m: position of node 0, m, within ``ORIGIN_M``.
+        title: of the volume.
 
     Raises:
         InvalidInput: naming the first field that is wrong.
@@ -71,10 +71,10 @@ class Volume:
         origin_m: Sequence[float] = (0.0, 0.0, 0.0),
         title: str = "",
     ) -> Volume:
-        """A volume of numbers of any real type, in a type that is kept.
+        """A volume of any real type, converted to a stored type.
 
         Raises:
-            InvalidInput: as the volume itself, and for values that float32 cannot hold or tell apart.
+            InvalidInput: as ``Volume``, and for values that float32 cannot represent or distinguish.
         """
         given = np.asarray(values)
         check_type("values", given.dtype)
@@ -94,7 +94,7 @@ class Volume:
 
 
 def _as_float32(given: NDArray[Any]) -> NDArray[np.float32]:
-    """The same in float32; raises InvalidInput where that spoils the values."""
+    """Convert to float32; raises InvalidInput if values become indistinguishable."""
     low, high = given.min().item(), given.max().item()
     biggest = max(abs(low), abs(high))
     if MOST_FLOAT32 < biggest < math.inf:
@@ -102,24 +102,24 @@ def _as_float32(given: NDArray[Any]) -> NDArray[np.float32]:
         raise InvalidInput(
             "values", f"{found:g}, beyond float32", f"numbers up to {MOST_FLOAT32:.2g} in size"
         )
-    # A number too large beside an infinite one: both are refused with the volume.
+    # Infinite values are rejected with the volume.
     with np.errstate(over="ignore"):
         stored = np.ascontiguousarray(given, dtype=np.float32)
     if not math.isfinite(biggest) or not 0 < high - low < LEVELS * np.spacing(np.float32(biggest)):
         return stored
-    # The finest steps that float32 has there are coarse; values that lie on them are no worse for it.
+    # The steps of float32 are coarse here; values that are exact in float32 are accepted.
     lost = max(
         float(np.abs(np.subtract(mine, theirs, dtype=np.longdouble)).max())
         for mine, theirs in zip(given, stored, strict=True)
     )
     if lost > (high - low) / LEVELS:
-        found = f"{low} to {high}, values that float32 cannot tell apart"
+        found = f"{low} to {high}, values that float32 cannot distinguish"
         raise InvalidInput("values", found, "numbers near 0 beside their range; subtract an offset first")
     return stored
 
 
 def check_shape(field: str, shape: Sequence[int]) -> None:
-    """Refuse what is not (nx, ny, nz) with two nodes or more along each axis."""
+    """Reject shapes other than (nx, ny, nz) with two or more nodes along each axis."""
     if len(shape) != 3 or min(shape) < 2:
         raise InvalidInput(field, f"shape {tuple(shape)}", "(nx, ny, nz), at least two nodes along each axis")
 

@@ -102,14 +102,14 @@ def run(
                     entry.begin()
                     running[pool.submit(work, entry, stop.is_set)] = entry
                 for future in wait(running, POLL_S, FIRST_COMPLETED).done:
-                    _settle(running.pop(future), future)
+                    _finish(running.pop(future), future)
                 watch()
         finally:
             # Also after Ctrl-C: the pool waits for its threads, which poll this event.
             stop.set()
 
 
-def _settle(entry: Entry, future: Future[None]) -> None:
+def _finish(entry: Entry, future: Future[None]) -> None:
     try:
         future.result()
     # Any failure must not affect the other datasets.

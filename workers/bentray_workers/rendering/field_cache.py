@@ -1,4 +1,4 @@
-"""Geometry fields that are kept: surfaces and scenes made once a process, tables mapped from their files."""
+"""Cache of geometry fields: surfaces and scenes made once per process, memory-mapped tables."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from .field_scenes import scene_of
 from .field_tasks import FACE_BYTES
 from .field_view import FieldView
 
-# What a process keeps; tables are maps of files and count as none.
+# Memory of a process for cached fields, without memory-mapped tables.
 KEPT_BYTES = 2 * 2**30
-# Of the landscape and of the ball, in each scene.
+# Landscape and ball of each scene.
 SCENE_BYTES = 32 * 2**20
 
-# One of each for the process, as ``functools.lru_cache`` would have.
+# One of each per process.
 _SHAPES = MemoryCache(KEPT_BYTES // 2)
 _WORLDS = MemoryCache(KEPT_BYTES // 2)
 
@@ -41,7 +41,7 @@ class Textured(NamedTuple):
 
 
 def world_at(folder: Path, view: FieldView) -> World:
-    """The scene of a field's folder as kernels read it, from what is kept or made now.
+    """The scene of the folder of a field, cached or new.
 
     Raises:
         InvalidInput: from the files.
@@ -52,11 +52,11 @@ def world_at(folder: Path, view: FieldView) -> World:
     surface_bytes = FACE_BYTES * figures["faces"]
     image_bytes = 24 * figures["image_pixels"] ** 2
     made: Textured = _SHAPES.get(stamp, surface_bytes + image_bytes, lambda: shape_of(files))
-    # Where entries agree is worked out for each scene, a byte each; surfaces are copied where there are two.
+    # Equal entries are marked for each scene, a byte each; a second surface is copied.
     entries = len(made.shape.outer.faces) ** 2 if made.shape.outer else 0
-    looks = view.scene, view.mode, view.index, view.share, view.up
+    appearance = view.scene, view.mode, view.index, view.share, view.up
     world: World = _WORLDS.get(
-        (stamp, looks),
+        (stamp, appearance),
         entries + surface_bytes + SCENE_BYTES,
         lambda: world_of(scene_of(made.shape, made.texture, view)),
     )
@@ -64,10 +64,10 @@ def world_at(folder: Path, view: FieldView) -> World:
 
 
 def shape_of(files: FieldFiles) -> Textured:
-    """The surface of a field with its tables, mapped.
+    """The surface of a field with memory-mapped tables.
 
     Raises:
-        InvalidInput: from the files, and where the tables are not those of the surface.
+        InvalidInput: from the files, and for tables that do not match the surface.
     """
     surface = surface_of(read_chart(files.chart))
     faces, fractions = (mapped(path) for path in files.outer)

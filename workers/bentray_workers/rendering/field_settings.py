@@ -1,4 +1,4 @@
-"""How a geometry field is made: its samples, and its geometry image."""
+"""Settings of a geometry field: samples and geometry image."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from bentray_kernels.geometry_field.tables.cube import MOST_SAMPLES
 from bentray_kernels.ranges import Range
 from bentray_kernels.request_fields import asked, check
 
-# Of the meshes that are laid out by one task; its time grows a little faster than they do.
+# Largest mesh for the layout in one task; the time grows slightly faster than linearly.
 MOST_FACES = 300_000
 
-# Of the tables: a face and a fraction; a face.
+# Table entries: a face and a fraction; a face.
 OUTER_ENTRY_BYTES, INNER_ENTRY_BYTES = 8, 4
-# Of the geometry image: a position, a normal, a colour and whether it is valid.
+# Pixel of the geometry image: position, normal, colour and validity.
 PIXEL_BYTES = 37
-# Of the chart: corners and a vertex with its place on the square, each face with vertices of its own at
-# worst; and for each face its point.
+# Chart, per face: corners and vertices with their positions on the square, at most three new vertices per
+# face; and one point.
 FACE_BYTES = 3 * (4 + 24 + 16) + 8
 HEADER_BYTES = 64 * 2**10
 
-# Changed whenever the same mesh and settings give other tables.
+# To be changed when the same mesh and settings give other tables.
 VERSION = 1
 
 
 @dataclass(frozen=True)
 class FieldSettings:
-    """What each setting means is its metadata ``description``.
+    """The meaning of each setting is its metadata ``description``.
 
     Raises:
         InvalidInput: naming the first field that is wrong.
@@ -41,21 +41,21 @@ class FieldSettings:
         "Samples along an edge of the cube for rays from outside, n: the table has 36n⁴ entries.",
         Range(4, MOST_SAMPLES),
     )
-    inner_samples: int = asked(16, "The same for rays that leave the surface itself.", Range(4, MOST_SAMPLES))
+    inner_samples: int = asked(16, "The same for rays that start on the surface.", Range(4, MOST_SAMPLES))
     divisions: int = asked(
         16,
-        "Small cubes along an edge of the cube, in which points of the surface count as one.",
+        "Cells along an edge of the cube, in each of which points of the surface are merged.",
         Range(1, 64),
     )
     image_size: int = asked(
         513,
-        "Pixels along a side of the geometry image; the most, where there is a threshold.",
+        "Pixels along a side of the geometry image; with a threshold, the largest number.",
         Range(33, 1025),
     )
     image_threshold: float = asked(
         0.0,
-        "Greatest rms distance of the image from the surface, in edges of the unit cube: the image is "
-        "halved as long as it keeps it; 0 keeps image_size.",
+        "Largest rms distance of the image from the surface, in edges of the unit cube: the image is halved "
+        "as long as it stays below; 0: use image_size.",
         Range(0.0, 0.5),
     )
 
@@ -63,11 +63,11 @@ class FieldSettings:
         check(self, {})
 
     def plain(self) -> dict[str, Any]:
-        """Its fields as JSON has them."""
+        """The fields as JSON values."""
         return asdict(self)
 
     def largest_bytes(self, faces: int) -> int:
-        """Of the files of a field, at most.
+        """Largest size of the files of a field, bytes.
 
         Args:
             faces: of the mesh.
@@ -78,7 +78,7 @@ class FieldSettings:
         return outer + inner + self.image_size**2 * PIXEL_BYTES + faces * FACE_BYTES + HEADER_BYTES
 
     def content(self, mesh: str) -> str:
-        """SHA-256 that names the field of a mesh under these settings.
+        """SHA-256 that identifies the field of a mesh with these settings.
 
         Args:
             mesh: ``StoredMesh.content``.
@@ -88,7 +88,7 @@ class FieldSettings:
 
 
 def check_faces(faces: int) -> None:
-    """Refuse a mesh that is too large for a field.
+    """Reject a mesh that is too large for a field.
 
     Raises:
         InvalidInput: naming ``mesh``.

@@ -1,4 +1,4 @@
-"""How a geometry field is looked at, checked once for every door."""
+"""Settings of a picture of a geometry field, with their checks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range
 from bentray_kernels.request_fields import MOST_PIXELS, MOST_RAYS, asked, check
 
-# The names that people know, and those of the kernels.
+# Public names, and those of the kernels.
 LOOKUPS = {"nearest": "nearest", "linear": "linear", "accurate": "walk", "exact": "exact"}
 CHOICES = {
     "scene": ("object", "mirror-ball", "two-mirrors"),
@@ -23,9 +23,9 @@ CHOICES = {
 
 @dataclass(frozen=True)
 class FieldView:
-    """A picture of a mesh through its geometry field.
+    """A picture of a mesh by its geometry field.
 
-    What each field means is its metadata ``description``; query parameters and options are made of them.
+    The meaning of each field is its metadata ``description``, used by query parameters and options too.
 
     Raises:
         InvalidInput: naming the first field that is wrong.
@@ -33,8 +33,8 @@ class FieldView:
 
     scene: Literal["object", "mirror-ball", "two-mirrors"] = asked(
         "object",
-        "object: the mesh before a landscape; mirror-ball: two of it before a mirroring ball; "
-        "two-mirrors: two of it beside each other.",
+        "object: the mesh in a landscape; mirror-ball: two copies and a reflecting ball; two-mirrors: two "
+        "copies side by side.",
     )
     mode: Literal["reflect", "refract", "refract-single", "self", "self-only", "diffuse"] = asked(
         "reflect",

@@ -129,34 +129,34 @@ def _water(reader: Reader) -> tuple[float, float | None]:
         try:
             temperature = temperature_from_speed(speed)
         except InvalidInput:
-            # Coupled by something else than pure water; its speed is all that is needed.
+            # Another coupling medium than pure water; only its speed is needed.
             return speed, None
     return speed, temperature
 
 
 def traces_in(reader: Reader) -> bool:
-    """Whether there are traces; what they are is checked."""
+    """Whether there are traces; they are checked."""
     return reader.checked("waveform/object", "iuf", "traces over (ntx, nrx, nt)") is not None
 
 
 def placeholder_traces(reader: Reader) -> Waveform:
-    """The traces of a file as arrays of their shape and type that take no memory; they are all 0."""
+    """Arrays of zeros of the shape and type of the traces, which take no memory."""
 
-    def stand_in(path: str) -> NDArray[Any] | None:
+    def placeholder(path: str) -> NDArray[Any] | None:
         found = reader.checked(path, NUMERIC, TRACES)
         if found is None:
             return None
         zero = trace_type(path, np.zeros((), dtype=found.dtype))
         return np.broadcast_to(zero, found.shape)
 
-    return _waveform(reader, stand_in)
+    return _waveform(reader, placeholder)
 
 
 def trace_type(path: str, array: NDArray[Any]) -> NDArray[Any]:
     """Traces as int16 or float32, whichever holds them.
 
     Raises:
-        InvalidInput: naming ``path``, for integers that are wider.
+        InvalidInput: naming ``path``, for wider integers.
     """
     if array.dtype.kind == "f":
         # A damaged NaN may signal, which is no reason to warn.
