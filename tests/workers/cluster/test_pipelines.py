@@ -26,7 +26,7 @@ from bentray_workers.simulation.simulation_run import simulate_to_file
 PLAN = Settings(nodes=32, iterations=6, method="gauss-newton", resolution_check=True)
 SCAN = PhantomScan(waveform=True, nodes=32, elements=16, frequency_hz=2e5, side_m=0.03, emissions=8, snr=20.0)
 TURNTABLE = Turntable(iso=(0.5,), width=32, height=24, frames=8)
-FIELD = FieldSettings(samples=24, inner_samples=8, divisions=8, image_size=33)
+FIELD = FieldSettings(samples=16, inner_samples=8, divisions=8, image_size=33)
 
 
 def reconstruction(client, folder, work, on_progress):
