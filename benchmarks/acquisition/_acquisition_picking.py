@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 
 from bentray_kernels.acquisition import PICKERS, Dataset, Waveform, pick
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.guided_picking import alternate
+from bentray_kernels.tomography.guided_picking import reconstruct_guided
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.dataset import read_dataset
@@ -86,7 +86,7 @@ def guided(name: str, dataset: Dataset, true: np.ndarray) -> Iterable[Row]:
     """In noise: rms of picks about the arrivals that the image predicts, over that of picks without it."""
     settings = Settings.of(method="gauss-newton", rays="straight", attenuation=False, nodes=64)
     noisy = with_trace_noise(dataset, HARD_SNR)
-    errors = [1e9 * (one.delta_tof_s - true) for one in (pick(noisy), alternate(noisy, settings)[0])]
+    errors = [1e9 * (one.delta_tof_s - true) for one in (pick(noisy), reconstruct_guided(noisy, settings)[0])]
     rms = [float(np.sqrt(np.nanmean(error**2))) for error in errors]
     known = [int(np.isfinite(error).sum()) for error in errors]
     detail = (

@@ -49,11 +49,11 @@ def split(nodes: int, elements: int) -> Split:
     places = Ring(elements, ring_radius(TABLE7_SIDE_M, nodes)).positions() + 0.5 * TABLE7_SIDE_M
     source, receivers = places[0], places[1:]
     measured = np.linalg.norm(receivers - source, axis=1) / 1375.0
-    work = EmitterPass.over(slowness.shape, elements)
+    work = EmitterPass.for_grid(slowness.shape, elements)
     region, coverage = np.ones(slowness.shape, bool), np.zeros(slowness.shape)
 
     def look() -> None:
-        work.look(slowness, slowness, spacing, source, receivers, measured)
+        work.trace(slowness, slowness, spacing, source, receivers, measured)
 
     def front() -> None:
         # ``look`` leaves what it gave the wave front in the first field.

@@ -13,8 +13,8 @@ import numpy as np
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.phantoms import TABLE7_SIDE_M
 from bentray_kernels.tomography import Problem, Settings, rmse
-from bentray_kernels.tomography.gauss_newton.gauss_newton_step import look
-from bentray_kernels.tomography.grid_schedule import start
+from bentray_kernels.tomography.gauss_newton.gauss_newton_step import trace_rays
+from bentray_kernels.tomography.grid_schedule import initial_slowness
 from bentray_kernels.tomography.sart.sart_step import advance, begin
 from bentray_kernels.tomography.stage_graphs import batches_of
 from bentray_service.cli.output.benchmark_row import Row
@@ -165,14 +165,17 @@ def sweep(nodes: int, elements: int) -> tuple[float, int]:
     dataset = Dataset(ring.positions(), everyone, everyone, COUPLING_MPS, delta_tof_s=random + random.T)
     settings = Settings(nodes=nodes, side_m=TABLE7_SIDE_M, iterations=2)
     problem = Problem.of(dataset, settings)
-    state = advance(problem, settings, begin(start(problem, None)), elements)
+    state = advance(problem, settings, begin(initial_slowness(problem, None)), elements)
     started = time.perf_counter()
     state = advance(problem, settings, state, elements)
     seconds = time.perf_counter() - started
     once = problem.each_pair_once()
-    parts = [look(once, settings, state.slowness, emitters) for emitters in batches_of(once.sounding)[:1]]
+    parts = [
+        trace_rays(once, settings, state.slowness, emitters)
+        for emitters in batches_of(once.active_emitters)[:1]
+    ]
     held = sum(part.columns.nbytes + part.lengths.nbytes + part.pointers.nbytes for part in parts)
-    return seconds, held * len(batches_of(once.sounding))
+    return seconds, held * len(batches_of(once.active_emitters))
 
 
 def exponent(points: list[tuple[int, float]]) -> float:

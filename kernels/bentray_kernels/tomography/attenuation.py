@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
-from .finite_frequency import bending, seen
+from .finite_frequency import front_smoothing, ray_slowness
 from .focusing import focusing
 from .gauss_newton import huber
 from .gauss_newton.linear_problem import Linearised, smoothing
@@ -19,12 +19,12 @@ from .gauss_newton.ray_matrix import back_project, project
 from .problem import Problem
 from .settings import GaussNewtonSettings, Settings
 
-# Solutions, each with the outliers, and the total variation, that the misfit of the one before asks for: more
-# with total variation, none of whose solutions is carried to its end.
+# Number of solutions. Outlier limit and total variation of each follow from the misfit of the one before;
+# total variation needs more, because none of its solutions is iterated to convergence.
 PASSES, ROBUST_PASSES = 3, 12
 
 # What is read from traces holds diffraction and later paths, more than is absorbed, and far more where these
-# cancel the pulse. Of details below a Fresnel zone, √(wavelength · longest ray), rays know nothing: the image
+# cancel the pulse. Rays do not model details below a Fresnel zone, √(wavelength · longest ray): the image
 # is smooth over so many of them, and values count as outliers from so much less on. Chosen on scans by waves,
 # where total variation did worse (``benchmarks/results/raw_trace_experiments.md``).
 ZONES, TRACES_STRICTER = 3.0, 2.0
@@ -33,14 +33,14 @@ ZONES, TRACES_STRICTER = 3.0, 2.0
 MOST_NP_M = 500.0
 
 
-def heard(problem: Problem) -> Ints:
+def active_emitters(problem: Problem) -> Ints:
     """Emitters with amplitudes."""
     if problem.log_ratio is None:
         return np.empty(0, np.int64)
     return np.flatnonzero(np.isfinite(problem.log_ratio).any(axis=1))
 
 
-def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
+def trace_rays(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
     """Rows of some emitters along the rays of the finished image; any split gives the same.
 
     With ``settings.attenuation.focusing`` the amplitudes are corrected for focusing by refraction, and pairs
@@ -50,18 +50,18 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
         InvalidInput: for ``focusing`` without a frequency.
     """
     if settings.attenuation.focusing:
-        problem = _unfocused(problem, settings, slowness, emitters)
+        problem = _without_focusing(problem, settings, slowness, emitters)
     return linearise_losses(
         problem,
-        seen(problem, settings, slowness),
+        ray_slowness(problem, settings, slowness),
         emitters,
         rays=settings.rays,
         eikonal=settings.ray_eikonal,
-        front=bending(problem, settings),
+        front=front_smoothing(problem, settings),
     )
 
 
-def _unfocused(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Problem:
+def _without_focusing(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Problem:
     """The problem with the log ratios of some emitters as absorption alone would have them."""
     if problem.log_ratio is None:
         return problem
@@ -81,7 +81,7 @@ def _unfocused(problem: Problem, settings: Settings, slowness: Floats, emitters:
     return replace(problem, log_ratio=ratio)
 
 
-def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats:
+def solve(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats:
     """The attenuation from the rows of all emitters, in their order.
 
     The rays are fixed, so the problem is linear: log ratios are integrals of the attenuation, once focusing
@@ -110,7 +110,7 @@ def attenuation(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> 
         spreads, smooth = settings.numerics.huber_scale / TRACES_STRICTER, _smoothing(problem, settings)
     for _ in range(ROBUST_PASSES if spreads and smooth is None else PASSES):
         left = [
-            Rows(p.pointers, p.columns, p.lengths, p.residual - _along(p, image - water), p.emitters)
+            Rows(p.pointers, p.columns, p.lengths, p.residual - _projected(p, image - water), p.emitters)
             for p in parts
         ]
         residual = np.concatenate([part.residual for part in left])
@@ -140,7 +140,7 @@ def _smoothing(problem: Problem, settings: Settings) -> float:
 
 
 def _wavelength(problem: Problem, setting: str) -> float:
-    """Of the amplitudes, in water, m; refused where none is known and a setting needs it."""
+    """Wavelength of the amplitudes in water, m; rejected if it is unknown and a setting needs it."""
     if problem.wavelength_m is None:
         raise InvalidInput(
             "amplitude@frequency_hz", "nothing", f"a frequency in Hz, for the setting {setting}"
@@ -148,7 +148,7 @@ def _wavelength(problem: Problem, setting: str) -> float:
     return problem.wavelength_m
 
 
-def _along(part: Rows, image: Floats) -> Floats:
+def _projected(part: Rows, image: Floats) -> Floats:
     """A·image."""
     into = np.empty(part.residual.size)
     project(part.pointers, part.columns, part.lengths, image.ravel(), into)

@@ -1,4 +1,4 @@
-"""Rays as wide as the wave: what a band-limited pulse sees of an image, and what bends its ray."""
+"""Finite-frequency rays: the image that determines the time of a band-limited pulse, and the bending."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from .settings import Settings
 BENDS_WIDER = 2.0
 
 
-def nodes_wide(problem: Problem, settings: Settings) -> float:
+def width_in_nodes(problem: Problem, settings: Settings) -> float:
     """Standard deviation of the Gaussian across a ray, nodes; 0 for thin rays."""
     return settings.numerics.ray_width_m / problem.spacing
 
 
-def seen(problem: Problem, settings: Settings, slowness: Floats) -> Floats:
-    """The image as rays of the settings' width see it: integrals along thin lines of this are their times.
+def ray_slowness(problem: Problem, settings: Settings, slowness: Floats) -> Floats:
+    """The image blurred to the width of the rays; integrals along thin lines of it are their times.
 
     Args:
         slowness: of the region's shape, s/m.
     """
-    width = nodes_wide(problem, settings)
+    width = width_in_nodes(problem, settings)
     if width == 0.0:
         return slowness
     water = 1.0 / problem.water_speed
@@ -45,11 +45,11 @@ def blurred(change: Floats, width: float) -> Floats:
     return np.asarray(gaussian_filter(change, width, mode="constant") if width > 0.0 else change)
 
 
-def bending(problem: Problem, settings: Settings) -> float:
-    """Standard deviation, nodes, of the Gaussian on the speed that ``seen`` leaves, for rays to bend in.
+def front_smoothing(problem: Problem, settings: Settings) -> float:
+    """Standard deviation, nodes, of the Gaussian on the speed of ``ray_slowness`` in which rays bend.
 
     As the user has it; else what is missing to ``BENDS_WIDER`` widths.
     """
     if settings.numerics.front_smoothing_nodes > 0.0:
         return settings.numerics.front_smoothing_nodes
-    return nodes_wide(problem, settings) * math.sqrt(BENDS_WIDER**2 - 1.0)
+    return width_in_nodes(problem, settings) * math.sqrt(BENDS_WIDER**2 - 1.0)

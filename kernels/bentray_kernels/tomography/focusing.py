@@ -1,4 +1,4 @@
-"""What refraction does to the amplitudes of a scan, to be taken off before they are read as attenuation."""
+"""Focusing: the effect of refraction on amplitudes, which is subtracted before the attenuation is solved."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def focusing(
     """ln(A_water / A_object) through refraction alone, of every pair; below 0 where the object focuses.
 
     A log ratio is the sum of this and of the line integral of the attenuation, so that it is subtracted
-    from ``log_ratio`` where both ends of a ray lie in water. Rays know no wavelength, waves average over a
+    from ``log_ratio`` where both ends of a ray lie in water. Rays have no wavelength, waves average over a
     Fresnel zone: the image is smoothed by a Gaussian of ``FRESNEL_PART``·√(wavelength · ``longest_m``), the
     same for all pairs. Widths that follow each ray, √(s(L − s)/L), explained the simulation no better.
 

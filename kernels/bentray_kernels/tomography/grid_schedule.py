@@ -1,4 +1,4 @@
-"""The stages of a reconstruction: coarser grids and straight rays that come before what was asked for."""
+"""Stages of a reconstruction: coarser grids and straight rays before the requested grid and rays."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def stages(dataset: Dataset, settings: Settings) -> tuple[Settings, ...]:
     return tuple(found)
 
 
-def start(problem: Problem, image: Floats | None = None, before: Problem | None = None) -> Floats:
+def initial_slowness(problem: Problem, image: Floats | None = None, before: Problem | None = None) -> Floats:
     """The slowness that a stage begins with, s/m: the image of the stage before, or water everywhere.
 
     Args:

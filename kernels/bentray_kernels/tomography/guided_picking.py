@@ -1,4 +1,4 @@
-"""Picking and reconstruction in turn: the image says where the next picks are to be sought."""
+"""Guided picking: arrivals are picked again near the times that the image predicts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..acquisition import Dataset, pick
 from ..acquisition.picking.amplitudes import with_log_ratios
 from ..arrays import Floats
 from ..errors import InvalidInput
-from .gauss_newton.gauss_newton_step import look
+from .gauss_newton.gauss_newton_step import trace_rays
 from .problem import Problem
 from .reconstruction import reconstruct
 from .result import Progress, Reconstruction
@@ -21,7 +21,7 @@ from .settings import Settings
 SETTLED_S = 1e-9
 
 
-def alternate(
+def reconstruct_guided(
     dataset: Dataset,
     settings: Settings,
     rounds: int = 2,
@@ -31,8 +31,8 @@ def alternate(
 ) -> tuple[Dataset, Reconstruction]:
     """Pick, reconstruct, and pick again about the arrivals that the image predicts.
 
-    A first arrival that noise or a weak path hides from a picker on its own is found where the image of
-    the others expects it; one that was taken from the wrong swing is not looked for there again.
+    A first arrival that noise or a weak path hides from the picker is found near the time that the image of
+    the other pairs predicts; a pick on a wrong cycle is not repeated.
 
     Args:
         dataset: with traces; see ``acquisition.pick``.
@@ -49,12 +49,12 @@ def alternate(
     """
     if rounds < 0:
         raise InvalidInput("rounds", rounds, "a number >= 0")
-    picked = _listened(dataset, pick(dataset, settings.picking.picker), settings)
+    picked = _with_amplitudes(dataset, pick(dataset, settings.picking.picker), settings)
     result = reconstruct(_with_traces(picked, dataset, settings), settings, progress)
     for _ in range(rounds):
         expected = predicted_delta(picked, result)
         again = pick(dataset, settings.picking.picker, predicted_s=expected, reach_s=reach_s)
-        again = _listened(dataset, again, settings)
+        again = _with_amplitudes(dataset, again, settings)
         settled = same_picks(picked, again)
         picked = again
         if settled:
@@ -63,16 +63,16 @@ def alternate(
     return picked, result
 
 
-def _listened(dataset: Dataset, picked: Dataset, settings: Settings) -> Dataset:
+def _with_amplitudes(dataset: Dataset, picked: Dataset, settings: Settings) -> Dataset:
     """What was picked, with the amplitudes that the settings want from the traces."""
     if not settings.reads_amplitudes:
         return picked
-    heard = with_log_ratios(replace(picked, waveform=dataset.waveform), settings.attenuation.amplitudes)
-    return replace(heard, waveform=None)
+    with_ratios = with_log_ratios(replace(picked, waveform=dataset.waveform), settings.attenuation.amplitudes)
+    return replace(with_ratios, waveform=None)
 
 
 def _with_traces(picked: Dataset, dataset: Dataset, settings: Settings) -> Dataset:
-    """What was picked, with the traces by which trials are judged."""
+    """The picked dataset, with the traces that held-out validation needs."""
     return replace(picked, waveform=dataset.waveform) if settings.selects_model else picked
 
 
@@ -100,15 +100,15 @@ def predicted_delta(dataset: Dataset, result: Reconstruction) -> Floats:
     shape = (len(dataset.tx), len(dataset.rx))
     level = dataset.tx[:, None] == dataset.rx[None, :]
     whole = shape if dataset.slice_z_m is None else (dataset.slices, *shape)
-    # With a difference of 0 asked of every pair, what is left over is the prediction, less its sign.
-    asked = replace(
+    # With a measured difference of 0 for every pair, the residual is minus the prediction.
+    zeroed = replace(
         dataset, delta_tof_s=np.zeros(whole), tof_s=None, sigma_s=None, valid=None, log_ratio_np=None
     )
     found = np.full((dataset.slices, *shape), np.nan)
     for index in range(dataset.slices):
-        problem = Problem.of(asked, settings.changed(reciprocity=False), index)
+        problem = Problem.of(zeroed, settings.changed(reciprocity=False), index)
         speed = result.speed if result.speed.ndim == 2 else result.speed[:, :, index]
-        rows = look(problem, settings, 1.0 / speed, np.arange(len(dataset.tx)))
+        rows = trace_rays(problem, settings, 1.0 / speed, np.arange(len(dataset.tx)))
         found[index][~level] = -rows.residual
     return found[0] if dataset.slice_z_m is None else found
 

@@ -14,7 +14,7 @@ from . import pairs
 from .roi import inside
 from .settings import Settings
 
-# Water kept around the outermost transducer, nodes, so that wave front and gradient have room.
+# Water kept around the outermost transducer, nodes, as a margin for wave front and gradient.
 MARGIN_NODES = 3
 
 # Nodes nearer to the array than this are water and stay so.
@@ -121,7 +121,7 @@ class Problem:
         )
 
     @property
-    def sounding(self) -> Ints:
+    def active_emitters(self) -> Ints:
         """Emitters with travel times."""
         return np.flatnonzero(np.isfinite(self.delta_tof).any(axis=1))
 
@@ -134,7 +134,7 @@ class Problem:
     def longest_m(self) -> float:
         """Longest distance between an emitter and a receiver of its ring, m."""
         pairs_of = ((self.receivers_of(k), at) for k, at in enumerate(self.emitters))
-        return max(float(np.linalg.norm(heard - at, axis=1).max()) for heard, at in pairs_of)
+        return max(float(np.linalg.norm(other - at, axis=1).max()) for other, at in pairs_of)
 
     def receivers_of(self, emitter: int) -> Floats:
         """(nrx, ndim), m: where the emitter's row of the data was received."""
@@ -157,8 +157,8 @@ class Problem:
         """
         members = [np.flatnonzero(self.ring == k) for k in range(len(self.receivers))]
         for k, of_ring in enumerate(members):
-            at, heard = self.emitters[of_ring], self.receivers[k]
-            if at.shape != heard.shape or (at != heard).any():
+            at, other = self.emitters[of_ring], self.receivers[k]
+            if at.shape != other.shape or (at != other).any():
                 return self
 
         def once(data: Floats) -> Floats:

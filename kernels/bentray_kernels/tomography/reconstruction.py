@@ -31,9 +31,9 @@ from .reconstruction_graph import (
 from .result import Progress, Reconstruction, Trial
 from .settings import Settings
 from .stage_graphs import Scan
-from .stopping import noise_of
+from .stopping import travel_time_noise
 from .waveform.memory_scan import MemoryWaveScan
-from .waveform.refinement import Following, WaveScanOf
+from .waveform.refinement import Refinement, WaveScanOf
 from .waveform.refinement_graph import WaveScan
 from .waveform.waveform_settings import WaveSettings
 
@@ -119,18 +119,18 @@ def run_reconstruction(
         return rays
     done = before + sum(graph.total for graph in graphs)
     if refinement is None:
-        return waves.advised(rays, noise_of(dataset), run_graphs, done)
+        return waves.advised(rays, travel_time_noise(dataset), run_graphs, done)
     return refinement.refined(rays, run_graphs, done)
 
 
 def _refinement(
     dataset: Dataset, settings: Settings, samples: int, wave_scan_of: WaveScanOf
-) -> Following | None:
+) -> Refinement | None:
     """The waveform refinement that may follow; None if not requested, or impossible with ``auto``."""
     if settings.method not in ("waveform", "auto") or (settings.method == "auto" and not samples):
         return None
     try:
-        return Following(dataset, settings, samples, wave_scan_of)
+        return Refinement(dataset, settings, samples, wave_scan_of)
     except InvalidInput:
         if settings.method == "waveform":
             raise

@@ -9,10 +9,10 @@ from typing import Any, Protocol
 from ..arrays import Floats, Ints
 from ..task_graph import ResumableGraph, Task
 from . import attenuation, resolution
-from .finite_frequency import nodes_wide
+from .finite_frequency import width_in_nodes
 from .gauss_newton.gauss_newton_step import Iterate
 from .gauss_newton.linearisation import Rows
-from .grid_schedule import start
+from .grid_schedule import initial_slowness
 from .result import Progress, Sweep
 from .sart.sart_step import State
 from .stage_graphs import GaussNewtonStage, SartStage, Scan, Stage, batches_of
@@ -66,10 +66,10 @@ class ReconstructionGraph:
         self._plans = scan.stages()
         self._history: tuple[Sweep, ...] = ()
         self._passes_before = 0
-        self._stage = self._stage_of(0, start(scan.problem(index, 0), None))
+        self._stage = self._stage_of(0, initial_slowness(scan.problem(index, 0), None))
         self._evaluations = self._evaluated()
         self.total = sum(
-            len(scan.problem(index, number).sounding) * plan.iterations
+            len(scan.problem(index, number).active_emitters) * plan.iterations
             for number, plan in enumerate(self._plans)
         )
         self.total += sum(sum(one.sizes) for one in self._evaluations)
@@ -79,10 +79,10 @@ class ReconstructionGraph:
         settings, problem = self._plans[-1], self._scan.problem(self._index)
         evaluations = []
         if settings.attenuation.enabled and problem.log_ratio is not None:
-            emitters = attenuation.heard(problem)
+            emitters = attenuation.active_emitters(problem)
             evaluations.append(Evaluation(trace_attenuation_rays, solve_attenuation, emitters))
         if settings.resolution_check:
-            evaluations.append(Evaluation(trace_resolution_rays, check_resolution, problem.sounding))
+            evaluations.append(Evaluation(trace_resolution_rays, check_resolution, problem.active_emitters))
         return evaluations
 
     @property
@@ -141,7 +141,7 @@ class ReconstructionGraph:
         self._history = self.history
         self._passes_before += self._stage.total
         earlier, problem = (self._scan.problem(self._index, k) for k in (number - 1, number))
-        self._stage = self._stage_of(number, start(problem, image, earlier))
+        self._stage = self._stage_of(number, initial_slowness(problem, image, earlier))
         return self._stage.first()
 
     def _stage_of(self, number: int, image: Floats) -> Stage:
@@ -193,25 +193,27 @@ class Evaluation:
 def trace_attenuation_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:
     """Task: rays of one batch of emitters with amplitudes, through the finished image."""
     problem = scan.problem(index)
-    emitters = batches_of(attenuation.heard(problem))[batch]
-    return attenuation.look(problem, scan.stages()[-1], slowness, emitters)
+    emitters = batches_of(attenuation.active_emitters(problem))[batch]
+    return attenuation.trace_rays(problem, scan.stages()[-1], slowness, emitters)
 
 
 def solve_attenuation(scan: Scan, index: int, rows: list[Rows]) -> Floats:
     """Task: the attenuation image."""
-    return attenuation.attenuation(scan.problem(index), scan.stages()[-1], rows)
+    return attenuation.solve(scan.problem(index), scan.stages()[-1], rows)
 
 
 def trace_resolution_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:
     """Task: rays of one batch of emitters through the finished image."""
     problem = scan.problem(index)
-    return resolution.look(problem, scan.stages()[-1], slowness, batches_of(problem.sounding)[batch])
+    return resolution.trace_rays(
+        problem, scan.stages()[-1], slowness, batches_of(problem.active_emitters)[batch]
+    )
 
 
 def check_resolution(scan: Scan, index: int, rows: list[Rows]) -> Floats:
     """Task: how much of a checkerboard the rays recover."""
     problem = scan.problem(index)
-    return resolution.recovery(problem, rows, nodes_wide(problem, scan.stages()[-1]))
+    return resolution.recovery(problem, rows, width_in_nodes(problem, scan.stages()[-1]))
 
 
 def progress_of(graphs: Sequence[TomographyGraph], before: int = 0, after: int = 0) -> Progress:

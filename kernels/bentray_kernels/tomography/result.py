@@ -37,8 +37,8 @@ class Sweep:
             comes to it; with Gauss–Newton of the best image, once it is known which.
         band_hz: of an image that was refined by waveforms, (lower, upper) corner of the band. Its residual is
             then the shift of a wave in the middle of the band that has the same misfit.
-        misfit: of its waveforms, 0 where they agree and 1 where they have nothing in common.
-        held_out_misfit: the same of emitters that only judge.
+        misfit: of its waveforms, 0 where they agree and 1 where they are uncorrelated.
+        held_out_misfit: the same of held-out emitters.
         of_attenuation: whether waveforms refined that; the residual is then that of the speed, which stays.
     """
 
@@ -73,7 +73,7 @@ class Trial:
     """One way to reconstruct, tried on part of the pairs.
 
     Attributes:
-        settings: what differs from those that were asked for, by name.
+        settings: changes relative to the requested settings, by name.
         held_out_rms_s: rms misfit of the pairs that it was not shown, s.
         shown_rms_s: rms misfit of those that it was shown, s, in its last sweep.
         held_out_mean_s: mean size of the misfit of the former, s, of which wrong picks are a smaller part;

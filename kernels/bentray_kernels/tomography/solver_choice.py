@@ -37,6 +37,6 @@ def solver_of(settings: Settings, dimensions: int) -> Solver:
 
 def needs_device(settings: Settings) -> bool:
     """Whether a call of the reconstruction tracks wave fronts on an OpenCL device."""
-    # Methods that are tried bend rays whatever was asked for.
+    # Candidate models have curved rays whatever the setting.
     straight = settings.rays == "straight" and not settings.selects_model
     return not straight and METHODS[settings.ray_eikonal].on_device

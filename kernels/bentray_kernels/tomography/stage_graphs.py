@@ -49,7 +49,7 @@ class Stage(ABC):
     def __init__(self, scan: Scan, index: int, number: int) -> None:
         self._at = scan, index, number
         self.number = number
-        self._emitters = len(scan.problem(index, number).sounding)
+        self._emitters = len(scan.problem(index, number).active_emitters)
         self.total = self._emitters * scan.stages()[number].iterations
 
     @property
@@ -95,7 +95,7 @@ class GaussNewtonStage(Stage):
     def __init__(self, scan: Scan, index: int, number: int, image: Floats) -> None:
         super().__init__(scan, index, number)
         self.state: gauss_newton_step.Iterate = gauss_newton_step.begin(image)
-        self._sizes = [len(batch) for batch in batches_of(scan.problem(index, number).sounding)]
+        self._sizes = [len(batch) for batch in batches_of(scan.problem(index, number).active_emitters)]
         self._rows: dict[int, Any] = {}
 
     @property
@@ -134,8 +134,8 @@ def update_sart(
 def trace_rays(scan: Scan, index: int, stage: int, slowness: Floats, batch: int) -> Rows:
     """Task: the rays of one batch of emitters through an image."""
     problem = scan.problem(index, stage)
-    emitters = batches_of(problem.sounding)[batch]
-    return gauss_newton_step.look(problem, scan.stages()[stage], slowness, emitters)
+    emitters = batches_of(problem.active_emitters)[batch]
+    return gauss_newton_step.trace_rays(problem, scan.stages()[stage], slowness, emitters)
 
 
 def update_gauss_newton(

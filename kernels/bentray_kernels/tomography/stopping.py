@@ -15,17 +15,17 @@ from .settings import Settings
 EXPLAINED = 1.1
 
 
-def stopped(settings: Settings, chosen: Trial, noise_s: float) -> Settings:
+def stop_at_noise(settings: Settings, chosen: Trial, noise_s: float) -> Settings:
     """The settings with the misfit to stop at, unless the chosen trial shows that there is less noise."""
     if settings.numerics.stop_rms_s is None and noise_s <= EXPLAINED * chosen.held_out_rms_s:
         return settings.changed(stop_rms_s=EXPLAINED * noise_s)
     return settings
 
 
-def noise_of(dataset: Dataset) -> float:
-    """Standard deviation of the travel times, s: as the dataset tells it, or as their roughness does."""
+def travel_time_noise(dataset: Dataset) -> float:
+    """Standard deviation of the travel times, s: from the dataset, or estimated from their roughness."""
     if dataset.sigma_s is not None:
-        told = dataset.sigma_s[np.isfinite(dataset.differential_tof()) & np.isfinite(dataset.sigma_s)]
-        if told.size:
-            return math.sqrt(float((told**2).mean()))
+        known = dataset.sigma_s[np.isfinite(dataset.differential_tof()) & np.isfinite(dataset.sigma_s)]
+        if known.size:
+            return math.sqrt(float((known**2).mean()))
     return noise_level(dataset.differential_tof())

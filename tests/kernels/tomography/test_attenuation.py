@@ -11,7 +11,7 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeSca
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
-from bentray_kernels.tomography.attenuation import look
+from bentray_kernels.tomography.attenuation import trace_rays
 from bentray_kernels.tomography.focusing import focusing
 
 NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
@@ -162,9 +162,9 @@ def test_focusing_is_taken_off(scan):
     )
     bent = replace(problem, log_ratio=problem.log_ratio + lens)
     some = np.arange(4)
-    plain = look(problem, plan(), slowness, some)
-    lensed = look(bent, plan(), slowness, some)
-    mended = look(bent, plan(focusing=True), slowness, some)
+    plain = trace_rays(problem, plan(), slowness, some)
+    lensed = trace_rays(bent, plan(), slowness, some)
+    mended = trace_rays(bent, plan(focusing=True), slowness, some)
     assert np.abs(lensed.residual - plain.residual).max() > 0.1
     assert len(mended.residual) <= len(plain.residual)
     assert np.isin(np.round(mended.residual, 9), np.round(plain.residual, 9)).all()
@@ -183,7 +183,7 @@ def test_focusing_does_not_ask_which_emitters_come_together(scan):
     problem = Problem.of(few, settings)
     slowness = 1.0 / PHANTOM.speed(NODES, SIDE)
     near, far = np.array([12]), np.array([12, 36])
-    alone, together = (look(problem, settings, slowness, emitters) for emitters in (near, far))
+    alone, together = (trace_rays(problem, settings, slowness, emitters) for emitters in (near, far))
     assert np.array_equal(alone.residual, together.residual[: alone.residual.size])
 
 

@@ -11,7 +11,13 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
-from bentray_kernels.tomography.finite_frequency import BENDS_WIDER, bending, blurred, nodes_wide, seen
+from bentray_kernels.tomography.finite_frequency import (
+    BENDS_WIDER,
+    blurred,
+    front_smoothing,
+    ray_slowness,
+    width_in_nodes,
+)
 from bentray_kernels.tomography.gauss_newton import gauss_newton_step
 
 WATER = 1500.0
@@ -39,21 +45,21 @@ def test_the_blur_is_linear_and_its_own_adjoint(seed, width):
 def test_thin_rays_see_the_image_itself_and_water_stays_water():
     problem = Problem.of(scan(), PLAN)
     image = np.full(problem.region.shape, 1.0 / WATER)
-    assert np.array_equal(seen(problem, PLAN, image), image)
+    assert np.array_equal(ray_slowness(problem, PLAN, image), image)
     image[20, 20] *= 1.1
-    assert seen(problem, PLAN.changed(ray_width_m=0.0), image) is image
-    wide = seen(problem, PLAN, image)
+    assert ray_slowness(problem, PLAN.changed(ray_width_m=0.0), image) is image
+    wide = ray_slowness(problem, PLAN, image)
     assert 1.0 / WATER < wide[20, 20] < image[20, 20]
     assert (wide - 1.0 / WATER).sum() == pytest.approx((image - 1.0 / WATER).sum(), rel=1e-3)
 
 
 def test_rays_bend_in_what_twice_the_width_leaves_unless_told_otherwise():
     problem = Problem.of(scan(), PLAN)
-    width = nodes_wide(problem, PLAN)
+    width = width_in_nodes(problem, PLAN)
     assert width == pytest.approx(WIDTH / problem.spacing)
-    assert np.hypot(width, bending(problem, PLAN)) == pytest.approx(BENDS_WIDER * width)
-    assert bending(problem, PLAN.changed(front_smoothing_nodes=3.0)) == 3.0
-    assert bending(problem, PLAN.changed(ray_width_m=0.0)) == 0.0
+    assert np.hypot(width, front_smoothing(problem, PLAN)) == pytest.approx(BENDS_WIDER * width)
+    assert front_smoothing(problem, PLAN.changed(front_smoothing_nodes=3.0)) == 3.0
+    assert front_smoothing(problem, PLAN.changed(ray_width_m=0.0)) == 0.0
 
 
 def test_wide_times_ask_for_wide_rays():
@@ -63,7 +69,7 @@ def test_wide_times_ask_for_wide_rays():
     axis = (np.arange(40) - 19.5) * problem.spacing
     far = np.hypot(axis[:, None] - 0.01, axis[None, :])
     true = WATER + 60.0 * (far < 0.02)
-    rows = gauss_newton_step.look(problem, plan, 1.0 / true, problem.sounding)
+    rows = gauss_newton_step.trace_rays(problem, plan, 1.0 / true, problem.active_emitters)
     delta = np.full(problem.delta_tof.shape, np.nan)
     delta[np.isfinite(problem.delta_tof)] = -rows.residual
     wide = reconstruct(scan(delta), plan)

@@ -9,7 +9,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct
-from bentray_kernels.tomography.grid_schedule import stages, start
+from bentray_kernels.tomography.grid_schedule import initial_slowness, stages
 
 WATER = 1375.0
 RING = Ring(32, 0.09)
@@ -54,12 +54,12 @@ def test_a_finer_grid_begins_with_the_same_image(scan):
     coarse, fine = (Problem.of(scan, replace(PLAN, nodes=n, side_m=0.2)) for n in (25, 49))
     x = np.linspace(-1.0, 1.0, 25)
     image = 1.0 / WATER * (1.0 + 0.02 * np.exp(-((x[:, None] - 0.2) ** 2 + x[None, :] ** 2) / 0.05))
-    found = start(fine, image, coarse)
+    found = initial_slowness(fine, image, coarse)
     again = found[::2, ::2]
     inside = coarse.region & fine.region[::2, ::2]
     assert np.allclose(again[inside], image[inside], rtol=0.0, atol=1e-12)
     assert np.allclose(found[~fine.region], 1.0 / WATER)
-    assert np.array_equal(start(fine, None), np.full((49, 49), 1.0 / WATER))
+    assert np.array_equal(initial_slowness(fine, None), np.full((49, 49), 1.0 / WATER))
 
 
 def test_a_finer_grid_of_a_volume_begins_with_the_same_image_at_the_same_heights():
@@ -74,5 +74,5 @@ def test_a_finer_grid_of_a_volume_begins_with_the_same_image_at_the_same_heights
         z = problem.origin[2] + problem.spacing * np.arange(problem.region.shape[2])
         return np.broadcast_to((1.0 + z) / WATER, problem.region.shape)
 
-    found = start(fine, tilted(coarse), coarse)
+    found = initial_slowness(fine, tilted(coarse), coarse)
     assert np.allclose(found[fine.region], tilted(fine)[fine.region], rtol=0.0, atol=1e-12)

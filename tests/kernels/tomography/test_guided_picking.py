@@ -10,7 +10,7 @@ import pytest
 from bentray_kernels.acquisition import pick
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings, reconstruct
-from bentray_kernels.tomography.guided_picking import alternate, predicted_delta
+from bentray_kernels.tomography.guided_picking import predicted_delta, reconstruct_guided
 
 from ..acquisition.traces import RADIUS_M, blob_delay, scan
 
@@ -51,7 +51,7 @@ def test_in_noise_the_image_finds_more_arrivals_and_no_worse_ones():
     noisy = scan(delay, elements=ELEMENTS, noise=0.22, seed=4)
     far = noisy.distance_m() > RADIUS_M
     alone = pick(noisy).delta_tof_s
-    guided, result = alternate(noisy, SETTINGS, rounds=2)
+    guided, result = reconstruct_guided(noisy, SETTINGS, rounds=2)
     assert result.speed.shape == (32, 32)
 
     def right(found: np.ndarray) -> int:
@@ -66,11 +66,11 @@ def test_in_noise_the_image_finds_more_arrivals_and_no_worse_ones():
 def test_without_rounds_nothing_is_guided_and_settled_picks_end_it():
     quiet = scan(blob_delay(ELEMENTS), elements=ELEMENTS)
     seen: list[int] = []
-    picked, _ = alternate(quiet, SETTINGS, rounds=0, progress=lambda p: seen.append(p.done))
+    picked, _ = reconstruct_guided(quiet, SETTINGS, rounds=0, progress=lambda p: seen.append(p.done))
     np.testing.assert_array_equal(picked.delta_tof_s, pick(quiet).delta_tof_s)
     once = len(seen)
     seen.clear()
-    alternate(quiet, SETTINGS, rounds=5, progress=lambda p: seen.append(p.done))
+    reconstruct_guided(quiet, SETTINGS, rounds=5, progress=lambda p: seen.append(p.done))
     assert len(seen) < 3 * once
 
 
@@ -80,4 +80,4 @@ def test_without_rounds_nothing_is_guided_and_settled_picks_end_it():
 )
 def test_what_cannot_be_alternated_is_refused(settings, rounds):
     with pytest.raises(InvalidInput):
-        alternate(scan(elements=ELEMENTS), settings, rounds)
+        reconstruct_guided(scan(elements=ELEMENTS), settings, rounds)

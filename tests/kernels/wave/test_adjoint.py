@@ -33,7 +33,7 @@ def change(seed, shape=(40, 42)):
 
 def windows():
     arrival = np.linalg.norm(RECEIVERS - EMITTER, axis=1) / 1500.0 + 6e-6
-    return misfits.around(arrival, TIME, 6e-6, 8e-6)
+    return misfits.arrival_window(arrival, TIME, 6e-6, 8e-6)
 
 
 @pytest.mark.parametrize("measure", [misfits.correlation, misfits.least_squares])

@@ -1,4 +1,4 @@
-"""`bentray demo`: the whole path through a real service, small; and its judgement of the two results."""
+"""`bentray demo`: the whole path through a real service, small; and its validation of the two results."""
 
 from __future__ import annotations
 

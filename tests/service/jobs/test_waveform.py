@@ -72,7 +72,7 @@ def test_a_torn_job_gives_the_image_of_one_process(http, torn, tmp_path):
         "pick_emissions",
         "finish_slice",
         "write_picked",
-        "enter",
+        "start_band",
     } < set(job["plan"]["call_bytes"])
     deadline = time.monotonic() + PATIENCE_S
     while job["state"] not in ENDED:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bentray_kernels.tomography.waveform.band_inversion import Model
-from bentray_kernels.tomography.waveform.refinement_graph import look_at_waves
+from bentray_kernels.tomography.waveform.refinement_graph import evaluate_emitter
 from bentray_kernels.wave import time_blocks
 from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import write_dataset
@@ -23,8 +23,8 @@ def test_a_look_at_waves_ends_with_its_job(tmp_path, monkeypatch):
     waves = FileWaveScan(path, path.stat().st_mtime_ns, SETTINGS, 0, folder / "findings.json")
     problem = waves.problem(0)
     water = Model(problem.water.speed + 0.0 * problem.region)
-    assert look_at_waves(waves, 0, water, 0).misfit > 0.0
+    assert evaluate_emitter(waves, 0, water, 0).misfit > 0.0
     monkeypatch.setattr(time_blocks, "STRIP", 10**5)
     folder.rename(tmp_path / "job.ended")
     with pytest.raises(JobEnded):
-        look_at_waves(waves, 0, water, 0)
+        evaluate_emitter(waves, 0, water, 0)

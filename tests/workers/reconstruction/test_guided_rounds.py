@@ -11,7 +11,7 @@ import pytest
 from bentray_kernels.acquisition import Waveform
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.guided_picking import alternate
+from bentray_kernels.tomography.guided_picking import reconstruct_guided
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.reconstruction import reconstruction_run
 from bentray_workers.reconstruction.memory import picking_memory
@@ -33,7 +33,7 @@ def noisy():
 
 @cache
 def expected():
-    return alternate(noisy(), ALONE, rounds=2)
+    return reconstruct_guided(noisy(), ALONE, rounds=2)
 
 
 @pytest.fixture

@@ -152,7 +152,7 @@ def test_waves_are_planned_for():
         plan(RING, asked, [])
     heard = replace(RING, traces=Traces(256, 256, 1000, 2, 1e7, 4e5, 1500.0))
     found = plan(heard, asked, [LARGE])
-    assert {"enter", "look_at_waves", "step_by_waves"} < set(found.call_bytes)
+    assert {"start_band", "evaluate_emitter", "update_image"} < set(found.call_bytes)
     assert found.tasks > plan(heard, replace(asked, method="auto"), [LARGE]).tasks
     with pytest.raises(InvalidInput) as refusal:
         plan(heard, replace(asked, nodes=32), [WorkerCapacity(160 * MIB, BOTH)])
@@ -162,7 +162,7 @@ def test_waves_are_planned_for():
     with pytest.raises(InvalidInput) as refusal:
         plan(heard, tried, [WorkerCapacity(100 * MIB, BOTH)])
     assert refusal.value.field == "method"
-    assert "judge_by_waves" not in plan(replace(heard, in_space=True, height_m=0.1), tried, []).call_bytes
+    assert "validate_image" not in plan(replace(heard, in_space=True, height_m=0.1), tried, []).call_bytes
 
 
 @given(

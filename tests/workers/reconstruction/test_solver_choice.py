@@ -7,7 +7,7 @@ import pytest
 from bentray_kernels.eikonal import methods
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Problem, Settings
-from bentray_kernels.tomography.grid_schedule import start
+from bentray_kernels.tomography.grid_schedule import initial_slowness
 from bentray_kernels.tomography.sart import sart_update
 from bentray_kernels.tomography.sart.sart_step import advance, begin
 from bentray_kernels.tomography.settings import DEVIATION
@@ -40,7 +40,7 @@ def test_what_runs_is_what_was_chosen(scans, monkeypatch, rays, cut, eikonal):
     problem = Problem.of(scans[cut], settings, 0)
     chosen = solver_of(settings, problem.region.ndim)
     solved, passed = [], []
-    solve, look = sart_update.solve, sart_update.EmitterPass.look
+    solve, look = sart_update.solve, sart_update.EmitterPass.trace
 
     def watched(speed, spacing, source, method):
         solved.append(method)
@@ -52,7 +52,7 @@ def test_what_runs_is_what_was_chosen(scans, monkeypatch, rays, cut, eikonal):
 
     monkeypatch.setattr(sart_update, "solve", watched)
     monkeypatch.setattr(sart_update.EmitterPass, "look", counted)
-    advance(problem, settings, begin(start(problem)), 1)
+    advance(problem, settings, begin(initial_slowness(problem)), 1)
     assert bool(passed) is chosen.compiled
     if chosen.compiled:
         assert solved == []

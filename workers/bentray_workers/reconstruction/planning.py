@@ -111,7 +111,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     limit = max((one.task_bytes for one in fitting), default=math.inf)
     name, size = max(calls.items(), key=lambda item: item[1])
     if size > limit:
-        field: str = "nodes" if name not in waves else "method" if name == "judge_by_waves" else "minutes"
+        field: str = "nodes" if name not in waves else "method" if name == "validate_image" else "minutes"
         found = getattr(settings, field)
         raise InvalidInput(
             field,

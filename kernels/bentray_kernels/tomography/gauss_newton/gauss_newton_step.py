@@ -14,7 +14,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...rays.fan import Kind
-from ..finite_frequency import bending, nodes_wide, seen
+from ..finite_frequency import front_smoothing, ray_slowness, width_in_nodes
 from ..problem import Problem
 from ..result import Sweep, residual_counts
 from ..settings import Settings
@@ -28,7 +28,7 @@ from .ray_matrix import back_project
 LEAST_GAIN = 0.98
 PATIENCE = 2
 
-# A step that makes the misfit grow is halved so often at most: rays of an image say little about far ones.
+# A step that makes the misfit grow is halved so often at most: the linearisation holds only near the image.
 MOST_HALVINGS = 3
 
 
@@ -53,17 +53,17 @@ class Measured:
 
 @dataclass(frozen=True)
 class Iterate:
-    """Where an iteration stands; all that is needed to go on, to the bit.
+    """State of the iteration; the result of a resumed run has the same bits.
 
     Attributes:
         slowness: of the region's shape, s/m.
         begun: the image that the iteration began with.
         dual: (ndim, ...), s, of the last linear problem.
         coverage: as ``slowness``, metres of ray through each node.
-        best: the best image so far: each is held against the best before it, at the limit of that one.
+        best: the best image so far: each is compared with the best before it, at the limit of that one.
         halvings: of the last step.
         idle: images in a row, up to the last, that gained nothing.
-        done: whether nothing is left to do.
+        done: whether the iteration has ended.
         history: a record per iteration, of the misfit that it began with.
     """
 
@@ -101,7 +101,7 @@ def begin(slowness: Floats) -> Iterate:
     )
 
 
-def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
+def trace_rays(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
     """Rows of some emitters through an image; any split of the emitters gives the same.
 
     In an image without contrast, as the water that the first iteration begins with, rays are straight.
@@ -109,11 +109,11 @@ def look(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints)
     rays: Kind = settings.rays if slowness.min() < slowness.max() else "straight"
     return linearise(
         problem,
-        seen(problem, settings, slowness),
+        ray_slowness(problem, settings, slowness),
         emitters,
         rays=rays,
         eikonal=settings.ray_eikonal,
-        front=bending(problem, settings),
+        front=front_smoothing(problem, settings),
     )
 
 
@@ -122,10 +122,10 @@ def step(
 ) -> Iterate:
     """The next image from the rows of all emitters, in their order; at the end, the best of those measured.
 
-    Of two that miss about as much the last measured is given, which has met the penalty more nearly.
+    Of two with about the same misfit the last one is returned, which fulfils the penalty better.
 
-    ``settings.iterations`` passes make one image less, for the last one measures; a single pass makes one
-    too, which nothing measures.
+    There is one image less than ``settings.iterations``, because the last iteration only measures the misfit;
+    a single iteration makes one image without measuring it.
 
     The strength of the total variation follows the misfit: strong while rays are still wrong, so that their
     errors do not become structure, and in the end as weak as the data are exact.
@@ -133,7 +133,7 @@ def step(
     residual = np.concatenate([part.residual for part in parts])
     rms = math.sqrt(float((residual**2).mean()))
     number = len(state.history) + 1
-    record = Sweep(slice_index, number, rms, len(problem.sounding), given=False)
+    record = Sweep(slice_index, number, rms, len(problem.active_emitters), given=False)
     history = (*state.history, record)
     best, limit = state.best, huber.limit(residual, settings.numerics.huber_scale)
     against = huber.loss(residual, best.limit)
@@ -157,7 +157,7 @@ def step(
         return replace(state, slowness=nearer, halvings=state.halvings + 1, history=history)
     lowest, highest = settings.speed_bounds_mps
     coverage = _coverage(problem, parts)
-    # Total variation is told the misfit, s; quadratic penalties are weighed against the data themselves.
+    # Total variation is scaled by the misfit, s; quadratic penalties are relative to the data.
     unit = huber.clipped_rms(residual, limit) if settings.gauss_newton.penalty == "total-variation" else 1.0
     image, dual = Linearised(
         parts,
@@ -170,7 +170,7 @@ def step(
         limit,
         state.begun * problem.spacing,
         problem.spacing * settings.gauss_newton.edge_mps / problem.water_speed**2 or math.inf,
-        nodes_wide(problem, settings),
+        width_in_nodes(problem, settings),
     ).solve(state.dual)
     return replace(
         state,

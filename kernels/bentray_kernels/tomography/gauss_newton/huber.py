@@ -12,7 +12,7 @@ from ...arrays import Floats
 MEDIAN_PART = 0.6745
 
 # The limit is at least this part of the mean size. Of a small object in exact times most rays pass nothing
-# but water and fit from the start; were the spread theirs alone, the others would have no say.
+# but water and fit from the start; if only these set the spread, the other rays would have no weight.
 LEAST_PART = 0.7
 
 

@@ -20,7 +20,7 @@ from .ray_matrix import back_project, normal_product, project
 SPLIT = 0.75
 
 # Rounds of splitting, and conjugate gradient steps in each, which begin at the last round's image. They do
-# not reach the minimum; the next iteration goes on from the dual variable. A strength above every slope of
+# not reach the minimum; the next iteration starts from the dual variable. A strength above every slope of
 # the image acts like one as large as the slopes.
 ROUNDS = 12
 STEPS = 6
@@ -34,7 +34,7 @@ TOLERANCE = 1e-5
 # plane blur a point to 1/(π·distance), whose transform is 2/k.
 CURVATURE = 2.0
 
-# Solutions of a quadratic penalty with Huber's loss, each with the weights that the one before asks for.
+# Solutions of a quadratic penalty with Huber's loss, each with weights from the residuals of the one before.
 REWEIGHTINGS = 4
 
 
@@ -60,7 +60,7 @@ class Linearised:
         strength: of the penalty; of total variation in s: about the error of a travel time that an edge less
             may cost; of the others a plain number: 1 weighs as much as the data do on average.
         penalty: its name.
-        huber: s; rows that miss by more count less.
+        huber: s; rows with larger residuals have less weight.
         reference: as the image, s, what ``tikhonov`` stays near; None: the image.
         edge: of total variation, s: slopes count as g·edge·log(1 + |∇u|/edge), so that well above it a higher
             edge costs hardly more than a low one and keeps its contrast. Iteratively reweighted (Candès,
@@ -83,7 +83,7 @@ class Linearised:
     width: float = 0.0
 
     def solve(self, dual: Floats) -> tuple[Floats, Floats]:
-        """An image nearer the minimum, and the dual variable that a later, similar problem goes on from.
+        """An image nearer the minimum, and the dual variable as initial value of a later, similar problem.
 
         Bounds are kept by clipping.
 
@@ -96,7 +96,7 @@ class Linearised:
             return self._split(dual)
         image = self.image
         for _ in range(REWEIGHTINGS if self.huber < math.inf else 1):
-            image = self._descend(image, self._steepness(image), self._stiffness, MOST_STEPS)
+            image = self._descend(image, self._penalty_gradient(image), self._penalty_hessian, MOST_STEPS)
         return image, dual
 
     def _split(self, dual: Floats) -> tuple[Floats, Floats]:
@@ -117,12 +117,12 @@ class Linearised:
             image = self._descend(image, SPLIT * adjoint(gradient(image) - edges + dual), rough, STEPS)
         return image, dual
 
-    def _steepness(self, image: Floats) -> Floats:
+    def _penalty_gradient(self, image: Floats) -> Floats:
         """The gradient of a quadratic penalty."""
         reference = self.image if self.reference is None else self.reference
-        return self._stiffness(image - reference if self.penalty == "tikhonov" else image)
+        return self._penalty_hessian(image - reference if self.penalty == "tikhonov" else image)
 
-    def _stiffness(self, change: Floats) -> Floats:
+    def _penalty_hessian(self, change: Floats) -> Floats:
         """The second derivative of a quadratic penalty times a change."""
         if self.strength == 0.0:
             return np.zeros_like(change)
@@ -137,12 +137,12 @@ class Linearised:
             steepness: gradient of the quadratic term at the image; stiffness: its second derivative.
         """
         weights, downhill = [], np.zeros(image.size)
-        for part, missed in zip(self.parts, self._missed(image), strict=True):
-            weights.append(self._weights(missed))
-            back_project(part.pointers, part.columns, part.lengths, weights[-1] * missed, downhill)
-        residual = self._within(downhill) - np.where(self.region, steepness, 0.0)
-        evened = self._evener()
-        change, direction = np.zeros_like(residual), evened(residual)
+        for part, residual_part in zip(self.parts, self._residuals(image), strict=True):
+            weights.append(self._weights(residual_part))
+            back_project(part.pointers, part.columns, part.lengths, weights[-1] * residual_part, downhill)
+        residual = self._on_image(downhill) - np.where(self.region, steepness, 0.0)
+        precondition = self._preconditioner()
+        change, direction = np.zeros_like(residual), precondition(residual)
         square = float((residual * direction).sum())
         enough = TOLERANCE**2 * square
         for _ in range(steps):
@@ -152,16 +152,16 @@ class Linearised:
             wide = blurred(direction, self.width).ravel()
             for part, weight in zip(self.parts, weights, strict=True):
                 normal_product(part.pointers, part.columns, part.lengths, weight, wide, curved)
-            bent = self._within(curved) + np.where(self.region, stiffness(direction), 0.0)
+            bent = self._on_image(curved) + np.where(self.region, stiffness(direction), 0.0)
             step = square / float((direction * bent).sum())
             change = change + step * direction
             residual = residual - step * bent
-            even = evened(residual)
-            before, square = square, float((residual * even).sum())
-            direction = even + (square / before) * direction
+            preconditioned = precondition(residual)
+            before, square = square, float((residual * preconditioned).sum())
+            direction = preconditioned + (square / before) * direction
         return np.clip(image + change, *self.bounds)
 
-    def _evener(self) -> Callable[[Floats], Floats]:
+    def _preconditioner(self) -> Callable[[Floats], Floats]:
         """A preconditioner; the smoother an image is to be, the worse the steps would converge without.
 
         The inverse, wavenumber by wavenumber, of what data from all sides and a ``laplacian`` weigh.
@@ -173,20 +173,20 @@ class Linearised:
         curvature = CURVATURE / np.sqrt(squares) + self.strength * squares**2
         return lambda image: np.where(self.region, idctn(dctn(image) / curvature), 0.0)
 
-    def _within(self, flat: Floats) -> Floats:
+    def _on_image(self, flat: Floats) -> Floats:
         """A sum over rows as an image as wide as the rays, over the density, in the region."""
         return np.where(self.region, blurred(flat.reshape(self.image.shape), self.width) / self.density, 0.0)
 
-    def _missed(self, image: Floats) -> Iterator[Floats]:
-        """What an image leaves of the residuals, part by part, s."""
+    def _residuals(self, image: Floats) -> Iterator[Floats]:
+        """Residuals of an image, part by part, s."""
         change = blurred(image - self.image, self.width).ravel()
         for part in self.parts:
             explained = np.empty(part.residual.size)
             project(part.pointers, part.columns, part.lengths, change, explained)
             yield part.residual - explained
 
-    def _weights(self, missed: Floats) -> Floats:
+    def _weights(self, residual_part: Floats) -> Floats:
         """Of rows in Huber's loss: 1, less beyond its limit."""
         if self.huber == math.inf:
-            return np.ones_like(missed)
-        return self.huber / np.maximum(np.abs(missed), self.huber)
+            return np.ones_like(residual_part)
+        return self.huber / np.maximum(np.abs(residual_part), self.huber)

@@ -1,4 +1,4 @@
-"""What some emitters say about an image: their rays as rows of a matrix, and the times that are left over."""
+"""Linearisation for some emitters: their rays as rows of a sparse matrix, and the residuals."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ def linearise(
             integrals of the image along those rays.
     """
 
-    def lacking(emitter: int, heard: Ints, distance: Floats, predicted: Floats, _: Floats) -> Floats:
+    def residual_of(emitter: int, valid: Ints, distance: Floats, predicted: Floats, _: Floats) -> Floats:
         water = distance / problem.water_speed
-        return np.asarray(problem.delta_tof[emitter, heard] + water - predicted)
+        return np.asarray(problem.delta_tof[emitter, valid] + water - predicted)
 
-    return _trace(problem, slowness, emitters, problem.delta_tof, lacking, rays, eikonal, front)
+    return _trace(problem, slowness, emitters, problem.delta_tof, residual_of, rays, eikonal, front)
 
 
 def linearise_losses(
@@ -80,10 +80,10 @@ def linearise_losses(
     if ratio is None:
         raise ValueError("no amplitudes")
 
-    def lacking(emitter: int, heard: Ints, distance: Floats, _: Floats, length: Floats) -> Floats:
-        return np.asarray(ratio[emitter, heard] + water * (distance - length))
+    def residual_of(emitter: int, valid: Ints, distance: Floats, _: Floats, length: Floats) -> Floats:
+        return np.asarray(ratio[emitter, valid] + water * (distance - length))
 
-    return _trace(problem, slowness, emitters, ratio, lacking, rays, eikonal, front)
+    return _trace(problem, slowness, emitters, ratio, residual_of, rays, eikonal, front)
 
 
 def _trace(
@@ -91,7 +91,7 @@ def _trace(
     slowness: Floats,
     emitters: Ints,
     data: Floats,
-    lacking: Callable[[int, Ints, Floats, Floats, Floats], Floats],
+    residual_of: Callable[[int, Ints, Floats, Floats, Floats], Floats],
     rays: Kind,
     eikonal: str,
     front: float,
@@ -99,18 +99,18 @@ def _trace(
     """Rows of the pairs that have data.
 
     Args:
-        lacking: residual from the emitter, the receivers heard, their distances, m, predicted times, s, and
-            the lengths of the rays, m.
+        residual_of: residual from the emitter, the valid receivers, their distances, m, predicted times, s,
+            and the lengths of the rays, m.
     """
     speed = smoothed(1.0 / slowness, front)
     found, splines = [], {}
     for emitter in emitters:
-        heard = np.flatnonzero(np.isfinite(data[emitter]))
+        valid = np.flatnonzero(np.isfinite(data[emitter]))
         slab = problem.slab(int(emitter))
         foot = np.zeros(slowness.ndim)
         foot[-1] = slab.start * problem.spacing
         source = problem.emitters[emitter] - foot
-        receivers = problem.receivers_of(int(emitter))[heard] - foot
+        receivers = problem.receivers_of(int(emitter))[valid] - foot
         distance = np.linalg.norm(receivers - source, axis=1)
         inside, tof = np.ascontiguousarray(slowness[..., slab]), np.ascontiguousarray(speed[..., slab])
         spline = np.empty((0,) * slowness.ndim)
@@ -132,8 +132,8 @@ def _trace(
             columns = (column * slowness.shape[-1] + height + slab.start).astype(np.int32)
         ends = np.concatenate(([0], np.cumsum(counts)))
         length = np.array([lengths[a:b].sum(dtype=np.float64) for a, b in itertools.pairwise(ends)])
-        residual = lacking(
-            int(emitter), heard, distance, predicted * problem.spacing, length * problem.spacing
+        residual = residual_of(
+            int(emitter), valid, distance, predicted * problem.spacing, length * problem.spacing
         )
         found.append((counts, columns, lengths, residual))
     counts, columns, lengths, residual = (np.concatenate(parts) for parts in zip(*found, strict=True))

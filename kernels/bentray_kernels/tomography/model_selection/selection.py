@@ -13,7 +13,7 @@ from ..reconstruction_graph import Run
 from ..result import Reconstruction, Trial
 from ..settings import Settings
 from ..stage_graphs import Scan
-from ..stopping import noise_of, stopped
+from ..stopping import stop_at_noise, travel_time_noise
 from .candidates import CandidateGraph
 from .finite_frequency_candidates import (
     STRAIGHT,
@@ -120,7 +120,7 @@ def select_model(
         chosen = choose(trials)
     others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
     selected = settings.changed(**chosen.settings)
-    return stopped(selected, chosen, noise_of(dataset)), (chosen, *others), before
+    return stop_at_noise(selected, chosen, travel_time_noise(dataset)), (chosen, *others), before
 
 
 def _graphs(

@@ -21,7 +21,7 @@ TRUNCATE = 4.0
 
 @dataclass(frozen=True)
 class EmitterPass:
-    """The arrays that passes over one grid work in; nothing in them lasts from one update to the next.
+    """Work arrays for one grid; their content is not kept from one update to the next.
 
     Attributes:
         shape: of the grid.
@@ -39,7 +39,7 @@ class EmitterPass:
     sums: Singles
 
     @classmethod
-    def over(cls, shape: tuple[int, int], receivers: int) -> EmitterPass:
+    def for_grid(cls, shape: tuple[int, int], receivers: int) -> EmitterPass:
         """For up to so many receivers of an emitter."""
         nodes = shape[0] * shape[1]
         return cls(
@@ -51,7 +51,7 @@ class EmitterPass:
             np.zeros(2 * nodes, np.float32),
         )
 
-    def look(
+    def trace(
         self,
         slowness: Floats,
         front: Floats | None,
@@ -60,7 +60,7 @@ class EmitterPass:
         receivers: Floats,
         measured: Floats,
     ) -> Floats:
-        """Trace the rays of one emitter and back-project what is left of the travel times.
+        """Trace the rays of one emitter and back-project the residuals.
 
         Args:
             slowness: (nx, ny), of the image, s/m.
@@ -102,7 +102,7 @@ class EmitterPass:
         smoothing: float,
         bounds: tuple[float, float],
     ) -> None:
-        """Move the image, in place, by what all looks since the last update say (chapter 6, equation 1).
+        """Update the image in place from all emitters traced since the last update (chapter 6, equation 1).
 
         Args:
             slowness: (nx, ny), s/m, C order.

@@ -11,12 +11,12 @@ from ...arrays import Floats, Ints
 from ..problem import Problem
 from ..result import Sweep, residual_counts
 from ..settings import Settings
-from .sart_update import update_of
+from .sart_update import update_for
 
 
 @dataclass(frozen=True)
 class State:
-    """Where a reconstruction stands; all that is needed to go on, to the bit.
+    """State of SART; the result of a resumed run has the same bits.
 
     Attributes:
         slowness: of the region's shape, s/m.
@@ -25,7 +25,7 @@ class State:
         emitter: emitters done in the pass under way.
         squares, count: sum of squared residuals, s², and their number, in the pass under way.
         residuals: how many of them fall between two of ``RESIDUAL_EDGES_S``.
-        done: whether nothing is left to do.
+        done: whether all iterations are finished.
         history: a record per finished pass.
     """
 
@@ -71,7 +71,7 @@ def advance(problem: Problem, settings: Settings, state: State, emitters: int, s
     coverage = np.zeros_like(slowness) if fresh else state.coverage.copy()
     end = min(state.emitter + -(-emitters // settings.numerics.subset) * settings.numerics.subset, len(order))
     squares, left = state.squares, []
-    use = update_of(problem, settings)
+    use = update_for(problem, settings)
     for first in range(state.emitter, end, settings.numerics.subset):
         subset = order[first : min(first + settings.numerics.subset, end)]
         left.append(use(problem, settings, slowness, coverage, subset, state.sweep))
@@ -91,7 +91,7 @@ def advance(problem: Problem, settings: Settings, state: State, emitters: int, s
 
 def emitter_order(problem: Problem, seed: int, slice_index: int, sweep: int) -> Ints:
     """Emitters with data, in the random order of one pass; the same for every worker and every resume."""
-    return np.random.default_rng((seed, slice_index, sweep)).permutation(problem.sounding)
+    return np.random.default_rng((seed, slice_index, sweep)).permutation(problem.active_emitters)
 
 
 def _close_sweep(state: State, settings: Settings, slice_index: int, emitters: int) -> State:

@@ -21,7 +21,7 @@ from .emitter_pass import EmitterPass
 Use = Callable[[Problem, Settings, Floats, Floats, Ints, int], Floats]
 
 
-def update_of(problem: Problem, settings: Settings) -> Use:
+def update_for(problem: Problem, settings: Settings) -> Use:
     """How images of the problem are updated: compiled where the settings allow it."""
     return _compiled(problem) if solver_of(settings, problem.region.ndim).compiled else _traced
 
@@ -58,7 +58,7 @@ def smoothed(speed: Floats, nodes: float) -> Floats:
 def _compiled(problem: Problem) -> Use:
     """As ``_traced`` for a slice, several times as fast: see ``EmitterPass``."""
     rows, columns = problem.region.shape
-    work = EmitterPass.over((rows, columns), problem.delta_tof.shape[1])
+    work = EmitterPass.for_grid((rows, columns), problem.delta_tof.shape[1])
 
     def use(
         problem: Problem,
@@ -70,13 +70,13 @@ def _compiled(problem: Problem) -> Use:
     ) -> Floats:
         left = []
         for emitter in emitters:
-            source, receivers, measured, _ = _heard(problem, int(emitter))
+            source, receivers, measured, _ = _valid_receivers(problem, int(emitter))
             front = None
             if settings.rays == "curved":
                 front = slowness
                 if settings.sart.speed_range_mps is not None or settings.numerics.front_smoothing_nodes > 0.0:
                     front = 1.0 / propagation_speed(slowness, problem.region, settings, warm=sweep > 0)
-            left.append(work.look(slowness, front, problem.spacing, source, receivers, measured))
+            left.append(work.trace(slowness, front, problem.spacing, source, receivers, measured))
         work.update(
             slowness,
             coverage,
@@ -98,7 +98,7 @@ def _traced(
     corrections, weights = np.zeros_like(slowness), np.zeros_like(slowness)
     left = []
     for emitter in emitters:
-        source, receivers, measured, slab = _heard(problem, int(emitter))
+        source, receivers, measured, slab = _valid_receivers(problem, int(emitter))
         inside = np.ascontiguousarray(slowness[..., slab])
         tof = inside  # only the shape counts: straight rays need no travel time
         if settings.rays != "straight":
@@ -121,14 +121,14 @@ def _traced(
     return np.concatenate(left)
 
 
-def _heard(problem: Problem, emitter: int) -> tuple[Floats, Floats, Floats, slice]:
+def _valid_receivers(problem: Problem, emitter: int) -> tuple[Floats, Floats, Floats, slice]:
     """An emitter and its receivers in its slab, m, the times measured, s, and the slab."""
     slab = problem.slab(emitter)
     delta = problem.delta_tof[emitter]
-    heard = np.flatnonzero(np.isfinite(delta))
-    source, receivers = problem.emitters[emitter], problem.receivers_of(emitter)[heard]
+    valid = np.flatnonzero(np.isfinite(delta))
+    source, receivers = problem.emitters[emitter], problem.receivers_of(emitter)[valid]
     away = receivers - source
-    measured = delta[heard] + np.sqrt((away * away).sum(axis=1)) / problem.water_speed
+    measured = delta[valid] + np.sqrt((away * away).sum(axis=1)) / problem.water_speed
     if slab.start:
         foot = np.zeros(source.size)
         foot[-1] = slab.start * problem.spacing

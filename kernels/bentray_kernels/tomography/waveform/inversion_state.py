@@ -1,4 +1,4 @@
-"""Where a refinement stands: the band under way, what the bands before left."""
+"""State of a refinement: the active band, and the results of the bands before."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ...arrays import Floats
 from . import band_inversion
-from .band_inversion import Model, WaveIterate, WavePass
+from .band_inversion import Evaluation, InversionState, Model
 
 
 @dataclass(frozen=True)
@@ -29,21 +29,21 @@ class Image:
 
 @dataclass(frozen=True)
 class BandEnd:
-    """What a band left.
+    """Result of a band.
 
     Attributes:
         image: the image.
-        skipped: whether held-out emitters ended the band, or one before it, so that it was left out.
-        history: a record for each image that was looked at; none of a band that was passed over or left out.
+        skipped: whether held-out emitters ended the band, or one before it, so that it was skipped.
+        history: a record for each evaluated image; empty for a band that was passed over or skipped.
     """
 
     image: Image
     skipped: bool
-    history: tuple[WavePass, ...]
+    history: tuple[Evaluation, ...]
 
     @property
     def held(self) -> float:
-        """Misfit of held-out emitters in that image; NaN where none was looked at."""
+        """Misfit of held-out emitters in that image; NaN where none was evaluated."""
         if not self.history:
             return math.nan
         judged = self.skipped or self.image.attenuation is not None
@@ -51,24 +51,24 @@ class BandEnd:
 
 
 @dataclass(frozen=True)
-class Entered:
+class ActiveBand:
     """The band under way, without its problem, which only tasks make.
 
     Attributes:
-        state: where it stands.
+        state: of the inversion.
         origin: of its grid, m.
-        emitters: how many there are to look at in each iteration.
+        emitters: how many are evaluated in each iteration.
         frozen: (nx, ny), the speed where the attenuation is refined, m/s; else None.
     """
 
-    state: WaveIterate
+    state: InversionState
     origin: tuple[float, float]
     emitters: int
     frozen: Floats | None = None
 
     @property
     def model(self) -> Model:
-        """What is to be looked at next."""
+        """The model to evaluate next."""
         if self.frozen is None:
             return Model(self.state.image)
         return Model(self.frozen, self.state.image)
@@ -84,11 +84,11 @@ class RefinementCheckpoint:
     """
 
     ends: tuple[BandEnd, ...]
-    band: Entered | None
+    band: ActiveBand | None
 
     @property
-    def state(self) -> WaveIterate | None:
-        """Where the band under way stands."""
+    def state(self) -> InversionState | None:
+        """State of the active band."""
         return None if self.band is None else self.band.state
 
     @property

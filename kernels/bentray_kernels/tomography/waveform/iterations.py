@@ -6,14 +6,14 @@ import math
 from collections.abc import Sequence
 
 from ..result import Sweep
-from .band_inversion import WavePass, given_by
+from .band_inversion import Evaluation, given_by
 from .waveform_settings import Band, WaveSettings
 
 
-def sweeps(
+def iteration_records(
     settings: WaveSettings,
     number: int,
-    history: Sequence[WavePass],
+    history: Sequence[Evaluation],
     index: int,
     stage: int,
     *,
@@ -21,7 +21,7 @@ def sweeps(
     skipped: bool,
     kept_s: float = math.nan,
 ) -> list[Sweep]:
-    """A record for each image that was looked at in a band.
+    """A record for each image that was evaluated in a band.
 
     Args:
         settings: how it is refined.

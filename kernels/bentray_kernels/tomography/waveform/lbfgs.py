@@ -8,11 +8,13 @@ import numpy as np
 
 from ...arrays import Floats
 
-# Changes of image and gradient that say less of the curvature than this, relative, are left out.
+# Pairs of changes of image and gradient with less relative curvature than this are left out.
 FLAT = 1e-10
 
 
-def direction(gradient: Floats, steps: Floats, changes: Floats, prior: Callable[[Floats], Floats]) -> Floats:
+def search_direction(
+    gradient: Floats, steps: Floats, changes: Floats, prior: Callable[[Floats], Floats]
+) -> Floats:
     """The gradient by the inverse curvature, to be subtracted (Nocedal & Wright 2006, algorithm 7.4).
 
     Args:
@@ -37,7 +39,7 @@ def direction(gradient: Floats, steps: Floats, changes: Floats, prior: Callable[
     return np.asarray(found)
 
 
-def remember(
+def append_pair(
     steps: Floats, changes: Floats, step: Floats, change: Floats, memory: int
 ) -> tuple[Floats, Floats]:
     """The pairs with one more, the oldest forgotten; unchanged where the curvature is not positive.

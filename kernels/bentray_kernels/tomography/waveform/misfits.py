@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays import Floats
 
 
-class Measure(Protocol):
+class Misfit(Protocol):
     """A misfit: its value, and (nrx, nt) its derivative by every sample of the simulated traces."""
 
     def __call__(self, simulated: Floats, recorded: Floats, weight: Floats) -> tuple[float, Floats]: ...
@@ -46,7 +46,7 @@ def correlation(simulated: Floats, recorded: Floats, weight: Floats) -> tuple[fl
     return float((1.0 - alike).sum() / count), np.where(alive[:, None], slope / count, 0.0)
 
 
-def around(arrival_s: Floats, times_s: Floats, before_s: float, after_s: float) -> Floats:
+def arrival_window(arrival_s: Floats, times_s: Floats, before_s: float, after_s: float) -> Floats:
     """A window about the predicted arrival of each trace, (nrx, nt): 1 inside, half a cosine at its ends.
 
     Args:

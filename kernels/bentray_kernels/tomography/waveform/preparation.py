@@ -14,7 +14,7 @@ from ...wave.points import REACH
 from ...wave.time_blocks import Poll, unheeded
 from ..roi import inside
 from .band_grid import Extent
-from .source_calibration import Mapping, WaterShots, levelled, sounded
+from .source_calibration import Mapping, WaterShots, with_calibrated_source, with_normalised_amplitudes
 from .trace_resampling import Clock, Water
 from .waveform_problem import WaveProblem
 from .waveform_settings import WaveSettings
@@ -74,8 +74,8 @@ def prepare(
     use &= np.isfinite(gain) & np.isfinite(water_gain)
     if dataset.valid is not None:
         use &= dataset.valid
-    used, held = _drawn(np.flatnonzero(use.any(axis=1)), settings, number)
-    traces, use = _alive(recorded, use, np.concatenate((used, held)))
+    used, held = _draw_emitters(np.flatnonzero(use.any(axis=1)), settings, number)
+    traces, use = _without_dead_traces(recorded, use, np.concatenate((used, held)))
     used, held = (some[use[some].any(axis=1)] for some in (used, held))
     if used.size == 0:
         raise InvalidInput(
@@ -90,7 +90,7 @@ def prepare(
         clock=clock,
         wavelet=np.zeros(clock.steps),
         water=Water(dataset.water_speed_mps),
-        likeness=0.0,
+        water_correlation=0.0,
         weight=use.astype(np.float64),
         arrival_s=dataset.distance_m() / dataset.water_speed_mps,
         traces=traces,
@@ -102,11 +102,13 @@ def prepare(
         poll=poll,
     )
     shots = WaterShots(recorded.water, water_gain, samples, settings.window_s)
-    found = sounded(problem, shots, run)
-    return found if band.of == "speed" else levelled(found, shots)
+    found = with_calibrated_source(problem, shots, run)
+    return found if band.of == "speed" else with_normalised_amplitudes(found, shots)
 
 
-def _alive(recorded: Waveform, use: Flags, emitters: Ints) -> tuple[dict[int, NDArray[Any]], Flags]:
+def _without_dead_traces(
+    recorded: Waveform, use: Flags, emitters: Ints
+) -> tuple[dict[int, NDArray[Any]], Flags]:
     """The object's traces of some emitters, and (ntx, nrx) the pairs to use without those of dead traces.
 
     The traces are copies, for an emission that is read may be part of a larger block.
@@ -120,10 +122,10 @@ def _alive(recorded: Waveform, use: Flags, emitters: Ints) -> tuple[dict[int, ND
     return found, use
 
 
-def _drawn(sounding: Ints, settings: WaveSettings, number: int) -> tuple[Ints, Ints]:
+def _draw_emitters(sounding: Ints, settings: WaveSettings, number: int) -> tuple[Ints, Ints]:
     """The emitters of a band, other ones in each, and those held out, the same in all.
 
-    The circle is cut into as many parts as emitters are wanted, and one is drawn from each.
+    The circle is cut into as many parts as emitters are requested, and one is drawn from each.
     """
     places = np.linspace(0, sounding.size, settings.held_out, endpoint=False).astype(np.int64)
     held = sounding[np.unique(places)] if sounding.size else sounding

@@ -19,20 +19,20 @@ from ..settings import Settings
 from .automatic_settings import scale_of, wave_settings
 from .inversion_state import BandEnd, Image
 from .refinement_graph import RefinementGraph, WaveScan, resampled
-from .validation import Judge, judging, passes
-from .waveform_cost import worth
+from .validation import ValidationGraph, evaluations, validation_settings
+from .waveform_cost import advice
 from .waveform_settings import WaveSettings
 
-# Makes what tells the calls of one slice their data.
+# Makes the scan in which the tasks of one slice find their data.
 WaveScanOf = Callable[[WaveSettings, int], WaveScan]
 
 
-class Following:
+class Refinement:
     """A refinement that is to come.
 
     Args:
         dataset: its traces may still lie in its file.
-        settings: as they were asked for.
+        settings: as requested.
         samples: of each trace of object and water; 0: none.
         scan_of: see ``WaveScanOf``.
 
@@ -55,7 +55,7 @@ class Following:
         self._whole_minutes = scale.minutes(settings)
         budget = -1.0 if settings.minutes is None else settings.minutes
         self.within_budget = scale.minutes(self._settings) <= budget
-        self.total = slices * sum(band.looks(self._plan.held_out) for band in self._plan.bands)
+        self.total = slices * sum(band.evaluations(self._plan.held_out) for band in self._plan.bands)
 
     def refined(self, rays: Reconstruction, run_graphs: Run, before: int) -> Reconstruction:
         """The image of the rays, refined slice after slice: the emitters of one are enough for many workers.
@@ -73,30 +73,34 @@ class Following:
             chains.append(RefinementGraph(scan, image, index, history, self._stage(rays)))
             run_graphs(chains[-1:], before + each * index, self.total - each * (index + 1))
             history = chains[-1].history
-        if self._settings.method == "auto" and not preferred(chains):
-            told = f"{_told(rays, self._plan, chains)}; not clearly better, so the image of the rays is given"
+        if self._settings.method == "auto" and not predicts_better(chains):
+            told = (
+                f"{_summary(rays, self._plan, chains)}; not clearly better, so the image of the rays is given"
+            )
             return replace(rays, history=history, provenance={**rays.provenance, "waveform": told})
         return self._result(rays, chains)
 
     @property
     def passes(self) -> int:
         """Emitter passes of ``advised``."""
-        return passes(self._plan)
+        return evaluations(self._plan)
 
     def advised(self, rays: Reconstruction, noise_s: float, run_graphs: Run, before: int) -> Reconstruction:
-        """The reconstruction with a sentence whether waves are advised, by what they miss through its image.
+        """The reconstruction with a sentence whether full-waveform refinement is advised.
 
         Args:
-            rays: the reconstruction, with its trials; of several slices the middle one is looked at.
+            rays: the reconstruction, with its trials; of several slices the middle one is validated.
             noise_s: standard deviation of the travel times, s.
             run_graphs: runs graphs to their end.
             before: emitter passes that were made.
         """
         images = _slices(rays, rays.speed)
         index = len(images) // 2
-        judge = Judge(self._scan_of(judging(self._plan), index), images[index], rays.history)
+        judge = ValidationGraph(
+            self._scan_of(validation_settings(self._plan), index), images[index], rays.history
+        )
         run_graphs([judge], before, 0)
-        told = worth(judge.judgement, rays.trials[0], noise_s, self._whole_minutes)
+        told = advice(judge.validation, rays.trials[0], noise_s, self._whole_minutes)
         return replace(rays, provenance={**rays.provenance, "waveform": told})
 
     def _stage(self, rays: Reconstruction) -> int:
@@ -139,12 +143,12 @@ class Following:
                 **rays.provenance,
                 "ray_numerics": rays.provenance["numerics"],
                 **recorded(self._settings.numerics),
-                "waveform": _told(rays, self._plan, chains),
+                "waveform": _summary(rays, self._plan, chains),
             },
         )
 
 
-def preferred(chains: Sequence[RefinementGraph]) -> bool:
+def predicts_better(chains: Sequence[RefinementGraph]) -> bool:
     """Whether held-out emitters are predicted clearly better by what waves made, over all slices.
 
     A band begins with the image that the one before left, so that what bands of the speed gain multiplies.
@@ -172,7 +176,7 @@ def _slices(rays: Reconstruction, values: NDArray[np.float64]) -> list[Image]:
     return [Image(np.ascontiguousarray(image), rays.spacing_m[0], origin) for image in every]
 
 
-def _told(rays: Reconstruction, plan: WaveSettings, chains: Sequence[RefinementGraph]) -> str:
+def _summary(rays: Reconstruction, plan: WaveSettings, chains: Sequence[RefinementGraph]) -> str:
     """What it began with and how each band predicted the emitters that were held out."""
     used = rays.settings
     text = f"begun from the image of {used.rays} rays ({used.method})"
@@ -181,11 +185,11 @@ def _told(rays: Reconstruction, plan: WaveSettings, chains: Sequence[RefinementG
         if ends:
             what = "attenuation (experimental), " if band.of == "attenuation" else ""
             corners = f"{1e-3 * band.low_hz:.0f} to {1e-3 * band.high_hz:.0f} kHz"
-            text += f"; {what}{corners}: {_band_told(ends)}"
+            text += f"; {what}{corners}: {_band_summary(ends)}"
     return text
 
 
-def _band_told(ends: Sequence[BandEnd]) -> str:
+def _band_summary(ends: Sequence[BandEnd]) -> str:
     """What a band gave, over all slices that reached it."""
     looked = [end for end in ends if end.history]
     if not looked:

@@ -13,15 +13,15 @@ from ...arrays import Floats
 from ...task_graph import Task
 from ..result import Sweep
 from . import band_inversion
-from .band_inversion import Look, Model, WaveIterate
-from .inversion_state import BandEnd, Entered, Image, RefinementCheckpoint
-from .iterations import sweeps
+from .band_inversion import EmitterMisfit, InversionState, Model
+from .inversion_state import ActiveBand, BandEnd, Image, RefinementCheckpoint
+from .iterations import iteration_records
 from .waveform_problem import WaveProblem
 from .waveform_settings import WaveSettings
 
 # A band whose water shots are simulated with a lower correlation than this with the recorded ones is passed
 # over: its waves are too long for the array and its absorbing edges, or were not sent.
-LEAST_LIKENESS = 0.9
+LEAST_CORRELATION = 0.9
 
 
 class WaveScan(Protocol):
@@ -59,9 +59,9 @@ class RefinementGraph:
     ) -> None:
         self._scan, self._start = scan, start
         self._index, self._earlier, self._stage = index, earlier, stage
-        self._sizes = [band.looks(scan.settings().held_out) for band in scan.settings().bands]
+        self._sizes = [band.evaluations(scan.settings().held_out) for band in scan.settings().bands]
         self.ends: tuple[BandEnd, ...] = ()
-        self._band: Entered | None = None
+        self._band: ActiveBand | None = None
         self._looks: dict[int, Any] = {}
         self.total = sum(self._sizes)
 
@@ -98,7 +98,7 @@ class RefinementGraph:
         for number, of_band in enumerate(passes):
             skipped = number < self.number and self.ends[number].skipped
             over = number < self.number
-            found += sweeps(
+            found += iteration_records(
                 self._scan.settings(),
                 number,
                 of_band,
@@ -117,7 +117,7 @@ class RefinementGraph:
 
     @property
     def checkpoint(self) -> RefinementCheckpoint:
-        """The state, without looks of an iteration that is not finished."""
+        """The state, without misfits of an iteration that is not finished."""
         return RefinementCheckpoint(self.ends, self._band)
 
     def restore(self, checkpoint: RefinementCheckpoint) -> None:
@@ -129,28 +129,28 @@ class RefinementGraph:
         if self.over:
             return []
         if self._band is None:
-            return [Task(enter, (self._scan, self.number, self.image))]
+            return [Task(start_band, (self._scan, self.number, self.image))]
         model = self._band.model
         return [
-            Task(look_at_waves, (self._scan, self.number, model, place), keep_on_worker=True)
+            Task(evaluate_emitter, (self._scan, self.number, model, place), keep_on_worker=True)
             for place in range(self._band.emitters)
         ]
 
     def after(self, task: Task, result: Any) -> list[Task]:
         """As ``task_graph.TaskGraph``."""
-        if task.function is enter:
+        if task.function is start_band:
             self._band = result
             if result is None:
                 self.ends = (*self.ends, BandEnd(self.image, skipped=False, history=()))
             return self.first()
         assert self._band is not None
-        if task.function is look_at_waves:
+        if task.function is evaluate_emitter:
             self._looks[task.arguments[-1]] = result
             if len(self._looks) < self._band.emitters:
                 return []
             # In the order of the emitters, never in that of their coming.
-            looks = [found for _, found in sorted(self._looks.items())]
-            return [Task(step_by_waves, (self._scan, self.number, self._band.state, looks))]
+            parts = [found for _, found in sorted(self._looks.items())]
+            return [Task(update_image, (self._scan, self.number, self._band.state, parts))]
         self._looks = {}
         self._band = replace(self._band, state=result)
         if result.done:
@@ -177,28 +177,30 @@ class RefinementGraph:
         return replace(last, attenuation=on_it)
 
 
-def enter(scan: WaveScan, number: int, image: Image) -> Entered | None:
-    """Task: what a band begins with; None where it is passed over, see ``LEAST_LIKENESS``."""
+def start_band(scan: WaveScan, number: int, image: Image) -> ActiveBand | None:
+    """Task: what a band begins with; None where it is passed over, see ``LEAST_CORRELATION``."""
     problem = scan.problem(number)
-    if problem.likeness < LEAST_LIKENESS:
+    if problem.water_correlation < LEAST_CORRELATION:
         return None
     speed, count = on_grid(image, problem), len(band_inversion.emitters(problem))
     if problem.band.of == "speed":
-        return Entered(band_inversion.begin(speed), problem.origin, count)
-    return Entered(band_inversion.begin(np.zeros_like(speed)), problem.origin, count, speed)
+        return ActiveBand(band_inversion.begin(speed), problem.origin, count)
+    return ActiveBand(band_inversion.begin(np.zeros_like(speed)), problem.origin, count, speed)
 
 
-def look_at_waves(scan: WaveScan, number: int, model: Model, place: int) -> Look:
+def evaluate_emitter(scan: WaveScan, number: int, model: Model, place: int) -> EmitterMisfit:
     """Task: one emitter's look at an image, by its place among the band's emitters."""
     problem = scan.problem(number)
-    return band_inversion.look(
+    return band_inversion.evaluate(
         problem, scan.settings(), model, band_inversion.emitters(problem)[place : place + 1]
     )
 
 
-def step_by_waves(scan: WaveScan, number: int, state: WaveIterate, looks: list[Look]) -> WaveIterate:
+def update_image(
+    scan: WaveScan, number: int, state: InversionState, parts: list[EmitterMisfit]
+) -> InversionState:
     """Task: the next image."""
-    return band_inversion.step(scan.problem(number), scan.settings(), state, looks)
+    return band_inversion.step(scan.problem(number), scan.settings(), state, parts)
 
 
 def on_grid(image: Image, problem: WaveProblem) -> Floats:

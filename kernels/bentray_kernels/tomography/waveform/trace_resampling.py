@@ -33,7 +33,7 @@ class Clock(NamedTuple):
     steps: int
 
 
-# Parts of the lower and the upper corner within which the filter falls to nothing, as half a cosine. What
+# Parts of the lower and the upper corner within which the filter falls to zero, as half a cosine. What
 # lies beyond the upper corner is carried worst by the grid: a fall over half of it left twice the misfit that
 # one over a quarter leaves, with the true image.
 RISE = 0.5

@@ -1,4 +1,4 @@
-"""Whether waves through an image agree with recorded ones, on emitters that no refinement begins with."""
+"""Held-out validation of an image: simulated against recorded traces, on emitters that no image uses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from ...task_graph import Task
 from ..result import Sweep
-from .band_inversion import Model, look
+from .band_inversion import Model, evaluate
 from .inversion_state import Image
 from .refinement_graph import WaveScan, on_grid
 from .waveform_settings import WaveSettings
@@ -16,17 +16,17 @@ from .waveform_settings import WaveSettings
 # The band of the continuation, from 1, that holds the middle of the pulse: there noise counts least.
 WHOLE = 3
 
-# Where water shots are simulated with a lower correlation than this nothing is said. Noise lowers it as well,
-# and less is asked than of a band that refines: images are held against each other, and all hear the noise.
-LEAST_LIKENESS = 0.7
+# Where water shots are simulated with a lower correlation than this there is no validation. Noise lowers it
+# too; the limit is lower than for a band that refines, because all compared images have the same noise.
+LEAST_CORRELATION = 0.7
 
-# Emitters whose water shots tell the pulse; those that judge are the settings' ``held_out``.
+# Emitters whose water shots calibrate the source; held-out ones are the settings' ``held_out``.
 SHOTS = 4
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """What waves say of an image; None where its water shots could not be simulated.
+class Validation:
+    """Misfits of an image; None where its water shots could not be simulated.
 
     Attributes:
         misfit: of held-out emitters through the image, a mean.
@@ -41,19 +41,19 @@ class Judgement:
 class ValidationCheckpoint:
     """State of a ``Judge``; see ``task_graph.Checkpoint``."""
 
-    state: Judgement | None
+    state: Validation | None
 
     @property
     def milestone(self) -> tuple[bool]:
         return (self.state is not None,)
 
 
-class Judge:
-    """The one task that judges an image; see ``task_graph.TaskGraph``.
+class ValidationGraph:
+    """The one task that validates an image; see ``task_graph.TaskGraph``.
 
     Args:
-        scan: with the settings of ``judging``.
-        image: to be judged.
+        scan: with the settings of ``validation_settings``.
+        image: to be validated.
         history: of what led to it.
 
     Attributes:
@@ -64,15 +64,15 @@ class Judge:
         self._scan, self._image = scan, image
         self.history = history
         self.checkpoint = ValidationCheckpoint(None)
-        self.total = passes(scan.settings())
+        self.total = evaluations(scan.settings())
 
     @property
     def done(self) -> int:
         return 0 if self.checkpoint.state is None else self.total
 
     @property
-    def judgement(self) -> Judgement:
-        """What waves say, once the call has been made."""
+    def validation(self) -> Validation:
+        """The misfits, once the task has run."""
         assert self.checkpoint.state is not None
         return self.checkpoint.state
 
@@ -82,30 +82,30 @@ class Judge:
 
     def first(self) -> list[Task]:
         """The call, unless it has been made."""
-        return [Task(judge_by_waves, (self._scan, self._image))] if self.checkpoint.state is None else []
+        return [Task(validate_image, (self._scan, self._image))] if self.checkpoint.state is None else []
 
-    def after(self, task: Task, result: Judgement) -> list[Task]:
+    def after(self, task: Task, result: Validation) -> list[Task]:
         """Nothing follows it."""
         self.checkpoint = ValidationCheckpoint(result)
         return []
 
 
-def judging(plan: WaveSettings) -> WaveSettings:
-    """The settings of a refinement in the one band that judges, of a few emitters."""
+def validation_settings(plan: WaveSettings) -> WaveSettings:
+    """The settings of a refinement in the one band of the validation, with a few emitters."""
     speed = [band for band in plan.bands if band.of == "speed"]
     return replace(plan, bands=(replace(speed[:WHOLE][-1], emitters=SHOTS),))
 
 
-def passes(settings: WaveSettings) -> int:
-    """Emitter passes of one judge."""
+def evaluations(settings: WaveSettings) -> int:
+    """Emitter passes of one validation."""
     return SHOTS + settings.held_out
 
 
-def judge_by_waves(scan: WaveScan, image: Image) -> Judgement:
-    """Task: what waves say of an image."""
+def validate_image(scan: WaveScan, image: Image) -> Validation:
+    """Task: the misfits of an image."""
     settings, problem = scan.settings(), scan.problem(0)
-    if problem.likeness < LEAST_LIKENESS or not problem.held.size:
-        return Judgement()
+    if problem.water_correlation < LEAST_CORRELATION or not problem.held.size:
+        return Validation()
     model = Model(np.clip(on_grid(image, problem), *settings.speed_bounds_mps))
-    held = look(problem, settings, model, problem.held).held / problem.held.size
-    return Judgement(held, 1.0 - problem.likeness)
+    held = evaluate(problem, settings, model, problem.held).held / problem.held.size
+    return Validation(held, 1.0 - problem.water_correlation)

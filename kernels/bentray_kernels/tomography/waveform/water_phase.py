@@ -15,7 +15,9 @@ WEAK = 0.05
 LEAST_PAIRS = 8
 
 
-def fitted(water: Water, distance: Floats, simulated: Floats, recorded: Floats, time_step_s: float) -> Water:
+def fit_water(
+    water: Water, distance: Floats, simulated: Floats, recorded: Floats, time_step_s: float
+) -> Water:
     """The water in which simulated traces would have the phases of the recorded ones.
 
     At each frequency the phase between the two is a straight line over distance, whose slope is the error of

@@ -6,19 +6,19 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from .. import checkpoint
-from .band_inversion import WaveIterate, WavePass
-from .inversion_state import BandEnd, Entered, Image, RefinementCheckpoint
-from .validation import Judgement, ValidationCheckpoint
+from .band_inversion import Evaluation, InversionState
+from .inversion_state import ActiveBand, BandEnd, Image, RefinementCheckpoint
+from .validation import Validation, ValidationCheckpoint
 
 RECORDS = (
     RefinementCheckpoint,
     BandEnd,
-    Entered,
+    ActiveBand,
     Image,
-    WaveIterate,
-    WavePass,
+    InversionState,
+    Evaluation,
     ValidationCheckpoint,
-    Judgement,
+    Validation,
 )
 
 TYPES: Mapping[str, type] = MappingProxyType(

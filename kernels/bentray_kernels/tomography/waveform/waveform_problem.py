@@ -13,7 +13,7 @@ from ...arrays import Flags, Floats, Ints
 from ...wave.adjoint import stored_bytes
 from ...wave.medium import Medium
 from ...wave.time_blocks import Poll, unheeded
-from .misfits import around
+from .misfits import arrival_window
 from .trace_resampling import Clock, Water
 from .waveform_settings import Band
 
@@ -31,14 +31,14 @@ class WaveProblem:
         clock: of the simulator.
         wavelet: (steps,), the source.
         water: as the water shots have it.
-        likeness: mean correlation of simulated with recorded water shots.
+        water_correlation: mean correlation of simulated with recorded water shots.
         weight: (ntx, nrx), 1 for the pairs that are used, else 0.
         arrival_s: (ntx, nrx), predicted, s.
         traces: of the object by emitter, (nrx, nt) each, as recorded; of those used and held.
         gain: (ntx, nrx), pressure per count of each trace; for the attenuation such that the water shots of
             each pair have the amplitude that is simulated.
         sampler: (nt, steps), see ``resampler``.
-        used, held: emitters that make the image, and that only judge.
+        used, held: emitters that make the image, and held-out ones.
         every: time steps from one stored field to the next.
         poll: of its simulations, see ``time_blocks``.
     """
@@ -51,7 +51,7 @@ class WaveProblem:
     clock: Clock
     wavelet: Floats
     water: Water
-    likeness: float
+    water_correlation: float
     weight: Floats
     arrival_s: Floats
     traces: Mapping[int, NDArray[Any]]
@@ -67,22 +67,22 @@ class WaveProblem:
         return Medium.of(speed, self.band.spacing_m, self.clock.step_s, attenuation=attenuation)
 
     @property
-    def look_bytes(self) -> int:
-        """Bytes of wave field that one emitter's look keeps; as many looks may run at once as fit."""
+    def evaluation_bytes(self) -> int:
+        """Bytes of wave field that the evaluation of one emitter keeps; as many may run at once as fit."""
         still = self.medium(np.full(self.region.shape, self.water.speed))
         return stored_bytes(still, self.clock.steps, self.every)
 
-    def recorded(self, emitter: int, heard: Ints) -> Floats:
-        """Traces of some receivers in the simulator's time, (heard, steps)."""
-        sampled = self.traces[emitter][heard] @ self.sampler
-        return np.asarray(self.gain[emitter][heard][:, None] * sampled, dtype=np.float64)
+    def recorded(self, emitter: int, receivers: Ints) -> Floats:
+        """Traces of some receivers in the simulator's time, (receivers, steps)."""
+        sampled = self.traces[emitter][receivers] @ self.sampler
+        return np.asarray(self.gain[emitter][receivers][:, None] * sampled, dtype=np.float64)
 
-    def heard(self, emitter: int) -> Ints:
+    def valid_receivers(self, emitter: int) -> Ints:
         """Receivers whose traces of an emitter are used."""
         return np.flatnonzero(self.weight[emitter] > 0.0)
 
-    def window(self, emitter: int, heard: Ints, reach_s: tuple[float, float]) -> Floats:
-        """Weight of each sample, (heard, steps): about the arrival, and fading before the record ends."""
+    def window(self, emitter: int, receivers: Ints, reach_s: tuple[float, float]) -> Floats:
+        """Weight of each sample, (receivers, steps): about the arrival, and fading before the record ends."""
         times = self.clock.begin_s + self.clock.step_s * np.arange(self.clock.steps, dtype=np.float64)
         ending = np.clip((times[-1] - times) * 0.5 * self.band.high_hz, 0.0, 1.0)
-        return np.asarray(around(self.arrival_s[emitter][heard], times, *reach_s) * ending)
+        return np.asarray(arrival_window(self.arrival_s[emitter][receivers], times, *reach_s) * ending)

@@ -9,7 +9,7 @@ from ...errors import InvalidInput
 from ...limits import SPACING_M, SPEED_MPS
 from ...ranges import SEED, Range, check_ranges, ranged
 from ...wave.simulation import Unknown
-from .misfits import Measure, correlation, least_squares
+from .misfits import Misfit, correlation, least_squares
 
 # Of a band, around those that every pulse of a scan asks for.
 CORNER_HZ = Range(1e2, 1e11, unit="Hz")
@@ -45,7 +45,7 @@ class Band:
         if self.low_hz >= self.high_hz:
             raise InvalidInput("band_hz", (self.low_hz, self.high_hz), "low_hz < high_hz, in Hz")
 
-    def looks(self, held_out: int) -> int:
+    def evaluations(self, held_out: int) -> int:
         """Looks of single emitters at images, the first one included; shortened steps take more."""
         return (self.iterations + 1) * (self.emitters + held_out)
 
@@ -147,6 +147,6 @@ class WaveSettings:
             return LOSS_STEPS
         return Steps(self.speed_bounds_mps, self.first_step_mps, self.largest_step_mps)
 
-    def measure(self, of: Unknown) -> Measure:
+    def measure(self, of: Unknown) -> Misfit:
         """What is made small to find speed or attenuation."""
         return correlation if of == "speed" else least_squares

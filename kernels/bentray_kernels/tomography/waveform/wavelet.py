@@ -7,11 +7,11 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import InvalidInput
 
-# Energy below this part of the strongest frequency's says nothing of the source.
+# Energy below this part of the strongest frequency's does not determine the source.
 NOISE = 1e-3
 
 
-def matched(wavelet: Floats, simulated: Floats, recorded: Floats) -> Floats:
+def fit_wavelet(wavelet: Floats, simulated: Floats, recorded: Floats) -> Floats:
     """The wavelet that makes simulated traces fit recorded ones best, by least squares at each frequency.
 
     Args:

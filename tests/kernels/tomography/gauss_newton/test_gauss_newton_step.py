@@ -11,7 +11,7 @@ from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
 from bentray_kernels.tomography.gauss_newton import gauss_newton_step
 from bentray_kernels.tomography.gauss_newton.linearisation import Rows
-from bentray_kernels.tomography.grid_schedule import start
+from bentray_kernels.tomography.grid_schedule import initial_slowness
 
 WATER = 1500.0
 PLAN = Settings(method="gauss-newton", nodes=24, iterations=9)
@@ -57,7 +57,7 @@ def rows(residual):
 
 def test_a_step_that_makes_the_misfit_grow_is_halved_and_then_given_up():
     of = problem(np.zeros((8, 8)))
-    states = [gauss_newton_step.begin(start(of, None))]
+    states = [gauss_newton_step.begin(initial_slowness(of, None))]
     misfits = [4e-7, 2e-7, 6e-7, 5e-7, 4e-7, 3e-7]
     for misfit in misfits:
         assert not states[-1].done
@@ -73,7 +73,7 @@ def test_a_step_that_makes_the_misfit_grow_is_halved_and_then_given_up():
 
 def test_a_halved_step_that_helps_goes_on():
     of = problem(np.zeros((8, 8)))
-    state = gauss_newton_step.begin(start(of, None))
+    state = gauss_newton_step.begin(initial_slowness(of, None))
     for misfit in (4e-7, 2e-7, 6e-7, 1e-7):
         state = gauss_newton_step.step(of, PLAN, state, [rows(misfit)])
     assert not state.done
@@ -84,7 +84,7 @@ def test_a_halved_step_that_helps_goes_on():
 def test_the_last_pass_measures_and_the_best_image_is_given():
     of = problem(np.zeros((8, 8)))
     plan = replace(PLAN, iterations=3)
-    states = [gauss_newton_step.begin(start(of, None))]
+    states = [gauss_newton_step.begin(initial_slowness(of, None))]
     for misfit in (4e-7, 2e-7, 1e-7):
         states.append(gauss_newton_step.step(of, plan, states[-1], [rows(misfit)]))
     assert [state.done for state in states] == [False, False, False, True]
@@ -101,7 +101,7 @@ def test_the_last_pass_measures_and_the_best_image_is_given():
 @pytest.mark.parametrize(("misfit", "given"), [(2.03e-7, 3), (2.05e-7, 2)])
 def test_of_images_that_miss_alike_the_last_is_given(misfit, given):
     of = problem(np.zeros((8, 8)))
-    state = gauss_newton_step.begin(start(of, None))
+    state = gauss_newton_step.begin(initial_slowness(of, None))
     for missed in (4e-7, 2e-7, misfit):
         before, state = state, gauss_newton_step.step(of, replace(PLAN, iterations=3), state, [rows(missed)])
     assert [sweep.sweep for sweep in state.history if sweep.given] == [given]
@@ -111,13 +111,13 @@ def test_of_images_that_miss_alike_the_last_is_given(misfit, given):
 def test_no_ray_through_the_image_leaves_water():
     of = problem(np.zeros((8, 8)))
     outside = Rows(np.array([0, 1]), np.array([0], np.int32), np.ones(1, np.float32), np.array([1e-7]), 1)
-    state = gauss_newton_step.step(of, PLAN, gauss_newton_step.begin(start(of, None)), [outside])
+    state = gauss_newton_step.step(of, PLAN, gauss_newton_step.begin(initial_slowness(of, None)), [outside])
     assert np.allclose(state.slowness, 1.0 / WATER)
 
 
 def test_nothing_gained_ends_too():
     of = problem(np.zeros((8, 8)))
-    state = gauss_newton_step.begin(start(of, None))
+    state = gauss_newton_step.begin(initial_slowness(of, None))
     for misfit in (4e-7, 2e-7, 1.99e-7, 1.98e-7):
         assert not state.done
         state = gauss_newton_step.step(of, PLAN, state, [rows(misfit)])
@@ -127,7 +127,7 @@ def test_nothing_gained_ends_too():
 def test_one_image_that_gains_nothing_may_come_before_better_ones():
     """As bent rays gave it on waves of 1 MHz: far less was missed after an image that missed as much."""
     of = problem(np.zeros((8, 8)))
-    state = gauss_newton_step.begin(start(of, None))
+    state = gauss_newton_step.begin(initial_slowness(of, None))
     # One that grows is halved, and counts for nothing.
     for misfit, idle in ((4e-7, 0), (2e-7, 0), (1.99e-7, 1), (2.1e-7, 1), (1.5e-7, 0), (1.49e-7, 1)):
         state = gauss_newton_step.step(of, PLAN, state, [rows(misfit)])

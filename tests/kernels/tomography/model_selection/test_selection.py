@@ -10,7 +10,7 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeSca
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings, Trial, reconstruct
-from bentray_kernels.tomography.gauss_newton.gauss_newton_step import look
+from bentray_kernels.tomography.gauss_newton.gauss_newton_step import trace_rays
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import (
     choose_finite_frequency,
     finite_frequency_candidates,
@@ -25,7 +25,7 @@ from bentray_kernels.tomography.model_selection.selection import (
     explain_trials,
 )
 from bentray_kernels.tomography.reconstruction import MemoryScan
-from bentray_kernels.tomography.stopping import noise_of, stopped
+from bentray_kernels.tomography.stopping import stop_at_noise, travel_time_noise
 
 WATER = 1375.0
 RING = Ring(48, 0.09)
@@ -95,7 +95,7 @@ def test_straight_times_ask_for_straight_rays(scan):
     axis = np.arange(48) * problem.spacing
     x, y = np.meshgrid(axis - axis.mean(), axis - axis.mean(), indexing="ij")
     image = 1.0 / (WATER + 100.0 * (np.hypot(x, y) < 0.05) + 60.0 * (np.hypot(x - 0.02, y) < 0.01))
-    rows = look(problem, straight, image, problem.sounding)
+    rows = trace_rays(problem, straight, image, problem.active_emitters)
     delta = np.full(scan.delta_tof_s.shape, np.nan)
     delta[np.isfinite(problem.delta_tof)] = problem.delta_tof[np.isfinite(problem.delta_tof)] - rows.residual
     for frequency in (None, 4e5):
@@ -179,25 +179,25 @@ def test_bent_rays_must_be_clearly_better():
 
 def test_noise_says_where_to_stop():
     chosen = trial("straight", 100e-9)
-    assert stopped(PLAN, chosen, 90e-9).numerics.stop_rms_s == pytest.approx(99e-9)
+    assert stop_at_noise(PLAN, chosen, 90e-9).numerics.stop_rms_s == pytest.approx(99e-9)
     # What predicts better than the noise estimate shows that there is less of it.
-    assert stopped(PLAN, chosen, 120e-9).numerics.stop_rms_s is None
+    assert stop_at_noise(PLAN, chosen, 120e-9).numerics.stop_rms_s is None
     asked = PLAN.changed(stop_rms_s=5e-9)
-    assert stopped(asked, chosen, 90e-9) == asked
+    assert stop_at_noise(asked, chosen, 90e-9) == asked
 
 
 def test_the_noise_is_told_or_estimated(scan):
-    clean = noise_of(scan)
+    clean = travel_time_noise(scan)
     random = np.random.default_rng(3)
     noisy = replace(scan, delta_tof_s=scan.delta_tof_s + random.normal(0.0, 3e-7, scan.delta_tof_s.shape))
     assert clean < 2.2e-7
-    assert 2.7e-7 < noise_of(noisy) < 4.5e-7
+    assert 2.7e-7 < travel_time_noise(noisy) < 4.5e-7
     told = replace(scan, sigma_s=np.full(scan.delta_tof_s.shape, 5e-8))
-    assert noise_of(told) == pytest.approx(5e-8)
+    assert travel_time_noise(told) == pytest.approx(5e-8)
     # A pair without a time says nothing, whatever its sigma.
     told.sigma_s[0, 1:] = 1.0
     gaps = replace(told, delta_tof_s=np.where(told.sigma_s < 1.0, told.delta_tof_s, np.nan))
-    assert noise_of(gaps) == pytest.approx(5e-8)
+    assert travel_time_noise(gaps) == pytest.approx(5e-8)
 
 
 def test_trials_are_coarser_and_speed_alone():

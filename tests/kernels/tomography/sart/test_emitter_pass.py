@@ -29,12 +29,12 @@ def moved(work, slowness, smoothing, relaxation=0.5):
 
 
 def test_what_the_image_explains_moves_nothing():
-    work = EmitterPass.over(SHAPE, len(RECEIVERS))
+    work = EmitterPass.for_grid(SHAPE, len(RECEIVERS))
     slowness = image()
     nothing = np.zeros(len(RECEIVERS))
-    predicted = -work.look(slowness, slowness, SPACING, SOURCE, RECEIVERS, nothing)
+    predicted = -work.trace(slowness, slowness, SPACING, SOURCE, RECEIVERS, nothing)
     moved(work, slowness, 1.0)
-    left = work.look(slowness, slowness, SPACING, SOURCE, RECEIVERS, predicted)
+    left = work.trace(slowness, slowness, SPACING, SOURCE, RECEIVERS, predicted)
     assert np.abs(left).max() < 1e-12
     after, coverage = moved(work, slowness, 1.0)
     assert np.allclose(after, slowness, rtol=1e-7)
@@ -45,8 +45,8 @@ def test_straight_rays_and_their_update_are_equation_1():
     slowness = image()
     rows = sensitivities(slowness, SPACING, RECEIVERS, SOURCE, kind="straight")
     measured = rows @ slowness.ravel() + 1e-7 * np.sin(np.arange(len(RECEIVERS)))
-    work = EmitterPass.over(SHAPE, len(RECEIVERS))
-    left = work.look(slowness, None, SPACING, SOURCE, RECEIVERS, measured)
+    work = EmitterPass.for_grid(SHAPE, len(RECEIVERS))
+    left = work.trace(slowness, None, SPACING, SOURCE, RECEIVERS, measured)
     truth = measured - rows @ slowness.ravel()
     # Two parts of a node are read there, one and a half nodes at once here.
     assert np.allclose(left, truth, atol=1e-9)
@@ -62,11 +62,11 @@ def test_straight_rays_and_their_update_are_equation_1():
 
 def test_looks_add_up_until_the_update():
     slowness = image()
-    work = EmitterPass.over(SHAPE, len(RECEIVERS))
+    work = EmitterPass.for_grid(SHAPE, len(RECEIVERS))
     for half in (slice(None, 8), slice(8, None)):
-        work.look(slowness, slowness, SPACING, SOURCE, RECEIVERS[half], np.full(len(RECEIVERS[half]), 6e-5))
+        work.trace(slowness, slowness, SPACING, SOURCE, RECEIVERS[half], np.full(len(RECEIVERS[half]), 6e-5))
     twice = moved(work, slowness, 1.0)
-    work.look(slowness, slowness, SPACING, SOURCE, RECEIVERS, np.full(len(RECEIVERS), 6e-5))
+    work.trace(slowness, slowness, SPACING, SOURCE, RECEIVERS, np.full(len(RECEIVERS), 6e-5))
     once = moved(work, slowness, 1.0)
     assert np.allclose(twice[0], once[0], rtol=1e-6)
     assert np.allclose(twice[1], once[1], rtol=1e-4, atol=1e-7)
@@ -75,7 +75,7 @@ def test_looks_add_up_until_the_update():
 @given(seed=st.integers(0, 99), smoothing=st.sampled_from([0.4, 1.0, 2.5, 20.0]))
 @settings(max_examples=10, deadline=None)
 def test_the_gaussian_is_that_of_scipy(seed, smoothing):
-    work = EmitterPass.over(SHAPE, 1)
+    work = EmitterPass.for_grid(SHAPE, 1)
     change = np.random.default_rng(seed).uniform(-1e-6, 1e-6, SHAPE)
     slowness = np.full(SHAPE, 1.0 / WATER)
     work.sums[0::2], work.sums[1::2] = change.ravel() * SPACING, 1.0
@@ -87,7 +87,7 @@ def test_the_gaussian_is_that_of_scipy(seed, smoothing):
 
 
 def test_bounds_hold_and_weights_sum_to_one():
-    work = EmitterPass.over(SHAPE, 1)
+    work = EmitterPass.for_grid(SHAPE, 1)
     work.sums[0::2], work.sums[1::2] = 1.0, 1.0
     after, _ = moved(work, image(), 1.0)
     assert after[REGION].max() == BOUNDS[1]

@@ -9,7 +9,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct
-from bentray_kernels.tomography.grid_schedule import start
+from bentray_kernels.tomography.grid_schedule import initial_slowness
 from bentray_kernels.tomography.sart.sart_step import advance, begin, emitter_order
 
 NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
@@ -38,10 +38,10 @@ def test_cutting_the_work_changes_no_bit(cuts):
     dataset = Dataset(ring.positions(), everyone, everyone, WATER, delta_tof_s=delta)
     wanted = Settings(nodes=24, iterations=2)
     problem = Problem.of(dataset, wanted)
-    whole = begin(start(problem, None))
+    whole = begin(initial_slowness(problem, None))
     while not whole.done:
         whole = advance(problem, wanted, whole, 10**6)
-    cut, k = begin(start(problem, None)), 0
+    cut, k = begin(initial_slowness(problem, None)), 0
     while not cut.done:
         cut = advance(problem, wanted, cut, cuts[k % len(cuts)])
         k += 1

@@ -9,7 +9,7 @@ import pytest
 from bentray_kernels.tomography.waveform.band_inversion import (
     MOST_SHORTENINGS,
     PATIENCE,
-    Look,
+    EmitterMisfit,
     begin,
     given_by,
     step,
@@ -30,7 +30,11 @@ def problem():
 def told(problem, misfit, held, seed=0):
     """A look of all emitters with a mean misfit and some gradient."""
     shape = problem.region.shape
-    return [Look(misfit * problem.used.size, held * problem.held.size, change(seed, shape), np.ones(shape))]
+    return [
+        EmitterMisfit(
+            misfit * problem.used.size, held * problem.held.size, change(seed, shape), np.ones(shape)
+        )
+    ]
 
 
 def first(problem):
@@ -94,7 +98,7 @@ def test_without_held_out_emitters_the_last_image_counts():
     for k in range(2):
         last = state.image
         shape = problem.region.shape
-        look = Look((1.0 - 0.1 * k) * problem.used.size, 0.0, change(k, shape), np.ones(shape))
+        look = EmitterMisfit((1.0 - 0.1 * k) * problem.used.size, 0.0, change(k, shape), np.ones(shape))
         state = step(problem, plan, state, [look])
     assert np.array_equal(state.image, last)
     assert given_by(state.history, judged=True) == 1

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.tomography.waveform.lbfgs import direction, remember
+from bentray_kernels.tomography.waveform.lbfgs import append_pair, search_direction
 
 from ....effort import effort
 
@@ -26,10 +26,10 @@ def test_a_quadratic_is_solved(seed):
         gradient = curvature @ (place - aim)
         if np.linalg.norm(gradient) < 1e-10:
             break
-        way = -direction(gradient.reshape(2, 3), steps, changes, same).ravel()
+        way = -search_direction(gradient.reshape(2, 3), steps, changes, same).ravel()
         assert way @ gradient < 0.0
         length = -(way @ gradient) / (way @ curvature @ way)
-        steps, changes = remember(
+        steps, changes = append_pair(
             steps, changes, (length * way).reshape(2, 3), (length * curvature @ way).reshape(2, 3), 6
         )
         place = place + length * way
@@ -39,13 +39,13 @@ def test_a_quadratic_is_solved(seed):
 def test_without_pairs_the_prior_decides():
     gradient = np.arange(6.0).reshape(2, 3)
     none = np.zeros((0, 2, 3))
-    assert np.array_equal(direction(gradient, none, none, lambda image: 3.0 * image), 3.0 * gradient)
+    assert np.array_equal(search_direction(gradient, none, none, lambda image: 3.0 * image), 3.0 * gradient)
 
 
 def test_only_so_many_pairs_are_kept_and_none_of_negative_curvature():
     steps = changes = np.zeros((0, 2, 3))
     for k in range(5):
-        steps, changes = remember(steps, changes, np.full((2, 3), k + 1.0), np.ones((2, 3)), 3)
+        steps, changes = append_pair(steps, changes, np.full((2, 3), k + 1.0), np.ones((2, 3)), 3)
     assert steps[:, 0, 0].tolist() == [3.0, 4.0, 5.0]
-    kept, _ = remember(steps, changes, np.ones((2, 3)), -np.ones((2, 3)), 3)
+    kept, _ = append_pair(steps, changes, np.ones((2, 3)), -np.ones((2, 3)), 3)
     assert kept is steps

@@ -54,7 +54,7 @@ def test_silent_traces_say_nothing():
 
 def test_window_holds_the_arrival_and_ends():
     times = np.arange(100.0)
-    found = misfits.around(np.array([40.0]), times, 20.0, 30.0)[0]
+    found = misfits.arrival_window(np.array([40.0]), times, 20.0, 30.0)[0]
     assert (found[26:62] == 1.0).all()
     assert not found[:20].any()
     assert not found[71:].any()

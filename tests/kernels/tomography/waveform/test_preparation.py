@@ -21,10 +21,10 @@ SETTINGS = WaveSettings(
 
 def test_water_shots_are_simulated_as_recorded():
     problem = prepare(scan(), SETTINGS, 0)
-    assert problem.likeness > 0.99
+    assert problem.water_correlation > 0.99
     assert abs(problem.water.lead) < 1e-3
     emitter = int(problem.held[0])
-    heard = problem.heard(emitter)
+    heard = problem.valid_receivers(emitter)
     medium = problem.medium(np.full(problem.region.shape, 1500.0))
     found = simulate(medium, problem.emitters[emitter], problem.receivers[heard], problem.wavelet)
     recorded = scan().waveform.water[emitter][heard] @ problem.sampler
@@ -59,7 +59,7 @@ def test_dead_traces_and_near_pairs_are_left_out():
     traces = data.waveform.object.copy()
     traces[3, 7] = 0.0
     problem = prepare(replace(data, waveform=replace(data.waveform, object=traces)), SETTINGS, 0)
-    assert 7 not in problem.heard(3)
+    assert 7 not in problem.valid_receivers(3)
     distance = data.distance_m()
     assert not (problem.weight * (distance < 0.012)).any()
 

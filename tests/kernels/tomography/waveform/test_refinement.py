@@ -9,11 +9,11 @@ import pytest
 from bentray_kernels.acquisition import pick
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings, Trial, reconstruct
-from bentray_kernels.tomography.waveform.band_inversion import WavePass
+from bentray_kernels.tomography.waveform.band_inversion import Evaluation
 from bentray_kernels.tomography.waveform.inversion_state import BandEnd, Image
-from bentray_kernels.tomography.waveform.refinement import preferred
-from bentray_kernels.tomography.waveform.validation import Judgement
-from bentray_kernels.tomography.waveform.waveform_cost import worth
+from bentray_kernels.tomography.waveform.refinement import predicts_better
+from bentray_kernels.tomography.waveform.validation import Validation
+from bentray_kernels.tomography.waveform.waveform_cost import advice
 
 from .scans import error, scan
 
@@ -71,11 +71,11 @@ def test_waves_are_advised_where_the_image_explains_less_than_water_does(rays):
 
 def test_without_waves_times_tell_whether_they_are_advised():
     missed = Trial({}, held_out_rms_s=100e-9, shown_rms_s=50e-9)
-    assert worth(Judgement(), missed, 10e-9, 3.4) == (
+    assert advice(Validation(), missed, 10e-9, 3.4) == (
         "method waveform is advised, for rays miss held-out times by 100 ns, whose noise is 10 ns; "
         "it takes about 3 minutes of a core"
     )
-    assert worth(Judgement(), missed, 80e-9, 0.2).startswith(
+    assert advice(Validation(), missed, 80e-9, 0.2).startswith(
         "method waveform would gain little, for rays miss"
     )
 
@@ -106,7 +106,7 @@ def test_what_bands_gain_multiplies(held, expected):
     image = Image(np.zeros((2, 2)), 1.0, (0.0, 0.0))
     ends = [BandEnd(image, skipped=False, history=())]
     for before, after in held:
-        passes = (WavePass(1.0, before, taken=True), WavePass(0.5, after, taken=True))
+        passes = (Evaluation(1.0, before, accepted=True), Evaluation(0.5, after, accepted=True))
         ends.append(BandEnd(image, skipped=False, history=passes))
-    assert preferred([SimpleNamespace(ends=ends)]) is expected
-    assert not preferred([SimpleNamespace(ends=ends[:1])])
+    assert predicts_better([SimpleNamespace(ends=ends)]) is expected
+    assert not predicts_better([SimpleNamespace(ends=ends[:1])])

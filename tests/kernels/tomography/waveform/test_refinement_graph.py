@@ -7,9 +7,9 @@ import numpy as np
 
 from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Sweep
-from bentray_kernels.tomography.waveform.band_inversion import WavePass
+from bentray_kernels.tomography.waveform.band_inversion import Evaluation
 from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
-from bentray_kernels.tomography.waveform.refinement_graph import RefinementGraph, on_grid, step_by_waves
+from bentray_kernels.tomography.waveform.refinement_graph import RefinementGraph, on_grid, update_image
 
 from .scans import SETTINGS, refined, scan, water
 
@@ -112,9 +112,9 @@ def test_after_a_stop_bands_of_the_speed_are_left_out_and_the_loss_is_not():
     (task,) = graph.first()
     graph.after(task, task.function(*task.arguments))
     state = replace(
-        graph.checkpoint.state, skipped=True, done=True, history=(WavePass(1.0, 1.0, taken=True),)
+        graph.checkpoint.state, skipped=True, done=True, history=(Evaluation(1.0, 1.0, accepted=True),)
     )
-    (task,) = graph.after(Task(step_by_waves, ()), state)
+    (task,) = graph.after(Task(update_image, ()), state)
     assert task.arguments[1] == 2
     assert [(end.skipped, len(end.history)) for end in graph.ends] == [(True, 1), (True, 0)]
     assert graph.done == sum((band.iterations + 1) * 10 for band in SETTINGS.bands[:2])

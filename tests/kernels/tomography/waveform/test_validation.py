@@ -11,13 +11,13 @@ from bentray_kernels.tomography.waveform.automatic_settings import scale_of, wav
 from bentray_kernels.tomography.waveform.inversion_state import Image
 from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.validation import (
-    LEAST_LIKENESS,
+    LEAST_CORRELATION,
     SHOTS,
-    Judge,
-    Judgement,
-    judge_by_waves,
-    judging,
-    passes,
+    Validation,
+    ValidationGraph,
+    evaluations,
+    validate_image,
+    validation_settings,
 )
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
@@ -40,22 +40,22 @@ def plan_for(data):
 @pytest.fixture(scope="module")
 def heard():
     data = scan()
-    return MemoryWaveScan(data, judging(plan_for(data)))
+    return MemoryWaveScan(data, validation_settings(plan_for(data)))
 
 
 def test_images_are_ranked_as_the_truth_ranks_them(heard):
-    found = [judge_by_waves(heard, image) for image in images()]
+    found = [validate_image(heard, image) for image in images()]
     assert [one.misfit for one in found] == sorted(one.misfit for one in found)
     assert found[1].misfit > 5.0 * found[0].misfit
-    assert {one.water for one in found} == {1.0 - heard.problem(0).likeness}
+    assert {one.water for one in found} == {1.0 - heard.problem(0).water_correlation}
     # Through the truth no more is left than in water, but for what the grid does to it.
     assert found[0].misfit < 3.0 * found[0].water
 
 
 def test_noise_counts_as_it_does_in_water():
     data = scan(seed=1, noise=0.1)
-    noisy = MemoryWaveScan(data, judging(plan_for(data)))
-    found = judge_by_waves(noisy, images()[0])
+    noisy = MemoryWaveScan(data, validation_settings(plan_for(data)))
+    found = validate_image(noisy, images()[0])
     assert 0.5 * found.water < found.misfit < 2.0 * found.water
 
 
@@ -63,25 +63,25 @@ def test_nothing_is_said_where_water_shots_cannot_be_simulated():
     data = scan()
     random = np.random.default_rng(0).normal(size=data.waveform.water.shape).astype(np.float32)
     deaf = replace(data, waveform=replace(data.waveform, water=random))
-    here = MemoryWaveScan(deaf, judging(plan_for(deaf)))
-    assert here.problem(0).likeness < LEAST_LIKENESS
-    assert judge_by_waves(here, images()[0]) == Judgement()
+    here = MemoryWaveScan(deaf, validation_settings(plan_for(deaf)))
+    assert here.problem(0).water_correlation < LEAST_CORRELATION
+    assert validate_image(here, images()[0]) == Validation()
 
 
 def test_few_emitters_are_read(heard):
     plan = heard.settings()
-    assert passes(plan) == SHOTS + plan.held_out
-    assert len(heard.problem(0).traces) == passes(plan)
+    assert evaluations(plan) == SHOTS + plan.held_out
+    assert len(heard.problem(0).traces) == evaluations(plan)
     assert [band.of for band in plan.bands] == ["speed"]
 
 
 def test_a_judge_goes_on_from_its_checkpoint(heard):
-    judge = Judge(heard, images()[1], ())
+    judge = ValidationGraph(heard, images()[1], ())
     (task,) = judge.first()
     assert (judge.done, judge.checkpoint.milestone) == (0, (False,))
     assert judge.after(task, task.function(*task.arguments)) == []
     assert judge.done == judge.total
-    again = Judge(heard, images()[1], ())
+    again = ValidationGraph(heard, images()[1], ())
     again.restore(unpack(*pack(judge.checkpoint), TYPES))
     assert again.first() == []
-    assert again.judgement == judge.judgement
+    assert again.validation == judge.validation

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.waveform.trace_resampling import Water
-from bentray_kernels.tomography.waveform.water_phase import fitted
+from bentray_kernels.tomography.waveform.water_phase import fit_water
 
 STEP, STEPS = 2.5e-7, 600
 DISTANCE = np.linspace(0.04, 0.16, 40)
@@ -25,11 +25,11 @@ def traces(water):
 @settings(max_examples=20, deadline=None)
 def test_lead_and_bend_are_found(lead, bend):
     plain, true = Water(1500.0), Water(1500.0, lead, bend)
-    found = fitted(plain, DISTANCE, traces(plain), traces(true), STEP)
+    found = fit_water(plain, DISTANCE, traces(plain), traces(true), STEP)
     assert found.lead == pytest.approx(lead, abs=2e-4)
     assert found.bend == pytest.approx(bend, abs=2e-15)
 
 
 def test_few_pairs_are_refused():
     with pytest.raises(InvalidInput, match="8 pairs"):
-        fitted(Water(1500.0), DISTANCE[:5], np.ones((5, 20)), np.ones((5, 20)), STEP)
+        fit_water(Water(1500.0), DISTANCE[:5], np.ones((5, 20)), np.ones((5, 20)), STEP)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography.waveform.wavelet import matched
+from bentray_kernels.tomography.waveform.wavelet import fit_wavelet
 
 
 def pulses(shift=0.0, width=4.0):
@@ -21,9 +21,9 @@ def test_the_wavelet_is_found_again():
     def heard(wavelet):
         return np.stack([np.convolve(row, wavelet)[:200] for row in green])
 
-    assert np.abs(matched(pulse, heard(pulse), heard(true)) - true).max() < 0.02
+    assert np.abs(fit_wavelet(pulse, heard(pulse), heard(true)) - true).max() < 0.02
 
 
 def test_silence_is_refused():
     with pytest.raises(InvalidInput, match="waveform/water"):
-        matched(pulses(), np.ones((3, 200)), np.zeros((3, 200)))
+        fit_wavelet(pulses(), np.ones((3, 200)), np.zeros((3, 200)))

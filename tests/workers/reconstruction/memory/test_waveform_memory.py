@@ -70,7 +70,7 @@ def test_more_of_anything_never_takes_less(bands, emissions, samples, width):
     # Beyond those that a band uses emissions do not count, but where they are read in blocks.
     many = wave_task_bytes(replace(traces, emissions=emissions + 64), width, settings)
     assert all(many[name] >= size for name, size in found.items())
-    assert emissions < 64 or many["look_at_waves"] == found["look_at_waves"]
+    assert emissions < 64 or many["evaluate_emitter"] == found["evaluate_emitter"]
     for other in (
         wave_task_bytes(replace(traces, receivers=traces.receivers + 64), width, settings),
         wave_task_bytes(replace(traces, samples=samples + 300), width, settings),
@@ -85,7 +85,7 @@ def test_what_auto_may_do_is_planned():
     """It judges by waves where there are traces, and refines where it is given minutes."""
     auto = Settings(method="auto")
     judged = wave_task_bytes(SCAN, 0.1, auto)
-    assert list(judged) == ["judge_by_waves"]
+    assert list(judged) == ["validate_image"]
     assert wave_task_bytes(SCAN, 0.1, replace(auto, minutes=1e4)) == wave_task_bytes(
         SCAN, 0.1, replace(auto, method="waveform")
     )

@@ -23,10 +23,10 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.waveform import refinement_graph as waves
 from bentray_kernels.tomography.waveform.automatic_settings import scale_of, wave_settings
-from bentray_kernels.tomography.waveform.band_inversion import WavePass
+from bentray_kernels.tomography.waveform.band_inversion import Evaluation
 from bentray_kernels.tomography.waveform.inversion_state import Image
 from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
-from bentray_kernels.tomography.waveform.validation import judge_by_waves, judging
+from bentray_kernels.tomography.waveform.validation import validate_image, validation_settings
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
 
@@ -75,22 +75,22 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     nothing = peak(lambda: None)
     fresh = MemoryWaveScan(dataset, plan)
     # Measured first, for what was read once stays.
-    found = {"enter": peak(lambda: waves.enter(fresh, number, start)) - nothing}
-    judged = MemoryWaveScan(dataset, judging(plan))
-    found["judge_by_waves"] = peak(lambda: judge_by_waves(judged, start)) - nothing
+    found = {"start_band": peak(lambda: waves.start_band(fresh, number, start)) - nothing}
+    judged = MemoryWaveScan(dataset, validation_settings(plan))
+    found["validate_image"] = peak(lambda: validate_image(judged, start)) - nothing
     here = MemoryWaveScan(dataset, plan)
-    entered = waves.enter(here, number, start)
+    entered = waves.start_band(here, number, start)
     assert entered is not None
     # As ``held`` counts the problem, and the traces that it holds.
     problem = here.problem(number)
     nothing = peak(lambda: None)
     image, model = entered.state.image, entered.model
 
-    def look() -> waves.Look:
-        return waves.look_at_waves(here, number, model, 0)
+    def look() -> waves.EmitterMisfit:
+        return waves.evaluate_emitter(here, number, model, 0)
 
     kept = held(problem, list(problem.traces.values()))
-    found["look_at_waves"] = kept + held(model) + peak(look) - nothing
+    found["evaluate_emitter"] = kept + held(model) + peak(look) - nothing
     looks = [look()] * entered.emitters
     random = np.random.default_rng(0)
     pairs = random.normal(size=(plan.memory, *image.shape))
@@ -100,11 +100,11 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
         illumination=np.ones_like(image),
         steps=pairs,
         changes=pairs.copy(),
-        history=(WavePass(1.0, 1.0, taken=True),),
+        history=(Evaluation(1.0, 1.0, accepted=True),),
     )
     copies = 2 * len(looks) * image.nbytes
-    found["step_by_waves"] = (
-        kept + held(state) + copies + peak(lambda: waves.step_by_waves(here, number, state, looks)) - nothing
+    found["update_image"] = (
+        kept + held(state) + copies + peak(lambda: waves.update_image(here, number, state, looks)) - nothing
     )
     return found
 

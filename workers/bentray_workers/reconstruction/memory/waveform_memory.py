@@ -12,7 +12,7 @@ from bentray_kernels.tomography.waveform.automatic_settings import (
 )
 from bentray_kernels.tomography.waveform.band_grid import Extent
 from bentray_kernels.tomography.waveform.source_calibration import SHOTS
-from bentray_kernels.tomography.waveform.validation import judging
+from bentray_kernels.tomography.waveform.validation import validation_settings
 from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings
 
 from ...files.dataset.counts import Traces
@@ -49,7 +49,7 @@ def wave_tasks(traces: Traces | None, width_m: float, settings: Settings) -> int
         return 0
     plan = _scale(traces, width_m).bands(settings)
     held_out = WaveSettings(plan).held_out
-    return sum(band.looks(held_out) + band.iterations + 2 for band in plan)
+    return sum(band.evaluations(held_out) + band.iterations + 2 for band in plan)
 
 
 def wave_task_bytes(traces: Traces | None, width_m: float, settings: Settings) -> dict[str, int]:
@@ -71,8 +71,8 @@ def wave_task_bytes(traces: Traces | None, width_m: float, settings: Settings) -
     if traces is None or not settings.selects_model:
         return {}
     plan = _scale(traces, width_m).bands(settings)
-    (judge,) = judging(WaveSettings(plan)).bands
-    found = {"judge_by_waves": _band_bytes(traces, width_m, settings, judge)["enter"]}
+    (judge,) = validation_settings(WaveSettings(plan)).bands
+    found = {"validate_image": _band_bytes(traces, width_m, settings, judge)["start_band"]}
     for band in plan if refines(settings) else ():
         for name, size in _band_bytes(traces, width_m, settings, band).items():
             found[name] = max(size, found.get(name, 0))
@@ -90,18 +90,18 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
     base = FLOOR_BYTES + kept
     medium = MEDIUM_BYTES * padded
     return {
-        "enter": base
+        "start_band": base
         + 2 * traces.read_bytes
         + max(SAMPLER_BYTES * traces.samples * extent.steps, SHOTS * SHOT_BYTES * samples)
         + medium
         + 12 * image,
-        "look_at_waves": base
+        "evaluate_emitter": base
         + 4 * extent.nodes**2 * -(-extent.steps // extent.every)
         + LOOK_BYTES * samples
         + medium
         + 4 * image,
         # The results of all emitters, and the L-BFGS pairs before and after.
-        "step_by_waves": base
+        "update_image": base
         + 2 * image * looks
         + 4 * WaveSettings((band,)).memory * image
         + STEP_BYTES * extent.nodes**2,
