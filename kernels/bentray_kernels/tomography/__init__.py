@@ -32,6 +32,10 @@ else:
                 return getattr(import_module(f".{module}", __name__), name)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
+    def __dir__() -> list[str]:
+        """The documentation is generated from this list."""
+        return __all__
+
 
 __all__ = [
     "RESIDUAL_EDGES_S",

@@ -137,7 +137,7 @@ def test_only_the_region_of_interest_may_change():
 def test_memory_of_a_look_is_known():
     problem = prepare(scan(), SETTINGS, 0)
     stored = -(-problem.clock.steps // problem.every)
-    assert problem.look_bytes == stored * problem.region.size * 4
+    assert problem.evaluation_bytes == stored * problem.region.size * 4
 
 
 @pytest.mark.parametrize("lacking", ["water", "all"])
