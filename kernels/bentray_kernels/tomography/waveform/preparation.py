@@ -122,16 +122,16 @@ def _without_dead_traces(
     return found, use
 
 
-def _draw_emitters(sounding: Ints, settings: WaveSettings, number: int) -> tuple[Ints, Ints]:
+def _draw_emitters(candidates: Ints, settings: WaveSettings, number: int) -> tuple[Ints, Ints]:
     """The emitters of a band, other ones in each, and those held out, the same in all.
 
     The circle is cut into as many parts as emitters are requested, and one is drawn from each.
     """
-    places = np.linspace(0, sounding.size, settings.held_out, endpoint=False).astype(np.int64)
-    held = sounding[np.unique(places)] if sounding.size else sounding
-    rest = np.setdiff1d(sounding, held)
+    places = np.linspace(0, candidates.size, settings.held_out, endpoint=False).astype(np.int64)
+    held = candidates[np.unique(places)] if candidates.size else candidates
+    rest = np.setdiff1d(candidates, held)
     if rest.size == 0:
-        raise InvalidInput("held_out", settings.held_out, f"fewer than the {sounding.size} emitters")
+        raise InvalidInput("held_out", settings.held_out, f"fewer than the {candidates.size} emitters")
     wanted = min(settings.bands[number].emitters, rest.size)
     edges = np.linspace(0, rest.size, wanted + 1)
     chance = np.random.default_rng((settings.seed, number)).random(wanted)
