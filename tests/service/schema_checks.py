@@ -11,7 +11,7 @@ from schemathesis.generation.meta import CoverageScenario
 from schemathesis.openapi.checks import RejectedPositiveData
 from schemathesis.specs.openapi.checks import negative_data_rejection, positive_data_acceptance
 
-from bentray_workers.simulation.request import OWN
+from bentray_workers.simulation.request import CONDITIONS
 
 # Pieces of uploads are bytes as they are.
 schemathesis.serializer.alias("application/offset+octet-stream", "application/octet-stream")
@@ -37,7 +37,7 @@ SETTINGS = {
     # Settings of a reconstruction that need or exclude another; the lower speed comes first.
     *("attenuation.focusing", "decomposition", "sart.speed_range_mps", "speed_bounds_mps"),
     # Settings that only some simulations have, or have in a narrower range; what is too large in all.
-    *OWN,
+    *CONDITIONS,
     *("coupling_mps", "elements", "nodes", "snr"),
 }
 DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {
