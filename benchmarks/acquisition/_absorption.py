@@ -1,4 +1,4 @@
-"""Traces through tissue that absorbs in proportion to the frequency; for scans, not for refinements."""
+"""Wave simulation with attenuation proportional to the frequency, for synthetic scans."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from bentray_kernels.compiled import kernel
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.wave.medium import EDGE_NODES, Medium
 from bentray_kernels.wave.points import Points
-from bentray_kernels.wave.simulation import placed
+from bentray_kernels.wave.simulation import place_elements
 from bentray_kernels.wave.stencil import HALO, longest_step, weights
 from bentray_kernels.wave.time_step import advance, inject, read
 
 
 @dataclass(frozen=True)
 class Absorbing:
-    """A medium whose compression follows the pressure with one relaxation, about one frequency.
+    """A medium with one relaxation process (standard linear solid) about one frequency.
 
-    The compressibility is (1 + D / (1 + i w T)) of the one that is too fast to relax (Debye; in mechanics
-    a standard linear solid, Zener). With T = 1 / (2 pi f0) the loss in a wavelength has its maximum at f0, so
-    that the attenuation grows as the frequency about it: within 3 % from 0.8 to 1.25 f0, 12 % from 0.6 to
-    1.65 f0. Being causal it is dispersive, as tissue is: speed and attenuation are those asked for at f0.
+    The compressibility is (1 + D / (1 + i w T)) times the unrelaxed one (Debye; Zener). With
+    T = 1 / (2 pi f0) the loss per wavelength has its maximum at f0, so that the attenuation grows in
+    proportion to the frequency about it: within 3 % from 0.8 to 1.25 f0, 12 % from 0.6 to 1.65 f0. The model
+    is causal and therefore dispersive, like tissue: speed and attenuation are exact at f0.
 
-    With x the part of the compression that lags, in units of the pressure,
+    With x the relaxing part of the compression, in units of the pressure,
 
         p'' + D/T p' - D/T^2 p + x/T^2 = c^2 (laplacian p + s),    T x' = D p - x
 
     so that a time step is that of ``Medium`` with other factors, less ``pull`` x.
 
     Attributes:
-        medium: of the fast speed c.
+        medium: of the unrelaxed speed c.
         pull, gain: (nx + 2 margin, ny + 2 margin), factors of x, and of the pressure in its next value.
         stay: factor of x in its next value.
     """
@@ -68,7 +68,7 @@ class Absorbing:
             dtype: of the fields.
 
         Raises:
-            InvalidInput: as ``Medium.of``; for a frequency that is none, an attenuation beyond its bounds.
+            InvalidInput: as ``Medium.of``; for an invalid frequency, an attenuation beyond its bounds.
         """
         if not 0.0 < frequency_hz < np.inf:
             raise InvalidInput("frequency_hz", frequency_hz, "a finite frequency > 0 Hz")
@@ -115,7 +115,7 @@ def simulate_absorbed(
     """Traces of a point source, as ``simulation.simulate`` gives them; releases the GIL.
 
     Args:
-        absorbing: to travel through.
+        absorbing: the medium.
         emitter: (2,), m, node 0 of the image at 0.
         receivers: (nrx, 2), m.
         wavelet: (nt,), a sample a time step.
@@ -129,9 +129,9 @@ def simulate_absorbed(
     """
     medium = absorbing.medium
     kind = medium.keep.dtype
-    source: Points = placed(medium, np.atleast_2d(emitter), wavelet)
-    heard = placed(medium, receivers)
-    traces = np.empty((len(heard.first), wavelet.size), kind)
+    source: Points = place_elements(medium, np.atleast_2d(emitter), wavelet)
+    detectors = place_elements(medium, receivers)
+    traces = np.empty((len(detectors.first), wavelet.size), kind)
     fields = np.zeros((3, *medium.keep.shape), kind)
     scale = float(np.abs(wavelet).max())
     _simulate(
@@ -147,8 +147,8 @@ def simulate_absorbed(
         weights(order).astype(kind),
         source.first[0],
         source.weights[0],
-        heard.first,
-        heard.weights,
+        detectors.first,
+        detectors.weights,
         (wavelet / scale).astype(kind),
         traces,
     )
@@ -170,14 +170,14 @@ def _simulate(
     weights: Any,
     first: Any,
     along: Any,
-    heard_first: Any,
-    heard_along: Any,
+    detector_first: Any,
+    detector_along: Any,
     wavelet: Any,
     traces: Any,
 ) -> None:
     for n in range(wavelet.size):
         for r in range(traces.shape[0]):
-            traces[r, n] = read(now, heard_first[r], heard_along[r])
+            traces[r, n] = read(now, detector_first[r], detector_along[r])
         advance(now, old, keep, fade, drive, weights)
         inject(old, drive, first, along, wavelet[n])
         _relax(now, old, lag, pull, gain, stay)
@@ -186,7 +186,7 @@ def _simulate(
 
 @kernel(inline="always")
 def _relax(now: Any, new: Any, lag: Any, pull: Any, gain: Any, stay: Any) -> None:
-    """Take the lagging part off the field after a step, then carry it on to that step's end."""
+    """Subtract the relaxing part from the field after a step, then advance it to the end of the step."""
     for i in range(HALO, now.shape[0] - HALO):
         here, there, late, pulled, gained = now[i], new[i], lag[i], pull[i], gain[i]
         for j in range(HALO, now.shape[1] - HALO):

@@ -16,27 +16,27 @@ from .fast_sweeping import Sweeper
 from .heap import DONE
 from .out_of_order import (
     LENGTH,
+    RESETS,
     SEED,
-    UNSETTLED,
     WAIT,
     Front,
+    accept_earlier,
     correct,
-    nothing_waiting,
-    settle_earlier,
+    empty_waiting,
     wait,
 )
 from .problem import Medium, PointSource
 from .updates import TIE, factored_update
 
-# The order of arrival is all that the first-order times are for; they need not settle to rounding.
+# First-order times only give the order of arrival; they need not converge to rounding.
 ORDER_TOLERANCE = 1e-3
 
-# First-order times order the nodes near the source badly, and all that follow inherit it. So where the speed
-# varies by no more than CONTRAST within RADIUS nodes, straight lines give the times there.
+# First-order times give a poor order near the source, which all later nodes inherit. Where the speed varies
+# by no more than CONTRAST within RADIUS nodes, times along straight lines are used there.
 RADIUS = 8
 CONTRAST = 1.5
 
-# A grid finer than this many times is a typing error.
+# Largest accepted refinement of the grid.
 FINEST = 8
 
 
@@ -44,14 +44,14 @@ def accurate(problem: PointSource, *, supersample: int = 1) -> Floats:
     """Factored second-order travel time without a heap.
 
     Fast sweeping gives the order in which the front arrives, a counting sort puts the nodes into that
-    order, and a pass of the update of ``hafmm`` follows it. Nodes that the order put before an earlier
-    neighbour are settled again in their turn: see ``out_of_order``. So every node is later than its earliest
+    order, and a pass of the update of ``hafmm`` follows it. Nodes that precede an earlier neighbour in that
+    order are recomputed: see ``out_of_order``. So every node is later than its earliest
     neighbour, and the times are those of ``hafmm``, up to its own error where speeds differ tenfold.
 
     Args:
         problem: the checked problem.
-        supersample: the medium is read off its cubic spline on a grid this many times as fine, and solved
-            there: with 2 the error falls to about a quarter for four (2-D) or eight (3-D) times the work.
+        supersample: the equation is solved on a grid this many times as fine, with the medium from its cubic
+            spline: with 2 the error falls to about a quarter for four (2-D) or eight (3-D) times the work.
 
     Returns:
         (nx, ny[, nz]), s.
@@ -147,7 +147,7 @@ def _pass(
     settled = np.full(slowness.size, math.inf)
     tau = np.ones(slowness.size)
     front = Front(steps, spacing, slowness, squares, tau, settled, limit, least)
-    waiting = nothing_waiting(slowness.size)
+    waiting = empty_waiting(slowness.size)
     place, numbers = waiting.place, waiting.numbers
     for k in range(seeds.size):
         place[seeds[k]] = SEED
@@ -159,9 +159,9 @@ def _pass(
             continue
         time = factored_update(node, steps, spacing, slowness, squares, tau, settled, limit, least)
         if numbers[LENGTH] > 0:
-            time = settle_earlier(node, time, front, waiting)
+            time = accept_earlier(node, time, front, waiting)
         if time == math.inf:
-            # The order puts it before all of its neighbours.
+            # In the given order it precedes all of its neighbours.
             wait(node, waiting)
             continue
         settled[node] = time
@@ -173,7 +173,7 @@ def _pass(
                 wrong |= later < settled[neighbour] < math.inf
         if wrong:
             correct(node, front, waiting)
-            if numbers[UNSETTLED] > slowness.size:
+            if numbers[RESETS] > slowness.size:
                 return settled, False
-    settle_earlier(-1, math.inf, front, waiting)
-    return settled, numbers[UNSETTLED] <= slowness.size
+    accept_earlier(-1, math.inf, front, waiting)
+    return settled, numbers[RESETS] <= slowness.size

@@ -1,13 +1,13 @@
-"""How much later than in a homogeneous medium a wave front arrives: factored sweeps of second order, in 2-D.
+"""Deviation of travel times from a homogeneous medium: additively factored second-order sweeping, 2-D.
 
 With the slowness s0 of the source and the distance r to it, T = s0·(r + u) (additive factoring: Luo & Qian
 2012). Only u is differenced, which is 0 in the water and smooth elsewhere; ∇r is known. The upwind
-neighbour of a node then stands at u − ∂r instead of at T, and everything else is as in ``fast_sweeping``:
-diagonals of independent nodes, so that the compiler fills its vectors. First-order sweeps, each over the
-quadrant that faces away from the source, settle u; second-order ones over a little more correct it.
+neighbour of a node then has u − ∂r in place of T, and everything else is as in ``fast_sweeping``: vectorised
+loops over diagonals of independent nodes. First-order sweeps, each over the quadrant that faces away from the
+source, compute u; second-order sweeps over a slightly larger region correct it.
 
-Made for tissue, whose slowness varies by tens of per cent, and for speed: lengths are in nodes, slowness is
-in units of s0, and 32 bits hold u to a few ten-thousandths of a node's crossing time.
+It is designed for tissue, whose slowness varies by tens of per cent, and for speed: lengths are in nodes,
+slowness is relative to s0, and float32 resolves u to a few ten-thousandths of a node's crossing time.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import kernel
+from ..float32 import lower
 from .diagonals import FIRST, Diagonals, move, turn
 
 Singles = NDArray[np.float32]
@@ -29,42 +30,43 @@ Box = tuple[int, int, int, int]
 ZERO, HALF, ONE, TWO = (np.float32(x) for x in (0.0, 0.5, 1.0, 2.0))
 THIRD, TWO_THIRDS, NINE_QUARTERS = (np.float32(x) for x in (1 / 3, 2 / 3, 9 / 4))
 
-# One over the sum of two squared weights, each 9/4 or 1: dividing would take as long as all the rest.
+# Reciprocals of the sum of two squared weights, each 9/4 or 1: a division would take as long as all the rest.
 FOUR_18THS, FOUR_13THS = np.float32(4 / 18), np.float32(4 / 13)
 
-# Nothing is known of a node; no front is ever as late, in crossing times of a node.
+# u of an unknown node: later than any front, in crossing times of a node.
 UNKNOWN = np.float32(1e6)
 
-# Nodes this near to the source are reached along straight lines.
+# Nodes this near to the source get the times of straight lines.
 SEEDED = np.float32(2.0)
 
-# Added to the square of a distance that divides.
+# Added to the square of a distance before division.
 TINY = np.float32(1e-12)
 
-# Where u bends by more than this from node to node, it has a kink, and the first order is the better one.
+# Second differences of u above this are a kink, at which first order is more accurate.
 KINK = np.float32(0.25)
 
-# Rows beyond the source that first-order sweeps of a quadrant take in, and part of the grid for second order.
+# Rows beyond the source in first-order sweeps of a quadrant, and fraction of the grid for second order.
 BEYOND = 2
 PART = 8
 
-# Sweeps of second order go on while one moves a node by more than this part of its crossing time, at most so
-# often; two rounds as narrow as ``PART`` says, the others over the whole grid. In tissue one is enough.
+# Second-order sweeps continue while one changes a node by more than this fraction of its crossing time, for
+# at most so many rounds; two rounds are restricted by ``PART``, the others cover the grid. In tissue one
+# suffices.
 SETTLED = np.float32(0.5)
 ROUNDS = 8
 
 
-class Sheets(NamedTuple):
-    """The arrays that sweeps work in, stored by diagonals; [0] the grid as it is, [1] with j flipped.
+class SweepArrays(NamedTuple):
+    """The arrays of the sweeps, stored by diagonals; [0] the original grid, [1] with j flipped.
 
     Attributes:
-        later: u.
+        deviation: u.
         slope_j, slope_k: ∇r.
         crossing: slowness.
         shape, stored: as in ``Diagonals``.
     """
 
-    later: Singles
+    deviation: Singles
     slope_j: Singles
     slope_k: Singles
     crossing: Singles
@@ -72,56 +74,56 @@ class Sheets(NamedTuple):
     stored: tuple[int, int]
 
 
-def sheets(shape: tuple[int, ...]) -> Sheets:
-    """For grids of that shape; used again from solve to solve."""
+def allocate_sweep_arrays(shape: tuple[int, ...]) -> SweepArrays:
+    """Allocate the arrays for grids of that shape; used again for every solve."""
     grid = Diagonals.of(shape)
-    later, slope_j, slope_k, crossing = np.full((4, 2, grid.size), UNKNOWN, np.float32)
-    return Sheets(later, slope_j, slope_k, crossing, grid.shape, grid.stored)
+    u, slope_j, slope_k, crossing = np.full((4, 2, grid.size), UNKNOWN, np.float32)
+    return SweepArrays(u, slope_j, slope_k, crossing, grid.shape, grid.stored)
 
 
 @kernel
-def deviate(slowness: Singles, j: float, k: float, at: Sheets, into: Singles) -> None:
-    """Fill ``into`` (nodes,) with u from a source at (j, k), nodes.
+def deviate(slowness: Singles, j: float, k: float, at: SweepArrays, out: Singles) -> None:
+    """Fill ``out`` (nodes,) with u from a source at (j, k), nodes.
 
     Args:
         slowness: (nodes,), 1 at the source.
-        at: from ``sheets``.
+        at: from ``allocate_sweep_arrays``.
     """
     _, nj, nk = at.shape
     for side in range(2):
         move(slowness, at.crossing[side], at.shape, at.stored, side == 1, np.float32(1.0), False, False)
-        _point(np.float32(j if side == 0 else nj - 1 - j), np.float32(k), side, at)
-        _seed(slowness, np.float32(j), np.float32(k), side, at)
+        _fill_directions(np.float32(j if side == 0 else nj - 1 - j), np.float32(k), side, at)
+        _fix_source(slowness, np.float32(j), np.float32(k), side, at)
     moved = 1
     for sweeps in range(ROUNDS + 1):
         if not moved:
             break
         moved = 0
-        beyond = BEYOND if sweeps == 0 else max(nj, nk) // PART
+        margin = BEYOND if sweeps == 0 else max(nj, nk) // PART
         if sweeps > 2:
-            beyond = max(nj, nk)
-        low_k, high_k = max(1, int(k) + 1 - beyond), min(nk, int(k) + 2 + beyond)
+            margin = max(nj, nk)
+        low_k, high_k = max(1, int(k) + 1 - margin), min(nk, int(k) + 2 + margin)
         for side in range(2):
             middle = int(j) + 1 if side == 0 else nj - 1 - int(j)
-            low_j, high_j = max(1, middle - beyond), min(nj, middle + 1 + beyond)
+            low_j, high_j = max(1, middle - margin), min(nj, middle + 1 + margin)
             for way in (1, -1):
                 box = (low_j, nj, low_k, nk) if way > 0 else (1, high_j, 1, high_k)
                 if sweeps == 0:
-                    _settle(box, way, side, at)
+                    _sweep_first_order(box, way, side, at)
                     moved = 1
                 else:
-                    moved |= _correct(box, way, side, at)
+                    moved |= _sweep_second_order(box, way, side, at)
             if side == 0 or sweeps < ROUNDS:
-                turn(at.later[side], at.later[1 - side], at.shape, at.stored)
-    move(into, at.later[0], at.shape, at.stored, False, np.float32(1.0), False, True)
+                turn(at.deviation[side], at.deviation[1 - side], at.shape, at.stored)
+    move(out, at.deviation[0], at.shape, at.stored, False, np.float32(1.0), False, True)
 
 
 @kernel
-def _point(j: np.float32, k: np.float32, side: int, at: Sheets) -> None:
-    """∇r at every node, of whose u nothing is known."""
+def _fill_directions(j: np.float32, k: np.float32, side: int, at: SweepArrays) -> None:
+    """Fill ∇r, and u with the value of unknown nodes."""
     _, nj, nk = at.shape
     rows, width = at.stored
-    later, slope_j, slope_k = at.later[side], at.slope_j[side], at.slope_k[side]
+    u, slope_j, slope_k = at.deviation[side], at.slope_j[side], at.slope_k[side]
     for s in range(2, nj + nk + 1):
         first = max(1, s - nj)
         here = np.uint64(s % rows * width + first + FIRST - 1)
@@ -132,14 +134,14 @@ def _point(j: np.float32, k: np.float32, side: int, at: Sheets) -> None:
             inverse = ONE / np.sqrt(along * along + across * across + TINY)
             slope_j[here + x] = along * inverse
             slope_k[here + x] = across * inverse
-            later[here + x] = UNKNOWN
+            u[here + x] = UNKNOWN
 
 
 @kernel
-def _seed(slowness: Singles, j: np.float32, k: np.float32, side: int, at: Sheets) -> None:
-    """u around the source, at the mean slowness of both ends, to stay: ∇r, which turns there, is taken away.
+def _fix_source(slowness: Singles, j: np.float32, k: np.float32, side: int, at: SweepArrays) -> None:
+    """Fixed u around the source, from the mean slowness of both ends; ∇r, which is singular there, is NaN.
 
-    What compares with NaN is never earlier, so that sweeps leave such a node alone.
+    Comparisons with NaN are false, so that sweeps do not change such a node.
     """
     _, nj, nk = at.shape
     rows, width = at.stored
@@ -149,14 +151,14 @@ def _seed(slowness: Singles, j: np.float32, k: np.float32, side: int, at: Sheets
             distance = np.float32(math.sqrt((np.float32(a) - j) ** 2 + (np.float32(b) - k) ** 2))
             row = a if side == 0 else nj - 1 - a
             node = (row + b + 2) % rows * width + b + FIRST
-            at.later[side, node] = HALF * (slowness[a * nk + b] - ONE) * distance
+            at.deviation[side, node] = HALF * (slowness[a * nk + b] - ONE) * distance
             at.slope_j[side, node] = at.slope_k[side, node] = np.float32(math.nan)
 
 
 @kernel
-def _settle(box: Box, way: int, side: int, at: Sheets) -> None:
+def _sweep_first_order(box: Box, way: int, side: int, at: SweepArrays) -> None:
     """One first-order sweep: as ``fast_sweeping``, from neighbours at u ∓ ∂r."""
-    later, slope_j, slope_k, crossing = at.later[side], at.slope_j[side], at.slope_k[side], at.crossing[side]
+    u, slope_j, slope_k, crossing = at.deviation[side], at.slope_j[side], at.slope_k[side], at.crossing[side]
     rows, width = at.stored
     low, high = box[0] + box[2], box[1] + box[3]
     for turned in range(low, high + 1):
@@ -168,21 +170,21 @@ def _settle(box: Box, way: int, side: int, at: Sheets) -> None:
         after = np.uint64((s + 1) % rows * width + column)
         for x in range(np.uint64(min(box[3], s - box[0]) - first + 1)):
             along, across, rhs = slope_j[here + x], slope_k[here + x], crossing[here + x]
-            a = _less(later[before + x + np.uint64(1)] - along, later[after + x] + along)
-            b = _less(later[before + x] - across, later[after + x + np.uint64(1)] + across)
-            gap = _less(abs(a - b), rhs)
-            new = _less(a, b) + HALF * (gap + np.sqrt(TWO * rhs * rhs - gap * gap))
-            later[here + x] = _less(new, later[here + x])
+            a = lower(u[before + x + np.uint64(1)] - along, u[after + x] + along)
+            b = lower(u[before + x] - across, u[after + x + np.uint64(1)] + across)
+            gap = lower(abs(a - b), rhs)
+            new = lower(a, b) + HALF * (gap + np.sqrt(TWO * rhs * rhs - gap * gap))
+            u[here + x] = lower(new, u[here + x])
 
 
 @kernel
-def _correct(box: Box, way: int, side: int, at: Sheets) -> int:
+def _sweep_second_order(box: Box, way: int, side: int, at: SweepArrays) -> int:
     """One sweep of second order; returns 1 if a node moved by more than ``SETTLED``, else 0.
 
     Along each axis α·(u − base) with α = 3/2 and base = (4u1 − u2)/3 ∓ ⅔·∂r, or first order at kinks; then
     Σ α²·(u − base)² = s², or the earlier of the axes alone where that root lies before a base.
     """
-    later, slope_j, slope_k, crossing = at.later[side], at.slope_j[side], at.slope_k[side], at.crossing[side]
+    u, slope_j, slope_k, crossing = at.deviation[side], at.slope_j[side], at.slope_k[side], at.crossing[side]
     rows, width = at.stored
     low, high = box[0] + box[2], box[1] + box[3]
     one, two = np.uint64(1), np.uint64(2)
@@ -201,13 +203,13 @@ def _correct(box: Box, way: int, side: int, at: Sheets) -> int:
                 slope_j[here + x],
                 slope_k[here + x],
                 crossing[here + x],
-                later[here + x],
+                u[here + x],
             )
-            # All is read before anything is chosen, or there would be no vectors.
-            down, down_2 = later[before + x + one], later[before_2 + x + two]
-            up, up_2 = later[after + x], later[after_2 + x]
-            left, left_2 = later[before + x], later[before_2 + x]
-            right, right_2 = later[after + x + one], later[after_2 + x + two]
+            # All loads precede the selections: otherwise the loop is not vectorised.
+            down, down_2 = u[before + x + one], u[before_2 + x + two]
+            up, up_2 = u[after + x], u[after_2 + x]
+            left, left_2 = u[before + x], u[before_2 + x]
+            right, right_2 = u[after + x + one], u[after_2 + x + two]
             falls = down - along < up + along
             near, far = down if falls else up, down_2 if falls else up_2
             base_a, smooth_a = _base(old, near, far, -along if falls else along)
@@ -223,16 +225,16 @@ def _correct(box: Box, way: int, side: int, at: Sheets) -> int:
             root = both * rhs * rhs - square_a * square_b * gap * gap
             joint = square_a * base_a + square_b * base_b + np.sqrt(root if root > ZERO else ZERO)
             joint = joint * share
-            single = _less(
+            single = lower(
                 base_a + (TWO_THIRDS * rhs if smooth_a else rhs),
                 base_b + (TWO_THIRDS * rhs if smooth_b else rhs),
             )
             latest = base_a if base_a > base_b else base_b
             new = joint if (root > ZERO) & (joint >= latest) else single
-            # A correction is small; what is not would come from beyond the border.
+            # Corrections are small; large ones come from margin the border.
             new = new if new < old + ONE else old
             moved |= np.int32(1) if abs(new - old) > SETTLED * rhs else np.int32(0)
-            later[here + x] = new
+            u[here + x] = new
     return int(moved)
 
 
@@ -240,13 +242,8 @@ def _correct(box: Box, way: int, side: int, at: Sheets) -> int:
 def _base(
     old: np.float32, near: np.float32, far: np.float32, slope: np.float32
 ) -> tuple[np.float32, np.bool_]:
-    """Where the upwind difference along an axis starts from, and whether it is of second order."""
+    """Base of the upwind difference along an axis, and whether it is of second order."""
     fall = near - far
     smooth = abs(fall - (old - near)) < TWO * KINK
     second = near + fall * THIRD + slope * TWO_THIRDS
     return (second if smooth else near + slope), smooth
-
-
-@kernel(inline="always")
-def _less(a: np.float32, b: np.float32) -> np.float32:
-    return a if a < b else b

@@ -1,12 +1,12 @@
 """Grids stored by their diagonals, so that a Gauss–Seidel sweep runs along contiguous, independent nodes.
 
-A sweep in the order (+,+) may update all nodes of a diagonal j + k = s at once, for each has its neighbours
-on s − 1 and s + 1 (Detrixhe, Gibou & Min 2013). Here row ``s % rows`` holds diagonal s, column by k:
-neighbours are then one or no columns off in the row before and after, and the compiler fills its vectors.
-The orders (+,−) and (−,+) are the same in a grid whose j is flipped. A third axis is a stack of such planes.
+A sweep in the order (+,+) may update all nodes of a diagonal j + k = s at once, because their neighbours lie
+on s − 1 and s + 1 (Detrixhe, Gibou & Min 2013). Row ``s % rows`` holds diagonal s, column by k: neighbours
+are in the same or an adjacent column of the previous and next row, and the loop is vectorised. The orders
+(+,−) and (−,+) are the same in a grid with flipped j. A third axis is a stack of such planes.
 
-Border nodes carry a crossing time of infinity, so that no update lowers them; slots that hold no node stay
-at −∞, which keeps them from asking for updates.
+Border nodes have an infinite crossing time, so that no update lowers them; slots without a node stay at −∞,
+so that they never need an update.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from ..compiled import kernel
 
 Reals = NDArray[np.floating[Any]]
 
-# Nodes a run of updates is rounded up to; a multiple of what a vector holds.
+# Runs of updates are rounded up to a multiple of this many nodes; a multiple of the vector length.
 RUN = 8
 
-# A row holds the diagonals s and s + rows; this many slots keep a rounded run of one off the other.
+# A row holds the diagonals s and s + rows, separated by this many slots for rounded runs.
 GAP = 2 * RUN
 
 # Column of k = 1, the first of a run; the border and its border need two columns before it.
 FIRST = RUN
 
-# No column: above every column as a lowest one.
+# No column: larger than every column.
 NONE = 1 << 40
 
-# Fewer nodes than one in so many are copied one by one.
+# Below one changed node in this many, nodes are copied one by one.
 FEW = 3
 
-# Nodes of j and k that are moved at once; diagonals of such a patch stay in the cache.
-PATCH = (32, 64)
+# Nodes along j and k that are copied together; the diagonals of such a tile stay in the cache.
+TILE = (32, 64)
 
 
 class Columns(NamedTuple):
@@ -58,7 +58,7 @@ class Columns(NamedTuple):
 
 @dataclass(frozen=True)
 class Diagonals:
-    """How a padded grid of two or three axes lies in memory by diagonals.
+    """Memory layout of a padded grid of two or three axes by diagonals.
 
     Attributes:
         shape: (planes, nj, nk) without the border; planes is 0 for a grid of two axes.
@@ -112,12 +112,12 @@ class Diagonals:
 
     def turn_changed(self, source: Floats, into: Floats, changed: Columns) -> None:
         """As ``turn`` where no other nodes than ``changed`` differ."""
-        # Copied one by one, nodes cost more than patches of them do.
+        # Copying single nodes costs more per node than copying tiles.
         if _turn_some(source, into, changed.low, changed.high, self.shape, self.stored, self.size // FEW):
             return
         self.turn(source, into)
 
-    def nobody(self) -> Columns:
+    def no_columns(self) -> Columns:
         """An empty set of nodes."""
         _, nj, nk = self.shape
         return Columns(np.full((self.planes, nj + nk + 4), NONE), np.full((self.planes, nj + nk + 4), -1))
@@ -155,11 +155,11 @@ def move(
     origin = -rim * (line + 1 + (layer if planes else 0))
     for plane in range(rim if planes else 0, planes + 2 - rim if planes else 1):
         base = (plane + 1 if planes else 0) * rows * width
-        for some in range(rim, nj + 2 - rim, PATCH[0]):
-            for first in range(rim, nk + 2 - rim, PATCH[1]):
-                for j in range(some, min(some + PATCH[0], nj + 2 - rim)):
+        for some in range(rim, nj + 2 - rim, TILE[0]):
+            for first in range(rim, nk + 2 - rim, TILE[1]):
+                for j in range(some, min(some + TILE[0], nj + 2 - rim)):
                     k = first
-                    end = min(first + PATCH[1], nk + 2 - rim)
+                    end = min(first + TILE[1], nk + 2 - rim)
                     while k < end:
                         row = ((nj + 1 - j if flipped else j) + k) % rows
                         here = np.uint64(origin + plane * layer + j * line + k)
@@ -183,11 +183,11 @@ def turn(source: Reals, into: Reals, shape: tuple[int, int, int], stored: tuple[
     step = np.uint64(width + 1)
     for plane in range(planes + 2 if planes else 1):
         base = (plane + 1 if planes else 0) * rows * width
-        for some in range(0, nj + 2, PATCH[0]):
-            for first in range(0, nk + 2, PATCH[1]):
-                for j in range(some, min(some + PATCH[0], nj + 2)):
+        for some in range(0, nj + 2, TILE[0]):
+            for first in range(0, nk + 2, TILE[1]):
+                for j in range(some, min(some + TILE[0], nj + 2)):
                     k = first
-                    end = min(first + PATCH[1], nk + 2)
+                    end = min(first + TILE[1], nk + 2)
                     while k < end:
                         old = (j + k) % rows
                         new = (nj + 1 - j + k) % rows

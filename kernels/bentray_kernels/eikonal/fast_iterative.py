@@ -20,13 +20,13 @@ LISTED = 1
 def fast_iterative(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
     """Travel time by updating a list of active nodes until it is empty.
 
-    A node stays on the list while its time still falls. When it has settled it leaves, and lists those
-    of its neighbours whose times it lowers. No order is kept, so every node of the list could be
-    updated at once; ``fim-opencl`` does so.
+    A node stays on the list while its time falls. When it has converged it is removed, and those of its
+    neighbours whose times it lowers are added. The order of updates does not matter, so all nodes of the list
+    can be updated at once; ``fim-opencl`` does so.
 
     Args:
         problem: the checked problem.
-        tolerance: a fall by no more than this part of a node's own crossing time counts as settled.
+        tolerance: a decrease below this fraction of a node's own crossing time counts as converged.
 
     Returns:
         (nx, ny[, nz]), s; equal to first-order fast marching up to the tolerance.
@@ -37,7 +37,7 @@ def fast_iterative(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
     if not tolerance >= 0.0:
         raise InvalidInput("tolerance", tolerance, "a number >= 0")
     seeds, times = problem.seeds()
-    # The border counts as listed, so that nothing ever lists it.
+    # The border counts as listed, so that it is never added.
     listed = problem.places(OUT, LISTED)
     time = _iterate(
         problem.padded_slowness, listed, problem.strides, problem.spacing, seeds, times, tolerance
@@ -46,7 +46,7 @@ def fast_iterative(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
 
 
 @kernel(inline="always")
-def _renewed(node: int, strides: tuple[int, int, int], crossing: float, time: Floats) -> float:
+def _updated(node: int, strides: tuple[int, int, int], crossing: float, time: Floats) -> float:
     """The first-order time of a node from its neighbours as they are, or its own if none is earlier."""
     old = time[node]
     a = min(time[node - strides[0]], time[node + strides[0]])
@@ -84,7 +84,7 @@ def _iterate(
             node = active[k]
             crossing = spacing * slowness[node]
             old = time[node]
-            own = min(old, _renewed(node, steps, crossing, time))
+            own = min(old, _updated(node, steps, crossing, time))
             time[node] = own
             if old - own > tolerance * crossing:
                 following[kept] = node
@@ -99,7 +99,7 @@ def _iterate(
                     if listed[neighbour] == LISTED or before <= own:
                         continue
                     crossing = spacing * slowness[neighbour]
-                    after = _renewed(neighbour, steps, crossing, time)
+                    after = _updated(neighbour, steps, crossing, time)
                     if after < before:
                         time[neighbour] = after
                         if before - after > tolerance * crossing:

@@ -1,4 +1,4 @@
-"""The fast iterative method on an OpenCL device, or on the CPU where no device can be trusted."""
+"""The fast iterative method on an OpenCL device, or on the CPU where no device passes its self-test."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ def fast_iterative_opencl(problem: PointSource, *, tolerance: float = 1e-12) -> 
         (nx, ny[, nz]), s; equal to ``fim`` up to the tolerance.
 
     Raises:
-        InvalidInput: for a negative tolerance, or where ``BENTRAY_OPENCL_DEVICE`` names no one device.
+        InvalidInput: for a negative tolerance, or a ``BENTRAY_OPENCL_DEVICE`` that does not match one device.
 
     Warns:
-        OpenCLFallbackWarning: once, where no device passes its trial and ``fim`` computes instead.
+        OpenCLFallbackWarning: once, where no device passes its self-test and ``fim`` computes instead.
     """
     times = np.empty((1, *problem.slowness.shape))
     fast_iterative_opencl_many([problem], times, tolerance=tolerance)
@@ -39,13 +39,13 @@ def fast_iterative_opencl_many(
     """As ``fast_iterative_opencl`` for several problems of one shape and spacing, in the same launches.
 
     Args:
-        problems: as many as ``times`` has room for; each is solved bit for bit as if alone.
+        problems: as many as the batch of ``times``; each result is bit-for-bit that of a single solve.
         times: (batch, nx, ny[, nz]), s, C order; filled.
         tolerance: as in ``fim``.
     """
     if not tolerance >= 0.0:
         raise InvalidInput("tolerance", tolerance, "a number >= 0")
-    # Here, so that whoever never asks for OpenCL never loads it.
+    # Imported here, so that OpenCL is loaded only when it is used.
     from ..opencl.blocks import travel_times
     from ..opencl.choice import session_or_warning
 

@@ -11,20 +11,20 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from .heap import DONE, FAR, Nodes
 from .problem import PointSource
-from .untidy_queue import leave, wait
+from .untidy_queue import enter, take
 from .updates import TIE, plain_update
 
-# Buckets in the queue at most; media of great contrast get wider ones instead.
+# Most buckets in the queue; media of high contrast get wider ones.
 BUCKETS = 1 << 16
 
 
 def fast_marching_untidy(problem: PointSource, *, order: int = 2, width: float = 0.01) -> Floats:
-    """As ``fast_marching``, but nodes within ``width`` of each other leave the queue together.
+    """As ``fast_marching``, but nodes of one bucket of times take the queue together.
 
     Args:
         problem: the checked problem.
         order: 1 or 2.
-        width: bucket width as a part of the smallest crossing time, spacing times lowest slowness.
+        width: bucket width as a fraction of the smallest crossing time, spacing times lowest slowness.
 
     Returns:
         (nx, ny[, nz]), s. At order 1 between the time T of ``fast_marching`` and T·(1 + δ·√ndim/f), with the
@@ -40,10 +40,10 @@ def fast_marching_untidy(problem: PointSource, *, order: int = 2, width: float =
     if order not in (1, 2):
         raise InvalidInput("order", order, "1 or 2")
     seeds, times = problem.seeds()
-    # A little narrower, so that times that tie on an edge, as half a crossing does, are on one side of it.
+    # A little narrower, so that equal times at a bucket edge, such as half a crossing, fall on one side.
     bucket = _bucket_width(problem, width) * (1.0 - TIE)
-    # At order 1 no time in the queue is later than the current one by more than a crossing; the seeds, which
-    # lie in one cell, and order 2 get twice the room.
+    # At order 1 no time in the queue exceeds the current one by more than a crossing time; twice as many
+    # buckets serve the seeds, which lie in one cell, and order 2.
     buckets = int(2.0 * problem.spacing * problem.slowness.max() / bucket) + 3
     time = _march(
         problem.padded_slowness,
@@ -86,24 +86,24 @@ def _march(
     heads = np.zeros(buckets, np.int32)
     links = np.zeros((slowness.size, 2), np.int32)
     group = np.empty(slowness.size, np.int32)
-    waiting = 0
+    queued = 0
     for k in range(seeds.size):
         trials[seeds[k]] = seed_times[k]
-        waiting += wait(heads, links, place, width, seeds[k], seed_times[k])
+        queued += enter(heads, links, place, width, seeds[k], seed_times[k])
     latest = seed_times.min()
     bucket = int(latest / width) % buckets
-    while waiting > 0:
+    while queued > 0:
         while heads[bucket] == 0:
             bucket = bucket + 1 if bucket + 1 < buckets else 0
-        # What waits together is accepted together, so that the order within a bucket does not matter.
+        # Nodes of one bucket are accepted together, so that the order within it does not matter.
         members = 0
         while heads[bucket] != 0:
-            node = leave(heads, links, place, bucket)
+            node = take(heads, links, place, bucket)
             group[members] = node
             members += 1
             settled[node] = trials[node]
             latest = max(latest, trials[node])
-        waiting -= members
+        queued -= members
         for k in range(members):
             node = group[k]
             for axis in range(3):
@@ -117,5 +117,5 @@ def _march(
                     if trial < trials[neighbour]:
                         trials[neighbour] = trial
                         # A second-order time may fall behind the bucket that was emptied.
-                        waiting += wait(heads, links, place, width, neighbour, max(trial, latest))
+                        queued += enter(heads, links, place, width, neighbour, max(trial, latest))
     return settled

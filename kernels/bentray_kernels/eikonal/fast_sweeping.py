@@ -1,8 +1,8 @@
 """Fast sweeping: first-order Gauss–Seidel in the alternating orders (Zhao 2005; chapter 7.2.2).
 
-Two things make it fast. The nodes of a diagonal are independent of each other in a sweep, so whole vectors
-of them are updated at once (see ``diagonals``). And a node is updated only after a neighbour gave one of its
-axes an earlier time (locking: Bak, McLaughlin & Renzi 2010): what is skipped would change nothing.
+The nodes of a diagonal are independent of each other in a sweep, so whole vectors of them are updated at once
+(see ``diagonals``). A node is updated only after a neighbour has received an earlier time (locking: Bak,
+McLaughlin & Renzi 2010); skipped updates would change nothing.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from ..float32 import higher, lower
 from .diagonals import FIRST, NONE, RUN, Columns, Diagonals, include
 from .problem import PointSource
 
-# First and last changed node of a run, the same of those whose change the nodes just left must hear of
-# (diagonal, then plane), and whether a change was above the tolerance.
+# First and last changed node of a run; first and last node whose change affects the nodes of the previous
+# diagonal, then of the previous plane; whether a change exceeds the tolerance.
 Outcome = tuple[int, int, int, int, int, int, int]
 
 
@@ -67,11 +67,11 @@ def fast_sweeping(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
 def fast_sweeping_many(problems: Iterable[PointSource], times: Floats, *, tolerance: float = 1e-12) -> None:
     """As ``fast_sweeping`` for problems of one shape, in the same working arrays one after the other.
 
-    Sixteen solves in lockstep, with a lane of the vectors for each, took twice the time at 256²: their arrays
-    leave the cache, and no lane can skip what only another has to update.
+    Sixteen solves in lockstep, one vector lane each, took twice the time at 256²: their arrays do not fit the
+    cache, and no lane can skip updates that another one needs.
 
     Args:
-        problems: as many as ``times`` has room for.
+        problems: as many as the batch of ``times``.
         times: (batch, nx, ny[, nz]), s, C order; filled.
         tolerance: as for ``fast_sweeping``.
     """
@@ -83,24 +83,23 @@ def fast_sweeping_many(problems: Iterable[PointSource], times: Floats, *, tolera
 
 
 class Sweeper:
-    """The arrays that sweeps over grids of one shape work in, used again from solve to solve."""
+    """The arrays of sweeps over grids of one shape, used again for every solve."""
 
     def __init__(self, shape: tuple[int, ...]) -> None:
         self._grid = Diagonals.of(shape)
         self._sweep = _sweep_3d if len(shape) == 3 else _sweep_2d
-        # One block: freed ones of this size are kept by the allocator, smaller ones given back each time.
+        # One block: the allocator keeps freed blocks of this size, and returns smaller ones to the system.
         arrays = np.empty((5, self._grid.size))
         arrays[:3].fill(-math.inf)
         arrays[3:].fill(math.inf)
         self._times = arrays[0], arrays[1]
-        # Nothing is known of any node.
         self._unknown = arrays[2]
         self._grid.store(np.full(math.prod(n + 2 for n in shape), math.inf), self._unknown, False)
         self._crossings = arrays[3], arrays[4]
-        # Nodes that wait for an update, in either grid, and those that the last sweeps changed.
-        self._waiting = self._grid.nobody(), self._grid.nobody()
-        self._changed = self._grid.nobody()
-        # Of which slowness and spacing the crossing times are, in the grid as it is and in the flipped one.
+        # Nodes waiting for an update, in either grid, and nodes changed by the last sweeps.
+        self._waiting = self._grid.no_columns(), self._grid.no_columns()
+        self._changed = self._grid.no_columns()
+        # Slowness and spacing of the stored crossing times, in the original and in the flipped grid.
         self._stored: list[tuple[Floats, float] | None] = [None, None]
 
     def solve(self, problem: PointSource, tolerance: float, into: Floats) -> None:
@@ -112,10 +111,10 @@ class Sweeper:
         self._grid.load(into.reshape(-1), self._times[side], side == 1, border=False)
 
     def settle(self, time: Floats, slowness: Floats, spacing: float, tolerance: float, nodes: Ints) -> None:
-        """Sweep ``time`` in place until it is settled; its border stands for what lies beyond.
+        """Sweep ``time`` in place until it has converged; its border holds the times outside.
 
         Args:
-            time: flat and padded, s; infinity where nothing is known.
+            time: flat and padded, s; infinity where unknown.
             slowness: (nx, ny[, nz]), s/m, C order.
             spacing: node spacing, m.
             tolerance: as for ``fast_sweeping``.
@@ -126,7 +125,7 @@ class Sweeper:
         self._grid.load(time, self._times[side], side == 1)
 
     def _until_settled(self, slowness: Floats, spacing: float, tolerance: float, nodes: Ints) -> int:
-        """Sweep until nothing waits; returns which of the two grids holds the times."""
+        """Sweep until no node is waiting; returns which of the two grids holds the times."""
         grid = self._grid
         grid.neighbours(nodes, self._waiting[0])
         quiet = 0
@@ -150,7 +149,7 @@ class Sweeper:
         raise AssertionError
 
     def _crossing(self, side: int, slowness: Floats, spacing: float) -> Floats:
-        """Crossing times of the nodes by diagonals, kept from the last solve where they are the same."""
+        """Crossing times of the nodes by diagonals; those of the last solve if they are the same."""
         stored = self._stored[side]
         if stored is None or stored[1] != spacing or not _same(stored[0], slowness):
             self._grid.store(
@@ -179,7 +178,7 @@ def _sweep_3d(grid: Grid, tolerance: float) -> int:
     for up in (1, -1):
         for step in range(grid.shape[0]):
             plane = 2 + step if up > 0 else grid.shape[0] + 1 - step
-            # Both ways while the plane is in the cache.
+            # Both orders while the plane is in the cache.
             for way in (1, -1):
                 moved |= _sweep_plane(grid, tolerance, plane, way, up)
     return moved
@@ -187,7 +186,7 @@ def _sweep_3d(grid: Grid, tolerance: float) -> int:
 
 @kernel
 def _sweep_plane(grid: Grid, tolerance: float, plane: int, way: int, up: int) -> int:
-    """Update the diagonals of a plane that wait for it, in rising (``way`` 1) or falling (−1) order.
+    """Update the waiting diagonals of a plane, in rising (``way`` 1) or falling (−1) order.
 
     Columns that change are added to ``grid.changed``, their later neighbours to ``grid.waiting``.
     """
@@ -207,7 +206,7 @@ def _sweep_plane(grid: Grid, tolerance: float, plane: int, way: int, up: int) ->
         low[plane, s] = NONE
         high[plane, s] = -1
         column = base + start + FIRST
-        # Unsigned, or every index would be tested for counting from the end and no vectors be made.
+        # Unsigned: with signed indices numba handles negative ones, and the loop is not vectorised.
         at = np.uint64(s % rows * width + column)
         before = np.uint64((s - 1) % rows * width + column - 1)
         after = np.uint64((s + 1) % rows * width + column)
@@ -235,7 +234,7 @@ def _sweep_plane(grid: Grid, tolerance: float, plane: int, way: int, up: int) ->
         k = start + 1
         if last >= 0:
             include(lowest, highest, plane, s, k + first, k + last, shape)
-            # Nodes before share their column or have the next lower one, nodes after the next higher one.
+            # Neighbours before have the same column or the next lower one, those after the next higher one.
             include(low, high, plane, s + way, k + first + min(way, 0), k + last + max(way, 0), shape)
             if up != 0 and 2 <= plane + up <= shape[0] + 1:
                 include(low, high, plane + up, s, k + first, k + last, shape)
@@ -267,8 +266,8 @@ def _relax_2d(
 ) -> Outcome:
     """First-order time of ``count`` nodes from the earlier neighbour of each axis (Zhao 2005, equation 2.4).
 
-    Without branches, so that it compiles to vectors: a difference clamped to the crossing time gives the
-    time along one axis exactly, and where both are infinite the NaN compares as no improvement.
+    Without branches, so that it is vectorised: a difference clamped to the crossing time gives the time along
+    one axis exactly, and where both are infinite the NaN compares as no improvement.
     """
     first, last, first_behind, last_behind, moved = NONE, -1, NONE, -1, 0
     for x in range(np.uint64(count)):
@@ -279,13 +278,13 @@ def _relax_2d(
         new = lower(a, b) + 0.5 * (gap + math.sqrt(2.0 * rhs * rhs - gap * gap))
         old = time[at + x]
         changed = new < old
-        # A neighbour that an opposite neighbour reached earlier has nothing to gain from this one.
-        heard = changed & (new < higher(time[behind + x], time[behind + x + np.uint64(2)]))
+        # A neighbour that has an earlier time from its other side does not improve.
+        affected = changed & (new < higher(time[behind + x], time[behind + x + np.uint64(2)]))
         place = int(np.int64(x))
         first = min(first, place if changed else NONE)
         last = max(last, place if changed else -1)
-        first_behind = min(first_behind, place if heard else NONE)
-        last_behind = max(last_behind, place if heard else -1)
+        first_behind = min(first_behind, place if affected else NONE)
+        last_behind = max(last_behind, place if affected else -1)
         moved |= 1 if old - new > tolerance * rhs else 0
         time[at + x] = new if changed else old
     return first, last, first_behind, last_behind, NONE, -1, moved
@@ -305,7 +304,7 @@ def _relax_3d(
     count: int,
     tolerance: float,
 ) -> Outcome:
-    """As ``_relax_2d`` with three axes, taken in in the order of time while they are upwind."""
+    """As ``_relax_2d`` with three axes, added in order of time while they are upwind."""
     first, last, first_behind, last_behind, moved = NONE, -1, NONE, -1, 0
     first_below, last_below = NONE, -1
     for x in range(np.uint64(count)):
@@ -327,15 +326,15 @@ def _relax_3d(
         new = low + (time_3 if time_2 > far else time_2)
         old = time[at + x]
         changed = new < old
-        heard = changed & (new < higher(time[behind + x], time[behind + x + np.uint64(2)]))
-        heard_below = changed & (new < time[beneath + x])
+        affected = changed & (new < higher(time[behind + x], time[behind + x + np.uint64(2)]))
+        affected_below = changed & (new < time[beneath + x])
         place = int(np.int64(x))
         first = min(first, place if changed else NONE)
         last = max(last, place if changed else -1)
-        first_behind = min(first_behind, place if heard else NONE)
-        last_behind = max(last_behind, place if heard else -1)
-        first_below = min(first_below, place if heard_below else NONE)
-        last_below = max(last_below, place if heard_below else -1)
+        first_behind = min(first_behind, place if affected else NONE)
+        last_behind = max(last_behind, place if affected else -1)
+        first_below = min(first_below, place if affected_below else NONE)
+        last_below = max(last_below, place if affected_below else -1)
         moved |= 1 if old - new > tolerance * rhs else 0
         time[at + x] = new if changed else old
     return first, last, first_behind, last_behind, first_below, last_below, moved

@@ -1,8 +1,8 @@
-"""A binary min-heap of grid nodes with back pointers, so that a node's time can change where it stands.
+"""A binary min-heap of grid nodes with back pointers, so that the time of a node in it can change.
 
-Three arrays: ``heap`` holds nodes, ``keys`` their times beside them, and ``place`` where each node stands, or
-``FAR`` for one not yet entered, or ``DONE`` for one taken out (or never to be entered). The functions take
-the number of entries and give the new one.
+Three arrays: ``heap`` holds nodes, ``keys`` their times, and ``place`` the position of each node in the heap,
+``FAR`` for a node not yet entered, or ``DONE`` for one removed (or never to be entered). The functions take
+the number of entries and return the new one.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def rise(heap: Nodes, keys: Floats, place: Nodes, hole: int, node: int, time: fl
 
 @kernel(inline="always")
 def enter(heap: Nodes, keys: Floats, place: Nodes, length: int, node: int, time: float) -> int:
-    """Enter a node, or give one that is there an earlier time."""
+    """Enter a node, or decrease the time of one that is there."""
     hole = place[node]
     if hole == FAR:
         hole = length
@@ -52,8 +52,8 @@ def sink(heap: Nodes, keys: Floats, place: Nodes, length: int, hole: int) -> int
     """Move a hole down to a leaf along the earlier children; returns where it ends."""
     child = 2 * hole + 2
     while child < length:
-        # Arithmetic instead of a branch: which child is earlier cannot be predicted, and guessing wrong
-        # at every level would double the time of the whole march.
+        # Arithmetic instead of a branch: the processor cannot predict which child is earlier, and wrong
+        # predictions at every level double the time of the whole march.
         child -= keys[child - 1] <= keys[child]
         below = heap[child]
         heap[hole] = below
@@ -73,7 +73,7 @@ def sink(heap: Nodes, keys: Floats, place: Nodes, length: int, hole: int) -> int
 
 @kernel(inline="always")
 def take(heap: Nodes, keys: Floats, place: Nodes, length: int) -> int:
-    """Take out the earliest entry, which the caller has read from ``heap[0]`` and ``keys[0]``."""
+    """Remove the earliest entry, which the caller has read from ``heap[0]`` and ``keys[0]``."""
     place[heap[0]] = DONE
     length -= 1
     if length > 0:
@@ -86,7 +86,7 @@ def take(heap: Nodes, keys: Floats, place: Nodes, length: int) -> int:
 
 @kernel(inline="always")
 def change(heap: Nodes, keys: Floats, place: Nodes, length: int, node: int, time: float) -> int:
-    """Enter a node, or give one that is there another time, earlier or later."""
+    """Enter a node, or change the time of one that is there."""
     hole = place[node]
     if hole == FAR:
         hole = length

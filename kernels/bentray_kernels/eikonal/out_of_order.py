@@ -1,9 +1,9 @@
-"""Nodes settled too soon by a given order of arrival: unsettled, and settled again through a heap.
+"""Causality repair: nodes accepted too early by a given order of arrival are recomputed through a heap.
 
-A pass in a given order needs no heap, as long as the order is right. Where a node turns out to be earlier
-than a neighbour that is settled already, every node that may depend on that neighbour is unsettled and waits
-in a heap, which the pass empties as it reaches those times. So each final time comes from neighbours that are
-earlier and final, as in fast marching, and no node is earlier than all of its neighbours.
+A pass in a given order needs no heap while the order is right. Where a node gets an earlier time than an
+accepted neighbour, every node that may depend on that neighbour is reset and waits in a heap, which the pass
+empties as it reaches those times. So each final time is computed from earlier final times, as in fast
+marching, and no node is earlier than all of its neighbours.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from ..compiled import kernel
 from .heap import DONE, FAR, Nodes, change, take
 from .updates import TIE, factored_update
 
-# The place of a node of the source's cell, whose time is final.
+# The place of nodes of the source's cell, whose times are final.
 SEED = -3
 
 # Entries of ``Waiting.numbers``.
-LENGTH, WAIT, UNSETTLED = 0, 1, 2
+LENGTH, WAIT, RESETS = 0, 1, 2
 
 
 class Front(NamedTuple):
-    """What ``factored_update`` takes, flat and padded; ``settled`` and ``tau`` are filled node by node."""
+    """Arguments of ``factored_update``, flat and padded; ``settled`` and ``tau`` are filled node by node."""
 
     strides: tuple[int, int, int]
     spacing: float
@@ -39,14 +39,14 @@ class Front(NamedTuple):
 
 
 class Waiting(NamedTuple):
-    """The nodes that wait to be settled out of order.
+    """The nodes that wait to be accepted out of order.
 
     Attributes:
         heap, keys: as in ``heap``.
-        place: where a node stands in the heap, FAR for one that waits for its first settled neighbour,
+        place: position of a node in the heap, FAR for one that waits for its first accepted neighbour,
             SEED for seeds, DONE for all others, whether the pass has reached them or not.
-        taken: room for nodes.
-        numbers: length of the heap, nodes that wait, and how often in all one was unsettled.
+        taken: scratch memory for nodes.
+        numbers: length of the heap, number of waiting nodes, total number of resets.
     """
 
     heap: Nodes
@@ -57,7 +57,7 @@ class Waiting(NamedTuple):
 
 
 @kernel
-def nothing_waiting(size: int) -> Waiting:
+def empty_waiting(size: int) -> Waiting:
     """For grids of ``size`` padded nodes."""
     return Waiting(
         np.empty(size, np.int32),
@@ -70,20 +70,20 @@ def nothing_waiting(size: int) -> Waiting:
 
 @kernel
 def wait(node: int, waiting: Waiting) -> None:
-    """Let a node wait for its first settled neighbour."""
+    """Let a node wait for its first accepted neighbour."""
     waiting.place[node] = FAR
     waiting.numbers[WAIT] += 1
 
 
 @kernel
-def settle_earlier(node: int, time: float, front: Front, waiting: Waiting) -> float:
-    """Settle the waiting nodes up to the time of ``node``; returns that time, which they may have changed, s.
+def accept_earlier(node: int, time: float, front: Front, waiting: Waiting) -> float:
+    """Accept the waiting nodes up to the time of ``node``; returns that time, which they may have changed, s.
 
-    With a negative ``node`` and an infinite time all that wait are settled. Ends sooner once more nodes have
-    been unsettled than there are.
+    With a negative ``node`` and an infinite time all waiting nodes are accepted. Ends early once more nodes
+    have been reset than there are.
     """
     heap, keys, place, _, numbers = waiting
-    while numbers[LENGTH] > 0 and keys[0] <= time and keys[0] < math.inf and numbers[UNSETTLED] <= heap.size:
+    while numbers[LENGTH] > 0 and keys[0] <= time and keys[0] < math.inf and numbers[RESETS] <= heap.size:
         first = heap[0]
         front.settled[first] = keys[0]
         front.tau[first] = keys[0] / math.sqrt(front.squares[first])
@@ -91,36 +91,36 @@ def settle_earlier(node: int, time: float, front: Front, waiting: Waiting) -> fl
         numbers[WAIT] -= 1
         correct(first, front, waiting)
         if node >= 0:
-            time = _renewed(node, front)
+            time = _updated(node, front)
     return time
 
 
 @kernel
 def correct(node: int, front: Front, waiting: Waiting) -> None:
-    """Unsettle the later neighbours of ``node``, just settled, and give those that wait their new times."""
+    """Reset the later neighbours of ``node``, just accepted, and update the times of waiting ones."""
     place, taken, numbers = waiting.place, waiting.taken, waiting.numbers
     later = front.settled[node] * (1.0 + TIE)
     number = 0
     for axis in range(3):
         for neighbour in (node - front.strides[axis], node + front.strides[axis]):
             if later < front.settled[neighbour] < math.inf and place[neighbour] != SEED:
-                number = _unsettle(neighbour, number, node, front, waiting)
+                number = _reset(neighbour, number, node, front, waiting)
     numbers[WAIT] += number
-    numbers[UNSETTLED] += number
+    numbers[RESETS] += number
     for k in range(number):
         _enter(taken[k], front, waiting)
-        # Their times came from this node too.
+        # Their times depend on this node too.
         _enter_neighbours(taken[k], front, waiting)
     _enter_neighbours(node, front, waiting)
 
 
 @kernel
-def _unsettle(start: int, number: int, spared: int, front: Front, waiting: Waiting) -> int:
-    """Unsettle a node and all that may depend on it: those that ever later neighbours join to it.
+def _reset(start: int, number: int, spared: int, front: Front, waiting: Waiting) -> int:
+    """Reset a node and all that may depend on it: those connected to it by chains of later neighbours.
 
     Adds them to ``waiting.taken``, which holds ``number`` nodes; returns the new number.
     """
-    number = _take_back(start, number, front, waiting)
+    number = _reset_one(start, number, front, waiting)
     done = number - 1
     while done < number:
         node = waiting.taken[done]
@@ -129,13 +129,13 @@ def _unsettle(start: int, number: int, spared: int, front: Front, waiting: Waiti
         for axis in range(3):
             for neighbour in (node - front.strides[axis], node + front.strides[axis]):
                 if since <= front.settled[neighbour] < math.inf and neighbour != spared:
-                    number = _take_back(neighbour, number, front, waiting)
+                    number = _reset_one(neighbour, number, front, waiting)
     return number
 
 
 @kernel
-def _take_back(node: int, number: int, front: Front, waiting: Waiting) -> int:
-    """Unsettle one node, unless it is a seed; its τ keeps the time that it had."""
+def _reset_one(node: int, number: int, front: Front, waiting: Waiting) -> int:
+    """Reset one node, unless it is a seed; its τ keeps its previous time."""
     if waiting.place[node] == SEED:
         return number
     front.tau[node] = front.settled[node]
@@ -147,7 +147,7 @@ def _take_back(node: int, number: int, front: Front, waiting: Waiting) -> int:
 
 @kernel
 def _enter_neighbours(node: int, front: Front, waiting: Waiting) -> None:
-    """As ``_enter`` for the neighbours that wait."""
+    """As ``_enter`` for the waiting neighbours."""
     for axis in range(3):
         for neighbour in (node - front.strides[axis], node + front.strides[axis]):
             if waiting.place[neighbour] > DONE:
@@ -156,16 +156,16 @@ def _enter_neighbours(node: int, front: Front, waiting: Waiting) -> None:
 
 @kernel
 def _enter(node: int, front: Front, waiting: Waiting) -> None:
-    """Give a node that waits the time from its settled neighbours; infinite where they were all unsettled."""
-    time = _renewed(node, front)
+    """Update the time of a waiting node from its accepted neighbours; infinite if all of them were reset."""
+    time = _updated(node, front)
     if time < math.inf or waiting.place[node] != FAR:
         heap, keys, place, _, numbers = waiting
         numbers[LENGTH] = change(heap, keys, place, numbers[LENGTH], node, time)
 
 
 @kernel(inline="always")
-def _renewed(node: int, front: Front) -> float:
-    """Travel time of a node from its settled neighbours, s."""
+def _updated(node: int, front: Front) -> float:
+    """Travel time of a node from its accepted neighbours, s."""
     return factored_update(
         node,
         front.strides,

@@ -1,4 +1,4 @@
-"""A point-source Eikonal problem, checked once and laid out with a border for the kernels."""
+"""A point-source Eikonal problem, checked once and padded with a border for the kernels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
 
-# A source closer to a node than this, in nodes, is taken to sit on it.
+# A source closer to a node than this, in nodes, is treated as on it.
 ON_NODE = 1e-9
 
 Node = tuple[int, ...]
@@ -36,7 +36,7 @@ class Medium:
 
     @classmethod
     def checked(cls, speed: ArrayLike, spacing: float) -> Medium:
-        """The medium of ``solve``, refused with the first bad value's place.
+        """The medium for the arguments of ``solve``; an error names the first invalid node.
 
         Raises:
             InvalidInput: see ``bentray_kernels.eikonal.solve``.
@@ -176,7 +176,7 @@ class PointSource:
 
 
 def placed(position: ArrayLike, shape: tuple[int, ...], spacing: float) -> Floats:
-    """A source, (ndim,), m, checked to be in a grid; rounding at the rim is forgiven.
+    """A source, (ndim,), m, clipped to the grid within rounding.
 
     Raises:
         InvalidInput: for a source that is not in the grid.

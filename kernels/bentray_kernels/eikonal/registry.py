@@ -1,4 +1,4 @@
-"""The methods by name, and the two calls that run them."""
+"""Eikonal methods by name, and ``solve`` and ``solve_many``."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from .problem import Medium, PointSource
 
 @dataclass(frozen=True)
 class Method:
-    """A solver and what a user should know of it.
+    """A solver and its properties.
 
     Attributes:
-        name: how it is asked for.
+        name: of the method in requests.
         run: takes a ``PointSource`` and keyword options, gives the travel time in the grid's shape.
         order: order of accuracy away from shocks.
         factored: whether the source's singularity is factored out.
         summary: one line for help texts.
         run_many: as ``run`` for problems of one shape and spacing, into an array (batch, nx, ny[, nz]); None
-            where the method has nothing better than ``run`` for each.
-        on_device: whether ``run_many`` takes a sequence and spreads it itself; threads must not share it.
+            where the method runs each problem alone.
+        on_device: whether ``run_many`` parallelises a sequence itself; threads must not share it.
     """
 
     name: str
@@ -164,7 +164,7 @@ def solve_many(
     batch = max(len(fields), len(points)) if len(fields) and len(points) else 0
     times = np.empty((batch, *fields.shape[1:]))
 
-    # One medium checked and laid out once serves all its sources.
+    # One medium, checked and padded once, serves all its sources.
     shared = Medium.checked(fields[0], spacing) if len(fields) == 1 else None
 
     def problem(k: int) -> PointSource:
@@ -186,7 +186,7 @@ def solve_many(
         solve_part(parts[0])
     elif count > 1:
         with ThreadPoolExecutor(count) as pool:
-            # Reading the results raises what a thread raised, the first of the batch first.
+            # Raises the first exception of a thread, in order of the batch.
             list(pool.map(solve_part, parts))
     return times
 

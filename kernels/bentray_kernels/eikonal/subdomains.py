@@ -1,4 +1,4 @@
-"""Fast sweeping in blocks that trade their faces until they agree, for tasks that share no memory."""
+"""Fast sweeping by domain decomposition: blocks without shared memory exchange faces until they agree."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from .fast_sweeping import Sweeper
 # The sides of a block in the order of Faces: axis, and whether its high end.
 Side = tuple[int, bool]
 
-# Where a block stands among the blocks, and which nodes it holds.
+# Position of a block among the blocks, and the nodes that it holds.
 Place = tuple[int, ...]
 Box = tuple[slice, ...]
 
 # A block's neighbouring nodes beyond each side, s: (low x, high x, low y, high y[, low z, high z]), each in
-# the block's shape without that axis; None at the rim of the grid.
+# the block's shape without that axis; None at the boundary of the grid.
 Faces = Sequence[Floats | None]
 
 
 @dataclass(frozen=True)
 class BlockSweep:
-    """What ``sweep_block`` found.
+    """Result of ``sweep_block``.
 
     Attributes:
         times: (nx, ny[, nz]), s.
@@ -43,12 +43,12 @@ class BlockSweep:
 def sweep_block(
     slowness: Floats, times: Floats, faces: Faces, spacing: float, tolerance: float = 1e-12
 ) -> BlockSweep:
-    """Settle one block, given what its neighbours know; pure, so that a task can do it again.
+    """Sweep one block until it converges, given the faces of its neighbours; pure, repeatable.
 
     Args:
         slowness: (nx, ny[, nz]), s/m.
-        times: same shape, s; infinity where nothing is known yet. They may only be too late.
-        faces: what lies beyond each side.
+        times: same shape, s; infinity where unknown. They may only be too late.
+        faces: times beyond each side.
         spacing: node spacing, m.
         tolerance: as for ``fast_sweeping``.
 
@@ -82,7 +82,7 @@ def sweep_block(
 
 
 def cut(shape: tuple[int, ...], blocks: Sequence[int]) -> dict[Place, Box]:
-    """The nodes of each block, by its place among the blocks.
+    """The nodes of each block, by its position among the blocks.
 
     Raises:
         InvalidInput: for numbers of blocks that do not fit the grid.
@@ -102,7 +102,7 @@ def sides(axes: int) -> list[Side]:
 
 
 def opposite(side: int) -> int:
-    """The number of the side that meets this one from beyond."""
+    """The number of the adjacent side of the neighbouring block."""
     return side ^ 1
 
 
@@ -114,7 +114,7 @@ def face_of(block: Floats, side: Side) -> Floats:
 
 
 def neighbours(place: Place, boxes: Mapping[Place, Box]) -> list[tuple[int, Place]]:
-    """Numbers of the sides that have a block beyond, and where it is."""
+    """Numbers of the sides with a neighbouring block, and its position."""
     found = []
     for side, (axis, high) in enumerate(sides(len(place))):
         beyond = (*place[:axis], place[axis] + (1 if high else -1), *place[axis + 1 :])

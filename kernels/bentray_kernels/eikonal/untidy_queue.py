@@ -1,9 +1,10 @@
-"""A circular queue of buckets that nodes wait in by time, untidy within a bucket (Yatziv et al. 2006).
+"""A circular queue of buckets of nodes by time, unordered within a bucket (Yatziv et al. 2006).
 
 Bucket ``int(time / width) % buckets`` is a doubly linked list, so that a node moves when its time falls.
-Nodes come out by bucket, not by time, at a cost that does not depend on how many wait. Arrays: ``heads`` has
-the last entered node of each bucket, ``links`` the nodes before and after each, ``place`` the bucket a node
-waits in, or ``FAR`` or ``DONE`` as in ``heap``. Node 0 lies in the border, never waits, and ends a list.
+Nodes are removed by bucket, not by time, at a cost independent of the length of the queue. Arrays: ``heads``
+has the last entered node of each bucket, ``links`` the nodes before and after each, ``place`` the bucket of
+each node, or ``FAR`` or ``DONE`` as in ``heap``. Node 0 lies in the border, is never entered, and ends a
+list.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from .heap import DONE, FAR, Nodes
 
 
 @kernel(inline="always")
-def wait(heads: Nodes, links: Nodes, place: Nodes, width: float, node: int, time: float) -> int:
+def enter(heads: Nodes, links: Nodes, place: Nodes, width: float, node: int, time: float) -> int:
     """Enter a node, or move one to the bucket of its earlier time; returns the number of nodes entered."""
     bucket = int(time / width) % heads.size
     old = place[node]
@@ -42,7 +43,7 @@ def unlink(heads: Nodes, links: Nodes, node: int, bucket: int) -> None:
 
 
 @kernel(inline="always")
-def leave(heads: Nodes, links: Nodes, place: Nodes, bucket: int) -> int:
+def take(heads: Nodes, links: Nodes, place: Nodes, bucket: int) -> int:
     """Take out the last entered node of a bucket that has one."""
     node = heads[bucket]
     unlink(heads, links, node, bucket)

@@ -1,4 +1,4 @@
-"""Rays from receivers back to the source, the nodes they pass, the time along them and how they spread."""
+"""Bent rays: paths, sensitivities of travel times, travel times along them, geometrical spreading."""
 
 from .sensitivity import sensitivities
 from .spreading import log_amplitudes, spreading

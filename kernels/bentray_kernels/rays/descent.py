@@ -1,4 +1,4 @@
-"""One ray down the travel time to its source; the inner loop of every ray kernel.
+"""Tracing one ray down the gradient of the travel time; the inner loop of every ray kernel.
 
 Positions are in nodes (metres divided by the spacing) and arrays are flat. The direction is −∇(T²), not
 −∇T: near the source T² is a paraboloid, whose gradient is linear and vanishes only at the source, whereas
@@ -17,8 +17,8 @@ from ..arrays import Floats, Ints
 from ..compiled import kernel
 from .fan import Fan
 
-# Length of a step, nodes. Half of it gives the same error on Table 6, 3.7 %, in more time, and
-# steps halved where the direction turns change the time along a ray by 2 % of its error, past bone too.
+# Length of a step, nodes. Half of it gives the same error on Table 6, 3.7 %, in more time. Halving the steps
+# where the direction turns changes the time along a ray by 2 % of its error, even near bone.
 STEP = 1.0
 
 # Parts of a step, each with its own midpoint: with longer ones the path would skip nodes.
@@ -229,7 +229,7 @@ def merge_entries(
 
     Args:
         total: zeros, one a node; zeros again afterwards.
-        columns, lengths: of the rows so far, integers and reals of any width, with room for ``entries`` more.
+        columns, lengths: of the rows so far, of any width, with memory for ``entries`` more.
     """
     start = filled
     for k in range(entries):

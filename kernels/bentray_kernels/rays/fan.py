@@ -1,4 +1,4 @@
-"""All rays of one source: what is traced, checked and brought into node units once."""
+"""All rays of one source: arguments of the ray kernels, checked and converted to node units."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Fan(NamedTuple):
 
 @kernel
 def squared_gradient(tof: Floats, shape: tuple[int, ...], strides: tuple[int, ...]) -> Floats:
-    """∇(T²) at the nodes, (nodes, ndim): central differences, one-sided of second order on the rim."""
+    """∇(T²) at the nodes, (nodes, ndim): central differences, one-sided of second order at the boundary."""
     squared = tof * tof
     axes = len(shape)
     gradient = np.zeros((tof.size, axes))
@@ -102,7 +102,11 @@ def squared_gradient(tof: Floats, shape: tuple[int, ...], strides: tuple[int, ..
 
 
 def _inside(name: str, points: Floats, last: Floats, spacing: float) -> Floats:
-    """Points in nodes, rounding at the rim forgiven; anything farther out is refused."""
+    """Points in nodes, clipped to the grid within rounding.
+
+    Raises:
+        InvalidInput: naming the first point outside.
+    """
     bad = ~(np.isfinite(points) & (points >= -1e-9) & (points <= last + 1e-9)).all(axis=1)
     if bad.any():
         first = int(np.flatnonzero(bad)[0])

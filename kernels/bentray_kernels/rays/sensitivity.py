@@ -15,10 +15,10 @@ from .fan import Fan, Kind
 def sensitivities(
     tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, *, kind: Kind = "curved"
 ) -> csr_array:
-    """Metres of each ray that each node answers for, the w of SART (chapter 6, equation 1).
+    """Length of each ray attributed to each node, the weights w of SART (chapter 6, equation 1).
 
     By Fermat's principle the first-order change of a travel time is Σ w·δslowness along the unperturbed
-    ray, and Σ w·slowness is the travel time itself, read as the integral of the slowness along the ray.
+    ray, and Σ w·slowness is the travel time as the integral of the slowness along the ray.
 
     Args:
         tof, spacing, receivers, source, kind: as ``trace``.

@@ -1,13 +1,13 @@
-"""Geometrical spreading along bent rays, and what it does to the amplitude (dynamic ray tracing).
+"""Geometrical spreading along bent rays and its effect on the amplitude (dynamic ray tracing).
 
-A narrow tube of rays leaves the source; dx is how far a neighbour runs beside the ray, in a basis carried
-parallel along it. With Q = ∂dx/∂(take-off angles) and v the speed,
+A narrow ray tube leaves the source; dx is the offset of a neighbouring ray, in a basis that is transported
+parallel along the ray. With Q = ∂dx/∂(take-off angles) and v the speed,
 
     dQ/ds = v·P,  dP/ds = −v⁻²·V·Q,  Q = 0 and P = 1/v at the source,
 
 where V holds the second derivatives of v across the ray (V. Červený, Seismic Ray Theory, Cambridge 2001,
-section 4.1; the Jacobi equation of geodesics of the length ds/v). Q is a number in the plane and 2 × 2 in
-space, and |det Q| is the cross-section of the tube per unit of angle: r in homogeneous plane, r² in space.
+section 4.1; the Jacobi equation of geodesics of the length ds/v). Q is a number in 2-D and 2 × 2 in
+3-D, and |det Q| is the cross-section of the tube per unit of angle: r in homogeneous 2-D media, r² in 3-D.
 """
 
 from __future__ import annotations
@@ -20,34 +20,34 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats
 from ..compiled import kernel
 from ..splines.cubic import jet_2d, jet_3d
-from .bending import STRIDE, bend, bending
+from .bending import STRIDE, allocate_bending, bend
 from .descent import empty_path, trace_curved
 from .fan import Fan
 from .travel_time import log_slowness
 
-# Parts of a piece of the path, which is STRIDE nodes long, each crossed by one leapfrog step.
+# Leapfrog steps per segment of the path, which is STRIDE nodes long.
 PARTS = 3
 
 
 def spreading(
     tof: ArrayLike, speed: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike
 ) -> Floats:
-    """Cross-section of the ray tube at each receiver over that in a homogeneous medium, |det Q|/r^(ndim−1).
+    """Cross-section of the ray tube at each receiver relative to a homogeneous medium, |det Q|/r^(ndim−1).
 
     Below 1 where rays focus, above where they spread. Between exchanged ends it differs by the factor
     (v_receiver/v_source)^(ndim−1) (Snieder & Chapman, Geophys. J. Int. 132 (1998) 89–95).
 
     Rays are those of ``travel_times``. With 65 nodes across smooth media the error is below 1e-3, in the mean
-    1e-4. Second derivatives of the speed decide, so a medium that jumps from node to node must be smoothed
-    first, over no less than two nodes and, against measured waves, over what part of the Fresnel zone they
-    average. A first arrival has passed no caustic (Jacobi's condition). Where the path did, it is the wrong
-    one, ray theory gives no amplitude, and the spreading is NaN.
+    1e-4. The result depends on second derivatives of the speed: a medium with jumps must be smoothed first,
+    over at least two nodes and, for comparison with measured waves, over the part of the Fresnel zone that
+    they average. A first arrival has not passed a caustic (Jacobi's condition). Where the path has, it is
+    not the first arrival, ray theory gives no amplitude, and the spreading is NaN.
 
     Args:
         tof, speed, spacing, receivers, source: as ``travel_times``.
 
     Returns:
-        (k,), of no unit; 1 for a receiver on the source.
+        (k,), dimensionless; 1 for a receiver at the source.
 
     Raises:
         InvalidInput: as ``travel_times``.
@@ -59,12 +59,12 @@ def spreading(
 def log_amplitudes(
     tof: ArrayLike, speed: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike
 ) -> Floats:
-    """ln(A/A₀) of the pressure by refraction alone, −½·ln(spreading·v_source/v_receiver).
+    """ln(A/A₀) of the pressure due to refraction alone, −½·ln(spreading·v_source/v_receiver).
 
     A₀ is the amplitude at the same distance in a homogeneous medium of the source's speed. At constant
     density A²·|det Q|/v is the same all along a tube (the transport equation ∇·(A²∇T) = 0), and near a point
-    source of given strength A² is v/(8πωr) in the plane and 1/(4πr)² in space, so that the ratio is the
-    same for both. It is reciprocal but for A₀. Where both ends lie in water, −½·ln(spreading) is all.
+    source of given strength A² is v/(8πωr) in 2-D and 1/(4πr)² in 3-D, so that the ratio is the same for
+    both. It is reciprocal except for A₀. Where both ends lie in water, it equals −½·ln(spreading).
 
     Args:
         tof, speed, spacing, receivers, source: as ``spreading``.
@@ -85,7 +85,7 @@ def _tubes(fan: Fan, spline: Floats) -> tuple[Floats, Floats]:
     """Relative spreading, and speed at the source over that at the receiver, (k,) each."""
     path, scratch = empty_path(fan)
     rays = len(fan.receivers)
-    space = bending(len(path), fan.shape)
+    space = allocate_bending(len(path), fan.shape)
     relative = np.ones(rays)
     ends = np.ones(rays)
     for k in range(rays):
@@ -108,7 +108,7 @@ def _tubes(fan: Fan, spline: Floats) -> tuple[Floats, Floats]:
 
 @kernel(inline="always")
 def _width(path: Floats, count: int, start: float, spline: Floats) -> float:
-    """q at ``path[0]``, nodes, of a tube from the path's last point; NaN beyond a caustic.
+    """q at ``path[0]``, nodes, of a ray tube from the path's last point; NaN beyond a caustic.
 
     Args:
         start: slowness at the source, in the unit of the spline.
@@ -139,7 +139,7 @@ def _width(path: Floats, count: int, start: float, spline: Floats) -> float:
 
 @kernel(inline="always")
 def _area(path: Floats, count: int, start: float, spline: Floats) -> float:
-    """As ``_width`` in space: det Q, nodes²."""
+    """As ``_width`` in 3-D: det Q, nodes²."""
     q00 = q01 = q10 = q11 = p01 = p10 = 0.0
     p00 = p11 = start
     det = 0.0
@@ -153,7 +153,7 @@ def _area(path: Floats, count: int, start: float, spline: Floats) -> float:
         if tx == ty == tz == 0.0:
             ex, ey, ez = _across(x, y, z)
         else:
-            # The least rotation that takes the old direction to the new one.
+            # The smallest rotation from the old direction to the new one.
             share = (ex * x + ey * y + ez * z) / (1.0 + tx * x + ty * y + tz * z)
             ex, ey, ez = ex - share * (tx + x), ey - share * (ty + y), ez - share * (tz + z)
         tx, ty, tz = x, y, z
@@ -190,7 +190,7 @@ def _area(path: Floats, count: int, start: float, spline: Floats) -> float:
 
 @kernel(inline="always")
 def _across(x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A unit vector across another one."""
+    """A unit vector normal to another one."""
     if abs(x) <= abs(y) and abs(x) <= abs(z):
         u, v, w = 1.0 - x * x, -x * y, -x * z
     elif abs(y) <= abs(z):

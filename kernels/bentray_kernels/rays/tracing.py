@@ -1,4 +1,4 @@
-"""Paths of the rays of one source, as points."""
+"""Paths of the rays of one source."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def trace(
 ) -> list[Floats]:
     """Rays from every receiver back to the source, down the gradient of the travel time (chapter 6.2.2).
 
-    Every ray arrives: there is no ray linking and none is lost. In a homogeneous medium the paths
-    are straight to rounding, since T² is then a paraboloid, which central differences take exactly.
+    Every ray arrives; no ray linking is needed. In a homogeneous medium the paths
+    are straight to rounding: T² is a paraboloid, for which central differences are exact.
 
     Args:
         tof: (nx, ny[, nz]), s, as ``eikonal.solve`` gives it; straight rays use its shape alone.

@@ -1,4 +1,4 @@
-"""Travel times read as the integral of the slowness along bent rays."""
+"""Travel times as integrals of the slowness along bent rays."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..compiled import kernel
 from ..eikonal.problem import Medium
 from ..errors import InvalidInput
 from ..splines import coefficients
-from .bending import STRIDE, bend, bending
+from .bending import STRIDE, allocate_bending, bend
 from .descent import empty_path, trace_curved
 from .fan import Fan
 
@@ -18,13 +18,13 @@ from .fan import Fan
 def travel_times(
     tof: ArrayLike, speed: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike
 ) -> Floats:
-    """Travel times to receivers, several times as accurate as those of the grid that guides the rays.
+    """Travel times to receivers, several times as accurate as the grid travel time that guides the rays.
 
-    Each ray is traced down ``tof`` as by ``trace`` and then bent until its time is stationary (Fermat), in
-    the cubic spline through the logarithm of the slowness. The error of ``tof`` counts only in that it must
-    lead each ray to the right valley. Where the medium is smooth the error falls with about the third to
-    fourth power of the spacing; rays near the rim, where the spline is mirrored, keep the second. From node
-    to node by factors of four and more, no spline is a good guess at the medium, and no better time is given.
+    Each ray is traced as by ``trace`` and then bent until its time is stationary (Fermat), in the cubic
+    spline of the logarithm of the slowness. ``tof`` only has to lead to the right local minimum. In smooth
+    media the error falls with about the third to fourth power of the spacing, near the boundary, where the
+    spline is mirrored, with the second. Where the speed jumps by factors of four and more between nodes, a
+    spline does not represent the medium, and the time is no better than that of the grid.
 
     Args:
         tof: (nx, ny[, nz]), s, as ``eikonal.solve`` gives it for ``source``.
@@ -44,7 +44,7 @@ def travel_times(
 
 
 def log_slowness(fan: Fan, speed: ArrayLike, spacing: float) -> Floats:
-    """Spline coefficients of the logarithm of the slowness that a fan's rays are bent in.
+    """Spline coefficients of the logarithm of the slowness, in which the rays of a fan are bent.
 
     Raises:
         InvalidInput: see ``travel_times``.
@@ -58,7 +58,7 @@ def log_slowness(fan: Fan, speed: ArrayLike, spacing: float) -> Floats:
 def _bent_times(fan: Fan, spline: Floats) -> Floats:
     """Times for a spacing of 1, (k,)."""
     path, scratch = empty_path(fan)
-    space = bending(len(path), fan.shape)
+    space = allocate_bending(len(path), fan.shape)
     times = np.empty(len(fan.receivers))
     for k in range(len(times)):
         count = trace_curved(fan, k, STRIDE, path, scratch)

@@ -1,4 +1,4 @@
-"""The adjoint of the simulator: how a misfit changes with speed or loss at every node, by one reverse run."""
+"""Adjoint-state gradient: derivative of a misfit by speed or loss at every node."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from .medium import Medium
 from .points import Points
-from .simulation import Unknown, forward, placed
+from .simulation import Unknown, forward, place_elements
 from .stencil import weights
-from .time_blocks import Poll, strips, unheeded
+from .time_blocks import Poll, no_poll, split_steps
 from .time_step import advance, inject
 
 # A misfit of simulated traces (nrx, nt): its value, and its derivative by every sample.
 Misfit = Callable[[NDArray[Any]], tuple[float, Floats]]
 
 
-class Slope(NamedTuple):
-    """What one emitter says of the image.
+class MisfitGradient(NamedTuple):
+    """Misfit of one emitter and its derivatives.
 
     Attributes:
-        misfit: its value.
+        misfit: value.
         gradient: (nx, ny), of the misfit by the speed, s/m, or by the attenuation, m/Np.
-        illumination: (nx, ny), energy of what a change would radiate; large near the emitter.
+        illumination: (nx, ny), energy of the scattering sources; large near the emitter.
     """
 
     misfit: float
@@ -37,11 +37,11 @@ class Slope(NamedTuple):
 
 
 def stored_bytes(medium: Medium, samples: int, every: int = 1) -> int:
-    """Bytes of wave field that ``slope`` keeps: the image every ``every``-th of ``samples`` steps."""
+    """Bytes of the wave field that ``misfit_gradient`` stores: the image at every ``every``-th step."""
     return -(-samples // every) * medium.speed.size * medium.keep.dtype.itemsize
 
 
-def slope(
+def misfit_gradient(
     medium: Medium,
     emitter: Floats,
     receivers: Floats,
@@ -49,21 +49,21 @@ def slope(
     misfit: Misfit,
     every: int = 1,
     by: Unknown = "speed",
-    poll: Poll = unheeded,
-) -> Slope:
+    poll: Poll = no_poll,
+) -> MisfitGradient:
     """Misfit of one emitter's traces and its gradient (Plessix, Geophys. J. Int. 167, 2006).
 
-    The gradient is that of the discrete scheme: exact for ``every = 1``. A larger step keeps less of the wave
-    field, and is as good while it samples the highest frequency more than twice a period. The edges are
-    held fixed; by the speed, so is the damping of the medium.
+    The gradient is that of the discrete scheme: exact for ``every = 1``. Larger values store less of the wave
+    field and are as accurate while the highest frequency is sampled more than twice a period. The edges are
+    fixed, and for a gradient by speed also the damping of the medium.
 
     Args:
         emitter: (2,), m.
         receivers: (nrx, 2), m.
         wavelet: (nt,), as for ``simulate``.
         misfit: of the traces.
-        every: time steps from one stored field to the next.
-        by: of what the gradient is.
+        every: time steps between stored fields.
+        by: variable of the gradient.
         poll: see ``time_blocks``.
 
     Raises:
@@ -71,27 +71,30 @@ def slope(
     """
     if every < 1:
         raise InvalidInput("every", every, "at least 1 step")
-    source, heard = placed(medium, np.atleast_2d(emitter), wavelet), placed(medium, receivers)
-    traces, scattered = forward(medium, source, heard, wavelet, every, by=by, poll=poll)
+    source, detectors = (
+        place_elements(medium, np.atleast_2d(emitter), wavelet),
+        place_elements(medium, receivers),
+    )
+    traces, scattered = forward(medium, source, detectors, wavelet, every, by=by, poll=poll)
     value, residual = misfit(traces)
-    image, light = backward(medium, heard, residual, scattered, every, poll)
-    # By (c dt / h)^2, which drives a step, and by sigma dt = c alpha dt; the adjoint field is driven too.
+    image, light = backward(medium, detectors, residual, scattered, every, poll)
+    # By (c dt / h)^2, the factor of a step, and by sigma dt = c alpha dt; the adjoint field has it too.
     along = 2.0 if by == "speed" else -(medium.spacing**2) / medium.time_step_s
-    return Slope(value, along * every * float(np.abs(wavelet).max()) * image / medium.speed, light)
+    return MisfitGradient(value, along * every * float(np.abs(wavelet).max()) * image / medium.speed, light)
 
 
 def backward(
     medium: Medium,
-    heard: Points,
+    detectors: Points,
     residual: Floats,
     scattered: NDArray[Any],
     every: int,
-    poll: Poll = unheeded,
+    poll: Poll = no_poll,
 ) -> tuple[Floats, Floats]:
     """The adjoint field correlated with a stored one: (nx, ny), and the energy of the stored one.
 
     Args:
-        heard: the receivers.
+        detectors: receivers on the grid.
         residual: (nrx, nt), derivative of the misfit by every sample.
         scattered: as ``forward`` gives it.
         poll: see ``time_blocks``.
@@ -101,7 +104,7 @@ def backward(
     image, light = np.zeros(medium.speed.shape), np.zeros(medium.speed.shape)
     scale = float(np.abs(residual).max())
     taps, sources = weights().astype(kind), (residual / (scale or 1.0)).astype(kind)
-    for begin, end in strips(residual.shape[1], medium.keep.size, poll):
+    for begin, end in split_steps(residual.shape[1], medium.keep.size, poll):
         _backward(
             begin,
             end,
@@ -109,7 +112,7 @@ def backward(
             fields[1],
             medium.factors,
             taps,
-            heard,
+            detectors,
             sources,
             medium.margin,
             every,
@@ -136,8 +139,8 @@ def _backward(
     image: Any,
     light: Any,
 ) -> None:
-    # At the top of turn n, ``now`` is the adjoint field of equation n. Every equation of the scheme is
-    # symmetric but for the order of time, so the field runs backwards under the same step.
+    # At the start of iteration n, ``now`` is the adjoint field of equation n. The scheme is symmetric except
+    # for the direction of time, so the same step advances the adjoint field backwards.
     keep, fade, drive = factors
     nx, ny = image.shape
     last = residual.shape[1] - 1

@@ -1,4 +1,4 @@
-"""What waves travel through: speed, loss and absorbing edges, as the factors of one time step."""
+"""Acoustic medium: speed, loss and absorbing edges, as the factors of one time step."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Floats
 from ..errors import InvalidInput
-from .memory import check_room
+from .memory import check_memory
 from .stencil import HALO, longest_step
 
-# Width of the absorbing edge, nodes; power of its profile; what its end sends back at normal incidence.
-# Among powers 2 to 4 and ends of 1e-3 to 1e-6 these sent least back: 1 % of waves of 15 nodes, 0.4 % of 7.5.
+# Width of the absorbing edge, nodes; power of its profile; theoretical reflection at normal incidence. Among
+# powers 2 to 4 and reflections 1e-3 to 1e-6 these reflect least: 1 % of waves of 15 nodes, 0.4 % of 7.5.
 EDGE_NODES = 20
 EDGE_POWER = 2
 EDGE_REFLECTION = 1e-3
@@ -27,9 +27,9 @@ class Medium:
 
         next = keep * now - fade * before + drive * (h^2 laplacian now + sources)
 
-    Loss: a wave p = exp(-sigma t) q, where q knows no loss, solves it in a uniform medium. So the attenuation
-    is sigma / c for every frequency, without dispersion. Tissue's grows nearly as the frequency; give its
-    value at the centre of the band. The edges are the same term, growing outwards as a power (a sponge).
+    Loss: a wave p = exp(-sigma t) q, with a lossless q, solves it in a uniform medium. So the attenuation is
+    sigma / c at every frequency, without dispersion. That of tissue grows nearly as the frequency; use its
+    value at the centre of the band. The edges have the same term, growing outwards as a power (a sponge).
 
     Attributes:
         keep, fade, drive: (nx + 2 margin, ny + 2 margin[, nz + 2 margin]), float32 or float64.
@@ -62,7 +62,7 @@ class Medium:
         attenuation: Floats | None = None,
         edge_nodes: int = EDGE_NODES,
         dtype: DTypeLike = np.float32,
-        room_bytes: float = math.inf,
+        memory_bytes: float = math.inf,
     ) -> Medium:
         """The medium of an image, its outermost values continued through the edges.
 
@@ -73,11 +73,11 @@ class Medium:
             attenuation: as ``speed``, Np/m, >= 0; None: no loss.
             edge_nodes: width of the absorbing edges, nodes.
             dtype: of the fields; float64 for tests of exactness.
-            room_bytes: what one emission may take, see ``wave.memory.emission_bytes``.
+            memory_bytes: limit for one emission, see ``wave.memory.emission_bytes``.
 
         Raises:
-            InvalidInput: for a speed or an attenuation that is none, an edge without a node, a time step
-                beyond the limit of stability, or more nodes than there is room for.
+            InvalidInput: for an invalid speed or attenuation, an edge without a node, a time step beyond
+                the limit of stability, or more memory than the limit.
         """
         speed = np.asarray(speed, dtype=np.float64)
         if speed.ndim not in (2, 3) or 0 in speed.shape or not (np.isfinite(speed) & (speed > 0.0)).all():
@@ -86,10 +86,10 @@ class Medium:
             raise InvalidInput("spacing", spacing, "a finite spacing > 0 m")
         if edge_nodes < 1:
             raise InvalidInput("edge_nodes", edge_nodes, "at least 1 node")
-        check_room(speed.shape, edge_nodes, dtype, room_bytes)
+        check_memory(speed.shape, edge_nodes, dtype, memory_bytes)
         margin = edge_nodes + HALO
         c = np.pad(speed, margin, mode="edge")
-        # By the speed of the rim, so that no change of the object changes the edges.
+        # By the speed at the boundary, so that no change of the object changes the edges.
         faces = [speed.take(end, axis).ravel() for axis in range(speed.ndim) for end in (0, -1)]
         rim = np.concatenate(faces).mean()
         damping = _sponge(speed.shape, edge_nodes) * rim / spacing
@@ -105,7 +105,7 @@ class Medium:
             raise InvalidInput("time_step_s", time_step_s, f"a step > 0 and <= {limit:.4g} s, to be stable")
         turn = damping * time_step_s
         del damping
-        # Each made of its type before the next: in space they are what the memory goes into.
+        # Converted one after the other: in 3-D they dominate the memory.
         keep = np.ascontiguousarray((2.0 - turn**2) / (1.0 + turn), dtype=dtype)
         fade = np.ascontiguousarray((1.0 - turn) / (1.0 + turn), dtype=dtype)
         drive = np.ascontiguousarray((c * time_step_s / spacing) ** 2 / (1.0 + turn), dtype=dtype)
@@ -115,7 +115,7 @@ class Medium:
 def _sponge(shape: tuple[int, ...], edge_nodes: int) -> Floats:
     """Damping of the edges times spacing over speed, on the padded grid.
 
-    A wave that crosses the edge, returns from its end and crosses it again has lost all but EDGE_REFLECTION.
+    A wave that crosses the edge, is reflected at its end and crosses it again keeps EDGE_REFLECTION.
     """
     strongest = -0.5 * (EDGE_POWER + 1) * np.log(EDGE_REFLECTION) / edge_nodes
     margin = edge_nodes + HALO

@@ -1,4 +1,4 @@
-"""Elements between nodes: the Kaiser-windowed sinc that spreads a source and reads a field."""
+"""Sources and receivers between nodes: Kaiser-windowed sinc interpolation."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from ..arrays import Floats, Ints
 from ..errors import InvalidInput
 
 # Nodes on either side of an element, and the shape of the window (Hicks, Geophysics 67, 2002): with 5, waves
-# of 3.5 nodes and more are read to 0.3 % along each axis. Larger shapes are better only from 4 nodes on: 6.3
-# leaves 1.7 % at 3.5.
+# of 3.5 nodes and more have an error of 0.3 % along each axis. Larger shapes are better only from 4 nodes on:
+# 6.3 has 1.7 % at 3.5.
 REACH = 4
 SHAPE = 5.0
 
@@ -20,7 +20,7 @@ class Points(NamedTuple):
     """Elements on a grid.
 
     Attributes:
-        first: (elements, d), d = 2 or 3, the first node that each one touches.
+        first: (elements, d), d = 2 or 3, first node of the stencil of each element.
         weights: (elements, d, 2 REACH), along each axis; a node's weight is the product.
     """
 
@@ -29,10 +29,10 @@ class Points(NamedTuple):
 
 
 def place(positions: Floats, spacing: float, shape: tuple[int, ...], margin: int) -> Points:
-    """Elements of an image as they lie on the padded grid.
+    """Elements of an image on the padded grid.
 
-    A source spread with these weights and a field read with them are transposes of each other, so that
-    emitter and receiver may change places.
+    Injecting a source and reading a field with these weights are transposes of each other, so that emitter
+    and receiver are exchangeable.
 
     Args:
         positions: (elements, d), m, node 0 of the image at 0.

@@ -1,4 +1,4 @@
-"""Pressure traces of one emitter, and with them the wave field that a gradient needs."""
+"""Forward simulation of one emitter: pressure traces, and the wave field for a gradient."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from .medium import Medium
 from .points import Points, place
-from .simulation_3d import forward_in_space
+from .simulation_3d import forward_3d
 from .stencil import HALO, weights
-from .time_blocks import Poll, strips, unheeded
-from .time_step import advance, braked, curvature, inject, read, released, spread
+from .time_blocks import Poll, no_poll, split_steps
+from .time_step import advance, begin_loss_scattering, curvature, end_loss_scattering, inject, read, spread
 
-# What a gradient may be by.
+# Variables of a gradient.
 Unknown = Literal["speed", "attenuation"]
 
-# Nodes that the shortest wave of a source must have. Of the phase, space alone takes 6.3 % at 2.5 nodes,
-# 2.2 % at 3, 0.34 % at 4, 0.07 % at 5 (``stencil.phase_error``, which a test measures); ``sampling`` takes
-# out what water has of it, so that a refinement may work near the limit.
+# Fewest nodes per shortest wavelength of a source. The spatial phase error is 6.3 % at 2.5 nodes, 2.2 % at 3,
+# 0.34 % at 4, 0.07 % at 5 (``stencil.phase_error``, which a test measures); resampling compensates that of
+# water, so that an inversion may work near the limit.
 LEAST_POINTS = 2.5
 
-# A source's spectrum is taken to end where its amplitude falls below this part of the highest.
+# The band of a source ends where its amplitude falls below this fraction of the highest.
 BAND_EDGE = 0.03
 
 
@@ -35,19 +35,19 @@ def simulate(
     receivers: Floats,
     wavelet: Floats,
     order: int = 2 * HALO,
-    poll: Poll = unheeded,
+    poll: Poll = no_poll,
 ) -> Floats:
     """Traces of a point source.
 
-    Order 2 in time, in space 8 or what is asked for; free of temporal dispersion where wavelet and traces
-    are taken through ``waveform.trace_resampling.resampler``. Releases the GIL.
+    Second order in time, order 8 in space by default; free of temporal dispersion where wavelet and traces
+    are resampled by ``waveform.trace_resampling.resampler``. Releases the GIL.
 
     Args:
-        medium: to travel through, of two axes or three.
+        medium: of two or three axes.
         emitter: (d,), m, node 0 of the image at 0.
         receivers: (nrx, d), m.
         wavelet: (nt,), the source s(t) of (1/c^2) p'' - laplacian p = s(t) delta(x), a sample a time step.
-        order: in space; see ``stencil.weights``. Data of another one than a refinement's test it honestly.
+        order: in space; see ``stencil.weights``. Synthetic data for an inversion should use another order.
         poll: see ``time_blocks``.
 
     Returns:
@@ -56,14 +56,17 @@ def simulate(
     Raises:
         InvalidInput: elements outside the image, a wavelet with waves too short for the grid.
     """
-    source, heard = placed(medium, np.atleast_2d(emitter), wavelet), placed(medium, receivers)
+    source, detectors = (
+        place_elements(medium, np.atleast_2d(emitter), wavelet),
+        place_elements(medium, receivers),
+    )
     if medium.speed.ndim == 3:
-        return forward_in_space(medium, source, heard, wavelet, order, poll)
-    return forward(medium, source, heard, wavelet, 0, order, poll=poll)[0]
+        return forward_3d(medium, source, detectors, wavelet, order, poll)
+    return forward(medium, source, detectors, wavelet, 0, order, poll=poll)[0]
 
 
-def placed(medium: Medium, positions: Floats, wavelet: Floats | None = None) -> Points:
-    """Elements on the medium's grid, in its type; a wavelet is held against the grid as well."""
+def place_elements(medium: Medium, positions: Floats, wavelet: Floats | None = None) -> Points:
+    """Elements on the medium's grid, in its type; checks that the grid resolves the wavelet, if given."""
     if wavelet is not None:
         points = points_per_wavelength(medium, wavelet)
         if points < LEAST_POINTS:
@@ -76,14 +79,18 @@ def placed(medium: Medium, positions: Floats, wavelet: Floats | None = None) -> 
     return Points(found.first, found.weights.astype(medium.keep.dtype))
 
 
-def check_flat(medium: Medium) -> None:
-    """Refuse a medium in space, where waves are followed in a plane alone."""
+def check_2d(medium: Medium) -> None:
+    """Raise for a 3-D medium, where only 2-D waves are implemented.
+
+    Raises:
+        InvalidInput: naming its shape.
+    """
     if medium.speed.ndim != 2:
         raise InvalidInput("speed", f"shape {medium.speed.shape}", "(nx, ny)")
 
 
 def points_per_wavelength(medium: Medium, wavelet: Floats) -> float:
-    """Nodes in the shortest wave that a wavelet makes."""
+    """Nodes per shortest wavelength of a wavelet."""
     if wavelet.ndim != 1 or wavelet.size < 2 or not np.isfinite(wavelet).all() or not wavelet.any():
         raise InvalidInput("wavelet", f"shape {wavelet.shape}", "(nt,) of finite numbers, not all 0")
     spectrum = np.abs(np.fft.rfft(wavelet, 2 * wavelet.size))
@@ -95,34 +102,34 @@ def points_per_wavelength(medium: Medium, wavelet: Floats) -> float:
 def forward(
     medium: Medium,
     source: Points,
-    heard: Points,
+    detectors: Points,
     wavelet: Floats,
     every: int,
     order: int = 2 * HALO,
     by: Unknown = "speed",
-    poll: Poll = unheeded,
+    poll: Poll = no_poll,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Traces, and the source of scattered waves in the image at every ``every``-th step.
 
     Args:
-        source, heard: as ``placed`` gives them.
-        every: 0: keep nothing.
+        source, detectors: as ``place_elements`` gives them.
+        every: steps between stored fields; 0: store none.
         order: in space.
-        by: the change that scatters.
+        by: the variable whose change scatters.
         poll: see ``time_blocks``.
 
     Returns:
         traces: (nrx, nt).
-        scattered: (ceil(nt / every), nx, ny), over the wavelet's highest value: h^2 (laplacian p + s), what
-            a change of 1/c^2 would radiate; or next - before + 2 sigma dt now, what one of sigma dt takes.
+        scattered: (ceil(nt / every), nx, ny), relative to the wavelet's maximum: h^2 (laplacian p + s), the
+            source radiated by a change of 1/c^2, or next - before + 2 sigma dt now, by one of sigma dt.
 
     Raises:
-        InvalidInput: for a medium in space, which ``simulate`` alone takes.
+        InvalidInput: for a 3-D medium, which only ``simulate`` accepts.
     """
-    check_flat(medium)
+    check_2d(medium)
     kind = medium.keep.dtype
     nt = wavelet.size
-    traces = np.empty((len(heard.first), nt), kind)
+    traces = np.empty((len(detectors.first), nt), kind)
     kept = -(-nt // every) if every else 0
     scattered = np.empty((kept, *medium.speed.shape), kind)
     fields = np.zeros((2, *medium.keep.shape), kind)
@@ -131,7 +138,7 @@ def forward(
     fade = medium.fade[inner, inner]
     turn = (1 - fade) / (1 + fade)
     taps, pulse = weights(order).astype(kind), (wavelet / scale).astype(kind)
-    for begin, end in strips(nt, medium.keep.size, poll):
+    for begin, end in split_steps(nt, medium.keep.size, poll):
         _forward(
             begin,
             end,
@@ -140,7 +147,7 @@ def forward(
             medium.factors,
             taps,
             source,
-            heard,
+            detectors,
             pulse,
             medium.margin,
             every,
@@ -162,7 +169,7 @@ def _forward(
     factors: Any,
     weights: Any,
     source: Any,
-    heard: Any,
+    detectors: Any,
     wavelet: Any,
     margin: int,
     every: int,
@@ -175,15 +182,15 @@ def _forward(
     first, along = source.first[0], source.weights[0]
     for n in range(begin, end):
         for r in range(traces.shape[0]):
-            traces[r, n] = read(now, heard.first[r], heard.weights[r])
+            traces[r, n] = read(now, detectors.first[r], detectors.weights[r])
         kept = every > 0 and n % every == 0
         if kept and by_loss:
-            braked(now, old, turn, margin, scattered[n // every])
+            begin_loss_scattering(now, old, turn, margin, scattered[n // every])
         elif kept:
             curvature(now, weights, margin, scattered[n // every])
             spread(scattered[n // every], margin, first, along, wavelet[n])
         advance(now, old, keep, fade, drive, weights)
         inject(old, drive, first, along, wavelet[n])
         if kept and by_loss:
-            released(old, margin, scattered[n // every])
+            end_loss_scattering(old, margin, scattered[n // every])
         now, old = old, now

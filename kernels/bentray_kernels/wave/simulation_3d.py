@@ -1,4 +1,4 @@
-"""Waves in space: the compiled time step along three axes, and the traces of one emitter."""
+"""3-D wave simulation: the compiled time step along three axes, and the traces of one emitter."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from ..compiled import kernel
 from .medium import Medium
 from .points import Points
 from .stencil import HALO, weights
-from .time_blocks import Poll, strips
-from .time_step import QUIET, TAPS
+from .time_blocks import Poll, split_steps
+from .time_step import FLUSH, TAPS
 
 
-def forward_in_space(
-    medium: Medium, source: Points, heard: Points, wavelet: Floats, order: int, poll: Poll
+def forward_3d(
+    medium: Medium, source: Points, detectors: Points, wavelet: Floats, order: int, poll: Poll
 ) -> NDArray[Any]:
     """Traces, (nrx, nt), of a source in a medium of three axes; arguments as ``simulation.forward``."""
     kind = medium.keep.dtype
     scale = float(np.abs(wavelet).max())
     taps, pulse = weights(order).astype(kind), (wavelet / scale).astype(kind)
-    traces = np.empty((len(heard.first), wavelet.size), kind)
+    traces = np.empty((len(detectors.first), wavelet.size), kind)
     fields = np.zeros((2, *medium.keep.shape), kind)
-    for begin, end in strips(wavelet.size, medium.keep.size, poll):
-        _forward(begin, end, fields[0], fields[1], medium.factors, taps, source, heard, pulse, traces)
-    # A point is 1 / spacing^3 on its node, of which the factors hold spacing^2.
+    for begin, end in split_steps(wavelet.size, medium.keep.size, poll):
+        _forward(begin, end, fields[0], fields[1], medium.factors, taps, source, detectors, pulse, traces)
+    # A point source is 1 / spacing^3 on its node; the factors contain spacing^2.
     traces *= kind.type(scale / medium.spacing)
     return traces
 
@@ -41,27 +41,27 @@ def _forward(
     factors: Any,
     weights: Any,
     source: Any,
-    heard: Any,
+    detectors: Any,
     wavelet: Any,
     traces: Any,
 ) -> None:
     keep, fade, drive = factors
     for n in range(begin, end):
         for r in range(traces.shape[0]):
-            traces[r, n] = read_in_space(now, heard.first[r], heard.weights[r])
-        advance_in_space(now, old, keep, fade, drive, weights)
-        inject_in_space(old, drive, source.first[0], source.weights[0], wavelet[n])
+            traces[r, n] = read_3d(now, detectors.first[r], detectors.weights[r])
+        advance_3d(now, old, keep, fade, drive, weights)
+        inject_3d(old, drive, source.first[0], source.weights[0], wavelet[n])
         now, old = old, now
 
 
 @kernel(inline="always")
-def advance_in_space(now: Any, old: Any, keep: Any, fade: Any, drive: Any, weights: Any) -> None:
+def advance_3d(now: Any, old: Any, keep: Any, fade: Any, drive: Any, weights: Any) -> None:
     """As ``wave.time_step.advance``, for (nx, ny, nz)."""
     nx, ny, nz = now.shape
     inner = nz - 2 * HALO
     w0 = weights[0] + weights[0] + weights[0]
     w1, w2, w3, w4 = weights[1], weights[2], weights[3], weights[4]
-    quiet = now.dtype.type(QUIET)
+    flush = now.dtype.type(FLUSH)
     for i in range(HALO, nx - HALO):
         for j in range(HALO, ny - HALO):
             row = now[i, j]
@@ -88,11 +88,11 @@ def advance_in_space(now: Any, old: Any, keep: Any, fade: Any, drive: Any, weigh
                     + w3 * (((a3[m] + b3[m]) + (l3[m] + r3[m])) + (row[m + 1] + row[m + 7]))
                     + w4 * (((a4[m] + b4[m]) + (l4[m] + r4[m])) + (row[m] + row[m + 8]))
                 )
-                into[m] = (k[m] * here - f[m] * into[m] + d[m] * laplacian + quiet) - quiet
+                into[m] = (k[m] * here - f[m] * into[m] + d[m] * laplacian + flush) - flush
 
 
 @kernel(inline="always")
-def inject_in_space(field: Any, drive: Any, first: Any, along: Any, value: Any) -> None:
+def inject_3d(field: Any, drive: Any, first: Any, along: Any, value: Any) -> None:
     """Add a source of one element, as the scheme drives it."""
     for i in range(TAPS):
         for j in range(TAPS):
@@ -102,7 +102,7 @@ def inject_in_space(field: Any, drive: Any, first: Any, along: Any, value: Any) 
 
 
 @kernel(inline="always")
-def read_in_space(field: Any, first: Any, along: Any) -> Any:
+def read_3d(field: Any, first: Any, along: Any) -> Any:
     """The field at one element."""
     found = field.dtype.type(0)
     for i in range(TAPS):

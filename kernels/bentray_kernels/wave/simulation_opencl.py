@@ -1,4 +1,4 @@
-"""Pressure traces of one emitter from an OpenCL device, or from the CPU where no device can be trusted."""
+"""Pressure traces of one emitter by OpenCL, or by the CPU where no device passes its self-test."""
 
 from __future__ import annotations
 
@@ -9,46 +9,51 @@ import numpy as np
 from ..arrays import Floats
 from .medium import Medium
 from .points import REACH, Points
-from .simulation import check_flat, forward, placed
+from .simulation import check_2d, forward, place_elements
 from .stencil import HALO, weights
-from .time_step import QUIET
+from .time_step import FLUSH
 
 if TYPE_CHECKING:
     from ..opencl.session import Session
 
 
 def simulate_opencl(medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floats) -> Floats:
-    """As ``simulate``, from the same stencil, factors and weights; equal to it but for rounding.
+    """As ``simulate``, from the same stencil, factors and weights; equal to it except for rounding.
 
     Raises:
-        InvalidInput: as ``simulate``, for a medium in space, and where ``BENTRAY_OPENCL_DEVICE`` names no
-            one device.
+        InvalidInput: as ``simulate``, for a 3-D medium, and where ``BENTRAY_OPENCL_DEVICE`` does not
+            match one device.
 
     Warns:
-        OpenCLFallbackWarning: once, where no device passes its trial and ``simulate`` computes instead.
+        OpenCLFallbackWarning: once, where no device passes its self-test and ``simulate`` computes instead.
     """
-    # Here, so that whoever never asks for OpenCL never loads it.
+    # Imported here, so that OpenCL is loaded only when it is used.
     from ..opencl.choice import session_or_warning
 
-    check_flat(medium)
-    source, heard = placed(medium, np.atleast_2d(emitter), wavelet), placed(medium, receivers)
+    check_2d(medium)
+    source, detectors = (
+        place_elements(medium, np.atleast_2d(emitter), wavelet),
+        place_elements(medium, receivers),
+    )
     session = session_or_warning(instead="simulate")
     if session is None:
-        return forward(medium, source, heard, wavelet, 0)[0]
-    return _simulated(session, medium, source, heard, wavelet)
+        return forward(medium, source, detectors, wavelet, 0)[0]
+    return _simulated(session, medium, source, detectors, wavelet)
 
 
-def _simulated(session: Session, medium: Medium, source: Points, heard: Points, wavelet: Floats) -> Floats:
+def _simulated(
+    session: Session, medium: Medium, source: Points, detectors: Points, wavelet: Floats
+) -> Floats:
     from ..opencl.session import set_arguments
 
     kind = medium.keep.dtype
     taps = 2 * REACH
     defines = (f"REAL={'float' if kind == np.float32 else 'double'}", f"HALO={HALO}", f"TAPS={taps}")
-    advance, inject, listen = (
-        session.kernel(("wave/step",), name, *defines) for name in ("advance", "inject", "listen")
+    advance, inject, record = (
+        session.kernel(("wave/step",), name, *defines) for name in ("advance", "inject", "record")
     )
     nx, ny = medium.keep.shape
-    row, steps, count = np.uint32(ny), np.uint32(wavelet.size), len(heard.first)
+    row, steps, count = np.uint32(ny), np.uint32(wavelet.size), len(detectors.first)
     scale = float(np.abs(wavelet).max())
     traces = np.empty((count, wavelet.size), kind)
     with session.lock:
@@ -57,14 +62,14 @@ def _simulated(session: Session, medium: Medium, source: Points, heard: Points, 
         stencil = session.upload(weights().astype(kind))
         pulse = session.upload((wavelet / scale).astype(kind))
         at, along = session.upload(source.first[0].astype(np.int32)), session.upload(source.weights[0])
-        ears, hearing = session.upload(heard.first.astype(np.int32)), session.upload(heard.weights)
+        ears, hearing = session.upload(detectors.first.astype(np.int32)), session.upload(detectors.weights)
         given = session.reserve(traces.nbytes)
         for n in range(wavelet.size):
             now, old = fields[n % 2], fields[1 - n % 2]
             step = np.uint32(n)
-            set_arguments(listen, now, ears, hearing, given, step, steps, row)
-            session.launch(listen, (count,), None)
-            set_arguments(advance, now, old, keep, fade, drive, stencil, kind.type(QUIET), row)
+            set_arguments(record, now, ears, hearing, given, step, steps, row)
+            session.launch(record, (count,), None)
+            set_arguments(advance, now, old, keep, fade, drive, stencil, kind.type(FLUSH), row)
             session.launch(advance, (ny - 2 * HALO, nx - 2 * HALO), None)
             set_arguments(inject, old, drive, at, along, pulse, step, row)
             session.launch(inject, (taps, taps), None)

@@ -1,4 +1,4 @@
-"""The finite-difference Laplacian: its weights, the longest stable time step, the phase error it leaves."""
+"""The finite-difference Laplacian: weights, longest stable time step, numerical dispersion."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ HALO = 4
 def weights(order: int = 2 * HALO) -> Floats:
     """Weights of the second derivative at distances 0 to 4 nodes, times spacing squared, (5,).
 
-    They follow from the demand that every polynomial up to degree ``order + 1`` be differentiated exactly,
-    which for equally spaced nodes has a closed form (Fornberg, Math. Comp. 51, 1988).
+    Polynomials up to degree ``order + 1`` are differentiated exactly; for equally spaced nodes the weights
+    have a closed form (Fornberg, Math. Comp. 51, 1988).
 
     Args:
         order: even, at most 8; of a lower one the outermost weights are 0. The longest stable step of order
@@ -36,7 +36,7 @@ def weights(order: int = 2 * HALO) -> Floats:
 
 
 def symbol(angle: Floats, order: int = 2 * HALO) -> Floats:
-    """What the weights give in place of ``angle**2``; ``angle`` is wave number times spacing, any shape."""
+    """Symbol of the stencil, which approximates ``angle**2``; ``angle`` is wave number times spacing."""
     centre, *sides = weights(order)
     turns = np.cos(np.asarray(angle)[..., None] * np.arange(1, HALO + 1))
     return np.asarray(-centre - 2.0 * turns @ np.array(sides))
@@ -45,7 +45,7 @@ def symbol(angle: Floats, order: int = 2 * HALO) -> Floats:
 def longest_step(speed: float, spacing: float, damping: float = 0.0, dimensions: int = 2) -> float:
     """Longest stable time step, s.
 
-    The scheme is stable while no mode turns by more than half a circle a step: with the damping sigma,
+    The scheme is stable while the phase of no mode advances by more than π per step: with the damping sigma,
     dt^2 (sigma^2 + d S c^2 / h^2) <= 4, where S is the symbol at the shortest wave and d the dimensions.
 
     Args:
@@ -65,7 +65,7 @@ def phase_error(
 
     Args:
         points_per_wavelength: nodes in a wavelength.
-        courant: speed times time step over spacing; 0: what space alone does.
+        courant: speed times time step over spacing; 0: error of the spatial stencil alone.
         direction: angle of travel to the x axis, rad.
         order: in space.
     """
@@ -77,16 +77,16 @@ def phase_error(
     return turned / angle - 1.0
 
 
-def turning(wave_number: Floats, speed: float, spacing: float, time_step_s: float) -> Floats:
-    """Angular frequency at which the scheme carries waves of a wave number, a mean over directions, rad/s.
+def numerical_frequency(wave_number: Floats, speed: float, spacing: float, time_step_s: float) -> Floats:
+    """Angular frequency of the scheme for a wave number, averaged over directions, rad/s.
 
     Args:
-        wave_number: any shape, rad/m, up to half a turn a node.
+        wave_number: any shape, rad/m, up to π per node.
         speed: m/s.
         spacing: m.
         time_step_s: s.
     """
-    # Directions repeat after a right angle, mirrored at half of it.
+    # Directions are symmetric about 45° and repeat after 90°.
     angle = np.pi / 4.0 * (np.arange(16) + 0.5) / 16.0
     turn = np.asarray(wave_number)[..., None] * spacing
     size = np.sqrt(symbol(turn * np.cos(angle)) + symbol(turn * np.sin(angle))).mean(axis=-1)

@@ -1,4 +1,4 @@
-"""The compiled time step: one field forward in place, sources spread, receivers read."""
+"""The compiled finite-difference time step, point sources and receivers."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from .stencil import HALO
 
 TAPS = 2 * REACH
 
-# Fields are of the order of 1; this times the rounding of their type is as good as nothing.
-QUIET = 1e-20
+# Fields are of the order of 1; values far below this become 0.
+FLUSH = 1e-20
 
 
 @kernel(inline="always")
 def advance(now: Any, old: Any, keep: Any, fade: Any, drive: Any, weights: Any) -> None:
-    """Turn the field before ``now`` into the one after it, in place; the halo stays zero.
+    """Replace the field before ``now`` by the one after it, in place; the halo stays zero.
 
-    Nine rows of the field are read at a time, which the first cache holds up to a thousand nodes a row.
+    Nine rows of the field are read at a time; the first-level cache holds them up to a thousand nodes a row.
 
     Args:
         now, old, keep, fade, drive: (nx, ny), of one type.
         weights: (5,), of the Laplacian, of the same type.
     """
-    # Rows cut so that an index from 0 reaches every neighbour: no index can be negative, and the loop over
-    # a row becomes vector instructions.
+    # Rows are sliced so that every neighbour has an index from 0: no index is negative, and the loop over a
+    # row is vectorised.
     nx, ny = now.shape
     inner = ny - 2 * HALO
     w0 = weights[0] + weights[0]
     w1, w2, w3, w4 = weights[1], weights[2], weights[3], weights[4]
-    quiet = now.dtype.type(QUIET)
+    flush = now.dtype.type(FLUSH)
     for i in range(HALO, nx - HALO):
         row = now[i]
         into = old[i, HALO : HALO + inner]
@@ -52,8 +52,8 @@ def advance(now: Any, old: Any, keep: Any, fade: Any, drive: Any, weights: Any) 
                 + w3 * ((a3[j] + b3[j]) + (row[j + 1] + row[j + 7]))
                 + w4 * ((a4[j] + b4[j]) + (row[j] + row[j + 8]))
             )
-            # Values that nobody will hear become 0: below a type's normal range arithmetic is far slower.
-            into[j] = (k[j] * here - f[j] * into[j] + d[j] * laplacian + quiet) - quiet
+            # Negligible values become 0: arithmetic on subnormal numbers is far slower.
+            into[j] = (k[j] * here - f[j] * into[j] + d[j] * laplacian + flush) - flush
 
 
 @kernel(inline="always")
@@ -82,14 +82,14 @@ def curvature(now: Any, weights: Any, margin: int, into: Any) -> None:
 
 
 @kernel(inline="always")
-def braked(now: Any, old: Any, turn: Any, margin: int, into: Any) -> None:
-    """The part of what a change of the damping radiates, sign reversed, that is known before a step.
+def begin_loss_scattering(now: Any, old: Any, turn: Any, margin: int, into: Any) -> None:
+    """Source scattered by a change of the damping, sign reversed: the part that is known before a step.
 
     Args:
         now, old: padded fields.
         turn: (nx, ny), damping times time step.
         margin: nodes of padding.
-        into: of the image's shape; filled. The next field is added to it after the step, see ``released``.
+        into: of the image's shape; filled. ``end_loss_scattering`` adds the next field after the step.
     """
     for i in range(into.shape[0]):
         here, before, turned, out = now[i + margin, margin:], old[i + margin, margin:], turn[i], into[i]
@@ -98,8 +98,8 @@ def braked(now: Any, old: Any, turn: Any, margin: int, into: Any) -> None:
 
 
 @kernel(inline="always")
-def released(new: Any, margin: int, into: Any) -> None:
-    """The other part of ``braked``, from the field after the step."""
+def end_loss_scattering(new: Any, margin: int, into: Any) -> None:
+    """The remaining part of ``begin_loss_scattering``, from the field after the step."""
     for i in range(into.shape[0]):
         after, out = new[i + margin, margin:], into[i]
         for j in range(out.shape[0]):
@@ -108,7 +108,7 @@ def released(new: Any, margin: int, into: Any) -> None:
 
 @kernel(inline="always")
 def inject(field: Any, drive: Any, first: Any, along: Any, value: Any) -> None:
-    """Add a source of one element, as the scheme drives it."""
+    """Add the source of one element, with the factors of the scheme."""
     for i in range(TAPS):
         for j in range(TAPS):
             x, y = first[0] + i, first[1] + j
@@ -117,7 +117,7 @@ def inject(field: Any, drive: Any, first: Any, along: Any, value: Any) -> None:
 
 @kernel(inline="always")
 def spread(image: Any, margin: int, first: Any, along: Any, value: Any) -> None:
-    """Add a source of one element to an image without padding, where it falls inside."""
+    """Add the source of one element to an image without padding, where it lies inside."""
     for i in range(TAPS):
         for j in range(TAPS):
             x, y = first[0] + i - margin, first[1] + j - margin

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 
 from bentray_kernels.eikonal import solve
-from bentray_kernels.eikonal.deviation import deviate, sheets
+from bentray_kernels.eikonal.deviation import allocate_sweep_arrays, deviate
 from bentray_kernels.eikonal.problem import PointSource
 
 from ...effort import effort
@@ -21,7 +21,9 @@ def factored_sweeping(problem):
     slowness, at_source = problem.slowness, problem.source_slowness()
     into = np.empty(slowness.size, np.float32)
     j, k = problem.source / problem.spacing
-    deviate((slowness / at_source).astype(np.float32).ravel(), j, k, sheets(slowness.shape), into)
+    deviate(
+        (slowness / at_source).astype(np.float32).ravel(), j, k, allocate_sweep_arrays(slowness.shape), into
+    )
     x, y = (np.arange(n) for n in slowness.shape)
     distance = np.hypot(x[:, None] - j, y[None, :] - k)
     return (distance + into.reshape(slowness.shape)) * at_source * problem.spacing
@@ -98,7 +100,7 @@ def test_no_direction_is_preferred(seed):
 
 
 def test_used_arrays_change_no_bit():
-    at = sheets((50, 40))
+    at = allocate_sweep_arrays((50, 40))
     results = []
     for seed in (0, 1, 0):
         slowness = (WATER / tissue(seed, (50, 40))).astype(np.float32).ravel()

@@ -92,7 +92,7 @@ def test_turning_what_changed_turns_the_whole(shape, seed, many):
     inside = np.flatnonzero(np.pad(np.ones(shape), 1).ravel())
     nodes = rng.choice(inside, inside.size if many else 1, replace=False)
     grid.put(nodes, rng.uniform(0.0, 1.0, nodes.size), stored)
-    changed = grid.nobody()
+    changed = grid.no_columns()
     _, nj, nk = grid.shape
     for node in nodes:
         row, k = divmod(int(node), nk + 2)
@@ -117,7 +117,7 @@ def members(grid, low, high):
 def test_neighbours_of_a_node_are_those_of_the_grid(shape):
     grid = Diagonals.of(shape)
     padded = tuple(n + 2 for n in shape)
-    found = grid.nobody()
+    found = grid.no_columns()
     for node in np.ndindex(padded):
         expected = set()
         for axis in range(len(shape)):
@@ -136,7 +136,7 @@ def test_flipping_keeps_every_node(shape, seed):
     grid = Diagonals.of(shape)
     rng = np.random.default_rng(seed)
     nodes = rng.integers(0, numbered(shape).size, 5)
-    near, flipped = grid.nobody(), grid.nobody()
+    near, flipped = grid.no_columns(), grid.no_columns()
     grid.neighbours(nodes, near)
     grid.flip(near, flipped)
     _, nj, nk = grid.shape

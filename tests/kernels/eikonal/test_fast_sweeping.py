@@ -95,7 +95,7 @@ def test_the_square_root_is_taken_of_vectors():
     fresh = njit(nogil=True, error_model="numpy")(fast_sweeping._sweep_plane.py_func)
     grid = Diagonals.of((4, 4))
     time, crossing = np.full((2, grid.size), np.inf)
-    waiting, changed = grid.nobody(), grid.nobody()
+    waiting, changed = grid.no_columns(), grid.no_columns()
     fresh(fast_sweeping.Grid(time, crossing, waiting, changed, grid.shape, grid.stored), 0.0, 0, 1, 0)
     (assembly,) = fresh.inspect_asm().values()
     if "vsqrt" not in assembly:

@@ -5,9 +5,9 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.waveform import misfits
-from bentray_kernels.wave.adjoint import backward, slope, stored_bytes
+from bentray_kernels.wave.adjoint import backward, misfit_gradient, stored_bytes
 from bentray_kernels.wave.medium import Medium
-from bentray_kernels.wave.simulation import forward, placed, simulate
+from bentray_kernels.wave.simulation import forward, place_elements, simulate
 
 SPACING, STEP, STEPS = 1e-3, 2e-7, 180
 EMITTER = np.array([0.0123, 0.0201])
@@ -49,7 +49,7 @@ def test_gradient_of_every_misfit_is_that_of_finite_differences(measure, windowe
         return misfit(simulate(medium(speed), EMITTER, RECEIVERS, WAVELET))[0]
 
     speed, way = speeds(0), change(2)
-    found = slope(medium(speed), EMITTER, RECEIVERS, WAVELET, misfit)
+    found = misfit_gradient(medium(speed), EMITTER, RECEIVERS, WAVELET, misfit)
     small = 3e-2
     near = (value(speed + small * way) - value(speed - small * way)) / (2.0 * small)
     far = (value(speed + 2.0 * small * way) - value(speed - 2.0 * small * way)) / (4.0 * small)
@@ -69,7 +69,7 @@ def test_gradient_holds_with_loss():
     def at(c):
         return medium(c, loss=loss * speed / c)
 
-    found = slope(at(speed), EMITTER, RECEIVERS, WAVELET, misfit)
+    found = misfit_gradient(at(speed), EMITTER, RECEIVERS, WAVELET, misfit)
     values = [misfit(simulate(at(speed + s * way), EMITTER, RECEIVERS, WAVELET))[0] for s in (1e-2, -1e-2)]
     assert (found.gradient * way).sum() == pytest.approx((values[0] - values[1]) / 2e-2, rel=1e-6)
 
@@ -86,7 +86,7 @@ def test_gradient_by_the_attenuation_is_that_of_finite_differences(measure):
     def value(alpha):
         return misfit(simulate(medium(speed, loss=alpha), EMITTER, RECEIVERS, WAVELET))[0]
 
-    found = slope(medium(speed, loss=loss), EMITTER, RECEIVERS, WAVELET, misfit, by="attenuation")
+    found = misfit_gradient(medium(speed, loss=loss), EMITTER, RECEIVERS, WAVELET, misfit, by="attenuation")
     small = 0.1
     near = (value(loss + small * way) - value(loss - small * way)) / (2.0 * small)
     far = (value(loss + 2.0 * small * way) - value(loss - 2.0 * small * way)) / (4.0 * small)
@@ -97,13 +97,13 @@ def test_gradient_by_the_attenuation_is_that_of_finite_differences(measure):
 def test_source_to_traces_and_back_are_transposes():
     rng = np.random.default_rng(6)
     host = medium(speeds(5))
-    source, heard = placed(host, EMITTER[None]), placed(host, RECEIVERS)
+    source, heard = place_elements(host, EMITTER[None]), place_elements(host, RECEIVERS)
     wavelet, residual = rng.standard_normal(STEPS), rng.standard_normal((3, STEPS))
     traces, _ = forward(host, source, heard, wavelet, 0)
     # Read at the emitter, the adjoint field is the transpose of the whole run.
     turned = np.zeros(STEPS)
     for r in range(3):
-        one = placed(host, RECEIVERS[r : r + 1])
+        one = place_elements(host, RECEIVERS[r : r + 1])
         turned += forward(host, one, source, residual[r, ::-1].copy(), 0)[0][0][::-1]
     assert (traces * residual).sum() == pytest.approx(wavelet @ turned, rel=1e-10)
 
@@ -112,7 +112,7 @@ def test_born_modelling_and_the_gradient_are_transposes():
     rng = np.random.default_rng(8)
     speed, way = speeds(7), change(9)
     host = medium(speed)
-    source, heard = placed(host, EMITTER[None]), placed(host, RECEIVERS)
+    source, heard = place_elements(host, EMITTER[None]), place_elements(host, RECEIVERS)
     _, scattered = forward(host, source, heard, WAVELET, 1)
     residual = rng.standard_normal((3, STEPS))
     image, _ = backward(host, heard, residual, scattered, 1)
@@ -134,7 +134,7 @@ def test_born_modelling_of_loss_and_its_gradient_are_transposes():
     def lost(traces):
         return float((traces * residual).sum()), residual
 
-    found = slope(medium(speed, loss=loss), EMITTER, RECEIVERS, WAVELET, lost, by="attenuation")
+    found = misfit_gradient(medium(speed, loss=loss), EMITTER, RECEIVERS, WAVELET, lost, by="attenuation")
     small = 0.5
 
     def traces(factor):
@@ -153,18 +153,18 @@ def test_fewer_stored_fields_and_single_precision_change_the_gradient_little(by)
         return misfits.least_squares(traces, recorded, np.ones((3, 1)))
 
     smooth = np.full((40, 42), 1500.0)
-    exact = slope(medium(smooth), EMITTER, RECEIVERS, WAVELET, misfit, 1, by).gradient
-    cheap = slope(medium(smooth, np.float32), EMITTER, RECEIVERS, WAVELET, misfit, 4, by).gradient
+    exact = misfit_gradient(medium(smooth), EMITTER, RECEIVERS, WAVELET, misfit, 1, by).gradient
+    cheap = misfit_gradient(medium(smooth, np.float32), EMITTER, RECEIVERS, WAVELET, misfit, 4, by).gradient
     assert np.sqrt(((cheap - exact) ** 2).sum() / (exact**2).sum()) < 2e-2
 
 
 def test_bytes_are_known_before():
     host = medium(speeds(0), np.float32)
-    source, heard = placed(host, EMITTER[None]), placed(host, RECEIVERS)
+    source, heard = place_elements(host, EMITTER[None]), place_elements(host, RECEIVERS)
     _, scattered = forward(host, source, heard, WAVELET, 7)
     assert scattered.nbytes == stored_bytes(host, STEPS, 7)
 
 
 def test_a_step_of_nothing_is_refused():
     with pytest.raises(InvalidInput, match="every"):
-        slope(medium(speeds(0)), EMITTER, RECEIVERS, WAVELET, lambda traces: (0.0, traces), 0)
+        misfit_gradient(medium(speeds(0)), EMITTER, RECEIVERS, WAVELET, lambda traces: (0.0, traces), 0)

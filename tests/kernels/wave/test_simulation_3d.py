@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.wave.adjoint import slope
+from bentray_kernels.wave.adjoint import misfit_gradient
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.memory import emission_bytes
 from bentray_kernels.wave.simulation import simulate
@@ -153,20 +153,20 @@ def test_memory_is_known_before_and_refused_beyond_the_room():
     speed, loss = np.full((30, 24, 20), WATER), np.full((30, 24, 20), 3.0)
     known = emission_bytes(speed.shape, 16)
     tracemalloc.start()
-    medium = Medium.of(speed, SPACING, STEP, attenuation=loss, edge_nodes=16, room_bytes=known)
+    medium = Medium.of(speed, SPACING, STEP, attenuation=loss, edge_nodes=16, memory_bytes=known)
     simulate(medium, np.full(3, 8e-3), np.full((1, 3), 9e-3), pulse(np.arange(130) * STEP, 1.8e5))
     _, taken = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert 0.7 * known < taken < known
     with pytest.raises(InvalidInput, match=str(known)):
-        Medium.of(speed, SPACING, STEP, edge_nodes=16, room_bytes=known - 1)
+        Medium.of(speed, SPACING, STEP, edge_nodes=16, memory_bytes=known - 1)
 
 
 def test_what_space_does_not_have_is_refused():
     medium, time = water((14, 14, 14), edge_nodes=8), np.arange(130) * STEP
     wavelet, at = pulse(time, 1.8e5), np.full((1, 3), 5e-3)
     for wrong in (
-        lambda: slope(medium, at[0], at, wavelet, lambda traces: (0.0, traces)),
+        lambda: misfit_gradient(medium, at[0], at, wavelet, lambda traces: (0.0, traces)),
         lambda: simulate_opencl(medium, at[0], at, wavelet),
         lambda: simulate(medium, at[0], at[:, :2], wavelet),
         lambda: simulate(medium, at[0], at + 9e-3, wavelet),

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
-from bentray_kernels.wave.stencil import HALO, longest_step, phase_error, symbol, turning, weights
+from bentray_kernels.wave.stencil import HALO, longest_step, numerical_frequency, phase_error, symbol, weights
 
 
 @pytest.mark.parametrize("degree", range(10))
@@ -93,12 +93,12 @@ def test_phase_error_is_what_the_stencil_does_to_a_wave(points):
 
 def test_turning_is_the_speed_times_the_number_of_long_waves():
     number = np.array([10.0, 20.0])
-    assert turning(number, 1500.0, 1e-3, 1e-8) == pytest.approx(1500.0 * number, rel=1e-8)
+    assert numerical_frequency(number, 1500.0, 1e-3, 1e-8) == pytest.approx(1500.0 * number, rel=1e-8)
 
 
 def test_turning_has_the_error_of_the_phase():
     number, spacing, step = 2.0 * np.pi / (4.0 * 1e-3), 1e-3, 2e-7
     mean = np.mean([phase_error(4.0, 0.3, angle) for angle in np.linspace(0.0, np.pi / 2, 91)])
-    assert turning(np.array(number), 1500.0, spacing, step) == pytest.approx(
+    assert numerical_frequency(np.array(number), 1500.0, spacing, step) == pytest.approx(
         1500.0 * number * (1.0 + mean), rel=2e-4
     )

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels.tomography.waveform.misfits import correlation
 from bentray_kernels.wave import time_blocks as cut
-from bentray_kernels.wave.adjoint import slope
+from bentray_kernels.wave.adjoint import misfit_gradient
 from bentray_kernels.wave.simulation import simulate
 
 from .test_adjoint import EMITTER, RECEIVERS, STEPS, WAVELET, medium, speeds
@@ -24,10 +24,10 @@ class Unheard(Exception):
 @given(steps=st.integers(0, 5000), nodes=st.integers(1, 10**9))
 def test_all_steps_are_in_one_strip_each_and_all_but_the_last_are_even(steps, nodes):
     polled = []
-    found = list(cut.strips(steps, nodes, lambda: polled.append(None)))
+    found = list(cut.split_steps(steps, nodes, lambda: polled.append(None)))
     assert [n for first, end in found for n in range(first, end)] == list(range(steps))
     assert all((end - first) % 2 == 0 for first, end in found[:-1])
-    assert all((end - first - 2) * nodes <= cut.STRIP for first, end in found)
+    assert all((end - first - 2) * nodes <= cut.BLOCK for first, end in found)
     assert len(polled) == len(found)
 
 
@@ -35,9 +35,9 @@ def test_all_steps_are_in_one_strip_each_and_all_but_the_last_are_even(steps, no
 def test_strips_give_the_bits_of_one_piece(monkeypatch, by):
     recorded = simulate(medium(speeds(1)), EMITTER, RECEIVERS, WAVELET)
     compare = partial(correlation, recorded=recorded, weight=np.ones((3, 1)))
-    whole = slope(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, 3, by)
-    monkeypatch.setattr(cut, "STRIP", 4 * medium(speeds()).keep.size)
-    parts = slope(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, 3, by)
+    whole = misfit_gradient(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, 3, by)
+    monkeypatch.setattr(cut, "BLOCK", 4 * medium(speeds()).keep.size)
+    parts = misfit_gradient(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, 3, by)
     assert parts.misfit == whole.misfit
     np.testing.assert_array_equal(parts.gradient, whole.gradient)
     np.testing.assert_array_equal(parts.illumination, whole.illumination)
@@ -47,7 +47,7 @@ def test_strips_give_the_bits_of_one_piece(monkeypatch, by):
 
 @pytest.mark.parametrize("most", [3, STEPS // 4 + 3])
 def test_what_the_poll_raises_ends_both_directions(monkeypatch, most):
-    monkeypatch.setattr(cut, "STRIP", 4 * medium(speeds()).keep.size)
+    monkeypatch.setattr(cut, "BLOCK", 4 * medium(speeds()).keep.size)
     polled = []
 
     def poll():
@@ -59,5 +59,5 @@ def test_what_the_poll_raises_ends_both_directions(monkeypatch, most):
         return 0.0, traces
 
     with pytest.raises(Unheard):
-        slope(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, poll=poll)
+        misfit_gradient(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, poll=poll)
     assert len(polled) == most

@@ -24,7 +24,7 @@ from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.points import REACH
 from bentray_kernels.wave.simulation import simulate
 from bentray_kernels.wave.stencil import longest_step, phase_error
-from bentray_kernels.wave.time_blocks import Poll, unheeded
+from bentray_kernels.wave.time_blocks import Poll, no_poll
 
 from .plane import NODES, SNR, ring_radius
 
@@ -220,7 +220,7 @@ def scan_of(settings: WaveSimulationSettings, waveform: Waveform) -> Dataset:
 
 
 def simulate_emission(
-    settings: WaveSimulationSettings, emission: int, poll: Poll = unheeded
+    settings: WaveSimulationSettings, emission: int, poll: Poll = no_poll
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Object and water traces of an emission, (elements, samples); on ``poll`` see ``time_blocks``."""
     places = settings.places_m()
@@ -252,7 +252,7 @@ def _made(settings: WaveSimulationSettings) -> tuple[Medium, Medium]:
             settings.spacing_m,
             settings.step_s,
             edge_nodes=settings.edge_nodes,
-            room_bytes=MEMORY_LIMIT or math.inf,
+            memory_bytes=MEMORY_LIMIT or math.inf,
         )
         for speed in (settings.speed(), np.full(settings.grid, settings.coupling_mps))
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...arrays import Floats, Ints
 from ...compiled import kernel
 from ...eikonal import solve
-from ...rays.bending import STRIDE, bend, bending
+from ...rays.bending import STRIDE, allocate_bending, bend
 from ...rays.descent import PARTS, empty_path, list_entries, merge_entries, trace_ray
 from ...rays.fan import Fan, Kind
 from ...splines import coefficients
@@ -146,7 +146,7 @@ def _rows(
 ) -> tuple[Ints, NDArray[np.int32], NDArray[np.float32], Floats]:
     """Entries a ray, flat node and nodes of ray of each entry, and predicted times for a spacing of 1."""
     path, scratch = empty_path(fan)
-    space = bending(len(path), fan.shape)
+    space = allocate_bending(len(path), fan.shape)
     nodes = np.empty((BENT_PARTS * len(path)) << len(fan.shape), np.int64)
     weights = np.empty(nodes.size)
     total = np.zeros(fan.tof.size)

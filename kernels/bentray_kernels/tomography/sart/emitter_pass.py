@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ...arrays import Flags, Floats
 from ...compiled import kernel
-from ...eikonal.deviation import Sheets, deviate, sheets
-from ...rays.in_step import Bundle, bundle, follow, lay_out, spread
+from ...eikonal.deviation import SweepArrays, allocate_sweep_arrays, deviate
+from ...rays.vectorised import Bundle, allocate_bundle, back_project, interleave, trace_bundle
 
 Singles = NDArray[np.float32]
 
@@ -27,12 +27,12 @@ class EmitterPass:
         shape: of the grid.
         sheets, rays: of the wave front and of the rays.
         fields: slowness of the front and of the image, and u; (3, nodes).
-        readable: what rays read at each node, see ``lay_out``.
+        readable: what rays read at each node, see ``interleave``.
         sums: Σ correction·w and Σ w of each node in turn since the last update, (2·nodes,).
     """
 
     shape: tuple[int, int]
-    sheets: Sheets
+    sheets: SweepArrays
     rays: Bundle
     fields: Singles
     readable: Singles
@@ -44,8 +44,8 @@ class EmitterPass:
         nodes = shape[0] * shape[1]
         return cls(
             shape,
-            sheets(shape),
-            bundle(receivers, shape),
+            allocate_sweep_arrays(shape),
+            allocate_bundle(receivers, shape),
             np.zeros((3, nodes), np.float32),
             np.empty(4 * nodes, np.float32),
             np.zeros(2 * nodes, np.float32),
@@ -147,7 +147,7 @@ def _look(
     receivers: Floats,
     measured: Floats,
     shape: tuple[int, int],
-    at: Sheets,
+    at: SweepArrays,
     rays: Bundle,
     fields: Singles,
     readable: Singles,
@@ -170,7 +170,7 @@ def _look(
         deviate(ahead, x, y, at, later)
     else:
         later[:] = np.float32(0.0)
-    lay_out(later, image, shape, readable)
+    interleave(later, image, shape, readable)
     count = len(receivers)
     nearness = np.empty(count)
     for r in range(count):
@@ -179,7 +179,7 @@ def _look(
     for k in range(count):
         rays.x[k] = np.float32(receivers[order[k], 0])
         rays.y[k] = np.float32(receivers[order[k], 1])
-    steps = follow(x, y, readable, shape, count, rays)
+    steps = trace_bundle(x, y, readable, shape, count, rays)
     # A node of the source's slowness takes this long.
     unit = at_source * spacing
     worth = np.zeros(count, np.float32)
@@ -188,7 +188,7 @@ def _look(
         left[r] = measured[r] - rays.time[k] * unit
         if rays.length[k] > np.float32(0.0):
             worth[k] = np.float32(left[r] / rays.length[k])
-    spread(worth, steps, shape, rays, sums)
+    back_project(worth, steps, shape, rays, sums)
 
 
 @kernel

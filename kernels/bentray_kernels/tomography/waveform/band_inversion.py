@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from ...arrays import Floats, Ints
-from ...wave.adjoint import slope
+from ...wave.adjoint import misfit_gradient
 from ...wave.simulation import simulate
 from .lbfgs import append_pair, search_direction
 from .waveform_problem import WaveProblem
@@ -142,7 +142,9 @@ def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, some: I
             held += kind(traces, recorded, window)[0]
             continue
         compare = partial(kind, recorded=recorded, weight=window)
-        found = slope(medium, at, receivers, problem.wavelet, compare, problem.every, by, problem.poll)
+        found = misfit_gradient(
+            medium, at, receivers, problem.wavelet, compare, problem.every, by, problem.poll
+        )
         misfit += found.misfit
         gradient += found.gradient
         illumination += found.illumination

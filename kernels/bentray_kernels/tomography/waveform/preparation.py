@@ -11,7 +11,7 @@ from ...acquisition import Dataset, Waveform
 from ...arrays import Flags, Ints
 from ...errors import InvalidInput
 from ...wave.points import REACH
-from ...wave.time_blocks import Poll, unheeded
+from ...wave.time_blocks import Poll, no_poll
 from ..roi import inside
 from .band_grid import Extent
 from .source_calibration import Mapping, WaterShots, with_calibrated_source, with_normalised_amplitudes
@@ -26,7 +26,7 @@ def prepare(
     number: int,
     *,
     run: Mapping = map,
-    poll: Poll = unheeded,
+    poll: Poll = no_poll,
 ) -> WaveProblem:
     """The problem of a slice in band ``number``, its wavelet and its water's phase read from water shots.
 

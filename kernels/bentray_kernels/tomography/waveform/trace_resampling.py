@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats
-from ...wave.stencil import turning
+from ...wave.stencil import numerical_frequency
 
 
 class Water(NamedTuple):
@@ -73,7 +73,7 @@ def resampler(
     # A period of twice the length, so that nothing that the filter spreads comes round again.
     simulated = 2.0 * np.pi * np.fft.rfftfreq(2 * clock.steps, clock.step_s)
     number = np.linspace(0.0, np.pi / spacing, 2001)
-    reached = np.interp(simulated, turning(number, water.speed, spacing, clock.step_s), number)
+    reached = np.interp(simulated, numerical_frequency(number, water.speed, spacing, clock.step_s), number)
     frequency = np.linspace(0.0, 2.0 * band_hz[1], 2001)
     recorded = 1.0 - water.lead - water.bend * frequency**2
     true = np.interp(reached, 2.0 * np.pi * frequency * recorded / water.speed, 2.0 * np.pi * frequency)

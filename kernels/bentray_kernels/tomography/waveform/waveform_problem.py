@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...arrays import Flags, Floats, Ints
 from ...wave.adjoint import stored_bytes
 from ...wave.medium import Medium
-from ...wave.time_blocks import Poll, unheeded
+from ...wave.time_blocks import Poll, no_poll
 from .misfits import arrival_window
 from .trace_resampling import Clock, Water
 from .waveform_settings import Band
@@ -60,7 +60,7 @@ class WaveProblem:
     used: Ints
     held: Ints
     every: int
-    poll: Poll = unheeded
+    poll: Poll = no_poll
 
     def medium(self, speed: Floats, attenuation: Floats | None = None) -> Medium:
         """The medium of images on this grid."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from bentray_kernels.eikonal.diagonals import Diagonals
-from bentray_kernels.rays.in_step import LONGEST
+from bentray_kernels.rays.vectorised import LONGEST
 from bentray_kernels.tomography.problem import MARGIN_NODES
 from bentray_kernels.tomography.settings import Settings
 from bentray_kernels.tomography.solver_choice import solver_of

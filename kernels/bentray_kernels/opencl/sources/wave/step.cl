@@ -9,17 +9,17 @@
 // axis 0 along y.
 // now, old, keep, fade, drive   [nx][ny].
 // weights   of the second derivative at distances 0 to HALO.
-// quiet     values far below it become 0.
+// flush     values far below it become 0.
 kernel void advance(global const REAL *now, global REAL *old, global const REAL *keep,
                     global const REAL *fade, global const REAL *drive, constant REAL *weights,
-                    const REAL quiet, const uint ny)
+                    const REAL flush, const uint ny)
 {
     const uint here = (get_global_id(1) + HALO) * ny + get_global_id(0) + HALO;
     REAL laplacian = (weights[0] + weights[0]) * now[here];
     for (uint k = 1; k <= HALO; ++k)
         laplacian += weights[k] * ((now[here - k * ny] + now[here + k * ny]) + (now[here - k] + now[here + k]));
     const REAL next = keep[here] * now[here] - fade[here] * old[here] + drive[here] * laplacian;
-    old[here] = (next + quiet) - quiet;
+    old[here] = (next + flush) - flush;
 }
 
 // Adds a sample of the source; one work-item a tap, axis 0 along y.
@@ -37,7 +37,7 @@ kernel void inject(global REAL *field, global const REAL *drive, constant int *f
 // first    [receiver][axis].
 // along    [receiver][axis][tap].
 // traces   [receiver][step].
-kernel void listen(global const REAL *field, global const int *first, global const REAL *along,
+kernel void record(global const REAL *field, global const int *first, global const REAL *along,
                    global REAL *traces, const uint step, const uint steps, const uint ny)
 {
     const uint r = get_global_id(0);

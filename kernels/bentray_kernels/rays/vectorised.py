@@ -1,7 +1,7 @@
-"""All rays of one source traced in step, a part of each at a time, and what they pass (2-D, 32 bits).
+"""Vectorised ray tracing and back-projection: all rays of one source advance together (2-D, float32).
 
-One ray waits for itself: where it goes next hangs on what it has just read. Rays side by side do not, and
-fill the vectors. Positions are in nodes, and the front's direction is ∇r + ∇u, see ``eikonal.deviation``.
+The steps of one ray depend on each other; those of different rays do not, and fill the vector registers.
+Positions are in nodes. The gradient of the travel time is ∇r + ∇u, see ``eikonal.deviation``.
 """
 
 from __future__ import annotations
@@ -19,31 +19,32 @@ Singles = NDArray[np.float32]
 
 ZERO, HALF, ONE = (np.float32(x) for x in (0.0, 0.5, 1.0))
 
-# Length of a step, nodes; each is read at its middle. On Table 6 steps of 1 give the same error, 3.70 %.
+# Length of a step, nodes; fields are interpolated at its midpoint. Steps of 1 give the same error on
+# Table 6, 3.70 %.
 STRIDE = np.float32(1.5)
 
-# Steps that no ray needs more of, over the number of nodes along both sides. One that does has been caught
-# where the discrete gradient has no downhill, and goes straight.
+# Most steps, in sums of the nodes along both sides. A ray that needs more is caught where the discrete
+# gradient has no downhill direction; a straight ray replaces it.
 LONGEST = 2
 
 # A ray this near to its source, nodes, has arrived.
 ARRIVED = np.float32(1e-3)
 
-# Added to what divides.
+# Added to divisors.
 TINY = np.float32(1e-12)
 
 
 class Bundle(NamedTuple):
-    """Rays under way, and the parts that they have passed.
+    """Rays, and the steps that they have taken.
 
     Attributes:
-        x, y: where each ray is, (rays,), nodes.
+        x, y: position of each ray, (rays,), nodes.
         to_x, to_y: unit vector of its last step, (rays,).
-        length: nodes so far, (rays,).
+        length: of the ray so far, (rays,), nodes.
         time: integral of the slowness so far, (rays,).
-        read: what each ray has just read, (4·rays,): ∇u, slowness, nothing.
-        middle_x, middle_y, part: of each step: where it is read, and its length; (steps, rays).
-        going: rays that took each step, (steps,): the first so many.
+        read: interpolated at the midpoint of the step, (4·rays,): ∇u, slowness, padding.
+        middle_x, middle_y, part: midpoint and length of each step, (steps, rays).
+        active: number of rays that take each step, (steps,): the first of them.
     """
 
     x: Singles
@@ -56,23 +57,23 @@ class Bundle(NamedTuple):
     middle_x: Singles
     middle_y: Singles
     part: Singles
-    going: Ints
+    active: Ints
 
 
-def bundle(rays: int, shape: tuple[int, int]) -> Bundle:
-    """Room for so many rays through a grid; used again from source to source."""
+def allocate_bundle(rays: int, shape: tuple[int, int]) -> Bundle:
+    """Memory for up to ``rays`` rays through a grid; used again for every source."""
     steps = LONGEST * sum(shape)
     x, y, to_x, to_y, length, time = np.empty((6, rays), np.float32)
     middle_x, middle_y, part = np.empty((3, steps, rays), np.float32)
-    read, going = np.empty(4 * rays, np.float32), np.empty(steps, np.int64)
-    return Bundle(x, y, to_x, to_y, length, time, read, middle_x, middle_y, part, going)
+    read, active = np.empty(4 * rays, np.float32), np.empty(steps, np.int64)
+    return Bundle(x, y, to_x, to_y, length, time, read, middle_x, middle_y, part, active)
 
 
 @kernel
-def lay_out(later: Singles, slowness: Singles, shape: tuple[int, int], into: Singles) -> None:
-    """∇u, slowness and nothing of each node in turn, (4·nodes,): one ray reads them all at once.
+def interleave(deviation: Singles, slowness: Singles, shape: tuple[int, int], out: Singles) -> None:
+    """Interleave ∇u, slowness and padding of each node, (4·nodes,), in one cache line per ray.
 
-    Central differences, one-sided on the rim.
+    Central differences, one-sided at the boundary.
     """
     nx, ny = shape
     one, four = np.uint64(1), np.uint64(4)
@@ -81,28 +82,30 @@ def lay_out(later: Singles, slowness: Singles, shape: tuple[int, int], into: Sin
         scale = np.float32(1.0 / (high - low))
         here, before, after = np.uint64(i * ny), np.uint64(low * ny), np.uint64(high * ny)
         for j in range(one, np.uint64(ny - 1)):
-            into[four * (here + j)] = scale * (later[after + j] - later[before + j])
-            into[four * (here + j) + np.uint64(1)] = HALF * (later[here + j + one] - later[here + j - one])
-            into[four * (here + j) + np.uint64(2)] = slowness[here + j]
-            into[four * (here + j) + np.uint64(3)] = ZERO
+            out[four * (here + j)] = scale * (deviation[after + j] - deviation[before + j])
+            out[four * (here + j) + np.uint64(1)] = HALF * (
+                deviation[here + j + one] - deviation[here + j - one]
+            )
+            out[four * (here + j) + np.uint64(2)] = slowness[here + j]
+            out[four * (here + j) + np.uint64(3)] = ZERO
         for j, inner, outer in ((0, 0, 1), (ny - 1, ny - 2, ny - 1)):
             node = 4 * (i * ny + j)
-            into[node] = scale * (later[high * ny + j] - later[low * ny + j])
-            into[node + 1] = later[i * ny + outer] - later[i * ny + inner]
-            into[node + 2] = slowness[i * ny + j]
-            into[node + 3] = ZERO
+            out[node] = scale * (deviation[high * ny + j] - deviation[low * ny + j])
+            out[node + 1] = deviation[i * ny + outer] - deviation[i * ny + inner]
+            out[node + 2] = slowness[i * ny + j]
+            out[node + 3] = ZERO
 
 
 @kernel
-def follow(x: float, y: float, fields: Singles, shape: tuple[int, int], rays: int, at: Bundle) -> int:
-    """Bring the first ``rays`` rays of ``at`` from where they are to the source; returns the steps.
+def trace_bundle(x: float, y: float, fields: Singles, shape: tuple[int, int], rays: int, at: Bundle) -> int:
+    """Trace the first ``rays`` rays of ``at`` from their positions to the source; returns the steps.
 
-    The direction is read where the last one would lead in half a step, the slowness there as well.
+    Direction and slowness are interpolated half a step ahead along the last direction.
 
     Args:
         x, y: the source.
-        fields: from ``lay_out``; u and the slowness in units of that of the source.
-        rays: the longest first.
+        fields: from ``interleave``; u and slowness relative to the slowness at the source.
+        rays: their number; the longest first.
     """
     source_x, source_y = np.float32(x), np.float32(y)
     for r in range(rays):
@@ -111,30 +114,30 @@ def follow(x: float, y: float, fields: Singles, shape: tuple[int, int], rays: in
         at.to_x[r], at.to_y[r] = off_x * inverse, off_y * inverse
         at.length[r] = at.time[r] = ZERO
     left, steps = rays, 0
-    while left > 0 and steps < len(at.going):
-        at.going[steps] = left
-        _look_ahead(source_x, source_y, shape, left, steps, at)
-        _read(fields, shape, left, steps, at)
-        _go(source_x, source_y, shape, left, steps, at)
+    while left > 0 and steps < len(at.active):
+        at.active[steps] = left
+        _predict_midpoints(source_x, source_y, shape, left, steps, at)
+        _interpolate(fields, shape, left, steps, at)
+        _advance(source_x, source_y, shape, left, steps, at)
         steps += 1
-        while left > 0 and _arrived(source_x, source_y, left - 1, at):
+        while left > 0 and _has_arrived(source_x, source_y, left - 1, at):
             left -= 1
     for r in range(left):
-        if not _arrived(source_x, source_y, r, at):
-            _straighten(source_x, source_y, fields, shape, r, steps, at)
+        if not _has_arrived(source_x, source_y, r, at):
+            _trace_straight(source_x, source_y, fields, shape, r, steps, at)
     return steps
 
 
 @kernel(inline="always")
-def _arrived(x: np.float32, y: np.float32, r: int, at: Bundle) -> bool:
+def _has_arrived(x: np.float32, y: np.float32, r: int, at: Bundle) -> bool:
     return bool((at.x[r] - x) ** 2 + (at.y[r] - y) ** 2 < ARRIVED * ARRIVED)
 
 
 @kernel
-def _look_ahead(
+def _predict_midpoints(
     x: np.float32, y: np.float32, shape: tuple[int, int], rays: int, step: int, at: Bundle
 ) -> None:
-    """Size of the next step of each ray, and where it is read."""
+    """Length of the next step of each ray, and its midpoint."""
     last_x, last_y = np.float32(shape[0] - 1), np.float32(shape[1] - 1)
     xs, ys, to_x, to_y = at.x, at.y, at.to_x, at.to_y
     middle_x, middle_y, part = at.middle_x[step], at.middle_y[step], at.part[step]
@@ -148,8 +151,8 @@ def _look_ahead(
 
 
 @kernel
-def _read(fields: Singles, shape: tuple[int, int], rays: int, step: int, at: Bundle) -> None:
-    """The fields where each ray is read, multilinear; the one loop whose reads no vector can hold."""
+def _interpolate(fields: Singles, shape: tuple[int, int], rays: int, step: int, at: Bundle) -> None:
+    """The fields at each midpoint, multilinear; the only loop with gathered loads."""
     low_x, low_y = np.int32(shape[0] - 2), np.int32(shape[1] - 2)
     line = shape[1]
     middle_x, middle_y, read = at.middle_x[step], at.middle_y[step], at.read
@@ -162,22 +165,22 @@ def _read(fields: Singles, shape: tuple[int, int], rays: int, step: int, at: Bun
         wa = ONE - fx - wb
         a = np.uint64(4 * (i * line + j))
         c = np.uint64(4 * (i * line + j + line))
-        into = np.uint64(4) * r
+        out = np.uint64(4) * r
         one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
         four, five, six, seven = np.uint64(4), np.uint64(5), np.uint64(6), np.uint64(7)
         v0 = wa * fields[a] + wb * fields[a + four] + wc * fields[c] + wd * fields[c + four]
         v1 = wa * fields[a + one] + wb * fields[a + five] + wc * fields[c + one] + wd * fields[c + five]
         v2 = wa * fields[a + two] + wb * fields[a + six] + wc * fields[c + two] + wd * fields[c + six]
         v3 = wa * fields[a + three] + wb * fields[a + seven] + wc * fields[c + three] + wd * fields[c + seven]
-        read[into] = v0
-        read[into + one] = v1
-        read[into + two] = v2
-        read[into + three] = v3
+        read[out] = v0
+        read[out + one] = v1
+        read[out + two] = v2
+        read[out + three] = v3
 
 
 @kernel
-def _go(x: np.float32, y: np.float32, shape: tuple[int, int], rays: int, step: int, at: Bundle) -> None:
-    """The step of each ray, down ∇r + ∇u or, where the source is a step away, straight to it."""
+def _advance(x: np.float32, y: np.float32, shape: tuple[int, int], rays: int, step: int, at: Bundle) -> None:
+    """Advance each ray along −(∇r + ∇u) or, within a step of the source, straight to it."""
     last_x, last_y = np.float32(shape[0] - 1), np.float32(shape[1] - 1)
     xs, ys, to_x, to_y, length, time, read = at.x, at.y, at.to_x, at.to_y, at.length, at.time, at.read
     middle_x, middle_y, part = at.middle_x[step], at.middle_y[step], at.part[step]
@@ -210,11 +213,11 @@ def _clamp(place: np.float32, last: np.float32) -> np.float32:
 
 
 @kernel
-def _straighten(
+def _trace_straight(
     x: np.float32, y: np.float32, fields: Singles, shape: tuple[int, int], r: int, steps: int, at: Bundle
 ) -> None:
-    """Let a ray that was caught go straight from where it began, in as many steps as there were."""
-    # Its first middle lies half a step, straight towards the source, from where it began.
+    """Replace a ray that has not arrived by a straight one, in as many steps."""
+    # Its first midpoint lies half a step from its start, straight towards the source.
     off_x, off_y = x - at.middle_x[0, r], y - at.middle_y[0, r]
     distance = math.sqrt(off_x * off_x + off_y * off_y)
     length = distance + HALF * at.part[0, r]
@@ -235,19 +238,19 @@ def _straighten(
 
 
 @kernel
-def spread(worth: Singles, steps: int, shape: tuple[int, int], at: Bundle, into: Singles) -> None:
-    """Give each part of a ray, times what the ray is worth and as it is, to the nodes around it.
+def back_project(correction: Singles, steps: int, shape: tuple[int, int], at: Bundle, out: Singles) -> None:
+    """Distribute the length of each step, also times the ray's correction, to the nodes around it.
 
     Args:
-        worth: (rays,).
-        into: Σ worth·w, Σ w of each node in turn, (2·nodes,); added to.
+        correction: (rays,).
+        out: Σ correction·w and Σ w, interleaved, (2·nodes,); added to.
     """
     low_x, low_y = np.int32(shape[0] - 2), np.int32(shape[1] - 2)
     line = np.int32(shape[1])
     one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
     for step in range(steps):
-        for r in range(at.going[step]):
-            px, py, size, value = at.middle_x[step, r], at.middle_y[step, r], at.part[step, r], worth[r]
+        for r in range(at.active[step]):
+            px, py, size, value = at.middle_x[step, r], at.middle_y[step, r], at.part[step, r], correction[r]
             i, j = min(np.int32(px), low_x), min(np.int32(py), low_y)
             fx, fy = px - np.float32(i), py - np.float32(j)
             node = np.uint64(2 * (i * line + j))
@@ -255,14 +258,14 @@ def spread(worth: Singles, steps: int, shape: tuple[int, int], at: Bundle, into:
             low = size - high
             w = low * fy
             v = low - w
-            into[node] += value * v
-            into[node + one] += v
-            into[node + two] += value * w
-            into[node + three] += w
+            out[node] += value * v
+            out[node + one] += v
+            out[node + two] += value * w
+            out[node + three] += w
             node += np.uint64(2 * line)
             w = high * fy
             v = high - w
-            into[node] += value * v
-            into[node + one] += v
-            into[node + two] += value * w
-            into[node + three] += w
+            out[node] += value * v
+            out[node + one] += v
+            out[node + two] += value * w
+            out[node + three] += w

@@ -1,4 +1,4 @@
-"""Rays in step: straight in water, those of the tracer in tissue, none lost."""
+"""Vectorised rays: straight in water, equal to single rays in tissue, all of them arrive."""
 
 import numpy as np
 import pytest
@@ -8,24 +8,26 @@ from scipy.ndimage import gaussian_filter
 
 from bentray_kernels.eikonal import solve
 from bentray_kernels.rays import sensitivities
-from bentray_kernels.rays.in_step import STRIDE, bundle, follow, lay_out, spread
+from bentray_kernels.rays.vectorised import STRIDE, allocate_bundle, back_project, interleave, trace_bundle
 
 from ...effort import effort
 
 SHAPE = (60, 50)
 
 
-def laid_out(later, slowness):
-    into = np.empty(4 * later.size, np.float32)
-    lay_out(later.astype(np.float32).ravel(), slowness.astype(np.float32).ravel(), later.shape, into)
-    return into
+def interleaved(deviation, slowness):
+    out = np.empty(4 * deviation.size, np.float32)
+    interleave(
+        deviation.astype(np.float32).ravel(), slowness.astype(np.float32).ravel(), deviation.shape, out
+    )
+    return out
 
 
 def traced(fields, shape, source, receivers):
-    """The bundle of all rays, the longest first, and how many steps it took."""
-    rays = bundle(len(receivers), shape)
+    """The allocate_bundle of all rays, the longest first, and how many steps it took."""
+    rays = allocate_bundle(len(receivers), shape)
     rays.x[:], rays.y[:] = receivers.T
-    return rays, follow(source[0], source[1], fields, shape, len(receivers), rays)
+    return rays, trace_bundle(source[0], source[1], fields, shape, len(receivers), rays)
 
 
 def longest_first(source, receivers):
@@ -36,10 +38,10 @@ def points(rng, count, shape=SHAPE):
     return rng.uniform(0.0, np.array(shape) - 1.0, (count, 2))
 
 
-def given_out(worth, steps, rays, shape=SHAPE):
-    into = np.zeros(2 * shape[0] * shape[1], np.float32)
-    spread(worth.astype(np.float32), steps, shape, rays, into)
-    return into.reshape(-1, 2).T
+def back_projected(correction, steps, rays, shape=SHAPE):
+    out = np.zeros(2 * shape[0] * shape[1], np.float32)
+    back_project(correction.astype(np.float32), steps, shape, rays, out)
+    return out.reshape(-1, 2).T
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 20))
@@ -48,18 +50,18 @@ def test_rays_through_water_are_straight(seed, count):
     rng = np.random.default_rng(seed)
     source = points(rng, 1)[0]
     receivers = longest_first(source, points(rng, count))
-    rays, steps = traced(laid_out(np.zeros(SHAPE), np.full(SHAPE, 1.0)), SHAPE, source, receivers)
+    rays, steps = traced(interleaved(np.zeros(SHAPE), np.full(SHAPE, 1.0)), SHAPE, source, receivers)
     distance = np.linalg.norm(receivers - source, axis=1)
     assert np.allclose(rays.length, distance, atol=2e-3)
     assert np.allclose(rays.time, rays.length, rtol=1e-5, atol=1e-5)
     assert steps <= distance.max() / STRIDE + 2
     for step in range(steps):
-        going = rays.going[step]
-        middle = np.stack([rays.middle_x[step, :going], rays.middle_y[step, :going]], axis=1)
-        off, along = middle - source, (receivers - source)[:going]
+        active = rays.active[step]
+        middle = np.stack([rays.middle_x[step, :active], rays.middle_y[step, :active]], axis=1)
+        off, along = middle - source, (receivers - source)[:active]
         across = off[:, 0] * along[:, 1] - off[:, 1] * along[:, 0]
-        assert np.abs(across / np.maximum(distance[:going], 1e-3)).max() < 1e-2
-    weights = given_out(np.full(count, 2.0), steps, rays)
+        assert np.abs(across / np.maximum(distance[:active], 1e-3)).max() < 1e-2
+    weights = back_projected(np.full(count, 2.0), steps, rays)
     assert weights[1].sum() == pytest.approx(rays.length.sum(), rel=1e-4, abs=1e-3)
     assert np.allclose(weights[0], 2.0 * weights[1], rtol=1e-4, atol=1e-6)
 
@@ -78,14 +80,14 @@ def test_rays_through_tissue_are_those_of_the_tracer():
     tof = solve(1.0 / slowness, 1.0, source)
     rows = sensitivities(tof, 1.0, receivers, source)
     x, y = (np.arange(n) for n in SHAPE)
-    later = tof - np.hypot(x[:, None] - source[0], y[None, :] - source[1])
-    rays, steps = traced(laid_out(later, slowness), SHAPE, source, receivers)
-    straight, _ = traced(laid_out(np.zeros(SHAPE), slowness), SHAPE, source, receivers)
+    deviation = tof - np.hypot(x[:, None] - source[0], y[None, :] - source[1])
+    rays, steps = traced(interleaved(deviation, slowness), SHAPE, source, receivers)
+    straight, _ = traced(interleaved(np.zeros(SHAPE), slowness), SHAPE, source, receivers)
     assert np.allclose(rays.time, rows @ slowness.ravel(), atol=2e-3)
     assert (straight.time - rays.time).max() > 0.05
-    worth = np.linspace(-1.0, 1.0, len(receivers))
-    worth_passed, passed = (sums.reshape(SHAPE) for sums in given_out(worth, steps, rays))
-    for found, truth in ((worth_passed, rows.T @ worth), (passed, rows.sum(axis=0))):
+    correction = np.linspace(-1.0, 1.0, len(receivers))
+    worth_passed, passed = (sums.reshape(SHAPE) for sums in back_projected(correction, steps, rays))
+    for found, truth in ((worth_passed, rows.T @ correction), (passed, rows.sum(axis=0))):
         # Longer steps give single nodes more or less; the neighbourhood has the same.
         wanted = gaussian_filter(truth.reshape(SHAPE), 1.5)
         assert np.abs(gaussian_filter(found, 1.5) - wanted).mean() < 0.03 * np.abs(wanted).mean()
@@ -93,34 +95,34 @@ def test_rays_through_tissue_are_those_of_the_tracer():
 
 def test_spreading_adds():
     slowness, source, receivers = tissue()
-    rays, steps = traced(laid_out(np.zeros(SHAPE), slowness), SHAPE, source, receivers)
-    worth = np.ones(len(receivers), np.float32)
-    once = given_out(worth, steps, rays)
-    into = np.zeros(2 * once.shape[1], np.float32)
+    rays, steps = traced(interleaved(np.zeros(SHAPE), slowness), SHAPE, source, receivers)
+    correction = np.ones(len(receivers), np.float32)
+    once = back_projected(correction, steps, rays)
+    out = np.zeros(2 * once.shape[1], np.float32)
     for _ in range(2):
-        spread(worth, steps, SHAPE, rays, into)
-    assert np.allclose(into.reshape(-1, 2).T, 2.0 * once, rtol=1e-5, atol=1e-6)
+        back_project(correction, steps, SHAPE, rays, out)
+    assert np.allclose(out.reshape(-1, 2).T, 2.0 * once, rtol=1e-5, atol=1e-6)
 
 
 def test_a_ray_that_is_caught_goes_straight_and_the_others_as_before():
     slowness, source, receivers = tissue()
-    rays, _ = traced(laid_out(np.zeros(SHAPE), slowness), SHAPE, source, receivers)
+    rays, _ = traced(interleaved(np.zeros(SHAPE), slowness), SHAPE, source, receivers)
     # A deviation that falls away from the source, twice as steeply as the distance grows, in the far half.
     x, y = (np.arange(n) for n in SHAPE)
     distance = np.hypot(x[:, None] - source[0], y[None, :] - source[1])
     uphill = np.where(distance > 30.0, 60.0 - 2.0 * distance, 0.0)
     near = np.array([[10.0, 22.0]])
-    caught, steps = traced(laid_out(uphill, slowness), SHAPE, source, np.concatenate([receivers, near]))
+    caught, steps = traced(interleaved(uphill, slowness), SHAPE, source, np.concatenate([receivers, near]))
     assert np.allclose(caught.length[:-1], np.linalg.norm(receivers - source, axis=1), atol=1e-2)
     assert np.allclose(caught.time[:-1], rays.time, atol=1e-2)
     assert caught.length[-1] == pytest.approx(np.linalg.norm(near[0] - source), abs=1e-2)
-    weights = given_out(np.ones(len(receivers) + 1), steps, caught)
+    weights = back_projected(np.ones(len(receivers) + 1), steps, caught)
     assert weights[1].sum() == pytest.approx(caught.length.sum(), rel=1e-3)
 
 
 def test_a_receiver_at_the_source_has_no_length():
     rays, steps = traced(
-        laid_out(np.zeros((4, 4)), np.ones((4, 4))), (4, 4), (1.5, 2.0), np.array([[1.5, 2.0]])
+        interleaved(np.zeros((4, 4)), np.ones((4, 4))), (4, 4), (1.5, 2.0), np.array([[1.5, 2.0]])
     )
     assert rays.length[0] == rays.time[0] == 0.0
-    assert not given_out(np.ones(1), steps, rays, (4, 4)).any()
+    assert not back_projected(np.ones(1), steps, rays, (4, 4)).any()
