@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bentray_kernels.arrays import Float32s, Int32s
 from bentray_kernels.compiled import kernel
 from bentray_kernels.float32 import real, whole
 from bentray_kernels.geometry_field.tables.accurate_lookup import NOTHING, TOGETHER, meet
@@ -16,12 +17,19 @@ from bentray_kernels.geometry_field.tables.agreement import AGREE, NONE
 from bentray_kernels.geometry_field.tables.cube import line_of
 from bentray_kernels.geometry_field.tables.outer_field import OuterField
 from bentray_kernels.geometry_field.tables.quadrilinear import Corner, corner_of, lerp4
-from bentray_kernels.meshes.surface import Reals, Surface, Words
+from bentray_kernels.meshes.surface import Surface
 
 
 @kernel(inline="always")
 def corners(
-    n: int, origins: Reals, directions: Reals, start: int, first: Words, ways: Reals, near: Reals, far: Reals
+    n: int,
+    origins: Float32s,
+    directions: Float32s,
+    start: int,
+    first: Int32s,
+    ways: Float32s,
+    near: Float32s,
+    far: Float32s,
 ) -> None:
     """``corner_of`` the rays from ``start`` on, and their distances of entry and exit.
 
@@ -59,10 +67,10 @@ def find_linear(
     surface: Surface,
     field: OuterField,
     known: NDArray[np.uint8],
-    origins: Reals,
-    directions: Reals,
-    faces: Words,
-    distances: Reals,
+    origins: Float32s,
+    directions: Float32s,
+    faces: Int32s,
+    distances: Float32s,
 ) -> None:
     """The first face on each of many rays that begin outside the cube or on it.
 

@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bentray_kernels.arrays import Floats
+from bentray_kernels.arrays import Float32s, Floats, Int32s
 from bentray_kernels.compiled import kernel
 from bentray_kernels.float32 import real, whole
 from bentray_kernels.geometry_field.tables.accurate_lookup import TOGETHER, enter
 from bentray_kernels.geometry_field.tables.cube import samples
 from bentray_kernels.geometry_field.tables.outer_field import OuterField
-from bentray_kernels.meshes.surface import Reals, Surface, Words
+from bentray_kernels.meshes.surface import Surface
 
 # Half of what two bytes count to: what the components of a normal add up to.
 HALF = 32767
@@ -33,9 +33,9 @@ class PlaneTable(NamedTuple):
     """
 
     samples: int
-    offsets: Reals
-    normals: Words
-    fractions: Reals
+    offsets: Float32s
+    normals: Int32s
+    fractions: Float32s
 
 
 def plane_table(surface: Surface, field: OuterField) -> PlaneTable:
@@ -52,7 +52,7 @@ def plane_table(surface: Surface, field: OuterField) -> PlaneTable:
 
 
 @kernel
-def _fill(surface: Surface, field: OuterField, places: Floats, offsets: Reals, normals: Words) -> None:
+def _fill(surface: Surface, field: OuterField, places: Floats, offsets: Float32s, normals: Int32s) -> None:
     count = len(places)
     for i in range(count):
         for j in range(count):
@@ -75,7 +75,7 @@ def _fill(surface: Surface, field: OuterField, places: Floats, offsets: Reals, n
 
 
 @kernel
-def find_by_plane(table: PlaneTable, origins: Reals, directions: Reals, distances: Reals) -> None:
+def find_by_plane(table: PlaneTable, origins: Float32s, directions: Float32s, distances: Float32s) -> None:
     """How far away each of many rays meets the mesh, that begin outside the cube or on it.
 
     Args:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bentray_kernels.arrays import Ints
+from bentray_kernels.arrays import Float32s, Ints
 from bentray_kernels.compiled import kernel
 from bentray_kernels.float32 import higher, lower, real
 from bentray_kernels.geometry_field.tables.accurate_lookup import NOTHING, TOGETHER
@@ -16,12 +16,12 @@ from bentray_kernels.geometry_field.tables.cube import line_of, number_at
 from bentray_kernels.geometry_field.tables.outer_field import OuterField
 from bentray_kernels.geometry_field.tables.quadrilinear import Corner, lerp4
 from bentray_kernels.meshes.face_plane import meet_plane
-from bentray_kernels.meshes.surface import Reals, Surface
+from bentray_kernels.meshes.surface import Surface
 
 from ._linear_lookup import corners, nearest_of
 
 
-def uv_table(surface: Surface, field: OuterField, samples: Reals) -> Reals:
+def uv_table(surface: Surface, field: OuterField, samples: Float32s) -> Float32s:
     """The table as published: (6n², 6n², 2) float32 (u, v) by entry and exit, NaN for nothing.
 
     Args:
@@ -35,7 +35,7 @@ def uv_table(surface: Surface, field: OuterField, samples: Reals) -> Reals:
 
 
 @kernel
-def _fill_uv(surface: Surface, field: OuterField, samples: Reals, table: Reals) -> None:
+def _fill_uv(surface: Surface, field: OuterField, samples: Float32s, table: Float32s) -> None:
     for i in range(len(samples)):
         for j in range(len(samples)):
             face = field.faces[i, j]
@@ -51,7 +51,7 @@ def _fill_uv(surface: Surface, field: OuterField, samples: Reals, table: Reals) 
                 table[i, j, c] = lower(higher(inside, real(0.0)), real(1.0))
 
 
-def nearest_uv(n: int, table: Reals, origins: Reals, directions: Reals, uv: Reals) -> None:
+def nearest_uv(n: int, table: Float32s, origins: Float32s, directions: Float32s, uv: Float32s) -> None:
     """(u, v) of the entry nearest to each ray.
 
     Args:
@@ -65,7 +65,7 @@ def nearest_uv(n: int, table: Reals, origins: Reals, directions: Reals, uv: Real
 
 
 @kernel
-def _copy_nearest(n: int, table: Ints, origins: Reals, directions: Reals, found: Ints) -> None:
+def _copy_nearest(n: int, table: Ints, origins: Float32s, directions: Float32s, found: Ints) -> None:
     place = np.empty(TOGETHER, dtype=np.int32)
     for start in range(0, len(found), TOGETHER):
         rays = min(TOGETHER, len(found) - start)
@@ -86,7 +86,7 @@ def _copy_nearest(n: int, table: Ints, origins: Reals, directions: Reals, found:
 
 
 @kernel
-def linear_uv(n: int, table: Reals, origins: Reals, directions: Reals, uv: Reals) -> None:
+def linear_uv(n: int, table: Float32s, origins: Float32s, directions: Float32s, uv: Float32s) -> None:
     """(u, v) averaged over the sixteen entries about each ray, with the published weights.
 
     Entries that meet nothing are left out; where the nearest one meets nothing, so does the ray.
@@ -115,7 +115,7 @@ def linear_uv(n: int, table: Reals, origins: Reals, directions: Reals, uv: Reals
 
 
 @kernel
-def _of_those_that_meet(entries: Reals, n: int, corner: Corner) -> tuple[float, float]:
+def _of_those_that_meet(entries: Float32s, n: int, corner: Corner) -> tuple[float, float]:
     """Mean (u, v) of the entries that meet something, of which there is one."""
     at, a0, a1, a2, a3 = corner
     one, u, v, total = real(1.0), real(0.0), real(0.0), real(0.0)

@@ -1,4 +1,4 @@
-"""The decorator of every compiled kernel: no GIL, cached on disk, stale as soon as what it calls changed."""
+"""The decorator of compiled kernels: numba without the GIL, cached on disk by the content of all sources."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def kernel(function: Callable[..., Any] | None = None, *, inline: str = "never")
 
     Args:
         function: the function, when used without arguments.
-        inline: ``always`` for the functions inside innermost loops; they may not make arrays.
+        inline: ``always`` for functions inside innermost loops; they must not allocate arrays.
     """
     if function is None:
         return lambda wrapped: _compiled(wrapped, inline == "always")
@@ -33,12 +33,26 @@ def kernel(function: Callable[..., Any] | None = None, *, inline: str = "never")
 
 
 def _compiled(function: Callable[..., Any], inner: bool) -> Any:
-    # Inner functions are inlined by LLVM and built without reference counts. Inlined by numba instead, each
-    # would count its array arguments up and down, atomically: factored marching took four times as long.
+    # LLVM inlines inner functions, which are built without reference counts. If numba inlined them, each
+    # would count references to its array arguments atomically: factored marching took four times as long.
     dispatcher = njit(cache=True, nogil=True, error_model="numpy", forceinline=inner, _nrt=not inner)(
         function
     )
-    # Numba's own stamp is the time and size of the function's file: after an edit of what it calls, or an
-    # upgrade, it would go on running the old inner function. So the content of all that it imports decides.
-    dispatcher._cache._cache_file._source_stamp = digest(function.__module__)
+    # Numba's own stamp is the time and size of the function's file: after an edit of an imported module, or
+    # an upgrade, the old inner function would still run. So the stamp is the content of all imported modules.
+    index = dispatcher._cache._cache_file
+    index._source_stamp = digest(function.__module__)
+    index._load_index = _without_unknown_types(index._load_index)
     return dispatcher
+
+
+def _without_unknown_types(load: Callable[[], dict[Any, Any]]) -> Callable[[], dict[Any, Any]]:
+    """An index of another version may name types that this one does not have: it counts as empty."""
+
+    def loaded() -> dict[Any, Any]:
+        try:
+            return load()
+        except (AttributeError, ImportError):
+            return {}
+
+    return loaded

@@ -1,4 +1,4 @@
-"""What a compiled kernel depends on: a digest of its module's code and of all modules that it imports."""
+"""Digests for the compile cache: of a kernel's module and of all modules of the package that it imports."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ ROOT = Path(__file__).parent
 # ``from ..rays.descent import STEP, trace_ray``, also over several lines in brackets.
 _IMPORT = re.compile(r"^[ \t]*from (\.+)([\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
-# Digests of syntax trees by digests of their text: to parse the whole package takes a second.
+# Digests of syntax trees by digests of their text: parsing the whole package takes a second.
 MEMORY = f"syntax-{sys.version_info.major}.{sys.version_info.minor}.json"
-# Files that it remembers, from all checkouts and versions.
+# Most files remembered, from all checkouts and versions.
 MOST_REMEMBERED = 10_000
 
 
@@ -28,7 +28,7 @@ MOST_REMEMBERED = 10_000
 def digest(module: str) -> str:
     """Hex digest for a module of this package, as ``bentray_kernels.rays.descent``.
 
-    An edit elsewhere in the package leaves it as it is, and so does one of comments and docstrings. A module
+    Edits elsewhere in the package, and of comments and docstrings, do not change it. A module
     outside the package, as of a benchmark, may use all of the package and of its own folder.
     """
     package, *parts = module.split(".")
@@ -51,7 +51,7 @@ def _folder(module: str) -> Path:
 
 
 def _syntax(path: Path, memory: dict[str, str]) -> str:
-    """Hex digest of what a file says to Python: without comments, docstrings and layout."""
+    """Hex digest of the syntax tree of a file, without comments, docstrings and layout."""
     text = path.read_bytes()
     key = hashlib.sha256(text).hexdigest()
     if key not in memory:
@@ -70,7 +70,7 @@ def _without_docstrings(text: bytes) -> str:
 
 
 def _memory_file() -> Path:
-    """Beside numba's own files where these have a folder, as in an image; else in the user's cache."""
+    """In the folder of numba's cache if one is configured, as in the image; else in the user's cache."""
     folder = os.environ.get("NUMBA_CACHE_DIR")
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return (Path(folder) if folder else home / "bentray") / MEMORY
@@ -86,7 +86,7 @@ def _memory() -> dict[str, str]:
 
 
 def _keep(memory: dict[str, str]) -> None:
-    """Write it down whole or not at all; what another process adds meanwhile is only parsed again."""
+    """Write the file atomically; entries that another process adds meanwhile are parsed again."""
     with suppress(OSError, RuntimeError):
         file = _memory_file()
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -109,13 +109,13 @@ def _reached(*start: Path) -> set[Path]:
 
 @cache
 def _imported(path: Path) -> tuple[Path, ...]:
-    """The modules that one names in its imports from this package."""
+    """The modules of this package that a module imports."""
     found: list[Path] = []
     for dots, name, words in _IMPORT.findall(path.read_text(encoding="utf-8")):
         folder = path.parents[len(dots) - 1]
         parts = name.split(".") if name else []
         found += _located(folder, parts)
-        # ``from . import huber`` names a module.
+        # ``from . import huber`` imports a module.
         for word in re.findall(r"\w+", words):
             found += _located(folder, [*parts, word])
     return tuple(found)

@@ -1,4 +1,4 @@
-"""What a ring scanner recorded, and the first arrivals read from it."""
+"""Scans of ring transducers: datasets, and picking of first arrivals."""
 
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 else:
 
     def __getattr__(name: str) -> object:
-        """Picking is compiled and slow to load; each upload starts a process that needs none of it."""
+        """Import picking on first use: it is slow to load, and checks of uploads do not need it."""
         if name not in ("PICKERS", "pick"):
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         from .picking import first_arrivals

@@ -1,4 +1,4 @@
-"""The transducer dataset in memory: geometry, travel times, traces; checked when it is made."""
+"""The transducer dataset in memory: geometry, travel times, traces; validated on construction."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Dataset:
     """One transmission scan, in SI units; NaN means missing.
 
     Arrays over pairs are (ntx, nrx), or (nz, ntx, nrx) when ``slice_z_m`` is given. A dataset without
-    travel times (``picked`` is false) needs its traces, which may still lie in the file it came from.
+    travel times (``picked`` is false) needs its traces, which may remain in the file.
 
     Attributes:
         element_position_m: (elements, 2 or 3), m, origin at the centre of the ring.
@@ -50,7 +50,7 @@ class Dataset:
         valid: pairs that may be used; NaN pairs are never used.
 
     Raises:
-        InvalidInput: naming the field in the words of the file format.
+        InvalidInput: naming the field as in the file format.
     """
 
     element_position_m: Floats
@@ -163,7 +163,7 @@ class Dataset:
                 )
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Shapes of the arrays that are there, by their place in the upload format."""
+        """Shapes of the arrays present, by their path in the file format."""
         traces, truth = self.waveform, self.truth
         arrays = {
             POSITION: self.element_position_m,
@@ -188,7 +188,7 @@ class Dataset:
 
     @property
     def picked(self) -> bool:
-        """Whether travel times are there already; if not, they must be picked from the traces."""
+        """Whether travel times are present; if not, they must be picked from the traces."""
         return self.tof_s is not None or self.delta_tof_s is not None
 
     def slice(self, index: int) -> Dataset:
@@ -225,11 +225,11 @@ class Dataset:
     def differential_tof(self) -> Floats:
         """Object minus water travel time, (…, ntx, nrx), s; NaN where missing, invalid or tx equals rx.
 
-        Absolute times are turned into differences with the straight water path, which is exact in
+        Absolute times are converted to differences with the straight water path, which is exact in
         a homogeneous medium.
 
         Raises:
-            InvalidInput: when the dataset holds traces only; pick them first.
+            InvalidInput: when the dataset contains only traces; pick them first.
         """
         if self.delta_tof_s is not None:
             delta = np.array(self.delta_tof_s, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Traces that are read an emission at a time; channels are exchanged and turned over as they are read."""
+"""Lazily read traces: one emission at a time, with channels reordered and polarity corrected on reading."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from ..arrays import Flags, Ints
 
 @dataclass(frozen=True)
 class Emissions:
-    """The traces of one slice, which may lie in a file and be larger than the memory.
+    """The traces of one slice, which may be in a file and larger than the memory.
 
-    Stands where ``Waveform`` has an array (ntx, nrx, nt) of which single emissions are asked for.
+    Replaces an array (ntx, nrx, nt) of ``Waveform`` where single emissions are read.
 
     Attributes:
-        read: gives the traces of an emission as it was recorded, (nrx, nt).
+        read: returns the recorded traces of an emission, (nrx, nt).
         samples: of each trace.
         dtype: int16 or float32.
-        emission: (ntx,), which of the recorded ones each emission is.
-        reception: (nrx,), the same of the receptions.
-        down: (ntx, nrx), which traces are recorded upside down.
+        emission: (ntx,), index of the recorded emission of each one.
+        reception: (nrx,), the same for receptions.
+        inverted: (ntx, nrx), traces recorded with inverted polarity.
     """
 
     read: Callable[[int], NDArray[Any]]
@@ -32,13 +32,13 @@ class Emissions:
     dtype: np.dtype[Any]
     emission: Ints
     reception: Ints
-    down: Flags
+    inverted: Flags
 
     @classmethod
     def of(
         cls, read: Callable[[int], NDArray[Any]], shape: tuple[int, int, int], dtype: np.dtype[Any]
     ) -> Emissions:
-        """As they were recorded."""
+        """All recorded traces, unchanged."""
         ntx, nrx, samples = shape
         return cls(read, samples, dtype, np.arange(ntx), np.arange(nrx), np.zeros((ntx, nrx), dtype=bool))
 
@@ -58,7 +58,7 @@ class Emissions:
         found = self.read(int(self.emission[e]))
         if (self.reception != np.arange(len(self.reception))).any():
             found = found[self.reception]
-        return over(found, self.down[e]) if self.down[e].any() else found
+        return negate(found, self.inverted[e]) if self.inverted[e].any() else found
 
     def __iter__(self) -> Iterator[NDArray[Any]]:
         return (self[e] for e in range(len(self)))
@@ -70,26 +70,26 @@ class Emissions:
         return found
 
 
-def moved(traces: Any, order: Ints, axis: int) -> Any:
-    """Channels of an array, or of ``Emissions``, in another order."""
+def reorder_channels(traces: Any, order: Ints, axis: int) -> Any:
+    """Channels of an array or ``Emissions`` in another order."""
     if not isinstance(traces, Emissions):
         return np.take(traces, order, axis=axis)
     name = ("emission", "reception")[axis]
     changed: dict[str, Any] = {name: getattr(traces, name)[order]}
-    return replace(traces, **changed, down=np.take(traces.down, order, axis=axis))
+    return replace(traces, **changed, inverted=np.take(traces.inverted, order, axis=axis))
 
 
-def turned(traces: Any, where: Flags) -> Any:
-    """Traces of an array, or of ``Emissions``, with some turned over; ``where`` is (ntx, nrx)."""
+def invert_polarity(traces: Any, where: Flags) -> Any:
+    """Traces of an array or ``Emissions`` with inverted polarity where ``where``, (ntx, nrx), is true."""
     if isinstance(traces, Emissions):
-        return replace(traces, down=traces.down ^ where)
-    return over(traces, where)
+        return replace(traces, inverted=traces.inverted ^ where)
+    return negate(traces, where)
 
 
-def over(traces: NDArray[Any], where: Flags) -> NDArray[Any]:
-    """A copy with the opposite sign at some places of all axes but the last."""
+def negate(traces: NDArray[Any], where: Flags) -> NDArray[Any]:
+    """A copy with the opposite sign where ``where``, of all axes except the last, is true."""
     found = traces.copy()
-    # The lowest whole number has no opposite.
+    # The lowest integer has no opposite.
     lowest = np.iinfo(found.dtype).min + 1 if found.dtype.kind == "i" else -np.inf
     found[where] = -np.maximum(found[where], lowest)
     return found

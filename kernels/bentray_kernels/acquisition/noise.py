@@ -1,4 +1,4 @@
-"""Noise of travel times: put on simulated ones, estimated in measured ones."""
+"""Noise of travel times: added to simulated data, estimated in measured data."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def with_noise(data: Floats, snr: float, random: np.random.Generator, where: Fla
     Args:
         data: any shape and unit.
         snr: ratio of amplitudes, not in dB; the dissertation's hard case (section 7.3.1) is 10.
-        random: where the noise comes from.
-        where: of the shape of ``data``: values that count for the mean square and get noise.
+        random: generator of the noise.
+        where: of the shape of ``data``: values that define the mean square and receive noise.
 
     Returns:
         The noisy copy and the noise's standard deviation, in the unit of the data.
@@ -33,11 +33,11 @@ def with_noise(data: Floats, snr: float, random: np.random.Generator, where: Fla
 
 
 def noise_level(delta: Floats) -> float:
-    """Standard deviation of what neighbouring pairs do not share, unit of the data.
+    """Noise estimate from fourth differences of neighbouring pairs, unit of the data.
 
-    Fourth differences along emitters, receivers and both diagonals: they take away what is smooth over five
-    elements, the object, and leave the noise, wrong picks included. The largest of the four directions
-    counts, for noise may run along one. A coarse array leaves some of the object in it too.
+    Fourth differences along emitters, receivers and both diagonals remove what is smooth over five elements,
+    the object, and keep the noise, including wrong picks. The largest of the four directions is used, because
+    noise may be correlated along one. With a coarse array part of the object remains.
 
     Args:
         delta: (..., ntx, nrx) around a ring, NaN where there is none.

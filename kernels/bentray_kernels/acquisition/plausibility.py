@@ -1,4 +1,4 @@
-"""Whether the numbers of a scan can be in SI units: its width, and its times over the distances of pairs."""
+"""Plausibility of SI units in a scan: array width, and travel times against the distances of the pairs."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from ..limits import DEVIATION_S, LOG_RATIO_NP, PLACE_M, PRESSURE, RADIUS_M, TIM
 from . import rules
 from .dataset import POSITION, Dataset
 
-# Of sound on most pairs: fat has 1,400 m/s, bone 4,000; a straight path through both lies between.
+# Apparent sound speed of most pairs: fat has 1,400 m/s, bone 4,000.
 BULK_MPS = (300.0, 6_000.0)
 
-# A scan is plausible where at least this part of its pairs is: single picks may be wrong by anything.
+# A scan is plausible if at least this fraction of its pairs is: single picks may be arbitrarily wrong.
 MOST_PAIRS = 0.5
 
-# Pairs nearer than this part of the array's width are left out, for picks of neighbours are often wrong.
+# Pairs nearer than this fraction of the array's width are ignored: picks of neighbours are often wrong.
 NEAR = 0.1
 
-# Slices, emitters and receivers that are looked at, evenly spread: more would tell the same.
+# Slices, emitters and receivers that are sampled, evenly spaced.
 LOOKED_AT = (8, 128, 512)
 
-# The width that most arrays have, m, which decides between units that are both possible.
+# Typical array width, m, which decides between several possible units.
 USUAL_M = 0.2
 
 LENGTHS = {"cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "km": 1e3}
@@ -33,12 +33,12 @@ TIMES = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
 
 
 def check_plausible(dataset: Dataset) -> None:
-    """Refuse a scan whose lengths or times are in another unit, or that no scanner could have recorded.
+    """Raise for a scan whose lengths or times are in another unit, or physically impossible.
 
-    Traces are not looked at: they may still lie in their file.
+    Traces are not read: they may remain in the file.
 
     Raises:
-        InvalidInput: naming the field, what was found, and the unit that it is likely to be in.
+        InvalidInput: naming the field, its value, and the unit that is likely.
     """
     _check_places(dataset)
     for place, times in (
@@ -60,7 +60,7 @@ def check_plausible(dataset: Dataset) -> None:
 
 def _check_places(dataset: Dataset) -> None:
     position = dataset.element_position_m
-    # Halves, so that the largest numbers have a difference.
+    # Halved, so that the difference of the largest numbers is finite.
     width = 2.0 * float(np.ptp(0.5 * position, axis=0).max())
     if not WIDTH_M.holds(width):
         raise InvalidInput(
@@ -79,7 +79,7 @@ def _check_places(dataset: Dataset) -> None:
 
 
 def _length_hint(width: float, what: str) -> str:
-    """The unit in which a width would be nearest to that of most arrays, in words."""
+    """A hint at the unit in which a width would be nearest to the typical one."""
     found = {unit: width * factor for unit, factor in LENGTHS.items() if WIDTH_M.holds(width * factor)}
     if not found:
         return ""
@@ -90,24 +90,24 @@ def _length_hint(width: float, what: str) -> str:
 
 
 def _check_times(dataset: Dataset, place: str, times: Floats) -> None:
-    """Hold times against the distances of their pairs."""
-    looked = _looked_at(dataset, times)
-    distance, in_water = looked.distance, looked.distance / dataset.water_speed_mps
+    """Compare times with the distances of their pairs."""
+    sampled = _sample_pairs(dataset, times)
+    distance, in_water = sampled.distance, sampled.distance / dataset.water_speed_mps
     if not distance.size:
         return
     offset = in_water if place == "traveltime/delta_tof_s" else np.zeros_like(in_water)
 
     def plausible(factor: float) -> bool:
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            speed = distance / (offset + factor * looked.times)
+            speed = distance / (offset + factor * sampled.times)
         return bool(np.mean((speed >= BULK_MPS[0]) & (speed <= BULK_MPS[1])) >= MOST_PAIRS)
 
     if plausible(1.0):
         return
     low, high = BULK_MPS
-    middle = np.argsort(looked.times)[looked.times.size // 2]
+    middle = np.argsort(sampled.times)[sampled.times.size // 2]
     found = (
-        f"{looked.times[middle]:.4g} s between elements {distance[middle]:.3g} m apart, as most pairs have"
+        f"{sampled.times[middle]:.4g} s between elements {distance[middle]:.3g} m apart, as most pairs have"
     )
     accepted = f"times in s of sound that runs at {low:g} to {high:g} m/s between them{_time_hint(plausible)}"
     raise InvalidInput(place, found, accepted)
@@ -120,17 +120,17 @@ def _time_hint(plausible: Callable[[float], bool]) -> str:
     return ""
 
 
-class _Looked:
-    """Pairs with times that are looked at: distances, m, and times, s, of each."""
+class _Sampled:
+    """Sampled pairs with times: distances, m, and times, s."""
 
     def __init__(self, distance: Floats, times: Floats) -> None:
         self.distance = distance
         self.times = times
 
 
-def _looked_at(dataset: Dataset, times: Floats) -> _Looked:
+def _sample_pairs(dataset: Dataset, times: Floats) -> _Sampled:
     stacked = times if times.ndim == 3 else times[None]
-    z, e, r = (_spread(count, most) for count, most in zip(stacked.shape, LOOKED_AT, strict=True))
+    z, e, r = (_even_indices(count, most) for count, most in zip(stacked.shape, LOOKED_AT, strict=True))
     place = dataset.element_position_m
     offset = place[dataset.tx[e]][:, None, :] - place[dataset.rx[r]][None, :, :]
     distance = np.broadcast_to(np.linalg.norm(offset, axis=-1), (len(z), len(e), len(r)))
@@ -139,9 +139,9 @@ def _looked_at(dataset: Dataset, times: Floats) -> _Looked:
     if dataset.valid is not None:
         valid = dataset.valid if dataset.valid.ndim == 3 else dataset.valid[None]
         known &= valid[np.ix_(z, e, r)]
-    return _Looked(distance[known], some[known])
+    return _Sampled(distance[known], some[known])
 
 
-def _spread(count: int, most: int) -> NDArray[np.intp]:
-    """At most so many indices, evenly spread over all."""
+def _even_indices(count: int, most: int) -> NDArray[np.intp]:
+    """At most ``most`` indices, evenly spaced."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))

@@ -1,4 +1,4 @@
-"""What a field of a dataset may hold; each rule raises InvalidInput in the words of the file format."""
+"""Validation rules for the fields of a dataset; each raises InvalidInput with the name in the file format."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def within_or_nan(name: str, array: NDArray[Any], within: Range) -> None:
     """Every value lies in a range, or is NaN for a missing one."""
     if array.size == 0:
         return
-    # Without an array of flags where all is well: pairs may be hundreds of millions.
+    # No array of flags in the valid case: there may be hundreds of millions of pairs.
     if all(
         np.isnan(end) or within.holds(end)
         for end in (np.fmin.reduce(array, None), np.fmax.reduce(array, None))

@@ -10,7 +10,7 @@ from ..errors import InvalidInput
 # J. Acoust. Soc. Am. 102 (1997) 2776-2779, table II: powers 0 to 5 of the temperature in °C.
 MARCZAK = (1.402385e3, 5.038813, -5.799136e-2, 3.287156e-4, -1.398845e-6, 2.787860e-9)
 
-# The fit holds from 0 to 95 °C; the speed rises up to 74.1 °C and falls from there on.
+# The fit is valid from 0 to 95 °C; the speed rises up to 74.1 °C and falls above.
 RANGE_C = (0.0, 95.0)
 FASTEST_C = 74.0
 
@@ -31,7 +31,7 @@ def speed_from_temperature(temperature_c: float) -> float:
 
 
 def temperature_from_speed(speed_mps: float) -> float:
-    """Temperature of water, °C, whose speed of sound this is; the one below 74 °C, where it is unique.
+    """Temperature of water, °C, for a speed of sound; the solution below 74 °C, which is unique.
 
     Raises:
         InvalidInput: for a speed that water does not have between 0 and 74 °C.
@@ -42,7 +42,7 @@ def temperature_from_speed(speed_mps: float) -> float:
         raise InvalidInput(
             "water@sound_speed_mps", speed_mps, f"a speed from {slowest:.1f} to {fastest:.1f} m/s"
         )
-    # Halving converges to the last bit: the speed rises strictly on this interval.
+    # Bisection converges to the last bit: the speed rises strictly on this interval.
     while True:
         middle = 0.5 * (low + high)
         if middle in (low, high) or math.isclose(low, high, rel_tol=0.0, abs_tol=1e-12):

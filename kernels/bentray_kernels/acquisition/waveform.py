@@ -1,4 +1,4 @@
-"""Raw traces of a scan, as they were digitised."""
+"""Raw digitised traces of a scan."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from .out_of_order import (
     empty_waiting,
     wait,
 )
-from .problem import Medium, PointSource
+from .problem import PointSource, SlownessGrid
 from .updates import TIE, factored_update
 
 # First-order times only give the order of arrival; they need not converge to rounding.
@@ -84,7 +84,7 @@ def _supersampled(problem: PointSource, times: int) -> PointSource:
     """The same source in the medium's cubic spline, which may overshoot but not leave the medium's range."""
     slowness = problem.slowness
     fine = np.clip(refined(slowness, times), slowness.min(), slowness.max())
-    return PointSource(Medium(fine, problem.spacing / times), problem.source)
+    return PointSource(SlownessGrid(fine, problem.spacing / times), problem.source)
 
 
 def _first_order(problem: PointSource, nodes: Ints, times: Floats) -> Floats:

@@ -16,13 +16,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Float32s
 from ..compiled import kernel
 from ..float32 import lower
 from .diagonals import FIRST, Diagonals, move, turn
-
-Singles = NDArray[np.float32]
 
 # First and last j, first and last k, counted from 1.
 Box = tuple[int, int, int, int]
@@ -66,10 +64,10 @@ class SweepArrays(NamedTuple):
         shape, stored: as in ``Diagonals``.
     """
 
-    deviation: Singles
-    slope_j: Singles
-    slope_k: Singles
-    crossing: Singles
+    deviation: Float32s
+    slope_j: Float32s
+    slope_k: Float32s
+    crossing: Float32s
     shape: tuple[int, int, int]
     stored: tuple[int, int]
 
@@ -82,7 +80,7 @@ def allocate_sweep_arrays(shape: tuple[int, ...]) -> SweepArrays:
 
 
 @kernel
-def deviate(slowness: Singles, j: float, k: float, at: SweepArrays, out: Singles) -> None:
+def deviate(slowness: Float32s, j: float, k: float, at: SweepArrays, out: Float32s) -> None:
     """Fill ``out`` (nodes,) with u from a source at (j, k), nodes.
 
     Args:
@@ -138,7 +136,7 @@ def _fill_directions(j: np.float32, k: np.float32, side: int, at: SweepArrays) -
 
 
 @kernel
-def _fix_source(slowness: Singles, j: np.float32, k: np.float32, side: int, at: SweepArrays) -> None:
+def _fix_source(slowness: Float32s, j: np.float32, k: np.float32, side: int, at: SweepArrays) -> None:
     """Fixed u around the source, from the mean slowness of both ends; ∇r, which is singular there, is NaN.
 
     Comparisons with NaN are false, so that sweeps do not change such a node.

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 
-Reals = NDArray[np.floating[Any]]
+AnyFloats = NDArray[np.floating[Any]]
 
 # Runs of updates are rounded up to a multiple of this many nodes; a multiple of the vector length.
 RUN = 8
@@ -135,8 +135,8 @@ class Diagonals:
 
 @kernel
 def move(
-    plain: Reals,
-    diagonals: Reals,
+    plain: AnyFloats,
+    diagonals: AnyFloats,
     shape: tuple[int, int, int],
     stored: tuple[int, int],
     flipped: bool,
@@ -176,7 +176,7 @@ def move(
 
 
 @kernel
-def turn(source: Reals, into: Reals, shape: tuple[int, int, int], stored: tuple[int, int]) -> None:
+def turn(source: AnyFloats, into: AnyFloats, shape: tuple[int, int, int], stored: tuple[int, int]) -> None:
     """As ``Diagonals.turn``, for numbers of any width."""
     planes, nj, nk = shape
     rows, width = stored

@@ -23,7 +23,7 @@ Cell = list[tuple[Node, float]]
 
 
 @dataclass(frozen=True)
-class Medium:
+class SlownessGrid:
     """A regular grid of slowness, which many sources may share.
 
     Attributes:
@@ -35,7 +35,7 @@ class Medium:
     spacing: float
 
     @classmethod
-    def checked(cls, speed: ArrayLike, spacing: float) -> Medium:
+    def checked(cls, speed: ArrayLike, spacing: float) -> SlownessGrid:
         """The medium for the arguments of ``solve``; an error names the first invalid node.
 
         Raises:
@@ -76,7 +76,7 @@ class Medium:
 class PointSource:
     """|∇T| = slowness in a medium, T = 0 at ``source``, (ndim,), m, node 0 at 0."""
 
-    medium: Medium
+    medium: SlownessGrid
     source: Floats
 
     @classmethod
@@ -86,7 +86,7 @@ class PointSource:
         Raises:
             InvalidInput: see ``bentray_kernels.eikonal.solve``.
         """
-        return Medium.checked(speed, spacing).source(source)
+        return SlownessGrid.checked(speed, spacing).source(source)
 
     @property
     def slowness(self) -> Floats:

@@ -20,7 +20,7 @@ from .fast_iterative_opencl import fast_iterative_opencl, fast_iterative_opencl_
 from .fast_marching import fast_marching, high_accuracy_fast_marching
 from .fast_marching_untidy import fast_marching_untidy
 from .fast_sweeping import fast_sweeping, fast_sweeping_many
-from .problem import Medium, PointSource
+from .problem import PointSource, SlownessGrid
 
 
 @dataclass(frozen=True)
@@ -165,10 +165,10 @@ def solve_many(
     times = np.empty((batch, *fields.shape[1:]))
 
     # One medium, checked and padded once, serves all its sources.
-    shared = Medium.checked(fields[0], spacing) if len(fields) == 1 else None
+    shared = SlownessGrid.checked(fields[0], spacing) if len(fields) == 1 else None
 
     def problem(k: int) -> PointSource:
-        medium = shared or Medium.checked(fields[k], spacing)
+        medium = shared or SlownessGrid.checked(fields[k], spacing)
         return medium.source(points[k % len(points)])
 
     def solve_part(part: range) -> None:

@@ -1,4 +1,4 @@
-"""Iso-surfaces of filtered volumes: where they can be, and where a ray meets them."""
+"""Iso-surfaces of filtered volumes: cell classification and ray intersection."""
 
 from .cell_bounds import BOUNDS, CellRanges, cell_ranges
 

@@ -36,7 +36,7 @@ def weighted_range(nodes: Floats, least: Floats, most: Floats) -> tuple[float, f
 
     Equation 18 bounds f by iso + Σ (c − iso)·w, the weights at their extremes. The cell may reach an
     iso-value from below where that bound is not less than the iso-value itself; the greatest such
-    iso-value is the greatest value of the cell as far as ACCC can tell, whatever iso-value is drawn. It is
+    iso-value is the greatest value of the cell within the accuracy of ACCC, for every iso-value. It is
     found by Newton's method on h(r) = Σ (c − r)⁺·most − Σ (r − c)⁺·least, which is convex.
 
     Args:

@@ -1,4 +1,4 @@
-"""The Bernstein-Bézier form of a cell: the hull of its coefficients holds every value of the cell."""
+"""The Bernstein-Bézier form of a cell: the convex hull of its coefficients bounds the values of the cell."""
 
 from __future__ import annotations
 

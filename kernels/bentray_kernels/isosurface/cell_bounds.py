@@ -1,4 +1,4 @@
-"""The range of the field within every cell, by the bound that is asked for."""
+"""Range of the field within every cell, by a selectable bound."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class CellRanges(NamedTuple):
 def cell_ranges(
     spline: Spline, isos: Sequence[float], bound: str, pause: Callable[[], None] = lambda: None
 ) -> CellRanges:
-    """Bound the field in every cell; no cell with one of the iso-values is ever missed.
+    """Bound the field in every cell; no cell that contains an iso-value is missed.
 
     This holds for fields within the range of float32, in which the bounds are kept; ``Scene.build`` refuses
     others.
@@ -64,7 +64,7 @@ def cell_ranges(
         isos: iso-values.
         bound: "bmcc", "accc", "accc-subcells", "bernstein" (the hull of the cell's polynomial) or "ccc" (its
             exact range; slow, kept as the reference).
-        pause: called before every few layers of cells; what it raises ends the work.
+        pause: called before every few layers of cells; an exception that it raises ends the work.
 
     Raises:
         InvalidInput: no such bound.

@@ -1,4 +1,4 @@
-"""What a filter's weights can do within one cell: which nodes act there, how much, and in Bernstein form."""
+"""Weights of a filter within one cell: nodes, polynomials, ranges and Bernstein form."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The first place where the field along a ray leaves an interval of values: what every ray caster asks."""
+"""Ray intersection with iso-surfaces: the first point at which the field along a ray leaves an interval."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from ..compiled import kernel
 from .octree import Octree
 from .roots import Field, Ray, brent, field_at, first_root_of_cubic, newton
 
-# How the search looks within a cell.
+# Root finders within a cell.
 CERTAIN, CERTAIN_BRENT, BRENT, ANALYTIC = 0, 1, 2, 3
 
-# The gradient of a crossing that was found without one.
+# Gradient of a crossing that was found without it.
 UNKNOWN = (math.nan, math.nan, math.nan)
 
-# Accuracy of a crossing, nodes, and the shortest piece of a ray that is still halved.
+# Accuracy of a crossing, nodes, and the shortest segment of a ray that is still halved.
 TOLERANCE = 1e-9
 SHORTEST = 1e-7
 
-# Halvings that a ray may take; each comes with two readings of the field at most. Most rays take fewer than
-# ten, a grazing one some twenty at each surface, and one through noise, met by surfaces everywhere, some
-# hundreds. On a plateau of the field at an iso-value there would be no end of them.
+# Most halvings of a ray, each with at most two evaluations of the field. Most rays need fewer than ten, a
+# grazing one about twenty at each surface, and one through noise, with surfaces everywhere, some hundreds. On
+# a plateau of the field at an iso-value they would not end.
 MOST_HALVINGS = 512
 
 # How many of them the shortest piece counts for where nothing is proved of it. A ray that touches a surface
@@ -63,8 +63,8 @@ def leave_interval(
 ) -> tuple[float, int, Vector, int]:
     """First s, start < s < stop, where the field is no longer between ``below`` and ``above``.
 
-    A ray is in a layer of the object; the iso-values about it are the interval. So nested iso-surfaces, and
-    the way out as well as the way in, are one question.
+    A ray is in a layer of the object between two iso-values, the interval. So nested iso-surfaces, entry and
+    exit are one search.
 
     Args:
         field: what is read.
@@ -176,7 +176,7 @@ def _turned(s: float, end: float, slope: float, bend: float, height: float) -> f
 
 @kernel(inline="always")
 def _way_out(start: float, over: float, node: int, level: int, cells: int) -> float:
-    """s of the face by which the ray leaves a node of the octree along one axis; infinity if by none."""
+    """s of the face at which the ray leaves a node of the octree along one axis; infinity if none."""
     if math.isinf(over):
         return math.inf
     face = min((node + 1) << level, cells) if over > 0.0 else node << level

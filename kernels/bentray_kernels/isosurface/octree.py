@@ -1,4 +1,4 @@
-"""An octree over the cells: which iso-values each node may hold, from the ranges of the cells below it."""
+"""Octree over the cells: the iso-values that each node may contain, from the ranges of its cells."""
 
 from __future__ import annotations
 

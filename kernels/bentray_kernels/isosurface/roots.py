@@ -1,4 +1,4 @@
-"""Where the field along a ray takes a value: Brent's method, and the cubic of a trilinear cell."""
+"""Roots of the field along a ray: Brent's method, and the cubic of a trilinear cell."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Meshes as they come from files: made sound where that is safe, else refused, each defect by name."""
+"""Mesh repair: defects are corrected where that is unambiguous, else the mesh is rejected."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from .mesh import TriangleMesh
 from .opening import cut_open
 from .topology import components, edges_of, side_ends, topology_of
 
-# Height of a triangle over its longest side: angles of thinner ones are lost in every computation with them.
+# Lowest ratio of a triangle's height to its longest side: angles of thinner ones are dominated by rounding.
 THINNEST = 1e-9
 
 
 @dataclass(frozen=True)
 class SoundMesh:
-    """One connected, oriented surface, and what had to be done for it.
+    """One connected, oriented surface, and the repairs made.
 
     Attributes:
         mesh: every vertex is used by one fan of faces; closed surfaces have their normals outward.
-        origin: (vertices,) the vertex that each was.
-        merged: vertices that lay in the place of another one.
-        unused: vertices of no face.
-        turned: faces whose corners were put in the other order.
-        parted: vertices added where fans of faces touched in one.
+        origin: (vertices,) original vertex of each.
+        merged: number of vertices at the position of another one.
+        unused: number of vertices without a face.
+        turned: number of faces with reversed orientation.
+        parted: number of vertices added where fans of faces touched in one.
         holes: boundaries; 0 for a closed surface.
         genus: handles.
     """
@@ -43,7 +43,7 @@ class SoundMesh:
 
 
 def sound(vertices: Floats, faces: NDArray[np.integer]) -> SoundMesh:
-    """Merge vertices in one place, turn the faces alike, part fans that touch, and refuse what remains wrong.
+    """Merge coincident vertices, orient faces consistently, split touching fans, and reject other defects.
 
     Args:
         vertices: (vertices, 3), any unit.
@@ -114,7 +114,7 @@ def _plain(vertices: Floats, faces: Ints) -> None:
 
 
 def _thinness(mesh: TriangleMesh) -> Floats:
-    """(faces,) height over the longest side; 0 where it is lost in the rounding of the places."""
+    """(faces,) height over the longest side; 0 if it is below the rounding of the coordinates."""
     corners = mesh.corners
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1).max(axis=1)
     rounding = np.finfo(np.float64).eps * np.abs(mesh.vertices).max()
@@ -124,7 +124,7 @@ def _thinness(mesh: TriangleMesh) -> Floats:
 
 
 def _turned_alike(faces: Ints) -> tuple[Ints, int]:
-    """The faces, fewest of each piece turned, so that two run along each edge in opposite directions."""
+    """Orient the faces consistently, with the fewest changes in each piece; returns the number changed."""
     _, side_edge, count = edges_of(faces)
     if (count > 2).any():
         raise InvalidInput(
@@ -134,7 +134,7 @@ def _turned_alike(faces: Ints) -> tuple[Ints, int]:
     second = np.cumsum(count)[count == 2] - 1
     one, other = order[second - 1], order[second]
     start, _ = side_ends(faces)
-    # Each face comes twice, as it is and turned; what fits together along an edge is linked.
+    # Each face occurs in both orientations; compatible ones along an edge are linked.
     number, alike = len(faces), (start[one] == start[other]).astype(np.int64)
     f, g = one // 3, other // 3
     labels = components(

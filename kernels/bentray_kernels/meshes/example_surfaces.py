@@ -1,4 +1,4 @@
-"""Closed surfaces made of triangles: a sphere, a torus, and a bumpy ball with any number of faces."""
+"""Example meshes: a sphere, a torus, and a bumpy ball with any number of faces."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def bumpy_ball(faces: int) -> TriangleMesh:
     """A ball with waves of several lengths, its vertices spread almost evenly.
 
     Args:
-        faces: how many are wanted, 20 or more; of 20·n², the number nearest to it is made.
+        faces: target number, 20 or more; the result has the nearest 20·n².
 
     Raises:
         InvalidInput: for fewer.

@@ -1,10 +1,10 @@
-"""A ray and the plane of one face: where they meet, and to which neighbour the point lies."""
+"""Intersection of a ray with the plane of a face, and the neighbour on the side of the point."""
 
 from __future__ import annotations
 
+from ..arrays import Float32s, Int32s
 from ..compiled import kernel
 from ..float32 import lower, real
-from .surface import Reals, Words
 
 # Distance, in lengths of the direction; weights of the corners 0, 1 and 2; the determinant, above 0 where the
 # outside of the face is seen.
@@ -13,7 +13,7 @@ Meeting = tuple[float, float, float, float, float]
 
 @kernel(inline="always")
 def meet_plane(
-    triangles: Reals, face: int, sx: float, sy: float, sz: float, dx: float, dy: float, dz: float
+    triangles: Float32s, face: int, sx: float, sy: float, sz: float, dx: float, dy: float, dz: float
 ) -> Meeting:
     """Where a line meets the plane of a face (Möller and Trumbore, 1997), in the precision of its arguments.
 
@@ -38,7 +38,7 @@ def meet_plane(
 
 
 @kernel(inline="always")
-def beyond(links: Words, face: int, first: float, second: float, third: float, slack: float) -> int:
+def beyond(links: Int32s, face: int, first: float, second: float, third: float, slack: float) -> int:
     """The face across the edge that a point of the plane lies farthest behind; behind none, itself.
 
     Args:

@@ -1,4 +1,4 @@
-"""How far two surfaces are apart, either way."""
+"""Geometric error: symmetric distance between two surfaces."""
 
 from __future__ import annotations
 

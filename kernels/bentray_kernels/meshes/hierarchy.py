@@ -1,4 +1,4 @@
-"""A binary hierarchy of boxes over triangles, split where the surface area heuristic finds it cheapest.
+"""Bounding volume hierarchy of triangles, split by the surface area heuristic.
 
 MacDonald and Booth, Heuristics for ray tracing using space subdivision (1990); in bins as Wald, On fast
 construction of SAH-based bounding volume hierarchies (2007).
@@ -14,7 +14,7 @@ from ..compiled import kernel
 BINS = 16
 # Faces of a leaf; three bits of a child's word count them.
 MOST_IN_LEAF = 4
-# From this level on ranges are halved, so that no mesh makes a ray's list of waiting nodes overflow.
+# From this level on ranges are halved, so that the stack of a ray cannot overflow.
 HALVED_FROM = 48
 
 

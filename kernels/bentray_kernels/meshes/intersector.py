@@ -1,4 +1,4 @@
-"""The exact answer: the first triangle on a ray, watertight, through the hierarchy of boxes.
+"""Exact, watertight ray-triangle intersection with a bounding volume hierarchy.
 
 Corners are sheared into a plane across the ray, in which the ray is the point 0 (Woop, Benthin and Wald,
 Watertight ray/triangle intersection, 2013). On which side of it an edge passes is the sign of a difference of
@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Vector
+from ..arrays import Float32s, Floats, Int32s, Vector
 from ..compiled import kernel
-from .surface import Reals, Surface, Words
+from .surface import Surface
 
-# Nodes that may wait while a ray goes down one child: more than a hierarchy has levels.
+# Size of the traversal stack: more than a hierarchy has levels.
 WAITING = 96
 
 # Boxes are left this much later than computed: three roundings (Ize, Robust BVH ray traversal, 2013).
@@ -29,7 +29,7 @@ Shear = tuple[int, int, int, float, float, float]
 
 @kernel(inline="always")
 def box_entry(
-    nodes: Reals,
+    nodes: Float32s,
     node: int,
     at: int,
     origin: Vector,
@@ -50,7 +50,7 @@ def box_entry(
 @kernel(inline="always")
 def closest(
     surface: Surface,
-    waiting: Words,
+    waiting: Int32s,
     root: int,
     origin: Vector,
     direction: Vector,
@@ -62,11 +62,11 @@ def closest(
 
     Args:
         surface: ``surface_of``.
-        waiting: (96,) room for the nodes that wait.
+        waiting: (96,) traversal stack.
         root: node at which to begin: 0, but where several surfaces share their arrays.
         origin: edges of the cube.
         direction: any length.
-        begin, end: distances between which to look, lengths of the direction.
+        begin, end: range of distances, lengths of the direction.
         ignored: the face on which the ray starts, −1 for none.
 
     Returns:
@@ -82,7 +82,7 @@ def closest(
         one, other = surface.children[node, 12], surface.children[node, 13]
         if far < near:
             near, far, one, other = far, near, other, one
-        # The nearer child first; a farther inner node waits, a farther leaf is looked at at once.
+        # The nearer child first; a farther inner node is pushed, a farther leaf is tested at once.
         node = -1
         for turn in range(2):
             at, child = (near, one) if turn == 0 else (far, other)
@@ -126,7 +126,7 @@ def _shear_of(direction: Vector) -> Shear:
 
 
 @kernel(inline="always")
-def _meet(triangles: Reals, face: int, origin: Vector, shear: Shear) -> tuple[float, float, float, bool]:
+def _meet(triangles: Float32s, face: int, origin: Vector, shear: Shear) -> tuple[float, float, float, bool]:
     """Distance (∞ for none), weights of corners 0 and 1, and whether the outside is seen."""
     ax, ay, az = _sheared(triangles, face, 0, origin, shear)
     bx, by, bz = _sheared(triangles, face, 3, origin, shear)
@@ -141,7 +141,7 @@ def _meet(triangles: Reals, face: int, origin: Vector, shear: Shear) -> tuple[fl
 
 
 @kernel(inline="always")
-def _sheared(triangles: Reals, face: int, at: int, origin: Vector, shear: Shear) -> Vector:
+def _sheared(triangles: Float32s, face: int, at: int, origin: Vector, shear: Shear) -> Vector:
     across, up, along = shear[0], shear[1], shear[2]
     depth = triangles[face, at + along] - origin[along]
     return (
@@ -156,8 +156,8 @@ def intersect(
     surface: Surface,
     origins: Floats,
     directions: Floats,
-    ignored: Words,
-    faces: Words,
+    ignored: Int32s,
+    faces: Int32s,
     distances: Floats,
     weights: Floats,
     outside: NDArray[np.bool_],

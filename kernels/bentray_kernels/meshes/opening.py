@@ -1,4 +1,4 @@
-"""Meshes cut open along edges: the corners on the two sides of a cut become vertices of their own."""
+"""Cutting meshes along edges: both sides of a cut get separate vertices."""
 
 from __future__ import annotations
 

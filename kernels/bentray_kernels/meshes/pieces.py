@@ -9,7 +9,7 @@ from .topology import topology_of
 
 
 def pieces_of(mesh: TriangleMesh) -> list[TriangleMesh]:
-    """Each piece as a mesh of its own, the one of largest area first; what hangs together does so by edges.
+    """Each piece as a separate mesh, the one of largest area first; pieces are connected by edges.
 
     Raises:
         InvalidInput: as ``topology_of``.

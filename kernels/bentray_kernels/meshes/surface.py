@@ -1,4 +1,4 @@
-"""A mesh as rays need it: its triangles in the order of a hierarchy of boxes, with their neighbours."""
+"""A mesh for ray intersection: triangles in the order of a bounding volume hierarchy, with neighbours."""
 
 from __future__ import annotations
 
@@ -7,20 +7,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Ints
+from ..arrays import Float32s, Int32s, Ints
 from ..errors import InvalidInput
 from .hierarchy import build_hierarchy
 from .mesh import Chart
-
-Words = NDArray[np.int32]
-Reals = NDArray[np.float32]
 
 # 4-byte words of a triangle and of a node: a line of the cache each.
 WORDS = 16
 
 
 class Surface(NamedTuple):
-    """A mesh in the unit cube, its faces in an order in which near ones stand together.
+    """A mesh in the unit cube, with spatially sorted faces.
 
     Attributes:
         triangles: (faces, 16) float32: three corners of x, y, z; then words of ``links``.
@@ -34,13 +31,13 @@ class Surface(NamedTuple):
         order: (faces,) rows of the chart's mesh.
     """
 
-    triangles: Reals
-    links: Words
-    nodes: Reals
-    children: Words
-    normals: Reals
-    uv: Reals
-    order: Words
+    triangles: Float32s
+    links: Int32s
+    nodes: Float32s
+    children: Int32s
+    normals: Float32s
+    uv: Float32s
+    order: Int32s
 
 
 def surface_of(chart: Chart) -> Surface:
@@ -74,8 +71,8 @@ def surface_of(chart: Chart) -> Surface:
     return Surface(triangles, links, nodes, nodes.view(np.int32), normals, uv, order)
 
 
-def _lines(count: int) -> Reals:
-    """(count, 16) zeros, each row one line of the cache: near misses are what a lookup spends its time on."""
+def _lines(count: int) -> Float32s:
+    """(count, 16) zeros, each row one cache line: cache misses dominate the time of lookups."""
     room = np.zeros(count * WORDS + WORDS, dtype=np.float32)
     start = -room.ctypes.data % (4 * WORDS) // 4
     return room[start : start + count * WORDS].reshape(count, WORDS)

@@ -1,4 +1,4 @@
-"""The distance from points to a surface, exact, by a grid of its triangles."""
+"""Exact distance from points to a surface, by a grid of its triangles."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ FEWEST_CELLS, MOST_CELLS = 4, 128
 
 
 class SurfaceGrid:
-    """Triangles sorted into cubes of space, to ask for the distance of many points.
+    """Triangles sorted into a grid, for the distance of many points.
 
-    Meant for points near the surface: a far one looks through all the cubes between.
+    Efficient for points near the surface: a far one visits all cells between.
 
     Args:
         mesh: with one face at least.

@@ -1,4 +1,4 @@
-"""How the faces of a mesh hang together: edges, boundary loops, pieces, Euler characteristic, genus."""
+"""Mesh topology: edges, boundary loops, pieces, Euler characteristic, genus."""
 
 from __future__ import annotations
 

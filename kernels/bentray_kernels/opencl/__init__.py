@@ -1,4 +1,4 @@
-"""OpenCL with care: a device is chosen by name, tried in a child process, and only then used."""
+"""OpenCL devices: selection by name, self-test in a child process, sessions."""
 
 from .choice import Choice, OpenCLFallbackWarning, choose, scene_or_warning, session_or_warning
 from .devices import WISH, Device, find_devices

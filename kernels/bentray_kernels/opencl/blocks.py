@@ -1,4 +1,4 @@
-"""Travel times on an OpenCL device: blocks of points, many problems in each launch."""
+"""Fast iterative travel times on an OpenCL device: blocks of points, many problems per launch."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def travel_times(
         session: the device.
         crossings: (batch, nx, ny[, nz]), spacing times slowness, s; a batch of 1 serves all sources.
         seeds: where each problem's front starts.
-        tolerance: a fall by no more than this part of a point's crossing time counts as settled.
+        tolerance: a decrease below this fraction of a point's crossing time counts as converged.
 
     Returns:
         (len(seeds), nx, ny[, nz]), s. A problem's times do not depend on the rest of its batch.
@@ -92,7 +92,7 @@ def _advance_until_settled(
     session: Session, blocks: Blocks, crossings: Floats, seeds: Sequence[Seeds], tolerance: float
 ) -> Floats:
     start = np.full((len(seeds), math.prod(blocks.shape)), math.inf)
-    # Each problem begins with the colour of its own source, so that others cannot change its times.
+    # Each problem begins with the colour of its own source, so that its times do not depend on the others.
     lists: tuple[set[int], set[int]] = set(), set()
     for k, (nodes, values) in enumerate(seeds):
         start[k, nodes] = values

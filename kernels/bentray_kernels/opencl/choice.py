@@ -1,4 +1,4 @@
-"""The device that the kernels use: wished for or best, tried, and open; or none, with one warning."""
+"""The OpenCL device of the kernels: selected or best, tested and open; or none, with one warning."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TypeVar
 
-from .devices import NONE, WISH, Device, find_devices, hidden, wished
+from .devices import NONE, WISH, Device, find_devices, hidden, select_devices
 from .session import Session
 from .verdict import verdict_on
 
@@ -18,16 +18,16 @@ Placed = TypeVar("Placed")
 
 
 class OpenCLFallbackWarning(UserWarning):
-    """No OpenCL device can be trusted; the same is computed on the CPU without OpenCL."""
+    """No OpenCL device passes its self-test; the CPU computes instead, without OpenCL."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The device to use and what was refused before it was found.
+    """The device to use, and the devices rejected before it.
 
     Attributes:
         device: None where none passed.
-        refusals: a sentence for each refused device.
+        refusals: a message for each rejected device.
     """
 
     device: Device | None
@@ -44,13 +44,13 @@ class Choice:
 
 
 def choose() -> Choice:
-    """The first device that passes its trial: the one of ``BENTRAY_OPENCL_DEVICE``, or GPUs first.
+    """The first device that passes its self-test: the one of ``BENTRAY_OPENCL_DEVICE``, or GPUs first.
 
     Raises:
-        InvalidInput: when the variable fits no device or more than one.
+        InvalidInput: when the variable matches no device or more than one.
     """
     refusals: list[str] = []
-    for device in wished(find_devices(), os.environ.get(WISH)):
+    for device in select_devices(find_devices(), os.environ.get(WISH)):
         verdict = verdict_on(device)
         if verdict.usable:
             return Choice(device, tuple(refusals))
@@ -67,7 +67,7 @@ def session_or_warning(instead: str) -> Session | None:
     Raises:
         InvalidInput: as ``choose``.
     """
-    # Two threads must not try or open one device at the same time.
+    # Only one thread may test or open a device at a time.
     with _OPENING:
         found = _found(os.environ.get(WISH))
         if isinstance(found, Session):
@@ -77,11 +77,11 @@ def session_or_warning(instead: str) -> Session | None:
 
 
 def scene_or_warning(build: Callable[[Session], Placed], instead: str) -> Placed | None:
-    """What ``build`` puts on the chosen device; or None after a warning, also if it cannot hold it.
+    """The result of ``build`` on the chosen device; or None after a warning, also without enough memory.
 
     Args:
-        build: makes it in an open session.
-        instead: what takes over.
+        build: called with an open session.
+        instead: the function that replaces it.
 
     Raises:
         InvalidInput: as ``choose``, and what ``build`` raises.
@@ -89,7 +89,7 @@ def scene_or_warning(build: Callable[[Session], Placed], instead: str) -> Placed
     session = session_or_warning(instead)
     if session is None:
         return None
-    # Here, so that whoever has no device never loads it.
+    # Imported here, so that pyopencl is loaded only with a device.
     import pyopencl as cl
 
     try:
@@ -104,8 +104,8 @@ _OPENING = threading.Lock()
 
 
 @cache
-def _found(wish: str | None) -> Session | str:
-    """The open device or why there is none; asked for once by each wish in a process."""
+def _found(selection: str | None) -> Session | str:
+    """The open device, or the reason for none; once per selection and process."""
     choice = choose()
     if choice.device is not None:
         return Session(choice.device)
@@ -114,6 +114,6 @@ def _found(wish: str | None) -> Session | str:
 
 @cache
 def _warn_once(instead: str, reason: str) -> None:
-    # A warning made an error is not remembered, so it is raised each time.
+    # A warning turned into an error is not cached, so it is raised each time.
     message = f"no OpenCL device can be used, {instead} takes over: {reason} (see `bentray devices`)"
     warnings.warn(OpenCLFallbackWarning(message), stacklevel=5)

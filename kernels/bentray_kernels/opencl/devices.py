@@ -1,4 +1,4 @@
-"""The OpenCL devices of this machine: what there is, and which one the user wants."""
+"""The OpenCL devices of this machine, and their selection by the user."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from .library import library_of, package_of
 from .platforms import platforms
 from .pocl import prepare
 
-# The environment variable that names the device to use, and its word for none.
+# The environment variable that selects the device, and its value for none.
 WISH = "BENTRAY_OPENCL_DEVICE"
 NONE = "none"
 
 
 @dataclass(frozen=True)
 class Device:
-    """An OpenCL device as its driver describes it; plain words, so that it can be kept and sent.
+    """An OpenCL device as described by its driver; plain values, so that it can be stored and sent.
 
     Attributes:
-        index: its place among all devices of all platforms.
+        index: its position among all devices of all platforms.
         platform: name of the platform.
         name: name of the device.
         kind: ``gpu``, ``accelerator``, ``cpu`` or ``other``.
-        version: the OpenCL version it says; PoCL adds the processor that it compiles for.
+        version: the reported OpenCL version; PoCL adds the processor that it compiles for.
         driver: version of the driver.
         double_precision: whether it computes in float64.
-        library: path of the driver's shared library; empty where it cannot be told.
-        package: name and version of the Python package that brought it; empty where the system did.
+        library: path of the driver's shared library; empty if unknown.
+        package: name and version of the Python package that contains it; empty for one of the system.
     """
 
     index: int
@@ -58,10 +58,10 @@ def find_devices() -> tuple[Device, ...]:
 
 
 def handle_of(device: Device) -> Any:
-    """The ``pyopencl.Device`` of a found device.
+    """The ``pyopencl.Device`` of a device.
 
     Raises:
-        LookupError: when the machine's devices have changed since.
+        LookupError: if the devices of the machine have changed.
     """
     handles = _handles()
     if device.index < len(handles) and _described(device.index, handles[device.index]) == device:
@@ -74,29 +74,30 @@ def hidden() -> bool:
     return os.environ.get(WISH, "").strip().lower() == NONE
 
 
-def wished(devices: Sequence[Device], wish: str | None) -> tuple[Device, ...]:
-    """The devices to try, in order: the one that ``wish`` names, else GPUs first and processors last.
+def select_devices(devices: Sequence[Device], selection: str | None) -> tuple[Device, ...]:
+    """The devices to test, in order: the one selected, else GPUs first and processors last.
 
     Of several drivers for one processor Intel's comes first (measured, see docs/how-to/use-opencl.md).
 
     Args:
-        devices: what there is.
-        wish: an index, a part of ``platform:device`` in any case, or ``none``; None or empty for no wish.
+        devices: available devices.
+        selection: an index, a part of ``platform:device`` in any case, or ``none``; None or empty: no
+            selection.
 
     Raises:
-        InvalidInput: when the wish fits no device or more than one; lists what there is.
+        InvalidInput: when it matches no device or more than one; lists the available ones.
     """
-    if not wish:
+    if not selection:
         return tuple(sorted(devices, key=_rank))
-    word = wish.strip().lower()
+    word = selection.strip().lower()
     if word == NONE:
         return ()
-    # A number that is no index may still be a model's: "3090".
+    # A number that is not an index may be part of a name: "3090".
     fitting = [device for device in devices if str(device.index) == word]
     fitting = fitting or [device for device in devices if word in device.label.lower()]
     if len(fitting) != 1:
         known = "; ".join(f"{device.index} = {device.label}" for device in devices) or "there is none here"
-        found = f"{wish!r}, which fits {len(fitting)} devices"
+        found = f"{selection!r}, which fits {len(fitting)} devices"
         raise InvalidInput(WISH, found, f"an index or a part of the name of one OpenCL device: {known}")
     return tuple(fitting)
 

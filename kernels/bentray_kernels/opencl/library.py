@@ -1,4 +1,4 @@
-"""Which library an OpenCL device comes from, and which Python package brought that."""
+"""The shared library of an OpenCL driver, and the Python package that contains it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-# The packages of the Python index that bring a driver: PoCL, and Intel's runtime for processors.
+# Packages of the Python index that contain a driver: PoCL, and Intel's runtime for processors.
 PACKAGES = ("pocl-binary-distribution", "intel-opencl-rt")
 
 
@@ -26,10 +26,10 @@ class _SymbolInfo(ctypes.Structure):
 
 
 def library_of(handle: Any) -> str:
-    """Path of the shared library that a ``pyopencl.Device`` belongs to; empty where it cannot be told.
+    """Path of the shared library that a ``pyopencl.Device`` belongs to; empty if unknown.
 
-    Drivers that a loader finds begin each of their objects with a pointer to their table of functions
-    (cl_khr_icd); the dynamic linker knows which file the first of these functions was loaded from.
+    Objects of a driver begin with a pointer to its table of functions (cl_khr_icd); the dynamic linker gives
+    the file from which the first of these functions was loaded.
     """
     if not handle.int_ptr:
         return ""
@@ -45,7 +45,7 @@ def library_of(handle: Any) -> str:
 
 @cache
 def package_of(library: str) -> str:
-    """Name and version of the Python package that a library came with; empty where it came otherwise."""
+    """Name and version of the Python package that contains a library; empty without one."""
     if library:
         for package in PACKAGES:
             found = files_of(package, Path(library).name)
@@ -55,7 +55,7 @@ def package_of(library: str) -> str:
 
 
 def files_of(package: str, name: str) -> Iterator[Path]:
-    """The files of that name that a package has installed; none where it is not installed."""
+    """The files of that name in an installed package; none if it is not installed."""
     try:
         listed = metadata.files(package) or []
     except metadata.PackageNotFoundError:

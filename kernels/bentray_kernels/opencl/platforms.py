@@ -1,4 +1,4 @@
-"""The OpenCL platforms of this process: those of the system and those that Python packages bring."""
+"""The OpenCL platforms of this process: those of the system and of Python packages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 from .library import files_of
 
-# Where the system lists its drivers, unless one of these variables names another folder.
+# Folder of the system's drivers, unless one of these variables names another one.
 SYSTEM = "/etc/OpenCL/vendors"
 SYSTEM_VARIABLES = ("OCL_ICD_VENDORS", "OPENCL_VENDOR_PATH")
 
@@ -31,17 +31,17 @@ def platforms() -> list[Any]:
     import pyopencl as cl
 
     with _ASKING:
-        _ask_first()
+        _register_intel()
         return list(cl.get_platforms())
 
 
 @cache
-def _ask_first() -> None:
-    """Have the loader read a list with Intel's runtime in it, where that package is installed.
+def _register_intel() -> None:
+    """Register Intel's runtime with the loader, if its package is installed.
 
-    The loader reads its lists once, at the first question of a process. pip's PoCL is on the list in
-    pyopencl's wheel. Intel's package names a folder that does not exist, so a list is made for that question.
-    The system's list is read all the same; a runtime of Intel that is on it is not added a second time.
+    The loader reads its lists once, at the first call in a process. The list in pyopencl's wheel contains
+    pip's PoCL. Intel's package names a folder that does not exist, so a temporary list is used for that call.
+    The system's list is read as well; a runtime of Intel on it is not added again.
     """
     import pyopencl as cl
 

@@ -1,4 +1,4 @@
-"""PoCL as pip brings it: the name of a processor that its compiler knows, and a linker where there is none.
+"""Workarounds for PoCL from pip: a processor name that its compiler accepts, and a linker if there is none.
 
 The newest PoCL of the Python index, 3.0-rc2 of 2022, asks its LLVM 14 for the processor's name, but chooses
 its library of built-in functions by the processor's features. Where the two disagree it fails. A processor
@@ -52,24 +52,24 @@ PROGRAMS, PYTHON = "COMPILER_PATH", "BENTRAY_PYTHON"
 
 
 def prepare(handle: Any) -> None:
-    """Make a device of that build ready for its first program; leave all others as they are."""
+    """Prepare a device of that build for its first program; other devices are not changed."""
     if Path(library_of(handle)).name == BUILD:
         _name_processor(handle)
         if not system_links():
-            _offer_linker()
+            _provide_linker()
 
 
 def system_links(root: Path = Path("/")) -> bool:
-    """Whether the system has a linker and what PoCL has it link."""
+    """Whether the system has a linker and the libraries that PoCL links."""
     found = (any(any(root.glob(pattern)) for pattern in patterns) for patterns in SYSTEM_LIBRARIES)
     return shutil.which("ld") is not None and all(found)
 
 
-def _offer_linker() -> None:
+def _provide_linker() -> None:
     ours = str(Path(__file__).parent / "link")
     folders = [folder for folder in os.environ.get(PROGRAMS, "").split(os.pathsep) if folder]
     if ours not in folders:
-        # What the user has set comes first.
+        # A setting of the user has priority.
         os.environ[PROGRAMS] = os.pathsep.join([*folders, ours])
         os.environ[PYTHON] = sys.executable
 
@@ -77,13 +77,13 @@ def _offer_linker() -> None:
 def _name_processor(handle: Any) -> None:
     name = processor_name(processor())
     field = ctypes.c_char_p.from_address(handle.int_ptr + NAME_OFFSET)
-    # The version, made before, ends with the name that was found first.
+    # The version string, already built, ends with the original name.
     known = (field.value or b"").decode()
     if name in (None, known) or not known or not handle.version.strip().endswith(f"-{known}"):
         return
     copy = ctypes.CDLL(None).strdup
     copy.restype = ctypes.c_void_p
-    # A copy of its own, since PoCL frees what it holds.
+    # A separate copy, since PoCL frees it.
     ctypes.c_void_p.from_address(handle.int_ptr + NAME_OFFSET).value = copy(str(name).encode())
 
 

@@ -1,4 +1,4 @@
-"""What this machine's processor is and can do, in the words of the Linux kernel."""
+"""Model and features of this machine's processor, from /proc/cpuinfo."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 CPUINFO = Path("/proc/cpuinfo")
 
-# Lines that tell one model from another, on x86 and on Arm; the others change by the core or by the second.
+# Lines that identify a model, on x86 and on Arm; the others vary by core or over time.
 MODEL = (
     "vendor_id",
     "cpu family",
@@ -28,11 +28,11 @@ def processor() -> frozenset[str]:
         first = CPUINFO.read_text().partition("\n\n")[0]
     except OSError:
         return frozenset()
-    told: set[str] = set()
+    features: set[str] = set()
     for line in first.splitlines():
         name, _, value = line.partition(":")
         if name.strip() in FEATURES:
-            told.update(value.split())
+            features.update(value.split())
         elif name.strip() in MODEL:
-            told.add(f"{name.strip()}: {value.strip()}")
-    return frozenset(told)
+            features.add(f"{name.strip()}: {value.strip()}")
+    return frozenset(features)

@@ -14,12 +14,12 @@ from .devices import Device, handle_of
 
 
 class Session:
-    """A device in use. Hold ``lock`` while setting arguments and launching: kernels keep them inside.
+    """A device in use. Hold ``lock`` while setting arguments and launching: kernels store them.
 
     Attributes:
-        lock: one task at a time.
+        lock: for one task at a time.
         handle: the ``pyopencl.Device``.
-        queue: in order.
+        queue: in-order command queue.
     """
 
     def __init__(self, device: Device) -> None:
@@ -45,9 +45,9 @@ class Session:
         if key not in self._kernels:
             text = "".join(_named(source) for source in sources)
             with warnings.catch_warnings():
-                # Remarks of a compiler about a program that then passes its trial.
+                # Compiler remarks about programs that pass the self-test.
                 warnings.simplefilter("ignore", cl.CompilerWarning)
-                # Drivers keep built programs themselves; pyopencl's own cache would warn under load.
+                # Drivers cache programs themselves; pyopencl's own cache warns under load.
                 program = cl.Program(self.context, text).build(
                     [f"-D{define}" for define in defines], cache_dir=False
                 )
@@ -68,7 +68,7 @@ class Session:
         return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size_bytes)
 
     def download(self, array: Any, buffer: Any, offset_bytes: int = 0) -> None:
-        """Fill ``array`` from a buffer when all that was launched has ended."""
+        """Fill ``array`` from a buffer after all launched kernels have finished."""
         import pyopencl as cl
 
         cl.enqueue_copy(self.queue, array, buffer, src_offset=offset_bytes, is_blocking=True)
@@ -85,14 +85,14 @@ class Session:
 
 
 def _named(source: str) -> str:
-    """A file's text, which the compiler's remarks then name."""
+    """The text of a file, with its name for messages of the compiler."""
     file = f"{source}.cl"
     text = resources.files(__package__).joinpath("sources", *file.split("/")).read_text()
     return f'#line 1 "{file}"\n{text}\n'
 
 
 def set_arguments(kernel: Any, *arguments: Any) -> None:
-    """Set buffers and numpy scalars in order, without the launcher that pyopencl would write and cache."""
+    """Set buffers and numpy scalars in order, without the launcher that pyopencl generates and caches."""
     for place, argument in enumerate(arguments):
         kernel.set_arg(place, argument)
 

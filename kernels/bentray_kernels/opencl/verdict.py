@@ -1,4 +1,4 @@
-"""Whether a device may be used: the outcome of its trial, kept while nothing that it depends on changes."""
+"""Result of the self-test of a device, cached while driver, processor and program are unchanged."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from pathlib import Path
 
 from .devices import Device
 from .processor import processor
-from .trial import NEEDED, STAGES, WIDTHS
+from .self_test import NEEDED, STAGES, WIDTHS
 
-# A build of all kernels takes seconds; the machine may be busy with many workers starting.
+# Building all kernels takes seconds; the machine may be busy with starting workers.
 TIME_OUT_S = 120.0
 
-# How a stage is tried: device, stages and time-out in; the stages that answered, with their faults, out.
+# Runs stages: takes device, stages and time-out; returns the faults of the completed stages.
 Answers = dict[str, str]
 Child = Callable[[Device, Sequence[str], float], tuple[Answers, str]]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is known of a device.
+    """The test result of a device.
 
     Attributes:
-        reason: why it is refused; empty where it may be used.
-        widths: widths of vectors of doubles that it computes right.
-        faults: what was wrong, by stage of the trial; also of stages that our kernels do not need.
+        reason: of its rejection; empty if it may be used.
+        widths: correct vector widths of doubles.
+        faults: by stage of the self-test, including stages that the kernels do not need.
     """
 
     reason: str
@@ -48,7 +48,7 @@ class Verdict:
 
 @cache
 def verdict_on(device: Device) -> Verdict:
-    """The verdict, from a trial in a child process or from an earlier one that the device passed."""
+    """The verdict, from a self-test in a child process or from the cache."""
     if not device.double_precision:
         return Verdict("it has no double precision", (), {})
     kept = _kept(device)
@@ -61,7 +61,7 @@ def verdict_on(device: Device) -> Verdict:
 
 
 def examine(device: Device, child: Child) -> Verdict:
-    """Try all stages; where the device ends or stops the child, try the rest in another one."""
+    """Run all stages; if the device ends or stops the child, run the rest in another one."""
     faults: dict[str, str] = {}
     left = list(STAGES)
     while left:
@@ -79,12 +79,12 @@ def examine(device: Device, child: Child) -> Verdict:
 
 
 def in_a_child(device: Device, stages: Sequence[str], time_out_s: float) -> tuple[Answers, str]:
-    """Run ``trial`` in a process of its own.
+    """Run ``self_test`` in a process of its own.
 
     Returns:
-        The faults of the stages that answered, and how the process ended for the one after them.
+        The faults of the completed stages, and how the process ended in the next one.
     """
-    command = [sys.executable, "-m", f"{__package__}.trial", str(device.index), device.label, *stages]
+    command = [sys.executable, "-m", f"{__package__}.self_test", str(device.index), device.label, *stages]
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as errors:
         try:
             code = subprocess.run(  # noqa: S603 - our own module
@@ -96,7 +96,7 @@ def in_a_child(device: Device, stages: Sequence[str], time_out_s: float) -> tupl
         out.seek(0)
         errors.seek(0)
         said = errors.read().strip().splitlines() or [""]
-        # A compiler's error, which drivers follow with remarks, tells more than the last line.
+        # The error of a compiler is more useful than the last line, which may be a remark.
         last = ([line for line in said if "error:" in line.lower()] or said)[-1].strip()
         answers: Answers = {}
         for line in out.read().splitlines():
@@ -109,11 +109,11 @@ def in_a_child(device: Device, stages: Sequence[str], time_out_s: float) -> tupl
 
 
 def _file(device: Device) -> Path:
-    """Where the verdict is kept; another driver, processor, program or trial gives another name."""
-    # Hosts that share a home may have processors that differ under one generic name.
+    """File of the cached verdict; driver, processor, program and self-test determine its name."""
+    # Hosts with a common home may have different processors of the same generic name.
     digest = hashlib.sha256(repr((device, platform.machine(), sorted(processor()))).encode())
     package = resources.files(__package__)
-    for name in ("trial.py", "blocks.py", "session.py", "pocl.py", "link/shared_library.py"):
+    for name in ("self_test.py", "blocks.py", "session.py", "pocl.py", "link/shared_library.py"):
         digest.update(package.joinpath(name).read_bytes())
     for source in sorted(Path(str(package / "sources")).rglob("*.cl")):
         digest.update(source.read_bytes())
@@ -131,7 +131,7 @@ def _kept(device: Device) -> Verdict | None:
 
 
 def _keep(device: Device, verdict: Verdict) -> None:
-    """Only what passed is kept: a refusal may be the fault of a busy machine."""
+    """Store only success: a failure may be due to a busy machine."""
     try:
         file = _file(device)
         file.parent.mkdir(parents=True, exist_ok=True)

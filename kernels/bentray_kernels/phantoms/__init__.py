@@ -1,4 +1,4 @@
-"""Phantoms with an exact description, sampled on any grid."""
+"""Analytic phantoms, sampled on any grid."""
 
 from .cube_fields import CubeField, eight_bit, in_nodes, sampled
 from .ellipses import Ellipse, EllipsePhantom

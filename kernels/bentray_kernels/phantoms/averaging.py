@@ -1,4 +1,4 @@
-"""Means over the cells of a plane through painted solids, point by point only where a boundary passes."""
+"""Cell averages of a plane through solids; cells are supersampled only at boundaries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fields over the cube from −1 to 1 that are known exactly, and the volumes sampled from them."""
+"""Analytic fields over the cube from −1 to 1, and volumes sampled from them."""
 
 from __future__ import annotations
 

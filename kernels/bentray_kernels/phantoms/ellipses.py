@@ -1,4 +1,4 @@
-"""Phantoms of nested ellipses: known exactly at every point, sampled with area averaging."""
+"""Phantoms of nested ellipses, sampled with area averaging."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Glass balls: a sphere with a Gaussian fringe and air holes in it, and a sphere as a signed distance."""
+"""Glass balls: a sphere with a Gaussian fringe and air holes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Marschner–Lobb test signal, the touchstone of gradient filters."""
+"""The Marschner–Lobb test signal for interpolation filters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Solids that 3-D phantoms are made of: ellipsoids, and bodies whose outline changes along z."""
+"""Solids of 3-D phantoms: ellipsoids, and bodies whose outline varies along z."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The breast phantom of chapter 6: a thick layer of fat round tissue with large and small lesions."""
+"""The 2-D breast phantom (Li 2008, Table 6): a thick fat layer around tissue with large and small lesions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The breast phantom of chapter 7: skin, fat, tissue and lesions, no slice like the next."""
+"""The 3-D breast phantom (Li 2008, Table 7): skin, fat, tissue and lesions that vary between slices."""
 
 from __future__ import annotations
 

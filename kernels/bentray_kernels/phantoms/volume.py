@@ -1,4 +1,4 @@
-"""Phantoms of solids painted over each other: known at every point, sampled as volumes or slices."""
+"""Phantoms of overlapping solids, sampled as volumes or slices."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from ..arrays import Floats
 from ..compiled import kernel
 from ..errors import InvalidInput
 
-Kind = Literal["curved", "straight"]
+RayKind = Literal["curved", "straight"]
 
 
 class Fan(NamedTuple):
@@ -36,7 +36,7 @@ class Fan(NamedTuple):
 
     @classmethod
     def checked(
-        cls, tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, kind: Kind
+        cls, tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, kind: RayKind
     ) -> Fan:
         """The fan for the arguments of ``trace``.
 

@@ -9,11 +9,11 @@ from scipy.sparse import csr_array
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from .descent import PARTS, STEP, empty_path, list_entries, merge_entries, trace_ray
-from .fan import Fan, Kind
+from .fan import Fan, RayKind
 
 
 def sensitivities(
-    tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, *, kind: Kind = "curved"
+    tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, *, kind: RayKind = "curved"
 ) -> csr_array:
     """Length of each ray attributed to each node, the weights w of SART (chapter 6, equation 1).
 

@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from .descent import STEP, empty_path, trace_ray
-from .fan import Fan, Kind
+from .fan import Fan, RayKind
 
 
 def trace(
-    tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, *, kind: Kind = "curved"
+    tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, *, kind: RayKind = "curved"
 ) -> list[Floats]:
     """Rays from every receiver back to the source, down the gradient of the travel time (chapter 6.2.2).
 

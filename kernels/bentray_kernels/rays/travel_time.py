@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats
 from ..compiled import kernel
-from ..eikonal.problem import Medium
+from ..eikonal.problem import SlownessGrid
 from ..errors import InvalidInput
 from ..splines import coefficients
 from .bending import STRIDE, allocate_bending, bend
@@ -51,7 +51,7 @@ def log_slowness(fan: Fan, speed: ArrayLike, spacing: float) -> Floats:
     """
     if np.shape(speed) != fan.shape:
         raise InvalidInput("speed", f"shape {np.shape(speed)}", f"the shape of tof, {fan.shape}")
-    return coefficients(np.log(Medium.checked(speed, spacing).slowness))
+    return coefficients(np.log(SlownessGrid.checked(speed, spacing).slowness))
 
 
 @kernel

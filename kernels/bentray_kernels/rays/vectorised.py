@@ -10,12 +10,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Ints
+from ..arrays import Float32s, Ints
 from ..compiled import kernel
-
-Singles = NDArray[np.float32]
 
 ZERO, HALF, ONE = (np.float32(x) for x in (0.0, 0.5, 1.0))
 
@@ -47,16 +44,16 @@ class Bundle(NamedTuple):
         active: number of rays that take each step, (steps,): the first of them.
     """
 
-    x: Singles
-    y: Singles
-    to_x: Singles
-    to_y: Singles
-    length: Singles
-    time: Singles
-    read: Singles
-    middle_x: Singles
-    middle_y: Singles
-    part: Singles
+    x: Float32s
+    y: Float32s
+    to_x: Float32s
+    to_y: Float32s
+    length: Float32s
+    time: Float32s
+    read: Float32s
+    middle_x: Float32s
+    middle_y: Float32s
+    part: Float32s
     active: Ints
 
 
@@ -70,7 +67,7 @@ def allocate_bundle(rays: int, shape: tuple[int, int]) -> Bundle:
 
 
 @kernel
-def interleave(deviation: Singles, slowness: Singles, shape: tuple[int, int], out: Singles) -> None:
+def interleave(deviation: Float32s, slowness: Float32s, shape: tuple[int, int], out: Float32s) -> None:
     """Interleave ∇u, slowness and padding of each node, (4·nodes,), in one cache line per ray.
 
     Central differences, one-sided at the boundary.
@@ -97,7 +94,7 @@ def interleave(deviation: Singles, slowness: Singles, shape: tuple[int, int], ou
 
 
 @kernel
-def trace_bundle(x: float, y: float, fields: Singles, shape: tuple[int, int], rays: int, at: Bundle) -> int:
+def trace_bundle(x: float, y: float, fields: Float32s, shape: tuple[int, int], rays: int, at: Bundle) -> int:
     """Trace the first ``rays`` rays of ``at`` from their positions to the source; returns the steps.
 
     Direction and slowness are interpolated half a step ahead along the last direction.
@@ -151,7 +148,7 @@ def _predict_midpoints(
 
 
 @kernel
-def _interpolate(fields: Singles, shape: tuple[int, int], rays: int, step: int, at: Bundle) -> None:
+def _interpolate(fields: Float32s, shape: tuple[int, int], rays: int, step: int, at: Bundle) -> None:
     """The fields at each midpoint, multilinear; the only loop with gathered loads."""
     low_x, low_y = np.int32(shape[0] - 2), np.int32(shape[1] - 2)
     line = shape[1]
@@ -214,7 +211,7 @@ def _clamp(place: np.float32, last: np.float32) -> np.float32:
 
 @kernel
 def _trace_straight(
-    x: np.float32, y: np.float32, fields: Singles, shape: tuple[int, int], r: int, steps: int, at: Bundle
+    x: np.float32, y: np.float32, fields: Float32s, shape: tuple[int, int], r: int, steps: int, at: Bundle
 ) -> None:
     """Replace a ray that has not arrived by a straight one, in as many steps."""
     # Its first midpoint lies half a step from its start, straight towards the source.
@@ -238,7 +235,7 @@ def _trace_straight(
 
 
 @kernel
-def back_project(correction: Singles, steps: int, shape: tuple[int, int], at: Bundle, out: Singles) -> None:
+def back_project(correction: Float32s, steps: int, shape: tuple[int, int], at: Bundle, out: Float32s) -> None:
     """Distribute the length of each step, also times the ray's correction, to the nodes around it.
 
     Args:

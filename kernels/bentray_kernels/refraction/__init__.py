@@ -1,4 +1,4 @@
-"""Refracting volumes before a backdrop: optics, cameras, the ray caster and supersampling."""
+"""Refractive rendering of volumes before a backdrop: optics, cameras, ray caster and supersampling."""
 
 from .backdrop import Backdrop, Plane, backdrop_of, checkerboard
 from .camera import Camera, orthographic, perspective

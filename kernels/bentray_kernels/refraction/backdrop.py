@@ -1,4 +1,4 @@
-"""Backdrops: flat pictures behind the object, and where on them a ray ends."""
+"""Backdrops: flat images behind the object, and their intersection with rays."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class Plane:
         right: (3,) from its left to its right edge, m.
         down: (3,) from its upper to its lower edge, perpendicular to ``right``, m.
         picture: (rows, columns, 3) 8-bit RGB.
-        repeats: how often the picture stands side by side and one below the other on the rectangle.
-        smooth: whether colours run into each other between the middles of pixels; else pixels are squares.
-        endless: whether the pattern goes on beyond the rectangle.
+        repeats: number of copies of the picture along each edge of the rectangle.
+        smooth: whether colours are interpolated between pixel centres; else pixels are squares.
+        endless: whether the pattern continues beyond the rectangle.
     """
 
     centre: tuple[float, float, float]
@@ -65,7 +65,7 @@ def checkerboard(
 
 
 class Backdrop(NamedTuple):
-    """Planes as the compiled functions read them.
+    """Planes for compiled functions.
 
     Attributes:
         frames: (planes, 4, 3): centre; across and down, divided by their squared lengths; normal.
@@ -165,7 +165,7 @@ def colour_at(backdrop: Backdrop, plane: int, u: float, v: float) -> tuple[float
         )
     left, upper = int(np.floor(x - 0.5)), int(np.floor(y - 0.5))
     t, w = x - 0.5 - left, y - 0.5 - upper
-    # Over its edge a picture that stands alone keeps its last pixel, one that repeats begins again.
+    # Beyond its edge a single picture keeps its last pixel, a repeated one is periodic.
     alone = repeats == 1.0 and not backdrop.tables[plane, 4]
     x0, x1 = _column(left, columns, alone), _column(left + 1, columns, alone)
     y0, y1 = _column(upper, rows, alone) * columns, _column(upper + 1, rows, alone) * columns

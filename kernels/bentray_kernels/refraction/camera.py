@@ -1,4 +1,4 @@
-"""Cameras: which ray belongs to a place in the image."""
+"""Cameras: the ray of each position in the image."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..errors import InvalidInput
 
 @dataclass(frozen=True)
 class Camera:
-    """Where rays start and which way they go; x runs along the rows of the image, y down its columns.
+    """Origins and directions of rays; x runs along the rows of the image, y down its columns.
 
-    Of a place in the image u and v run from −½ to ½, across and down. Its ray starts at origin[0] +
-    u·origin[1] + v·origin[2] and goes along direction[0] + u·direction[1] + v·direction[2].
+    The coordinates u and v of the image run from −½ to ½, across and down. A ray starts at origin[0] +
+    u·origin[1] + v·origin[2] in the direction direction[0] + u·direction[1] + v·direction[2].
 
     Attributes:
         origin: (3, 3), m.

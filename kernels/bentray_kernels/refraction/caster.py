@@ -1,4 +1,4 @@
-"""The ray caster: from the camera through all interfaces to the backdrop, a block of rays a call."""
+"""The ray caster: from the camera through all interfaces to the backdrop, one block of rays per call."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from ..splines.sampling import value_and_gradient_at
 from .optics import refracted
 from .scene import Scene
 
-# What became of a ray: it met nothing; it was refracted; it did not leave within the depth limit, or ran
-# along an iso-surface so closely that the search for crossings was given up.
+# Fate of a ray: no interface; refracted; not left within the depth limit, or so close to an iso-surface that
+# the search for crossings was ended.
 MISSED, REFRACTED, LOST = 0, 1, 2
 
 
-class Medium(NamedTuple):
-    """A scene as the compiled functions read it.
+class RefractiveMedium(NamedTuple):
+    """A scene for compiled functions.
 
     Attributes:
         field, octree: as in ``Scene``.
         levels: (isos + 2,) −∞, the iso-values, +∞: layer m lies between m and m + 1.
         indices: (isos + 1,) refractive indices of the layers.
-        around: the layer that goes on around the grid.
+        around: the layer around the grid.
         origin: of node 0, m.
         density: nodes per m along each axis.
         low, high: corners of the box that holds all surfaces, nodes.
-        open: whether that is the grid itself, whose faces then cut the object.
+        open: whether the box is the grid itself, whose faces then cut the object.
     """
 
     field: Field
@@ -48,12 +48,12 @@ class Medium(NamedTuple):
     open: bool
 
 
-def medium_of(scene: Scene, structure: str) -> Medium:
-    """The scene for the compiled functions; the DDA and steps go through the whole grid, as published."""
+def medium_of(scene: Scene, structure: str) -> RefractiveMedium:
+    """The scene for the compiled functions; the DDA and steps traverse the whole grid, as published."""
     boxed = structure == "octree"
     low, high = scene.box if boxed else scene.grid
     levels = np.array([-np.inf, *scene.layers.isos, np.inf])
-    return Medium(
+    return RefractiveMedium(
         scene.field,
         scene.octree,
         levels,
@@ -73,15 +73,15 @@ def _vector(numbers: Floats) -> Vector:
 
 
 class Traced(NamedTuple):
-    """What the caster says of n rays.
+    """Results of the caster for n rays.
 
     Attributes:
-        point: (n, 3) a place on the ray when it left, m.
-        direction: (n, 3) its direction then, unit vectors.
+        point: (n, 3) a point of the outgoing ray, m.
+        direction: (n, 3) its direction, unit vectors.
         fate: (n,) ``MISSED``, ``REFRACTED`` or ``LOST``.
-        crossed: (n,) interfaces that it met.
-        weight: (n,) share of unpolarised energy that took this path.
-        vertices: (n, depth + 1, 3) where it met them, m; (0, 0, 3) if the paths are not asked for.
+        crossed: (n,) number of interfaces.
+        weight: (n,) share of unpolarised energy on this path.
+        vertices: (n, depth + 1, 3) intersections with them, m; (0, 0, 3) without paths.
     """
 
     point: Floats
@@ -92,7 +92,7 @@ class Traced(NamedTuple):
     vertices: Floats
 
     def part(self, rays: slice) -> Traced:
-        """Some of the rays; what is written there is written here."""
+        """A view of some of the rays."""
         return Traced(
             self.point[rays],
             self.direction[rays],
@@ -103,8 +103,8 @@ class Traced(NamedTuple):
         )
 
 
-def space_for(rays: int, depth: int, paths: bool) -> Traced:
-    """Arrays for the caster to fill."""
+def allocate_results(rays: int, depth: int, paths: bool) -> Traced:
+    """Allocate the results of the caster."""
     return Traced(
         np.empty((rays, 3)),
         np.empty((rays, 3)),
@@ -117,14 +117,14 @@ def space_for(rays: int, depth: int, paths: bool) -> Traced:
 
 @kernel
 def cast(
-    medium: Medium,
+    medium: RefractiveMedium,
     search: Search,
     camera: tuple[Floats, Floats],
     places: Floats,
     depth: int,
     traced: Traced,
 ) -> None:
-    """Follow rays through the medium.
+    """Trace rays through the medium.
 
     Args:
         medium: the scene.
@@ -140,7 +140,7 @@ def cast(
         ahead = affine(direction, places[n, 0], places[n, 1])
         length = math.sqrt(ahead[0] ** 2 + ahead[1] ** 2 + ahead[2] ** 2)
         ahead = (ahead[0] / length, ahead[1] / length, ahead[2] / length)
-        _follow(medium, search, start, ahead, depth, traced, n)
+        _trace_ray(medium, search, start, ahead, depth, traced, n)
 
 
 @kernel(inline="always")
@@ -153,8 +153,14 @@ def affine(basis: Floats, u: float, v: float) -> Vector:
 
 
 @kernel(inline="always")
-def _follow(
-    medium: Medium, search: Search, origin: Vector, direction: Vector, depth: int, traced: Traced, n: int
+def _trace_ray(
+    medium: RefractiveMedium,
+    search: Search,
+    origin: Vector,
+    direction: Vector,
+    depth: int,
+    traced: Traced,
+    n: int,
 ) -> None:
     crossed, weight = 0, 1.0
     layer, entered, slope = 0, False, 0.0
@@ -171,11 +177,11 @@ def _follow(
             layer = layer_at(medium, ray, start)
             if layer != medium.around and near >= 0.0:
                 # The object is cut by the grid's face, which is flat. (A camera within it sees no face.)
-                origin = _moved(origin, direction, start)
+                origin = _point_at(origin, direction, start)
                 ratio = medium.indices[medium.around] / medium.indices[layer]
                 direction, share, passed = refracted(direction, _axis(face_in), ratio)
                 weight, crossed, fate = weight * share, crossed + 1, REFRACTED
-                _note(traced, n, crossed, origin)
+                _record_vertex(traced, n, crossed, origin)
                 if not passed:
                     break
                 continue
@@ -198,7 +204,7 @@ def _follow(
         if crossed == depth or halvings < 0:
             fate = LOST
             break
-        origin = _moved(origin, direction, s)
+        origin = _point_at(origin, direction, s)
         if side == 0:
             normal, behind = _axis(face_out), medium.around
             gradient = (0.0, 0.0, 0.0)
@@ -208,7 +214,7 @@ def _follow(
         ratio = medium.indices[layer] / medium.indices[behind]
         direction, share, passed = refracted(direction, normal, ratio)
         weight, crossed, fate = weight * share, crossed + 1, REFRACTED
-        _note(traced, n, crossed, origin)
+        _record_vertex(traced, n, crossed, origin)
         if passed:
             layer = behind
             if side == 0:
@@ -220,8 +226,8 @@ def _follow(
 
 
 @kernel(inline="always")
-def layer_at(medium: Medium, ray: Ray, s: float) -> int:
-    """The layer in which a ray begins, at the box or within it."""
+def layer_at(medium: RefractiveMedium, ray: Ray, s: float) -> int:
+    """The layer at the start of a ray, at the box or within it."""
     layer = medium.around
     # On the faces of a box within the grid lies that of the surroundings, and most rays begin there.
     if medium.open or s == 0.0:
@@ -233,7 +239,7 @@ def layer_at(medium: Medium, ray: Ray, s: float) -> int:
 
 
 @kernel(inline="always")
-def in_nodes(medium: Medium, origin: Vector, direction: Vector) -> Ray:
+def in_nodes(medium: RefractiveMedium, origin: Vector, direction: Vector) -> Ray:
     x, y, z = medium.density
     place = (
         (origin[0] - medium.origin[0]) * x,
@@ -271,7 +277,7 @@ def _axis(axis: int) -> Vector:
 
 
 @kernel(inline="always")
-def gradient_at(medium: Medium, ray: Ray, s: float, known: Vector) -> Vector:
+def gradient_at(medium: RefractiveMedium, ray: Ray, s: float, known: Vector) -> Vector:
     """Of the field at s, per m; read there unless it is known per node, not NaN."""
     slopes = known
     if math.isnan(known[0]):
@@ -282,7 +288,7 @@ def gradient_at(medium: Medium, ray: Ray, s: float, known: Vector) -> Vector:
 
 @kernel(inline="always")
 def unit_normal(gradient: Vector, direction: Vector) -> Vector:
-    """Along the gradient; a singular point has none, and there a ray passes as if it stood on the surface."""
+    """Unit vector along the gradient; at singular points the direction, without refraction."""
     square = gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2]
     if square == 0.0:
         return direction
@@ -291,12 +297,12 @@ def unit_normal(gradient: Vector, direction: Vector) -> Vector:
 
 
 @kernel(inline="always")
-def _moved(origin: Vector, direction: Vector, s: float) -> Vector:
+def _point_at(origin: Vector, direction: Vector, s: float) -> Vector:
     return origin[0] + s * direction[0], origin[1] + s * direction[1], origin[2] + s * direction[2]
 
 
 @kernel(inline="always")
-def _note(traced: Traced, n: int, crossed: int, place: Vector) -> None:
+def _record_vertex(traced: Traced, n: int, crossed: int, place: Vector) -> None:
     if crossed <= traced.vertices.shape[1]:
         traced.vertices[n, crossed - 1, 0] = place[0]
         traced.vertices[n, crossed - 1, 1] = place[1]

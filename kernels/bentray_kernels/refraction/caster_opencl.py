@@ -1,4 +1,4 @@
-"""The ray caster on an OpenCL device: the same rays as ``caster.cast``, one work-item each."""
+"""The ray caster on an OpenCL device: the same rays as ``caster.cast``, one work-item per ray."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from ..isosurface.roots import STEPS
 from ..opencl import OpenCLFallbackWarning, Session, scene_or_warning
 from ..opencl.session import set_arguments
 from .camera import perspective
-from .caster import Medium, Traced, cast, space_for
+from .caster import RefractiveMedium, Traced, allocate_results, cast
 from .scene import Scene
 
-# Each is written in terms of those before it.
+# In order of dependence.
 SOURCES = tuple(f"refraction/{job}" for job in ("rays", "field", "roots", "crossing", "optics", "caster"))
 
 # Rays of a work-group.
 GROUP = 64
 
-# What the kernel calls the ways to look within a cell.
+# Names of the root finders in the kernel.
 WITHIN_CELLS = {
     crossing.CERTAIN: "CERTAIN",
     crossing.CERTAIN_BRENT: "CERTAIN_BRENT",
@@ -36,23 +36,22 @@ WITHIN_CELLS = {
 # the camera neighbouring numbers of float32 lie 1e-4 nodes apart.
 FINENESS = {"float64": (crossing.TOLERANCE, crossing.SHORTEST), "float32": (1e-4, 1e-3)}
 
-# Rays that are compared with the CPU before a device is believed, and the most interfaces that they may meet:
-# at each of them what was rounded differently grows.
+# Rays of the self-test, and their most interfaces: rounding differences grow at each of them.
 TRIED, TRIED_DEPTH = 256, 4
 
-# How far a direction may be off then, and the share of rays that may be off farther: a ray that grazes the
-# object, or passes close to one of its edges, may go either way.
+# Tolerance of directions in the self-test, and the share of rays that may exceed it: grazing rays, and rays
+# close to an edge, may take either path.
 TOLERANCES = {"float64": (1e-6, 0.02), "float32": (1e-2, 0.05)}
 
 
 class OpenCLCaster:
-    """A scene on a device. What the device gets wrong in its trial, ``caster.cast`` does in its place.
+    """A scene on a device; ``caster.cast`` replaces root finders that fail their self-test.
 
     Args:
         scene: its volume and octree are copied to the device, once.
         session: the device.
         precision: of all numbers there, "float64" or "float32", which finds crossings to 1e-4 nodes instead
-            of 1e-9; None for the better one that the device has.
+            of 1e-9; None for the best one of the device.
 
     Raises:
         InvalidInput: for another precision.
@@ -83,7 +82,7 @@ class OpenCLCaster:
 
     def cast(
         self,
-        medium: Medium,
+        medium: RefractiveMedium,
         search: Search,
         camera: tuple[Floats, Floats],
         places: Floats,
@@ -96,8 +95,8 @@ class OpenCLCaster:
             InvalidInput: for a medium of another scene.
 
         Warns:
-            OpenCLFallbackWarning: once for each way to look for crossings, where the device fails its trial
-                and ``caster.cast`` follows the rays.
+            OpenCLFallbackWarning: once for each root finder for which the device fails its self-test and
+                ``caster.cast`` traces the rays.
         """
         if medium.field is not self.scene.field:
             raise InvalidInput("medium", "that of another scene", "a medium of the scene on the device")
@@ -111,12 +110,12 @@ class OpenCLCaster:
         follow = cast if self._faults[way] else self.follow
         follow(medium, search, camera, places, depth, traced)
 
-    def fault_of(self, medium: Medium, search: Search) -> str:
-        """How the device differs from ``caster.cast`` in rays at the object; empty where it does not."""
+    def fault_of(self, medium: RefractiveMedium, search: Search) -> str:
+        """Difference from ``caster.cast`` for rays at the object, as a message; empty if correct."""
         import pyopencl as cl
 
         camera, places = _towards_the_object(self.scene)
-        found, expected = (space_for(TRIED, TRIED_DEPTH, False) for _ in range(2))
+        found, expected = (allocate_results(TRIED, TRIED_DEPTH, False) for _ in range(2))
         try:
             self.follow(medium, search, camera, places, TRIED_DEPTH, found)
         except cl.Error as error:
@@ -130,14 +129,14 @@ class OpenCLCaster:
 
     def follow(
         self,
-        medium: Medium,
+        medium: RefractiveMedium,
         search: Search,
         camera: tuple[Floats, Floats],
         places: Floats,
         depth: int,
         traced: Traced,
     ) -> None:
-        """As ``cast``, but on the device, whatever it computes."""
+        """As ``cast``, on the device, without self-test."""
         # Place, point, direction, weight and the two whole numbers of a ray; its path.
         at_once = max(1, self.session.doubles_at_once() // (10 + 3 * traced.vertices.shape[1]))
         kernel = self.session.kernel(SOURCES, "follow", *self._defines(medium, search))
@@ -149,7 +148,7 @@ class OpenCLCaster:
     def _launch(
         self,
         kernel: Any,
-        medium: Medium,
+        medium: RefractiveMedium,
         search: Search,
         camera: tuple[Floats, Floats],
         places: Floats,
@@ -208,7 +207,7 @@ class OpenCLCaster:
     def _kind_of(self, array: Any) -> Any:
         return self._real if array.dtype.kind == "f" else array.dtype
 
-    def _defines(self, medium: Medium, search: Search) -> tuple[str, ...]:
+    def _defines(self, medium: RefractiveMedium, search: Search) -> tuple[str, ...]:
         names = {"float64": "double", "float32": "float"}
         weights = medium.field.stencil.weights
         tolerance, shortest = FINENESS[self.precision]
@@ -241,16 +240,16 @@ def _towards_the_object(scene: Scene) -> tuple[tuple[Floats, Floats], Floats]:
 
 
 def on_the_device(scene: Scene, precision: str | None = None) -> OpenCLCaster | None:
-    """The scene on the chosen OpenCL device, for ``render``; None where no device can be trusted.
+    """The scene on the chosen OpenCL device, for ``render``; None where no device passes its self-test.
 
     Args:
         scene: to look at.
         precision: as in ``OpenCLCaster``.
 
     Raises:
-        InvalidInput: for another precision, or where ``BENTRAY_OPENCL_DEVICE`` names no one device.
+        InvalidInput: for another precision, or where ``BENTRAY_OPENCL_DEVICE`` does not match one device.
 
     Warns:
-        OpenCLFallbackWarning: once, where no device passes its trial; and where it cannot hold the scene.
+        OpenCLFallbackWarning: once, where no device passes its self-test; and without enough memory.
     """
     return scene_or_warning(lambda session: OpenCLCaster(scene, session, precision), "caster.cast")

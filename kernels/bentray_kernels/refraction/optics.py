@@ -1,4 +1,4 @@
-"""What a smooth interface does to a ray: Snell's law, total reflection and Fresnel's weights."""
+"""Refraction and reflection at smooth interfaces: Snell's law, total reflection and Fresnel weights."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..compiled import kernel
 
 @kernel(inline="always")
 def refracted(direction: Vector, normal: Vector, ratio: float) -> tuple[Vector, float, bool]:
-    """A direction behind an interface, or mirrored at it where nothing passes (dissertation, equation 10).
+    """Refracted direction, or the reflected one at total reflection (dissertation, equation 10).
 
     Args:
         direction: unit vector along which the ray arrives.

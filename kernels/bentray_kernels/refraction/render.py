@@ -1,4 +1,4 @@
-"""A picture of a refracting volume before a backdrop."""
+"""Refractive rendering of a volume before a backdrop."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..arrays import Floats
 from ..errors import InvalidInput
 from .backdrop import Backdrop, Colours, locate
 from .camera import Camera
-from .caster import LOST, cast, medium_of, space_for
+from .caster import LOST, allocate_results, cast, medium_of
 from .caster_opencl import OpenCLCaster
 from .scene import Scene
 from .supersampling import averaged, point_colours, post_refraction_colours
@@ -26,7 +26,7 @@ SUPERSAMPLING = ("none", "prss", "real")
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """How a picture is made.
+    """Settings of a rendering.
 
     Attributes:
         rows, columns: pixels.
@@ -34,10 +34,10 @@ class RenderSettings:
             backdrop's colour beyond all planes.
         supersampling: "none"; "prss", after refraction (4.3.3); "real", more rays.
         degree: for "prss" as in ``post_refraction_colours``; for "real" rays a pixel along each axis.
-        fresnel: whether light is weakened by what each interface mirrors away.
+        fresnel: whether light is attenuated by reflection at each interface.
         structure, roots, step: as in ``Scene.search``.
-        seed: of the jitter of real supersampling; None leaves the rays in even rows.
-        threads: tiles of rows are cast in so many threads.
+        seed: of the jitter of real supersampling; None: regular rays.
+        threads: number of threads for tiles of rows.
 
     Raises:
         InvalidInput: for a number below 1, or another name.
@@ -65,7 +65,7 @@ class RenderSettings:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture and what is known of each pixel; with real supersampling, of each ray.
+    """An image and the results for each pixel; with real supersampling, for each ray.
 
     Attributes:
         image: (rows, columns, 3) 8-bit RGB.
@@ -93,7 +93,7 @@ def render(
     caster: OpenCLCaster | None = None,
     pause: Callable[[], None] = lambda: None,
 ) -> Picture:
-    """Cast one ray a pixel, or more, and colour each by where it ends on the backdrop.
+    """Cast one ray per pixel, or more, and colour each by its intersection with the backdrop.
 
     Args:
         scene: the volume, ``Scene.build``.
@@ -102,12 +102,12 @@ def render(
         settings: the rest.
         caster: follows the rays of this scene on an OpenCL device, ``caster_opencl.on_the_device``; None for
             this CPU.
-        pause: called before every tile, maybe in another thread; what it raises ends the picture.
+        pause: called before every tile, possibly in another thread; an exception ends the rendering.
     """
     times = settings.degree if settings.supersampling == "real" else 1
     rows, columns = times * settings.rows, times * settings.columns
     places = _places(rows, columns, settings.seed if settings.supersampling == "real" else None)
-    traced = space_for(rows * columns, settings.depth, False)
+    traced = allocate_results(rows * columns, settings.depth, False)
     plane, where = np.empty(rows * columns, dtype=np.int8), np.empty((rows * columns, 2))
     medium = medium_of(scene, settings.structure)
     search = scene.search(settings.structure, settings.roots, settings.step)

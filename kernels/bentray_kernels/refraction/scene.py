@@ -1,4 +1,4 @@
-"""What a ray meets: a filtered volume whose nested iso-surfaces part layers of different refractive index."""
+"""Scene of a refractive rendering: a filtered volume with iso-surfaces between layers of refractive index."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ LEAST_BIGGEST, MOST_BIGGEST = 1e-30, 1e35
 
 @dataclass(frozen=True)
 class Layers:
-    """Nested iso-surfaces and what lies between them.
+    """Nested iso-surfaces and the refractive indices between them.
 
     Attributes:
-        isos: rising iso-values, unit of the volume.
+        isos: ascending iso-values, unit of the volume.
         indices: refractive index below the first, between them, and above the last; one more than ``isos``.
-        surroundings: which of these layers goes on around the volume: 0, the one below the first, or in
+        surroundings: index of the layer around the volume: 0, the one below the first, or in
             water faster than fat the one between fat and tissue.
 
     Raises:
@@ -55,7 +55,7 @@ class Layers:
 
 @dataclass(frozen=True)
 class Scene:
-    """A volume made ready for rays.
+    """A volume prepared for ray casting.
 
     Attributes:
         field: the filtered volume.
@@ -130,7 +130,7 @@ class Scene:
         return cls(field, octree, layers, origin, spacing, grid, box, cut, octree.highest_empty(), linear)
 
     def search(self, structure: str = "octree", roots: str = "certain", step: float = 0.1) -> Search:
-        """How rays look for surfaces.
+        """Settings of the search for surfaces.
 
         Args:
             structure: "octree"; "dda", through all cells; "steps", of fixed length.

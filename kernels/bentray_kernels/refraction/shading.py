@@ -1,4 +1,4 @@
-"""The surface itself, lit and opaque: the picture that does not refract."""
+"""Phong shading of the opaque surface, without refraction."""
 
 from __future__ import annotations
 
@@ -14,7 +14,16 @@ from ..errors import InvalidInput
 from ..isosurface.crossing import MOST_HALVINGS, Search, leave_interval
 from .backdrop import Colours
 from .camera import Camera
-from .caster import Medium, affine, gradient_at, in_nodes, layer_at, medium_of, through_box, unit_normal
+from .caster import (
+    RefractiveMedium,
+    affine,
+    gradient_at,
+    in_nodes,
+    layer_at,
+    medium_of,
+    through_box,
+    unit_normal,
+)
 from .scene import Scene
 
 
@@ -58,8 +67,8 @@ def shade(scene: Scene, camera: Camera, light: Light, rows: int, columns: int) -
 
     Args:
         scene: ``Scene.build``; the refractive indices are not used.
-        camera: where the picture is taken from.
-        light: and what the surface looks like.
+        camera: of the image.
+        light: light and surface properties.
         rows, columns: pixels, at least 1.
 
     Raises:
@@ -76,7 +85,7 @@ def shade(scene: Scene, camera: Camera, light: Light, rows: int, columns: int) -
 
 @kernel
 def _shade(
-    medium: Medium,
+    medium: RefractiveMedium,
     search: Search,
     camera: tuple[Floats, Floats],
     light: Light,

@@ -1,4 +1,4 @@
-"""From places on the backdrop to pixels: by points, by post-refraction or by real supersampling (4.3.3)."""
+"""Supersampling: pixel colours by point sampling, post-refraction or real supersampling (4.3.3)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Splines through the nodes of a grid, and the other filters that read between them."""
+"""Spline and filter interpolation on grids: value and gradient between the nodes."""
 
 from .cubic import coefficients, refined
 from .filters import FILTERS, Filter

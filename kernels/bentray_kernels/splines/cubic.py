@@ -1,4 +1,4 @@
-"""The cubic B-spline through all nodes of a grid, with the derivatives that bending a ray asks for."""
+"""Interpolating cubic B-spline of a grid, with the derivatives for ray bending."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from ..arrays import Floats
 from ..compiled import kernel
 from .prefilter import prefilter
 
-# Nodes added by mirroring before the first and after the last one, so that four lie about every point.
+# Nodes added by mirroring before the first and after the last one, so that every point has four.
 BEFORE, AFTER = 1, 2
 
 
 def coefficients(values: ArrayLike) -> Floats:
-    """B-spline coefficients of a grid, mirrored at its rim and with the border that the jets read.
+    """B-spline coefficients of a grid, mirrored at its boundary, with a border for the jets.
 
     Args:
         values: (nx, ny[, nz]), any unit.
@@ -27,14 +27,14 @@ def coefficients(values: ArrayLike) -> Floats:
 
 
 def refined(values: ArrayLike, times: int) -> Floats:
-    """The spline through a grid, read on one that is ``times`` as fine and has the same outer nodes.
+    """The interpolating spline of a grid on one that is ``times`` as fine and has the same outer nodes.
 
     Args:
         values: (nx, ny[, nz]), any unit.
         times: at least 1.
 
     Returns:
-        (times·(nx − 1) + 1, …), in which every ``times``-th node has its old value to rounding.
+        (times·(nx − 1) + 1, …), in which every ``times``-th node keeps its value to rounding.
     """
     fine = coefficients(values)
     for axis in range(fine.ndim):
@@ -51,7 +51,7 @@ def refined(values: ArrayLike, times: int) -> Floats:
 
 @kernel(inline="always")
 def _weights(t: float) -> tuple[float, float, float, float]:
-    """The B-spline at the four nodes about a point, ``t`` of a cell after the second."""
+    """Weights of the four nodes around a point, ``t`` of a cell after the second."""
     u = 1.0 - t
     return (
         u * u * u / 6.0,
@@ -75,7 +75,7 @@ def _bends(t: float) -> tuple[float, float, float, float]:
 
 @kernel(inline="always")
 def _cell(place: float, stored: int) -> int:
-    """Index of the first of the four coefficients about a place, nodes."""
+    """Index of the first of the four coefficients around a position, nodes."""
     return min(max(int(place), 0), stored - BEFORE - AFTER - 1)
 
 

@@ -1,4 +1,4 @@
-"""The filters between nodes: which nodes a point reads, and with which polynomial weights."""
+"""Interpolation filters: nodes and polynomial weights of a point."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ Polynomial = list[Fraction]
 
 @dataclass(frozen=True)
 class Filter:
-    """A separable filter whose weights are polynomials of the place within a cell of the filter.
+    """A separable filter whose weights are polynomials of the position within a cell of the filter.
 
     A point x (in nodes) lies in the filter's cell i = ⌊x + shift⌋ at t = x + shift − i, 0 ≤ t < 1, and reads
     the nodes i − before … i − before + taps − 1. Along one axis its value is Σ value[k]·c[k] and its slope
-    Σ slope[k]·c[k], where each weight is Σ_p matrix[k, p]·t^p. In space the axes' weights are multiplied.
+    Σ slope[k]·c[k], where each weight is Σ_p matrix[k, p]·t^p. In several dimensions the weights of the axes
+    are multiplied.
 
     Attributes:
         name: as in ``FILTERS``.
-        order: the polynomial degree n of a B-spline, 0 for a filter that reads the data themselves.
+        order: the polynomial degree n of a B-spline, 0 for a filter without prefilter.
         shift: 0, or ½ for B-splines of even order, whose knots lie between the nodes.
         before: how many nodes before cell i are read.
         value: (taps, degree + 1) coefficients of rising powers of t.
@@ -40,7 +41,7 @@ class Filter:
 
     @property
     def taps(self) -> int:
-        """How many nodes a point reads along one axis."""
+        """Number of nodes per point along one axis."""
         return len(self.value)
 
 
@@ -114,7 +115,7 @@ def filter_of(name: str) -> Filter:
     """The filter of that name.
 
     Raises:
-        InvalidInput: there is none.
+        InvalidInput: for an unknown name.
     """
     if name not in FILTERS:
         raise InvalidInput("filter", name, "one of " + ", ".join(FILTERS))

@@ -1,4 +1,4 @@
-"""The vector instructions that read a filter's nodes: written out for LLVM, with no loop left in them."""
+"""SIMD code generation for filters: fully unrolled LLVM vector instructions, one lane per node."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ INDEX, SHORT, BIT = ir.IntType(64), ir.IntType(32), ir.IntType(1)
 
 
 def width_of(taps: int) -> int:
-    """Lanes of a vector with one lane a tap: a power of two, those left over hold 0."""
+    """Lanes of a vector with one lane per tap: a power of two, unused lanes hold 0."""
     return 1 << (taps - 1).bit_length()
 
 
 class Lanes:
-    """Instructions on vectors of ``width`` lanes, one a tap, and on pairs of such vectors in one.
+    """Instructions on vectors of ``width`` lanes, one per tap, and on pairs of such vectors.
 
     Args:
-        builder: where the instructions go.
+        builder: of the LLVM instructions.
         taps: nodes that a point reads along one axis.
         real: LLVM's type of the numbers, float or double.
     """
@@ -33,7 +33,7 @@ class Lanes:
         self.real = real
 
     def load_nodes(self, start: Any) -> Any:
-        """``taps`` neighbouring nodes; nothing beyond them is touched."""
+        """Load ``taps`` neighbouring nodes, and no memory beyond them."""
         if self.width == self.taps:
             return self.load(start, self.width)
         row = ir.VectorType(self.real, self.width)
@@ -45,26 +45,26 @@ class Lanes:
         return self.builder.call(load, [place, SHORT(self._size()), wanted, ir.Constant(row, None)])
 
     def load(self, start: Any, count: int) -> Any:
-        """A vector of so many numbers."""
+        """Load a vector of ``count`` numbers."""
         numbers = self.builder.load(self.builder.bitcast(start, ir.VectorType(self.real, count).as_pointer()))
         numbers.align = self._size()
         return numbers
 
     def pick(self, vector: Any, places: Sequence[int], other: Any | None = None) -> Any:
-        """These lanes of a vector, or of two that follow one another."""
+        """Select lanes of a vector, or of the concatenation of two."""
         wanted = ir.Constant(ir.VectorType(SHORT, len(places)), [SHORT(k) for k in places])
         second = ir.Constant(vector.type, ir.Undefined) if other is None else other
         return self.builder.shuffle_vector(vector, second, wanted)
 
     def multiply_add(self, a: Any, b: Any, c: Any | None) -> Any:
-        """a·b + c, rounded once where the processor can; without ``c`` the product."""
+        """a·b + c, fused where the processor supports it; without ``c`` the product."""
         if c is None:
             return self.builder.fmul(a, b)
         name = f"llvm.fmuladd.v{a.type.count}f{8 * self._size()}"
         return self.builder.call(self._instruction(name, a.type, [a.type] * 3), [a, b, c])
 
     def totals(self, vectors: Sequence[Any]) -> list[Any]:
-        """Sum of the lanes of each of up to four vectors, as doubles; added in halves, all at once."""
+        """Sum of the lanes of each of up to four vectors, as doubles, by pairwise addition of all at once."""
         width = vectors[0].type.count
         joined = self._joined(vectors)
         while width > 1:
@@ -76,7 +76,7 @@ class Lanes:
         return [self.builder.extract_element(joined, SHORT(k)) for k in range(len(vectors))]
 
     def _joined(self, vectors: Sequence[Any]) -> Any:
-        """Vectors end to end; a third one is followed by itself."""
+        """Concatenate vectors; a third one is repeated."""
         if len(vectors) == 1:
             return vectors[0]
         if len(vectors) > 2:
@@ -93,7 +93,7 @@ class Lanes:
 
 
 def point_vector(builder: Any, numbers: Sequence[Any]) -> Any:
-    """One double an axis, in a vector of 1, 2 or 4 lanes; a lane left over repeats the last one."""
+    """One double per axis, in a vector of 1, 2 or 4 lanes; an unused lane repeats the last one."""
     width = width_of(len(numbers))
     filled = [*numbers, *[numbers[-1]] * (width - len(numbers))]
     vector = ir.Constant(ir.VectorType(DOUBLE, width), ir.Undefined)
@@ -114,7 +114,7 @@ def within(builder: Any, point: Sequence[Any], last: Sequence[Any]) -> Any:
 
 
 def cells(lanes: Lanes, point: Sequence[Any], shift: Any, counts: Sequence[Any]) -> tuple[list[Any], Any]:
-    """The filter's cell of a point along every axis, and how far into it the point lies.
+    """The filter's cell of a point along every axis, and the position within it.
 
     Args:
         lanes: of the filter.
@@ -132,7 +132,7 @@ def cells(lanes: Lanes, point: Sequence[Any], shift: Any, counts: Sequence[Any])
     last = [builder.sitofp(builder.sub(count, taps), DOUBLE) for count in counts]
     ends = point_vector(builder, last)
     starts = ir.Constant(places.type, [DOUBLE(0.0)] * places.type.count)
-    # Both comparisons are false for NaN, which so reads a node of the grid.
+    # Both comparisons are false for NaN, so that its index is inside the grid.
     inside = builder.select(builder.fcmp_ordered(">", places, starts), places, starts)
     inside = builder.select(builder.fcmp_ordered("<", inside, ends), inside, ends)
     floors = builder.fptosi(inside, ir.VectorType(INDEX, places.type.count))
@@ -143,7 +143,7 @@ def cells(lanes: Lanes, point: Sequence[Any], shift: Any, counts: Sequence[Any])
 
 
 class Axis:
-    """One axis of a grid: which of its nodes a point reads, and with which weights.
+    """One axis of a grid: nodes and weights of a point.
 
     Args:
         lanes: of the filter.
@@ -187,7 +187,7 @@ class Axis:
 
 
 def value(lanes: Lanes, axes: Sequence[Axis], start: Any) -> Any:
-    """The weighted sum of the nodes about a point.
+    """The weighted sum of the nodes around a point.
 
     Args:
         lanes: of the filter.
@@ -210,8 +210,8 @@ def value(lanes: Lanes, axes: Sequence[Axis], start: Any) -> Any:
 def value_and_gradient(lanes: Lanes, axes: Sequence[Axis], start: Any) -> list[Any]:
     """The same and its gradient, for axes with slopes.
 
-    A vector holds two rows of nodes at once: summed with the weights of the value, and with those of the
-    slope along the last axis but one. So both cost one multiplication, and the weights one polynomial.
+    A vector holds two rows of nodes: summed with the weights of the value, and with those of the slope along
+    the second to last axis. So both take one multiplication, and the weights one polynomial.
     """
     first = _first(lanes, axes, start)
     low, high = range(lanes.width), range(lanes.width, 2 * lanes.width)
@@ -255,6 +255,6 @@ def _first(lanes: Lanes, axes: Sequence[Axis], start: Any) -> Any:
 
 
 def _nodes(lanes: Lanes, axis: Axis, start: Any) -> Any:
-    """The places and the addresses of the nodes along an axis."""
+    """Indices and addresses of the nodes along an axis."""
     for k in range(lanes.taps):
         yield k, lanes.builder.gep(start, [lanes.builder.mul(INDEX(k), axis.stride)])

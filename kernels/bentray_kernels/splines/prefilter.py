@@ -1,4 +1,4 @@
-"""B-spline coefficients of a grid: the spline through its nodes, or one that smooths them."""
+"""B-spline prefilter: coefficients of the interpolating or smoothing spline of a grid."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from .filters import bspline
 
-# Lines that are filtered side by side: whole vectors, and few enough to stay in the nearest caches.
+# Lines filtered together: whole vectors, and few enough to stay in the first-level cache.
 LOCKSTEP = 32
 
-# This much smooths over dozens of nodes; rounding errors grow with λ and reach 1e-8 here.
+# Smooths over dozens of nodes; rounding errors grow with λ and reach 1e-8 here.
 MOST_SMOOTHING = 1e6
 
 
 def prefilter(values: ArrayLike, order: int, smoothing: float = 0.0) -> Floats:
-    """B-spline coefficients along all axes of a grid that goes on beyond its rim as in a mirror.
+    """B-spline coefficients along all axes of a grid with mirrored boundaries.
 
     Along each axis the spline g of order n with these coefficients minimises, over all splines of that order,
-    Σ (f_k − g(k))² + λ ∫ (dᵐg/dxᵐ)² dx with m = ⌊(n + 1)/2⌋, taken over the mirrored data without end; for
-    λ = 0 it passes through the nodes. For odd n it so is the smoothing spline of Unser, Aldroubi & Eden
+    Σ (f_k − g(k))² + λ ∫ (dᵐg/dxᵐ)² dx with m = ⌊(n + 1)/2⌋, over the infinite mirrored data; for λ = 0 it
+    interpolates the nodes. For odd n it is the smoothing spline of Unser, Aldroubi & Eden
     (1993, part II), the minimum over all functions; for n = 2 the penalty is on the slope, for n = 4 on the
     curvature as for n = 3, for n = 6 as for n = 5. Axes are filtered in turn (dissertation, 3.2.3).
 
     Args:
-        values: (x[, y[, z]]), any unit. An axis of one node is left as it is.
+        values: (x[, y[, z]]), any unit. An axis of one node is not changed.
         order: n, 1 to 6; 1 without smoothing changes nothing.
         smoothing: λ, 0 to 1e6, in nodes to the power 2m − 1.
 
@@ -53,7 +53,7 @@ def prefilter(values: ArrayLike, order: int, smoothing: float = 0.0) -> Floats:
         if len(numerator) > 1:
             filtered = correlate1d(filtered, numerator, axis, mode="mirror")
         lines = filtered.reshape(math.prod(filtered.shape[:axis]), n, -1)
-        # Lines that run along memory are taken side by side as well.
+        # Contiguous lines are also processed together.
         _solve(lines if lines.shape[2] > 1 else lines.transpose(2, 1, 0), *_factors(_band(denominator, n)))
     return filtered
 
@@ -92,7 +92,7 @@ def sampled_bspline(order: int) -> Floats:
 
 
 def _sum(a: Floats, b: Floats) -> Floats:
-    """Of two symmetric kernels about their middles."""
+    """Sum of two symmetric kernels, aligned at their centres."""
     reach = max(len(a), len(b)) // 2
     return np.pad(a, reach - len(a) // 2) + np.pad(b, reach - len(b) // 2)
 
@@ -118,10 +118,10 @@ def _band(symmetric: Floats, n: int) -> Floats:
 
 @kernel
 def _factors(band: Floats) -> tuple[Floats, Floats]:
-    """The matrix as L·D·Lᵀ; it is positive definite, so that no pivot is sought.
+    """The matrix as L·D·Lᵀ; it is positive definite, so that no pivoting is needed.
 
-    Away from the rim the rows of L settle to the recursive filter of Unser et al.; at the rim they hold its
-    exact initial values, also where a line is shorter than the filter's memory.
+    Away from the boundary the rows of L converge to the recursive filter of Unser et al.; at the boundary
+    they contain its exact initial values, also for lines shorter than the filter.
 
     Returns:
         (n, reach): L to the left of its diagonal, the nearest first; (n,): 1 / D.

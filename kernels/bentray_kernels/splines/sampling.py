@@ -1,4 +1,4 @@
-"""Value and gradient of a filtered grid at a point: the innermost functions of every ray."""
+"""Value and gradient of a filtered grid at one point, for compiled code."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .lanes import DOUBLE, FLOAT, INDEX, Axis, Lanes, cells, value, value_and_gr
 
 
 class Stencil(NamedTuple):
-    """A filter as the compiled functions read it.
+    """A filter as an argument of compiled functions.
 
-    The number of taps must be known when a kernel is compiled, or its loops stay loops. Numba compiles anew
-    for each type of argument, and the length of a tuple is part of its type: hence ``places``. So one kernel
-    serves all filters, is built once for each number of taps, and numba's cache on disk keeps every build.
-    From the number of taps, ``lanes`` writes the vector instructions; a plain loop took five times as long.
+    The number of taps must be a compile-time constant for unrolled loops. Numba compiles a kernel for each
+    type of argument, and the length of a tuple is part of its type: hence ``places``. So one kernel serves
+    all filters, compiled and cached once for each number of taps, for which ``lanes`` generates the vector
+    instructions; a plain loop took five times as long.
 
     Attributes:
         places: (0, 1, …, taps − 1); only its length is used.
@@ -45,7 +45,7 @@ def stencil_of(read: Filter, dtype: DTypeLike = np.float64) -> Stencil:
 
 
 def border_of(read: Filter) -> tuple[int, int]:
-    """How many nodes to add before the first and after the last one, so that every point has its taps."""
+    """Nodes to add before the first and after the last one, so that every point has all its taps."""
     # A point on the last node belongs to the cell before it, unless cells are centred on nodes.
     return read.before, read.taps - 1 - read.before - (0 if read.shift else 1)
 

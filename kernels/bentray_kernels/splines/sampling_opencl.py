@@ -1,4 +1,4 @@
-"""A spline read on an OpenCL device: value and gradient at many points in one launch."""
+"""Spline interpolation on an OpenCL device: value and gradient at many points in one launch."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from .spline import Spline
 # Points of a work-group.
 GROUP = 64
 
-# Points that are compared with the CPU before a device is believed.
+# Points that are compared with the CPU in the self-test.
 TRIED = 100
 
-# How far a device may be off, in units of the largest coefficient, by the type of the coefficients.
+# Tolerance relative to the largest coefficient, by the type of the coefficients.
 TOLERANCES = {"float64": 1e-12, "float32": 1e-5}
 
 
 class OpenCLSpline:
-    """The spline of a ``Spline``, its coefficients kept on a device; same points, same answers.
+    """A ``Spline`` with its coefficients on a device, and the same results.
 
     The sums are in the type of the coefficients: to 1e-12 in float64 and 1e-5 in float32 of the largest one.
 
@@ -86,16 +86,16 @@ class OpenCLSpline:
 
 
 def on_the_device(spline: Spline) -> Spline | OpenCLSpline:
-    """The spline on the chosen OpenCL device; or itself, where none can be trusted.
+    """The spline on the chosen OpenCL device; or itself, where no device passes its self-test.
 
     Args:
         spline: any filter.
 
     Raises:
-        InvalidInput: where ``BENTRAY_OPENCL_DEVICE`` names no one device.
+        InvalidInput: where ``BENTRAY_OPENCL_DEVICE`` does not match one device.
 
     Warns:
-        OpenCLFallbackWarning: where no device passes its trial, or reads this spline wrong.
+        OpenCLFallbackWarning: where no device passes its self-test, or evaluates this spline wrong.
     """
     session = session_or_warning(instead="Spline")
     if session is None:
@@ -110,7 +110,7 @@ def on_the_device(spline: Spline) -> Spline | OpenCLSpline:
 
 
 def fault_of(there: OpenCLSpline) -> str:
-    """How the device differs from the CPU at a few points on and off the grid; empty where it is right."""
+    """Difference between device and CPU at points on and off the grid, as a message; empty if correct."""
     spline = there.spline
     nodes = np.array(spline.shape)
     points = np.random.default_rng(0).uniform(-0.5, 1.5, (TRIED, len(nodes))) * nodes

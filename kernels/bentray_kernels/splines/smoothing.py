@@ -1,4 +1,4 @@
-"""How much to smooth: the λ that leaves as much of a volume behind as there is noise in it."""
+"""Choice of the smoothing parameter λ by the discrepancy principle, and noise estimation."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ LEAST_SMOOTHING = 1e-9
 def noise_of(volume: ArrayLike) -> float:
     """Standard deviation of a volume's noise, by the median of its finest differences.
 
-    A second difference along every axis keeps the noise and little else, where the field is smooth over most
-    of the volume (Donoho & Johnstone 1994). Whole numbers have at least the noise of their rounding.
+    Second differences along every axis remove a smooth field and keep the noise (Donoho & Johnstone 1994).
+    Integers have at least their rounding noise.
 
     Args:
         volume: (x[, y[, z]]), at least three nodes along each axis, any unit.
@@ -49,15 +49,15 @@ def noise_of(volume: ArrayLike) -> float:
 
 
 def smoothing_for_noise(volume: ArrayLike, order: int, sigma: float | None = None) -> float:
-    """The λ for which the smoothing spline misses the nodes by the noise, in the mean square.
+    """The λ for which the mean square residual of the smoothing spline equals the noise.
 
-    Morozov's discrepancy principle. The mean is taken over the mirrored volume, which counts its outer nodes
-    half; there the cosine transform turns the prefilter into a product, so that no λ needs a spline.
+    Morozov's discrepancy principle. The mean is taken over the mirrored volume, in which outer
+    nodes count half; there the cosine transform diagonalises the prefilter, so that no spline is computed.
 
     Args:
         volume: (x[, y[, z]]), finite, at least two nodes along each axis; three without sigma.
         order: of the B-spline, 2 to 6.
-        sigma: standard deviation of the noise, in the volume's unit; by ``noise_of`` if it is not known.
+        sigma: standard deviation of the noise, in the volume's unit; by ``noise_of`` if unknown.
             For data rounded to whole numbers it is 1/√12.
 
     Returns:
@@ -103,7 +103,7 @@ def response(symmetric: Floats, frequencies: Floats) -> Floats:
 
 
 def _passed(order: int, smoothing: float, shape: Sequence[int]) -> Floats:
-    """Which part of each cosine of the volume the smoothing spline has left at the nodes."""
+    """Transfer function of the smoothing spline for each cosine of the volume."""
     numerator, denominator = symbols(order, smoothing)
     passed = np.ones(())
     for n in shape:

@@ -1,4 +1,4 @@
-"""A grid read between its nodes by any of the filters: value and gradient at many points."""
+"""Interpolation of a grid by any filter: value and gradient at many points."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bentray_kernels.acquisition.emissions import Emissions, moved, turned
+from bentray_kernels.acquisition.emissions import Emissions, invert_polarity, reorder_channels
 
 SHAPE = (4, 5, 3)
 
@@ -35,10 +35,10 @@ def test_they_read_as_the_array_that_went_through_the_same(traces, done):
     whole, lazily = traces, Emissions.of(read, traces.shape, traces.dtype)
     for axis, how in done:
         if axis == 2:
-            whole, lazily = turned(whole, how), turned(lazily, how)
+            whole, lazily = invert_polarity(whole, how), invert_polarity(lazily, how)
         else:
             order = np.array(how)
-            whole, lazily = moved(whole, order, axis), moved(lazily, order, axis)
+            whole, lazily = reorder_channels(whole, order, axis), reorder_channels(lazily, order, axis)
     assert asked == []
     assert (lazily.shape, lazily.ndim, lazily.dtype, len(lazily)) == (SHAPE, 3, traces.dtype, SHAPE[0])
     np.testing.assert_array_equal(np.asarray(lazily), whole)
@@ -49,4 +49,6 @@ def test_they_read_as_the_array_that_went_through_the_same(traces, done):
 
 def test_the_lowest_whole_number_turns_into_the_highest():
     lowest = np.full((1, 1, 2), -(2**15), np.int16)
-    np.testing.assert_array_equal(turned(lowest, np.ones((1, 1), bool)), np.full((1, 1, 2), 2**15 - 1))
+    np.testing.assert_array_equal(
+        invert_polarity(lowest, np.ones((1, 1), bool)), np.full((1, 1, 2), 2**15 - 1)
+    )

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.opencl.blocks import EDGES, Blocks, travel_times
+from bentray_kernels.opencl.self_test import reference
 from bentray_kernels.opencl.session import Session
-from bentray_kernels.opencl.trial import reference
 
 SHAPES = st.one_of(st.tuples(*[st.integers(1, 20)] * 2), st.tuples(*[st.integers(1, 9)] * 3))
 

@@ -8,28 +8,28 @@ import pyopencl as cl
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.opencl.devices import find_devices, handle_of, wished
+from bentray_kernels.opencl.devices import find_devices, handle_of, select_devices
 
 
 def test_gpus_come_first_without_a_wish(three):
-    for wish in (None, ""):
-        assert [device.index for device in wished(three, wish)] == [1, 2, 0]
+    for selection in (None, ""):
+        assert [device.index for device in select_devices(three, selection)] == [1, 2, 0]
 
 
 @pytest.mark.parametrize(
-    ("wish", "index"), [("0", 0), (" 2 ", 2), ("9001", 2), ("slow platform:proc", 0), ("PROCESSOR", 0)]
+    ("selection", "index"), [("0", 0), (" 2 ", 2), ("9001", 2), ("slow platform:proc", 0), ("PROCESSOR", 0)]
 )
-def test_a_wish_is_an_index_or_a_part_of_the_name(three, wish, index):
-    assert [device.index for device in wished(three, wish)] == [index]
+def test_a_wish_is_an_index_or_a_part_of_the_name(three, selection, index):
+    assert [device.index for device in select_devices(three, selection)] == [index]
 
 
 @pytest.mark.parametrize(
-    ("wish", "fits"), [("GPU", 2), ("fast", 2), ("3", 0), ("nvidia", 0), ("-1", 0), ("1.0", 0)]
+    ("selection", "fits"), [("GPU", 2), ("fast", 2), ("3", 0), ("nvidia", 0), ("-1", 0), ("1.0", 0)]
 )
-def test_a_wish_for_none_or_two_lists_what_there_is(three, wish, fits):
+def test_a_wish_for_none_or_two_lists_what_there_is(three, selection, fits):
     with pytest.raises(InvalidInput, match="BENTRAY_OPENCL_DEVICE") as refusal:
-        wished(three, wish)
-    assert f"{wish!r}, which fits {fits} devices" in str(refusal.value)
+        select_devices(three, selection)
+    assert f"{selection!r}, which fits {fits} devices" in str(refusal.value)
     assert "0 = Slow Platform:Processor; 1 = Fast Platform:GPU 9000; 2 = Fast Platform:GPU 9001" in str(
         refusal.value
     )
@@ -37,7 +37,7 @@ def test_a_wish_for_none_or_two_lists_what_there_is(three, wish, fits):
 
 def test_a_wish_on_a_machine_without_devices_says_so():
     with pytest.raises(InvalidInput, match="there is none here"):
-        wished((), "nvidia")
+        select_devices((), "nvidia")
 
 
 def test_no_platform_is_no_device(monkeypatch):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from bentray_kernels.opencl import verdict
-from bentray_kernels.opencl.trial import STAGES
+from bentray_kernels.opencl.self_test import STAGES
 from bentray_kernels.opencl.verdict import Verdict, examine, in_a_child, verdict_on
 
 
@@ -76,7 +76,7 @@ def test_a_compilers_error_is_the_reason_and_not_what_follows_it(gpu, monkeypatc
     package = tmp_path / "refusing"
     package.mkdir()
     (package / "__init__.py").touch()
-    (package / "trial.py").write_text(
+    (package / "self_test.py").write_text(
         "raise SystemExit(\"error: unknown target CPU 'generic'\\nDevice failed\\n(options: -DREAL)\")"
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
@@ -90,7 +90,7 @@ def test_an_aborting_child_is_survived(gpu, monkeypatch, tmp_path):
     package = tmp_path / "aborting"
     package.mkdir()
     (package / "__init__.py").touch()
-    (package / "trial.py").write_text(
+    (package / "self_test.py").write_text(
         'import os\nprint(\'{"stage": "double1", "fault": ""}\', flush=True)\nprint(\'remark\')\nos.abort()\n'
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from bentray_kernels.refraction import Layers, Scene
-from bentray_kernels.refraction.caster import LOST, MISSED, REFRACTED, Traced, cast, medium_of, space_for
+from bentray_kernels.refraction.caster import (
+    LOST,
+    MISSED,
+    REFRACTED,
+    Traced,
+    allocate_results,
+    cast,
+    medium_of,
+)
 from bentray_kernels.splines import Spline
 
 from .solids import distance, squared, through_ball
@@ -29,7 +37,7 @@ def trace(
     """Rays with any start and direction: each is its own camera."""
     starts, directions = np.atleast_2d(starts).astype(float), np.atleast_2d(directions).astype(float)
     directions = directions / np.linalg.norm(directions, axis=1)[:, None]
-    traced = space_for(len(starts), depth, paths)
+    traced = allocate_results(len(starts), depth, paths)
     medium, search = medium_of(scene, structure), scene.search(structure, roots, 0.05)
     for n, (start, ahead) in enumerate(zip(starts, directions, strict=True)):
         still = np.zeros((2, 3))

@@ -20,7 +20,7 @@ from bentray_kernels.refraction import (
     perspective,
     render,
 )
-from bentray_kernels.refraction.caster import LOST, REFRACTED, Traced, cast, medium_of, space_for
+from bentray_kernels.refraction.caster import LOST, REFRACTED, Traced, allocate_results, cast, medium_of
 from bentray_kernels.refraction.caster_opencl import OpenCLCaster, on_the_device
 from bentray_kernels.splines import Spline
 
@@ -53,7 +53,7 @@ def cast_by_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
         scene, starts, directions, depth=16, structure="octree", roots="certain", paths=False
     ) -> Traced:
         starts, directions = np.atleast_2d(starts).astype(float), np.atleast_2d(directions).astype(float)
-        traced = space_for(len(starts), depth, paths)
+        traced = allocate_results(len(starts), depth, paths)
         medium, search = medium_of(scene, structure), scene.search(structure, roots, 0.05)
         caster, still = caster_of(scene), np.zeros((2, 3))
         for n, (start, ahead) in enumerate(zip(starts, directions, strict=True)):
@@ -88,7 +88,7 @@ def both(
     camera = perspective(eye, (0.0, 0.0, 0.0), random.normal(size=3), 14.0)
     places = random.uniform(-0.5, 0.5, (300, 2))
     medium, search = medium_of(scene, structure), scene.search(structure, roots, 0.1)
-    found, expected = (space_for(300, depth, paths) for _ in range(2))
+    found, expected = (allocate_results(300, depth, paths) for _ in range(2))
     views = camera.origin, camera.direction
     caster_of(scene, precision).follow(medium, search, views, places, depth, found)
     cast(medium, search, views, places, depth, expected)
@@ -231,7 +231,7 @@ def test_many_rays_are_cast_in_parts(monkeypatch):
 
 
 def test_no_rays_give_nothing():
-    scene, none = nested(), space_for(0, 4, True)
+    scene, none = nested(), allocate_results(0, 4, True)
     view = CAMERAS["orthographic"]
     caster_of(scene).cast(
         medium_of(scene, "octree"), scene.search(), (view.origin, view.direction), np.empty((0, 2)), 4, none

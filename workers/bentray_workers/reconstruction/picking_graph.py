@@ -14,11 +14,16 @@ import numpy as np
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.picking.amplitudes import read_log_ratios
-from bentray_kernels.acquisition.picking.first_arrivals import reach_of, read_times, require_traces, settled
+from bentray_kernels.acquisition.picking.first_arrivals import (
+    reach_of,
+    read_times,
+    require_traces,
+    screen_times,
+)
 from bentray_kernels.acquisition.quality import Finding
 from bentray_kernels.acquisition.quality.correction import apply, stacked
-from bentray_kernels.acquisition.quality.examination import times_judged
-from bentray_kernels.acquisition.quality.recording import Measured, judged
+from bentray_kernels.acquisition.quality.examination import check_times
+from bentray_kernels.acquisition.quality.recording import Measured, check_traces
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.task_graph import Task
@@ -223,7 +228,7 @@ def measure_traces(source: PickingSource, index: int, part: range) -> Measured:
 def examine_slice(source: PickingSource, index: int, parts: list[Measured]) -> tuple[Finding, ...]:
     """Task: findings in the traces of a slice; an unusable scan is rejected."""
     with source.slice(index) as one:
-        findings, _ = judged(one, Measured.joined(parts))
+        findings, _ = check_traces(one, Measured.joined(parts))
     return _usable(source, index, findings)
 
 
@@ -252,14 +257,14 @@ def finish_slice(
     one = apply(source.dataset.slice(index), findings)
     if parts and not one.picked:
         delta, sigma = (np.concatenate(rows) for rows in zip(*(part[:2] for part in parts), strict=True))
-        delta, sigma = settled(one, delta, sigma, screened=not source.examine)
+        delta, sigma = screen_times(one, delta, sigma, screened=not source.examine)
         one = replace(one, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=source.picker)
     if source.reads_amplitudes:
         ratio = np.concatenate([part.ratio for part in parts if part.ratio is not None])
         ratio = np.where(np.isfinite(one.differential_tof()), ratio, np.nan)
         one = replace(one, log_ratio_np=ratio, amplitude_frequency_hz=one.center_frequency_hz)
     if source.examines_times:
-        later = _usable(source, index, times_judged(one))
+        later = _usable(source, index, check_times(one))
         one, findings = apply(one, later), (*findings, *later)
     return one, findings
 

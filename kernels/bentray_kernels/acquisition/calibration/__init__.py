@@ -1,4 +1,4 @@
-"""Where the elements are, how late they are, and how fast the water is, from the shot without an object."""
+"""Calibration from the water shot: element positions, delays and water speed."""
 
 from .adjustment import calibrate
 from .result import Calibration

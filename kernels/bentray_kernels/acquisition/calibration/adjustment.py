@@ -1,4 +1,4 @@
-"""Adjustment of the water shot: positions, delays and speed by damped, reweighted least squares."""
+"""Least-squares adjustment of the water shot: positions, delays and speed, damped and reweighted."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ MOST_ITERATIONS = 30
 # No element moves further than this in one iteration, m.
 LONGEST_STEP_M = 2e-3
 
-# Residuals beyond this many robust deviations are left out.
+# Residuals beyond this many robust deviations are excluded.
 OUTLYING = 4.0
 
-# An element is adjusted when it is in so many pairs: two coordinates, two delays, and one to tell an error.
+# Fewest pairs of an adjusted element: two coordinates, two delays, and one redundant pair.
 FEWEST = 6
 
 
 @dataclass(frozen=True)
 class _Unknowns:
-    """Where each kind of unknown lies in the vector: positions, emission, reception, common, speed."""
+    """Offsets of the unknowns in the vector: positions, emission, reception, common, speed."""
 
     elements: int
     ntx: int
@@ -57,21 +57,21 @@ class _Unknowns:
 def calibrate(
     dataset: Dataset, times_s: Floats, *, sigma_s: float | None = None, fit_speed: bool = False
 ) -> Calibration:
-    """Positions, delays and speed that explain the times of the water shot best.
+    """Fit positions, delays and speed to the times of the water shot.
 
-    t_er = common + emission_e + reception_r + |p_e - p_r| / c, by Gauss–Newton. A water shot does not tell
-    where the array stands, how it is turned, or how the mean delay is shared; nor its size and the speed.
-    These stay as the drawing has them: centroid, orientation, delays of mean 0; and the speed, or with
+    t_er = common + emission_e + reception_r + |p_e - p_r| / c, by Gauss–Newton. A water shot does not
+    determine position and orientation of the array, the distribution of the mean delay, nor size and speed at
+    the same time. These are kept: centroid, orientation, delays of mean 0; and the speed, or with
     ``fit_speed`` the size.
 
     Args:
-        dataset: elements as drawn, and the water's speed, as from its temperature.
+        dataset: with nominal element positions and the water speed, for example from its temperature.
         times_s: (ntx, nrx), s, see ``water_times``; NaN where there is none.
-        sigma_s: standard deviation of a time, s; None: as the residuals have it.
+        sigma_s: standard deviation of a time, s; None: from the residuals.
         fit_speed: fit the water's speed; for arrays whose size is better known than the temperature.
 
     Raises:
-        InvalidInput: elements in space, too few times, or times that leave the unknowns open.
+        InvalidInput: for 3-D elements, too few times, or times that do not determine the unknowns.
     """
     if dataset.element_position_m.shape[1] != 2:
         raise InvalidInput(
@@ -101,11 +101,11 @@ def calibrate(
     noise = sigma_s if sigma_s is not None else math.sqrt(float((residual[kept] ** 2).sum()) / max(spare, 1))
     deviation = np.full(at.count, np.nan)
     deviation[free] = noise * np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return _told(at, value, deviation, residual[kept], int(used.sum() - kept.sum()), fit_speed)
+    return _calibration(at, value, deviation, residual[kept], int(used.sum() - kept.sum()), fit_speed)
 
 
 def _gauges(fit_speed: bool) -> int:
-    """How many unknowns are fixed by convention."""
+    """Number of unknowns fixed by convention."""
     return 6 if fit_speed else 5
 
 
@@ -133,7 +133,7 @@ def _used(dataset: Dataset, emitter: Ints, receiver: Ints) -> Flags:
 def _linear(
     dataset: Dataset, at: _Unknowns, value: Floats, emitter: Ints, receiver: Ints, time: Floats
 ) -> tuple[sparse.csr_array, Floats]:
-    """Derivatives of the times, and what is left of them."""
+    """Derivatives of the times, and residuals."""
     position, slowness = value[: at.emission].reshape(-1, 2), value[-1]
     a, b = dataset.tx[emitter], dataset.rx[receiver]
     along = position[a] - position[b]
@@ -158,14 +158,14 @@ def _linear(
 
 
 def _near(residual: Floats, used: Flags) -> Flags:
-    """Residuals that are not outlying; their median is the common delay until that is known."""
+    """Residuals that are not outliers; their median is the first estimate of the common delay."""
     middle = float(np.median(residual[used]))
     spread = 1.4826 * float(np.median(np.abs(residual[used] - middle)))
     return np.asarray(np.abs(residual - middle) <= OUTLYING * spread + 1e-12)
 
 
 def _free(dataset: Dataset, at: _Unknowns, emitter: Ints, receiver: Ints, fit_speed: bool) -> Flags:
-    """Unknowns that some pair tells of."""
+    """Unknowns with at least one pair."""
     free = np.zeros(at.count, dtype=bool)
     elements = np.union1d(dataset.tx[emitter], dataset.rx[receiver])
     free[2 * elements] = free[2 * elements + 1] = True
@@ -187,17 +187,18 @@ def _step(
     """Change of all unknowns, and the covariance of the free ones for times of deviation 1.
 
     Raises:
-        InvalidInput: where the times leave unknowns open.
+        InvalidInput: where the times do not determine the unknowns.
     """
     fixed = _conventions(dataset, at, fit_speed)[:, free]
     part = rows[:, np.flatnonzero(free)]
     normal = (part.T @ part).toarray()
-    # Unknowns are metres, seconds and s/m: scaled, they are alike.
+    # Unknowns are in m, s and s/m: scaled to similar size.
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-30))
     normal *= scale[:, None] * scale[None, :]
     held = fixed * scale[None, :]
     held /= np.maximum(np.linalg.norm(held, axis=1, keepdims=True), 1e-30)
-    # The conventions are met exactly with any weight; one like the data's keeps the sum well posed.
+    # The conventions are met exactly with any weight; a weight similar to the data's keeps the system well
+    # posed.
     normal += held.T @ held * len(scale)
     try:
         factor = cho_factor(normal)
@@ -208,13 +209,13 @@ def _step(
     change = np.zeros(at.count)
     change[free] = scale * cho_solve(factor, scale * (part.T @ residual))
     inverse = cho_solve(factor, np.eye(len(scale)))
-    # What the weight of the conventions adds along them is no uncertainty of the data.
+    # The contribution of the conventions is not an uncertainty of the data.
     covariance = inverse - inverse @ held.T @ np.linalg.solve(held @ inverse @ held.T, held @ inverse)
     return change, covariance * scale[:, None] * scale[None, :]
 
 
 def _conventions(dataset: Dataset, at: _Unknowns, fit_speed: bool) -> Floats:
-    """Rows whose product with a change must be 0: no shift, no turn, delays of mean 0, and no growth."""
+    """Rows whose product with a change must be 0: translation, rotation, mean delays, and scale."""
     place = dataset.element_position_m - dataset.element_position_m.mean(axis=0)
     rows = np.zeros((_gauges(fit_speed), at.count))
     rows[0, 0 : at.emission : 2] = 1.0
@@ -227,7 +228,7 @@ def _conventions(dataset: Dataset, at: _Unknowns, fit_speed: bool) -> Floats:
     return rows
 
 
-def _told(
+def _calibration(
     at: _Unknowns, value: Floats, deviation: Floats, residual: Floats, left_out: int, fit_speed: bool
 ) -> Calibration:
     slowness = float(value[-1])

@@ -1,4 +1,4 @@
-"""What a calibration gives, each figure with its standard deviation."""
+"""Result of a calibration, each value with its standard deviation."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ..dataset import Dataset
 
 @dataclass(frozen=True)
 class Calibration:
-    """Elements as the water shot has them.
+    """Calibrated elements and water speed.
 
-    Positions keep the centroid and the orientation of the drawing, and with a fitted speed its size; delays
-    of emission and of reception each have mean 0, what they share is the common delay. What was in no pair
-    is left as it was, its deviation NaN.
+    Positions keep the nominal centroid and orientation, and with a fitted speed the size; delays of emission
+    and of reception each have mean 0, the rest is the common delay. Elements without pairs are unchanged,
+    with standard deviation NaN.
 
     Attributes:
         element_position_m: (elements, 2), m.
@@ -29,8 +29,8 @@ class Calibration:
         water_speed_mps: m/s.
         water_speed_sigma_mps: 0 where the speed was given.
         residual_rms_s: of the pairs used, s.
-        pairs: how many were used.
-        left_out: how many had a time but too large a residual.
+        pairs: number of pairs used.
+        left_out: number of pairs with too large a residual.
     """
 
     element_position_m: Floats
@@ -47,7 +47,7 @@ class Calibration:
     left_out: int
 
     def applied(self, dataset: Dataset) -> Dataset:
-        """The dataset with these positions and this water; delays cancel in object minus water."""
+        """The dataset with these positions and this water speed; delays cancel in object minus water."""
         return replace(
             dataset,
             element_position_m=self.element_position_m,
@@ -57,10 +57,10 @@ class Calibration:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, None for NaN."""
-        told: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         for name, value in vars(self).items():
             if isinstance(value, np.ndarray):
-                told[name] = np.where(np.isfinite(value), value.astype(object), None).tolist()  # type: ignore[call-overload]
+                values[name] = np.where(np.isfinite(value), value.astype(object), None).tolist()  # type: ignore[call-overload]
             else:
-                told[name] = value
-        return told
+                values[name] = value
+        return values

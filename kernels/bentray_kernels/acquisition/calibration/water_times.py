@@ -1,4 +1,4 @@
-"""Times of the water pulses, to a small part of a sample: the common pulse matched with every trace."""
+"""Arrival times of the water pulses to a fraction of a sample, by correlation with the common pulse."""
 
 from __future__ import annotations
 
@@ -8,28 +8,27 @@ import numpy as np
 
 from ...arrays import Floats
 from ..dataset import Dataset
-from ..picking.cross_correlation import match
+from ..picking.cross_correlation import match_pulse
 from ..picking.first_arrivals import require_traces
 from ..picking.pulse import BEFORE, measured_pulse
 from ..quality.measures import Measures
 
-# How far from the envelope's crest the best match may lie, periods; further on lies the next swing.
+# Largest distance of the match from the maximum of the envelope, periods; the next cycle lies beyond.
 REACH = 0.5
 
-LEAST_LIKENESS = 0.8
+MIN_CORRELATION = 0.8
 
-# Pairs nearer than this part of the longest one hear more of the electronics than of the water.
+# Pairs nearer than this fraction of the longest one are dominated by cross-talk.
 NEAREST = 0.15
 
 
 def water_times(dataset: Dataset) -> Floats:
-    """When the pulse of the water shot arrives, (ntx, nrx), s; NaN where there is none.
+    """Arrival time of the pulse of the water shot, (ntx, nrx), s; NaN where there is none.
 
-    All times are late by the same: the pulse's own delay. They do not depend on where the elements are said
-    to be.
+    All times contain the same delay of the pulse. They do not depend on the nominal element positions.
 
     Args:
-        dataset: of one slice, channels in their places and the right way up; see ``quality``. Its traces may
+        dataset: of one slice, with correct channels and polarity; see ``quality``. Its traces may
             be ``Emissions``.
 
     Raises:
@@ -57,7 +56,7 @@ def water_times(dataset: Dataset) -> Floats:
             trace = np.asarray(emission[r], dtype=np.float64)
             trace = trace - np.median(trace)
             shift = (crest[e, r] - dataset.t0_s) * rate - ahead
-            lag, likeness = match(pulse, trace, begin, end, shift, REACH * period)
-            if math.isfinite(lag) and likeness >= LEAST_LIKENESS:
+            lag, correlation = match_pulse(pulse, trace, begin, end, shift, REACH * period)
+            if math.isfinite(lag) and correlation >= MIN_CORRELATION:
                 times[e, r] = dataset.t0_s + (ahead + lag) / rate
     return times

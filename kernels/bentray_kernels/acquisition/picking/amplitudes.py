@@ -1,4 +1,4 @@
-"""How much weaker the pulse of each pair is than in water: by its height, or by its spectrum alone."""
+"""Amplitude picking: log ratios of the pulses in water and object, by energy or by the spectral ratio."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ from ..dataset import Dataset
 from .first_arrivals import ROUNDING, require_traces
 from .gate import Gate
 
-# Frequencies count where the power of the pulse is this many times that of the noise in both traces.
+# Frequencies are used where the power of the pulse is this many times that of the noise in both traces.
 LEAST_SNR = 10.0
 
-# Values whose standard deviation is larger are left out, Np: a breast absorbs about as much at 1 MHz.
+# Values with a larger standard deviation are omitted, Np; the total absorption of a breast at 1 MHz is
+# similar.
 MOST_UNSURE_NP = 0.5
 
 
 class Powers(NamedTuple):
-    """Of the pulses of one emission.
+    """Power spectra of the pulses of one emission.
 
     Attributes:
-        water, object: (nrx, frequencies), with the noise in them.
+        water, object: (nrx, frequencies), including the noise.
         water_noise, object_noise: (nrx, 1).
-        frequency: (frequencies,), over the centre frequency.
-        alike: see ``Gate``.
+        frequency: (frequencies,), relative to the centre frequency.
+        noise_correlation: see ``Gate``.
     """
 
     water: Floats
@@ -37,7 +38,7 @@ class Powers(NamedTuple):
     water_noise: Floats
     object_noise: Floats
     frequency: Floats
-    alike: Floats
+    noise_correlation: Floats
 
 
 def read_log_ratios(dataset: Dataset, emissions: Sequence[int], delta_s: Floats, way: str) -> Floats:
@@ -45,15 +46,15 @@ def read_log_ratios(dataset: Dataset, emissions: Sequence[int], delta_s: Floats,
 
     Args:
         dataset: of one slice, see ``picking.first_arrivals.pick``; its traces may be ``Emissions``.
-        emissions: which, counted from 0.
-        delta_s: (emissions, nrx), s: travel time object minus water, which says where the pulse lies.
+        emissions: indices, from 0.
+        delta_s: (emissions, nrx), s: travel time object minus water, which locates the pulse.
         way: a name of ``WAYS``.
 
     Returns:
-        (emissions, nrx), Np; NaN where there is no time, the pulse is not whole or the noise too loud.
+        (emissions, nrx), Np; NaN without a time, with an incomplete pulse or too much noise.
 
     Raises:
-        InvalidInput: for another way, without what ``pick`` needs, and as ``Gate.of``.
+        InvalidInput: for an unknown method, without the traces that ``pick`` requires, and as ``Gate.of``.
     """
     if way not in WAYS:
         raise InvalidInput("amplitudes", repr(way), "one of " + ", ".join(WAYS))
@@ -71,7 +72,9 @@ def read_log_ratios(dataset: Dataset, emissions: Sequence[int], delta_s: Floats,
         water, water_noise = gate.powers(traces.water[e], straight[e], rounding)
         other, other_noise = gate.powers(traces.object[e], straight[e] + rate * delta_s[row], rounding)
         noises = water_noise[:, None], other_noise[:, None]
-        powers = Powers(water, other, *noises, gate.frequency_hz / dataset.center_frequency_hz, gate.alike)
+        powers = Powers(
+            water, other, *noises, gate.frequency_hz / dataset.center_frequency_hz, gate.noise_correlation
+        )
         with np.errstate(all="ignore"):
             value, sigma = WAYS[way](powers)
             if way == "ratio":
@@ -82,10 +85,10 @@ def read_log_ratios(dataset: Dataset, emissions: Sequence[int], delta_s: Floats,
 
 
 def with_log_ratios(dataset: Dataset, way: str) -> Dataset:
-    """The dataset with log ratios from its traces, where its travel times say that the pulses lie.
+    """The dataset with log ratios from its traces, at the positions given by its travel times.
 
     Args:
-        dataset: with travel times beside traces of object and water.
+        dataset: with travel times, and traces of object and water.
         way: see ``read_log_ratios``.
 
     Raises:
@@ -99,57 +102,57 @@ def with_log_ratios(dataset: Dataset, way: str) -> Dataset:
 
 
 def log_ratio(powers: Powers) -> tuple[Floats, Floats]:
-    """By the height of the pulse: half the logarithm of the energies, less the noise's, (nrx,) each.
+    """Energy ratio: half the logarithm of the energies minus noise, and its standard deviation, (nrx,) each.
 
-    Spreading and focusing are in it as well as absorption; see ``tomography.focusing``.
+    It includes spreading and focusing as well as absorption; see ``tomography.focusing``.
     """
     energies, variance = [], 0.0
     for power, noise in ((powers.water, powers.water_noise), (powers.object, powers.object_noise)):
         clean = np.where(power.sum(axis=1, keepdims=True) > LEAST_SNR * power.shape[1] * noise, power, np.nan)
         energies.append((clean - noise).sum(axis=1))
         height = np.sqrt(power)
-        moved = np.einsum("ri,ij,rj->r", height, powers.alike, height)
+        moved = np.einsum("ri,ij,rj->r", height, powers.noise_correlation, height)
         variance = variance + 0.5 * noise[:, 0] * moved / power.sum(axis=1) ** 2
     return 0.5 * np.log(energies[0] / energies[1]), np.sqrt(variance)
 
 
 def spectral_ratio(powers: Powers) -> tuple[Floats, Floats]:
-    """By how much more high frequencies have lost than low ones, (nrx,) each.
+    """Spectral ratio: log ratio from the slope over frequency, and its standard deviation, (nrx,) each.
 
-    Absorption in proportion to the frequency, a = a0 f, leaves of each frequency exp(-f B), B the integral of
-    a0 along the ray, whatever else made the pulse weaker for all frequencies alike. So
+    Absorption in proportion to the frequency, a = a0 f, multiplies the spectrum by exp(-f B), B the integral
+    of a0 along the ray; frequency-independent losses only add a constant g. So
 
         ln |W(f) / O(f)| = g + f B
 
-    is a line whose slope is B (the spectral ratio method; R. Kuc, IEEE Trans. ASSP 32, 1984), and f0 B what
-    the centre frequency has lost. Each frequency weighs as it is sure, W O / (W + O) of the powers over their
-    highest.
+    is a line of slope B (the spectral ratio method; R. Kuc, IEEE Trans. ASSP 32, 1984), and f0 B is the loss
+    at the centre frequency. The weight of each frequency is W O / (W + O) of the powers relative to their
+    maxima.
     """
-    water, other, heard = _clean(powers)
-    level = np.where(heard, 0.5 * np.log(water / other), 0.0)
+    water, other, detected = _clean(powers)
+    level = np.where(detected, 0.5 * np.log(water / other), 0.0)
     both = water.max(axis=1, keepdims=True) / water + other.max(axis=1, keepdims=True) / other
-    weight = np.where(heard, 1.0 / both, 0.0)
+    weight = np.where(detected, 1.0 / both, 0.0)
     weight /= weight.sum(axis=1, keepdims=True)
     away = powers.frequency - (weight @ powers.frequency)[:, None]
     share = weight * away / (weight * away**2).sum(axis=1, keepdims=True)
     unsure = np.where(
-        heard, 0.5 * (powers.water_noise / powers.water + powers.object_noise / powers.object), 0.0
+        detected, 0.5 * (powers.water_noise / powers.water + powers.object_noise / powers.object), 0.0
     )
     moved = share * np.sqrt(unsure)
-    sigma = np.sqrt(np.einsum("ri,ij,rj->r", moved, powers.alike, moved))
-    return (share * level).sum(axis=1), np.where(heard.sum(axis=1) > 2, sigma, np.nan)
+    sigma = np.sqrt(np.einsum("ri,ij,rj->r", moved, powers.noise_correlation, moved))
+    return (share * level).sum(axis=1), np.where(detected.sum(axis=1) > 2, sigma, np.nan)
 
 
 def _clean(powers: Powers) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Powers of the pulses of water and object less the noise's, and where both are heard well above it."""
-    heard = (powers.water > LEAST_SNR * powers.water_noise) & (
+    """Powers of water and object minus the noise, and where both are well above the noise."""
+    detected = (powers.water > LEAST_SNR * powers.water_noise) & (
         powers.object > LEAST_SNR * powers.object_noise
     )
-    return powers.water - powers.water_noise, powers.object - powers.object_noise, heard
+    return powers.water - powers.water_noise, powers.object - powers.object_noise, detected
 
 
 def _gain(scale: Floats | None, emission: int) -> Floats | float:
-    """Logarithm of the factors of the traces of an emission."""
+    """Logarithm of the scale factors of the traces of an emission."""
     return 0.0 if scale is None else np.asarray(np.log(np.abs(scale[emission])))
 
 

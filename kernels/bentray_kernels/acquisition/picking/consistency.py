@@ -1,4 +1,4 @@
-"""Picks that neither their neighbours nor their reverse confirm are taken out."""
+"""Consistency of picks with their neighbours and with reciprocity; inconsistent picks are removed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 from ...arrays import Flags
 from ..dataset import Dataset, Floats
 
-# Emitters and receivers, itself included, that a pick is compared with: 3 × 5 pairs.
+# Emitters and receivers, itself included, with which a pick is compared: 3 × 5 pairs.
 NEAR_EMITTERS = 3
 NEAR_RECEIVERS = 5
 
@@ -18,15 +18,15 @@ OUTLYING = 4.0
 
 
 def consistent(dataset: Dataset, delta: Floats, skip_s: float) -> Floats:
-    """The picks with the inconsistent ones made NaN.
+    """The picks with inconsistent ones replaced by NaN.
 
-    A wrong pick is mostly a whole swing off, so nothing nearer than half a swing is doubted. A pick goes
-    when it is further than that, and than ``OUTLYING`` robust standard deviations, from the median of
-    the pairs of neighbouring elements; then both of a pair go that differ by more when emitter and
-    receiver are exchanged, since neither says which is wrong.
+    Wrong picks are mostly off by a whole period, so smaller deviations than half a period are accepted. A
+    pick is removed if it differs by more than that, and by more than ``OUTLYING`` robust standard deviations,
+    from the median of the pairs of neighbouring elements. Then both picks of a reciprocal pair that differ by
+    more are removed, since it is unknown which one is wrong.
 
     Args:
-        dataset: gives the geometry.
+        dataset: with the geometry.
         delta: (ntx, nrx), s.
         skip_s: half a period, s.
 
@@ -40,7 +40,7 @@ def consistent(dataset: Dataset, delta: Floats, skip_s: float) -> Floats:
 
 
 def outliers(dataset: Dataset, delta: Floats, skip_s: float) -> tuple[Flags, Floats]:
-    """Picks that their neighbours contradict, and how far each pick lies from the median of its neighbours.
+    """Outlying picks, and the departure of each pick from the median of its neighbours.
 
     Args:
         dataset, delta, skip_s: as ``consistent`` takes them.
@@ -51,7 +51,7 @@ def outliers(dataset: Dataset, delta: Floats, skip_s: float) -> tuple[Flags, Flo
     around = _neighbours(dataset, delta)
     known = np.isfinite(around)
     count = known.sum(axis=0)
-    # Too few neighbours say nothing; the zeros keep the medians of empty columns quiet.
+    # Zeros avoid warnings of medians over columns without neighbours.
     around = np.where(count > 0, around, 0.0)
     middle = np.nanmedian(around, axis=0)
     spread = 1.4826 * np.nanmedian(np.abs(around - middle), axis=0)
@@ -62,7 +62,7 @@ def outliers(dataset: Dataset, delta: Floats, skip_s: float) -> tuple[Flags, Flo
 
 
 def unreciprocal(dataset: Dataset, delta: Floats, skip_s: float) -> Flags:
-    """(ntx, nrx): picks that differ by more than ``skip_s`` from their reverse."""
+    """(ntx, nrx): picks that differ by more than ``skip_s`` from their reciprocal pair."""
     elements = len(dataset.element_position_m)
     full = np.full((elements, elements), np.nan)
     full[np.ix_(dataset.tx, dataset.rx)] = delta

@@ -1,4 +1,4 @@
-"""How far one trace's pulse lies behind another's: by likeness, to a fraction of a sample."""
+"""Delay between the pulses of two traces by cross-correlation, to a fraction of a sample."""
 
 from __future__ import annotations
 
@@ -12,65 +12,65 @@ from .peak_interpolation import crest
 
 
 @kernel
-def match(
+def match_pulse(
     water: Trace, object_: Trace, begin: int, end: int, shift: float, reach: float
 ) -> tuple[float, float]:
-    """Delay, near ``shift``, at which ``water[begin:end]`` best resembles the object trace, and how well.
+    """Delay near ``shift`` with the highest correlation of ``water[begin:end]``, and the correlation.
 
-    The likeness is the normalised correlation Σwo/√(Σw²Σo²) of equally long pieces, so a weaker pulse
-    counts as much; a cosine through the best three gives the fraction of a sample. NaN when the best lies at
-    the rim of ``shift ± reach`` or outside the trace.
+    The correlation is normalised, Σwo/√(Σw²Σo²) over equally long segments, so that weak pulses count as
+    much; a cosine through the highest three values gives the fraction of a sample. NaN if the maximum lies at
+    the edge of ``shift ± reach`` or outside the trace.
     """
     first = math.floor(shift - reach) - 1
     count = math.ceil(shift + reach) + 1 - first + 1
-    likeness = likenesses(water, object_, begin, end, first, count, 0.0)
-    best = int(np.argmax(likeness))
-    if best == 0 or best == count - 1 or likeness[best - 1] < -1.5 or likeness[best + 1] < -1.5:
+    correlation = correlate(water, object_, begin, end, first, count, 0.0)
+    best = int(np.argmax(correlation))
+    if best == 0 or best == count - 1 or correlation[best - 1] < -1.5 or correlation[best + 1] < -1.5:
         return np.nan, 0.0
-    part, height = crest(likeness[best - 1], likeness[best], likeness[best + 1])
+    part, height = crest(correlation[best - 1], correlation[best], correlation[best + 1])
     return first + best + part, min(height, 1.0)
 
 
 @kernel
-def likeliest(
+def find_delay(
     water: Trace, object_: Trace, begin: int, end: int, early: float, late: float, noise: float
 ) -> float:
-    """Whole delay from ``early`` to ``late`` at which ``water[begin:end]`` best resembles the object trace.
+    """Integer delay from ``early`` to ``late`` with the highest correlation of ``water[begin:end]``.
 
-    Noise counts as power of the object, so that a stretch of it that happens to look alike does not win.
-    NaN where nothing resembles it, or the best lies at the rim.
+    The noise power is added to the power of the object, so that segments of noise do not win by chance. NaN
+    without a positive correlation, or with the maximum at the edge.
     """
     first = math.floor(early)
     count = max(math.ceil(late) + 1 - first, 1)
     least = (end - begin) * (FAINTEST * noise) ** 2
-    likeness = likenesses(water, object_, begin, end, first, count, least)
-    best = int(np.argmax(likeness))
-    if likeness[best] <= 0.0 or best == 0 or best == count - 1:
+    correlation = correlate(water, object_, begin, end, first, count, least)
+    best = int(np.argmax(correlation))
+    if correlation[best] <= 0.0 or best == 0 or best == count - 1:
         return np.nan
     return float(first + best)
 
 
 @kernel
-def spread(likeness: float, period: float, noisy: float, count: int) -> float:
+def delay_deviation(correlation: float, period: float, noisy: float, count: int) -> float:
     """Standard deviation of a delay, samples.
 
-    What of the likeness is lost to noise averages out over the pulse, as in the bound of Cramér and Rao;
-    what else differs, other paths and the wavelet's change on its way, may all pull one way.
+    The decorrelation by noise averages out over the pulse, as in the Cramér-Rao bound; other differences,
+    such as other paths and changes of the wavelet, may be fully correlated.
 
     Args:
-        likeness: of the two pulses, in (0, 1].
+        correlation: of the two pulses, in (0, 1].
         period: samples.
-        noisy: power of the noise over that of the pulse, of both traces together.
-        count: independent values of the noise in the pulse.
+        noisy: noise power over pulse power, sum of both traces.
+        count: independent noise values in the pulse.
     """
-    lost = 1.0 - likeness * likeness
+    lost = 1.0 - correlation * correlation
     different = max(lost - noisy, 0.0)
-    return math.sqrt(different + noisy / count) * period / (2.0 * math.pi * likeness)
+    return math.sqrt(different + noisy / count) * period / (2.0 * math.pi * correlation)
 
 
 @kernel
-def noise_share(x: Trace, begin: int, end: int, noise: float) -> float:
-    """Power of the noise in ``x[begin:end]`` over the power that is left without it, at most 1."""
+def noise_fraction(x: Trace, begin: int, end: int, noise: float) -> float:
+    """Noise power in ``x[begin:end]`` over the remaining power, at most 1."""
     power = 0.0
     for i in range(begin, end):
         power += x[i] * x[i]
@@ -79,11 +79,11 @@ def noise_share(x: Trace, begin: int, end: int, noise: float) -> float:
 
 
 @kernel
-def likenesses(
+def correlate(
     water: Trace, object_: Trace, begin: int, end: int, first: int, count: int, least: float
 ) -> Trace:
-    """Likeness of ``water[begin:end]`` with the object at delays from ``first`` on; −2 outside the trace."""
-    likeness = np.full(count, -2.0)
+    """Correlation of ``water[begin:end]`` with the object at delays from ``first``; −2 outside the trace."""
+    correlation = np.full(count, -2.0)
     power = 0.0
     for i in range(begin, end):
         power += water[i] * water[i]
@@ -96,5 +96,5 @@ def likenesses(
                 both += water[i] * object_[i + lag]
                 other += object_[i + lag] * object_[i + lag]
             if other > 0.0 and power > 0.0:
-                likeness[k] = both / math.sqrt(power * other)
-    return likeness
+                correlation[k] = both / math.sqrt(power * other)
+    return correlation

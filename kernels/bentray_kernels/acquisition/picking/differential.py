@@ -1,4 +1,4 @@
-"""The arrivals of one emission: object minus water at every receiver, one trace at a time."""
+"""Differential picking of one emission: arrival in the object minus arrival in water at every receiver."""
 
 from __future__ import annotations
 
@@ -7,36 +7,36 @@ import math
 import numpy as np
 
 from ...compiled import kernel
-from .cross_correlation import likeliest, match, noise_share, spread
+from .cross_correlation import delay_deviation, find_delay, match_pulse, noise_fraction
 from .onset import Trace, prepare
 from .pickers import CORRELATION, onset
 
-# Speeds along the straight path that a first arrival may have, m/s: slower than fat, faster than skin.
+# Range of apparent speeds of first arrivals, m/s: slower than fat, faster than skin.
 SLOWEST_MPS = 1300.0
 FASTEST_MPS = 1700.0
 
-# How far from the straight water time the water pulse may lie, periods: the pulse's own length, with the
-# reference time anywhere in it, and the dispersion of a simulated one.
+# Largest distance of the water pulse from the straight water time, periods: the length of the pulse, with the
+# reference time anywhere in it, and numerical dispersion of simulated ones.
 WATER_REACH = 4.0
 
-# The part of the water pulse that is sought in the object trace, periods before and after its onset. It
-# ends with the first swings: the coda belongs to other paths.
+# Segment of the water pulse that is correlated with the object trace, periods before and after its onset. It
+# ends with the first cycles: the coda belongs to other paths.
 PULSE_BEFORE = 0.5
 PULSE_AFTER = 1.5
 
-# How far the match may move the onset, periods; further on lies the next swing.
+# Largest shift of the onset by correlation, periods; the next cycle lies beyond.
 MATCH_REACH = 0.5
 
-# Least likeness of the pulse in object and water.
-LEAST_LIKENESS = 0.8
+# Lowest accepted correlation of the pulses in object and water.
+MIN_CORRELATION = 0.8
 
-# Independent values of the noise in a period, at most: it is as narrow as the transducers' band.
+# Most independent noise values per period, because of the bandwidth of the transducers.
 INDEPENDENT = 4.0
 
-# A delay is not known better than this part of a sample, whatever the noise.
+# Smallest standard deviation of a delay, samples.
 FINEST = 0.02
 
-# Receivers nearer than this to the emitter, wavelengths, hear its ringing and no path through an object.
+# Receivers nearer than this to the emitter, wavelengths, record its ringing and no path through the object.
 NEAREST = 2.0
 
 
@@ -66,8 +66,8 @@ def emission(
         frequency: centre frequency of the pulse, Hz.
         rounding: standard deviation of the traces' rounding, in their unit.
         picker: code of a ``picking.pickers.Picker``.
-        predicted: (nrx,), s: what a model says of ``delta``; NaN where it says nothing.
-        reach: how far from the prediction the pick may lie, s.
+        predicted: (nrx,), s: prediction of ``delta`` by a model; NaN where there is none.
+        reach: largest distance of the pick from the prediction, s.
         delta, sigma: (nrx,), s, written.
     """
     nt = water.shape[1]
@@ -88,8 +88,7 @@ def emission(
         water_onset, strong = onset(w, begin, end, period, water_noise, picker)
         if not math.isfinite(water_onset):
             continue
-        # The object's pulse lies where the water's does, moved by what a plausible speed can move it, or by
-        # what the model says.
+        # Search window in the object: around the water pulse, shifted by plausible speeds or the prediction.
         early = (far / FASTEST_MPS - far / water_speed) * rate
         late = (far / SLOWEST_MPS - far / water_speed) * rate
         guided = math.isfinite(predicted[r])
@@ -103,19 +102,21 @@ def emission(
         object_onset, _ = onset(o, begin, end, period, noise, picker)
         moved = object_onset - water_onset
         if picker == CORRELATION:
-            moved = likeliest(w, o, pulse, past, early, late, noise)
+            moved = find_delay(w, o, pulse, past, early, late, noise)
         if not math.isfinite(object_onset) or not math.isfinite(moved):
             continue
-        shift, same = match(w, o, pulse, past, moved, MATCH_REACH * period)
+        shift, same = match_pulse(w, o, pulse, past, moved, MATCH_REACH * period)
         if guided and not early <= shift <= late:
             continue
-        if math.isfinite(shift) and same >= LEAST_LIKENESS:
+        if math.isfinite(shift) and same >= MIN_CORRELATION:
             delta[r] = shift / rate
-            quiet = noise_share(w, pulse, past, water_noise)
+            quiet = noise_fraction(w, pulse, past, water_noise)
             moved_by = min(max(math.floor(shift + 0.5), -pulse), nt - past)
-            noisy = quiet + noise_share(o, pulse + moved_by, past + moved_by, noise)
+            noisy = quiet + noise_fraction(o, pulse + moved_by, past + moved_by, noise)
             count = max(1, math.floor(INDEPENDENT * (past - pulse) / period))
-            sigma[r] = math.hypot(spread(same, period, noisy, min(count, past - pulse)), FINEST) / rate
+            sigma[r] = (
+                math.hypot(delay_deviation(same, period, noisy, min(count, past - pulse)), FINEST) / rate
+            )
 
 
 @kernel(inline="always")

@@ -1,4 +1,4 @@
-"""Onsets where the energy of a trace grows: Coppens' energy ratio, and short over long average."""
+"""Energy-based onset pickers: Coppens' energy ratio, and short-term over long-term average (STA/LTA)."""
 
 from __future__ import annotations
 
@@ -12,22 +12,23 @@ from ...compiled import kernel
 
 Trace = NDArray[Any]
 
-# Coppens' stabilisation, part of the whole energy: without it the first noisy sample has the highest ratio.
+# Coppens' stabilisation, fraction of the total energy: without it the first noisy sample has the highest
+# ratio.
 COPPENS_PART = 0.2
 
-# Periods of both averages, and the floor of the long one as an amplitude, part of the peak.
+# Lengths of both averages, periods, and floor of the long one as an amplitude, fraction of the peak.
 LONG_PERIODS = 4.0
 SHORT_PERIODS = 0.5
 LONG_FLOOR = 0.02
 
-# A ratio has risen where it first reaches this part of its highest value. Its steepest rise, which
-# Coppens takes, jumps from one swing of the pulse to the next.
+# The onset is where a ratio first reaches this fraction of its maximum. Its steepest rise, which Coppens
+# uses, jumps between cycles of the pulse.
 RISEN = 0.5
 
 
 @kernel
 def energy_ratio(x: Trace, begin: int, end: int, period: float) -> float:
-    """Onset where the ratio of the last period's energy to all energy so far has half risen; NaN if none.
+    """Onset at half the maximum ratio of the energy of the last period to all energy so far; NaN if none.
 
     F. Coppens, "First arrival picking on common-offset trace collections for automatic estimation of static
     corrections", Geophysical Prospecting 33 (1985) 1212-1231.
@@ -46,14 +47,14 @@ def energy_ratio(x: Trace, begin: int, end: int, period: float) -> float:
 
 @kernel
 def sta_lta(x: Trace, begin: int, end: int, period: float) -> float:
-    """Onset where the short average of the energy over the long one before it has half risen; NaN if none.
+    """Onset at half the maximum ratio of the short-term to the preceding long-term average; NaN if none.
 
     R. V. Allen, "Automatic earthquake recognition and timing from single traces", Bulletin of the
     Seismological Society of America 68 (1978) 1521-1532.
     """
     n = end - begin
     short, long = max(1, math.ceil(SHORT_PERIODS * period)), max(1, math.ceil(LONG_PERIODS * period))
-    # The long average needs as much as the short one to say anything.
+    # The long average needs at least the length of the short one.
     known = 2 * short
     if n < known + 4:
         return np.nan
@@ -81,7 +82,7 @@ def energies(x: Trace, begin: int, n: int) -> Trace:
 
 @kernel
 def risen(ratio: Trace, known: int) -> float:
-    """Where ``ratio[known:]`` has first risen, between samples; NaN where it never does or begins so."""
+    """Where ``ratio[known:]`` first reaches the threshold, between samples; NaN if never or at the start."""
     highest = 0.0
     for i in range(known, ratio.size):
         highest = max(highest, ratio[i])

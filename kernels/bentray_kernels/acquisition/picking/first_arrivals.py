@@ -1,4 +1,4 @@
-"""First arrivals of a whole scan: travel time object minus water, read from its traces."""
+"""First-arrival picking of a whole scan: travel time object minus water from its traces."""
 
 from __future__ import annotations
 
@@ -31,27 +31,28 @@ def pick(
     reach_s: float | None = None,
     screened: bool = True,
 ) -> Dataset:
-    """Read the travel times of a scan from its traces.
+    """Pick the travel times of a scan from its traces.
 
     The water and the object trace of a pair are picked in the same way, so that the shape of the pulse
-    and the delay of the electronics cancel. The water onset is sought about the straight time at the
-    water's speed, the object onset where speeds from 1300 to 1700 m/s put it. The delay between the two
+    and the delay of the electronics cancel. The water onset is searched around the straight time at the
+    water's speed, the object onset in the range of speeds from 1300 to 1700 m/s. The delay between the two
     is then refined: the first one and a half periods of the water pulse are correlated with the object
-    trace, to a fraction of a sample. Pairs are left out (NaN) that are nearer than two wavelengths, have
-    no pulse above four times the noise, do not resemble the water pulse, or contradict their neighbours
-    or their own reverse by more than half a period.
+    trace, to a fraction of a sample. Pairs are omitted (NaN) if they are nearer than two wavelengths, have
+    no pulse above four times the noise, a low correlation with the water pulse, or differ from their
+    neighbours or reciprocal pair by more than half a period.
 
-    The standard deviation counts the measured noise as averaged over the pulse, and all else that object and
-    water pulse differ in as pulling one way, at the centre frequency; see ``cross_correlation.spread``.
+    The standard deviation assumes that the noise averages out over the pulse, and that all other differences
+    of object and water pulse are fully correlated, at the centre frequency; see
+    ``cross_correlation.delay_deviation``.
 
     Args:
         dataset: with traces of object and water, a sampling rate and a centre frequency.
-        picker: what finds the onset, see ``picking.pickers.PICKERS``.
+        picker: method of the onset, see ``picking.pickers.PICKERS``.
         progress: called with (emissions done, emissions in all).
-        predicted_s: (…, ntx, nrx), s: object minus water as a model has it; the object's window is then
-            about it and not where plausible speeds put it. NaN where the model says nothing.
-        reach_s: how far from the prediction a pick may lie, s; None: a period.
-        screened: false keeps what neighbours or reverse contradict, for ``quality`` to name.
+        predicted_s: (…, ntx, nrx), s: object minus water predicted by a model, which then replaces the window
+            of plausible speeds. NaN where there is no prediction.
+        reach_s: largest distance of a pick from the prediction, s; None: a period.
+        screened: whether to remove inconsistent picks; ``quality`` keeps them for its report.
 
     Returns:
         The dataset with ``delta_tof_s``, ``sigma_s`` and ``picker`` set, and without its traces and any
@@ -72,7 +73,7 @@ def pick(
                 progress(k * len(every) + e + 1, nz * len(every))
 
         times = read_times(one, every, picker, predicted[k], reach, done)
-        parts.append(settled(one, *times, screened=screened))
+        parts.append(screen_times(one, *times, screened=screened))
     delta, sigma = (np.stack(both) for both in zip(*parts, strict=True))
     if dataset.slice_z_m is None:
         delta, sigma = delta[0], sigma[0]
@@ -80,7 +81,7 @@ def pick(
 
 
 def reach_of(dataset: Dataset, picker: str, reach_s: float | None = None) -> float:
-    """How far from a prediction a pick may lie, s, of a scan that can be picked.
+    """Largest distance of a pick from its prediction, s; checks that the scan can be picked.
 
     Raises:
         InvalidInput: as ``pick``.
@@ -102,18 +103,18 @@ def read_times(
     reach_s: float,
     done: Callable[[int], None] = lambda e: None,
 ) -> tuple[Floats, Floats]:
-    """The times of some emissions by themselves, before anything else is asked of them.
+    """Pick some emissions, without consistency checks between pairs.
 
     Args:
         dataset: of one slice, see ``pick``; its traces may be ``Emissions``.
-        emissions: which, counted from 0.
+        emissions: indices, from 0.
         picker: one of ``PICKERS``.
         predicted_s: (ntx, nrx), s; NaN where nothing is predicted.
         reach_s: see ``reach_of``.
         done: called after each.
 
     Returns:
-        Object minus water and its standard deviation, (emissions, nrx), s; NaN where nothing was found.
+        Object minus water and its standard deviation, (emissions, nrx), s; NaN without an arrival.
     """
     chosen = picker_named(picker)
     inverse = Inverse.of(dataset) if chosen.filtered else None
@@ -125,8 +126,8 @@ def read_times(
     return delta, sigma
 
 
-def settled(dataset: Dataset, delta: Floats, sigma: Floats, *, screened: bool) -> tuple[Floats, Floats]:
-    """The times of a slice without those of pairs that may not be used, or that others contradict.
+def screen_times(dataset: Dataset, delta: Floats, sigma: Floats, *, screened: bool) -> tuple[Floats, Floats]:
+    """Remove the times of invalid pairs, and optionally of inconsistent ones, from a slice.
 
     Args:
         dataset: of one slice.
@@ -134,7 +135,7 @@ def settled(dataset: Dataset, delta: Floats, sigma: Floats, *, screened: bool) -
         screened: see ``pick``.
 
     Returns:
-        The same, NaN where there is none.
+        Copies, with NaN for removed times.
     """
     assert dataset.center_frequency_hz is not None
     delta = delta.copy()
@@ -147,10 +148,10 @@ def settled(dataset: Dataset, delta: Floats, sigma: Floats, *, screened: bool) -
 
 
 def require_traces(dataset: Dataset) -> None:
-    """What picking needs is there.
+    """Check that a dataset has what picking requires.
 
     Raises:
-        InvalidInput: naming what is not.
+        InvalidInput: naming the first missing field.
     """
     if dataset.waveform is None:
         raise InvalidInput("waveform/object", "no traces", "traces to pick from")

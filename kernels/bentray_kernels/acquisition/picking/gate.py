@@ -1,4 +1,4 @@
-"""The pulse cut out of traces about its arrival, and its power over the frequencies that it has."""
+"""Time gate around the arrival of a pulse, and its power spectrum in the band of the pulse."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from ..dataset import Dataset
 from .onset import Trace, prepare
 from .pulse import BEFORE, measured_pulse
 
-# Half the length of the gate, standard deviations of the pulse's power in time, and at most so many periods.
-# The gate is flat over the half of it. What it cuts off the pulse blurs the spectrum, and a blurred one hides
-# a part of the loss; what it lets in belongs to later paths.
+# Half the length of the gate, in standard deviations of the pulse's power over time, and at most in periods.
+# The gate is flat over its inner half. A shorter gate blurs the spectrum, which hides part of the loss; a
+# longer one includes later paths.
 HALF_SPREADS, MOST_PERIODS = 5.0, 4.0
 
-# The band ends where the power of the pulse falls below this part of its highest: two standard deviations of
-# a Gaussian spectrum.
+# The band ends where the power of the pulse falls below this fraction of its maximum: two standard deviations
+# of a Gaussian spectrum.
 BAND_FLOOR = 0.02
 
 # Frequencies in the band.
@@ -31,31 +31,31 @@ FREQUENCIES = 24
 
 @dataclass(frozen=True)
 class Gate:
-    """A window in time about the pulse of a scan, and the frequencies at which it is looked at.
+    """A time window around the pulse of a scan, and the frequencies of its spectrum.
 
     Attributes:
-        late: of the middle of the pulse after its arrival, samples.
+        late: delay of the centre of the pulse after its arrival, samples.
         half: half its length, samples.
-        frequency_hz: (frequencies,), rising evenly.
-        waves: (samples of a piece, frequencies), factors of a Fourier sum.
-        alike: (frequencies, frequencies), correlation of white noise's values there.
+        frequency_hz: (frequencies,), equally spaced.
+        waves: (samples of a segment, frequencies), factors of a Fourier sum.
+        noise_correlation: (frequencies, frequencies), correlation of white noise between them.
     """
 
     late: float
     half: float
     frequency_hz: Floats
     waves: NDArray[np.complex128]
-    alike: Floats
+    noise_correlation: Floats
 
     @classmethod
     def of(cls, dataset: Dataset) -> Gate:
-        """For the pulse that water carries, see ``measured_pulse``.
+        """For the pulse measured in water, see ``measured_pulse``.
 
         Args:
             dataset: of one slice, with water traces, sampling rate and centre frequency.
 
         Raises:
-            InvalidInput: as ``measured_pulse``; for one without a signal.
+            InvalidInput: as ``measured_pulse``; for a pulse without a signal.
         """
         assert dataset.sampling_rate_hz is not None
         assert dataset.center_frequency_hz is not None
@@ -74,11 +74,11 @@ class Gate:
         place = np.arange(math.ceil(2.0 * half) + 1.0)
         weight = _flat(place - half, half) ** 2
         apart = (turn[:, None] - turn)[..., None] * (place - half)
-        alike = (np.cos(apart) * weight).sum(axis=-1) / weight.sum()
-        return cls(late, half, frequency, np.exp(-1j * np.outer(place, turn)), alike)
+        noise_correlation = (np.cos(apart) * weight).sum(axis=-1) / weight.sum()
+        return cls(late, half, frequency, np.exp(-1j * np.outer(place, turn)), noise_correlation)
 
     def powers(self, traces: NDArray[Any], arrival: Floats, rounding: float) -> tuple[Floats, Floats]:
-        """Power of the pulses of one emission, and of the noise among it, which is taken as white.
+        """Power spectra of the pulses of one emission, and noise power, which is assumed to be white.
 
         Args:
             traces: (nrx, nt).
@@ -86,7 +86,7 @@ class Gate:
             rounding: see ``picking.onset.prepare``.
 
         Returns:
-            (nrx, frequencies) and (nrx,), in the traces' unit squared; NaN where the pulse is not whole.
+            (nrx, frequencies) and (nrx,), in the traces' unit squared; NaN for incomplete pulses.
         """
         pieces = np.empty((len(traces), len(self.waves)))
         noise = np.empty(len(traces))
@@ -95,7 +95,7 @@ class Gate:
 
 
 def _flat(late: Floats, half: float) -> Floats:
-    """The gate's height (Tukey): 1 in its inner half, down to 0 as a cosine."""
+    """The window (Tukey): 1 in its inner half, with cosine flanks."""
     return np.asarray(np.cos(np.pi * np.clip(np.abs(late) / half - 0.5, 0.0, 0.5)) ** 2)
 
 

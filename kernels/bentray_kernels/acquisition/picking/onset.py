@@ -1,7 +1,7 @@
-"""First motion in one trace at a time: noise, the first strong swing, AIC and threshold onsets.
+"""Onset picking of one trace: noise level, first strong cycle, AIC and threshold onsets.
 
-Traces are (nt,) in any unit; places and lengths are in samples and may be fractions. Nothing here
-depends on the unit of a trace, so per-trace scales are not needed.
+Traces are (nt,) in any unit; positions and lengths are in samples and may be fractional. The result does not
+depend on the unit of a trace, so per-trace scales are not needed.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ from .peak_interpolation import vertex
 
 Trace = NDArray[Any]
 
-# Fewest samples before the arrival that tell the noise.
+# Fewest samples before the arrival for a noise estimate.
 LEAD = 16
 
-# Floor of the standard deviations in the AIC, part of the peak. Without it the logarithm of a noiseless
-# lead reacts to the first bit that moves, which an attenuating object hides and water does not.
+# Floor of the standard deviations in the AIC, fraction of the peak. Without it the logarithm reacts to the
+# first non-zero sample of a noiseless trace, which differs between object and water.
 AIC_FLOOR = 0.01
 
-# Height of the threshold: part of the peak, or multiples of the noise if that is more.
+# Threshold: fraction of the peak, or multiple of the noise if that is more.
 THRESHOLD_PART = 0.2
 THRESHOLD_NOISE = 4.0
 
-# The first arrival ends where the trace first comes this near its peak in the window: what follows may be
-# stronger (paths around a lens) but is later.
+# The first arrival is where the trace first reaches this fraction of its peak in the window: later arrivals
+# (paths around a lens) may be stronger.
 STRONG_PART = 0.5
 
-# A peak below this many standard deviations of the noise is none.
+# Lowest peak of an arrival, standard deviations of the noise.
 FAINTEST = 4.0
 
 
 @kernel
 def prepare(trace: Trace, lead: int, rounding: float, out: Trace) -> float:
-    """Copy a trace less its offset to ``out``; give the noise, NaN where a sample is not finite.
+    """Copy a trace minus its offset to ``out``; returns the noise, NaN where a sample is not finite.
 
-    Offset and noise are the median and the median deviation of the first ``lead`` samples, which a spike
-    among them, such as the cross-talk of the emission, does not move. Where the lead is too short to
-    tell, the noise is ``rounding``, the standard deviation that whole numbers have by themselves.
+    Offset and noise are the median and the median absolute deviation of the first ``lead`` samples, robust
+    against spikes such as the cross-talk of the emission. If the lead is too short, the noise is
+    ``rounding``, the standard deviation of the rounding to integers.
     """
     n = trace.size
     for i in range(n):
@@ -58,7 +58,7 @@ def prepare(trace: Trace, lead: int, rounding: float, out: Trace) -> float:
 
 @kernel
 def first_strong(x: Trace, begin: int, end: int, period: float, noise: float) -> int:
-    """Place of the largest swing of the first arrival in ``x[begin:end]``; −1 if there is none."""
+    """Sample of the largest extremum of the first arrival in ``x[begin:end]``; −1 if there is none."""
     peak = 0.0
     for i in range(begin, end):
         peak = max(peak, abs(x[i]))
@@ -76,7 +76,7 @@ def first_strong(x: Trace, begin: int, end: int, period: float, noise: float) ->
 
 @kernel
 def aic(x: Trace, begin: int, end: int) -> float:
-    """Onset where ``x[begin:end]`` splits best into two stationary parts; NaN at the window's rim.
+    """Onset that splits ``x[begin:end]`` best into two stationary parts; NaN at the edge of the window.
 
     AIC(k) = k ln var(before k) + (n − k) ln var(from k), N. Maeda, Zisin 38 (1985) 365-379, with a
     parabola through the lowest three values for the fraction of a sample.

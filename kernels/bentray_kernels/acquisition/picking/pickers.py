@@ -1,4 +1,4 @@
-"""The pickers by name, and the one door to what each takes for the first motion of a trace."""
+"""Onset pickers by name, and their common interface for compiled code."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from .onset import Trace, aic, first_strong, threshold
 
 AIC, THRESHOLD, ENERGY_RATIO, STA_LTA, CORRELATION, MATCHED = range(6)
 
-# The crest of a filtered pulse lies half a period after where the pulse rises.
+# Delay of the maximum of a filtered pulse after its onset, periods.
 RISE = 0.5
 
 
 @dataclass(frozen=True)
 class Picker:
-    """A way to find the first arrival.
+    """A method of picking first arrivals.
 
     Attributes:
-        name: how it is asked for.
-        code: what compiled functions know it by.
+        name: in requests.
+        code: for compiled functions.
         summary: one line for help texts.
-        filtered: whether traces are taken through the inverse of the measured pulse first.
+        filtered: whether traces are first deconvolved with the measured pulse.
     """
 
     name: str
@@ -65,9 +65,9 @@ def picker_named(name: str) -> Picker:
 
 @kernel
 def onset(x: Trace, begin: int, end: int, period: float, noise: float, picker: int) -> tuple[float, int]:
-    """Onset of the first arrival in ``x[begin:end]`` and the place of its largest swing; NaN, −1 if none.
+    """Onset of the first arrival in ``x[begin:end]`` and the sample of its largest extremum; NaN, −1 if none.
 
-    ``CORRELATION`` needs no onset to find the object's delay, and takes that of ``AIC`` to tell the pulse.
+    ``CORRELATION`` finds the delay without an onset, and uses that of ``AIC`` to locate the pulse.
     """
     strong = first_strong(x, begin, end, period, noise)
     if strong < 0:
@@ -76,7 +76,7 @@ def onset(x: Trace, begin: int, end: int, period: float, noise: float, picker: i
         return threshold(x, begin, strong + 1, noise), strong
     if picker == MATCHED:
         return strong - RISE * period, strong
-    # A little past the swing, or its part of the window is too short for a variance.
+    # A little beyond the extremum, so that the second part is long enough for a variance.
     end = min(strong + 1 + math.ceil(0.25 * period), end)
     if picker == ENERGY_RATIO:
         return energy_ratio(x, begin, end, period), strong

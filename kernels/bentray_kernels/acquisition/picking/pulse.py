@@ -1,4 +1,4 @@
-"""The pulse of a scan, measured in water, and the filter that takes it off the traces."""
+"""The pulse of a scan, measured in water, and the deconvolution filter for it."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from numpy.typing import NDArray
 from ...errors import InvalidInput
 from ..dataset import Dataset, Floats
 
-# Power below this part of the strongest frequency's is left as it is rather than raised to the others.
+# Water level of the deconvolution, fraction of the highest power.
 WATER_LEVEL = 0.05
 
-# Periods before and after the straight time that the pulse may fill.
+# Extent of the pulse before and after the straight time, periods.
 BEFORE, AFTER = 4.0, 4.0
 
-# Emissions, evenly chosen, that the pulse is averaged over.
+# Emissions, evenly spaced, over which the pulse is averaged.
 EMISSIONS = 16
 
-# A pulse is read where the trace is at least this far, wavelengths: nearer ones are cross-talk.
+# Shortest distance of the pairs used, wavelengths: nearer ones contain cross-talk.
 FAR = 10.0
 
 
 def measured_pulse(dataset: Dataset, arrival_s: Floats | None = None) -> Floats:
-    """The pulse that water carries, about its arrival: the median over pairs, each scaled to its peak.
+    """The pulse in water around its arrival: the median over pairs, each scaled to its peak.
 
     Args:
         dataset: of one slice, with water traces, sampling rate and centre frequency.
@@ -36,7 +36,7 @@ def measured_pulse(dataset: Dataset, arrival_s: Floats | None = None) -> Floats:
         (n,), the arrival ``BEFORE`` periods after the first sample.
 
     Raises:
-        InvalidInput: where no water trace holds the pulse whole.
+        InvalidInput: where no water trace contains the whole pulse.
     """
     assert dataset.waveform is not None
     assert dataset.waveform.water is not None
@@ -51,8 +51,8 @@ def measured_pulse(dataset: Dataset, arrival_s: Floats | None = None) -> Floats:
     found: list[Floats] = []
     for e in range(0, len(dataset.tx), max(1, len(dataset.tx) // EMISSIONS)):
         place = (arrival_s[e] - dataset.t0_s) * dataset.sampling_rate_hz
-        heard = (distance[e] >= least) & np.isfinite(place)
-        found += _pieces(dataset.waveform.water[e], place, heard, before, length)
+        detected = (distance[e] >= least) & np.isfinite(place)
+        found += _pieces(dataset.waveform.water[e], place, detected, before, length)
     if not found:
         raise InvalidInput(
             "waveform/water", "no pulse whole in any trace", "traces that hold it about its arrival"
@@ -61,19 +61,19 @@ def measured_pulse(dataset: Dataset, arrival_s: Floats | None = None) -> Floats:
 
 
 def _pieces(
-    traces: NDArray[Any], place: Floats, heard: NDArray[np.bool_], before: int, length: int
+    traces: NDArray[Any], place: Floats, detected: NDArray[np.bool_], before: int, length: int
 ) -> list[Floats]:
-    """The pulses of one emission, moved by fractions of a sample to the same place, peak 1."""
+    """The pulses of one emission, aligned to a fraction of a sample, peak 1."""
     turn = -2j * np.pi * np.fft.rfftfreq(length)
     pieces = []
-    for r in np.flatnonzero(heard):
+    for r in np.flatnonzero(detected):
         begin = math.floor(place[r]) - before
         if begin < 0 or begin + length > traces.shape[1]:
             continue
         piece = traces[r, begin : begin + length].astype(np.float64)
         if not np.isfinite(piece).all():
             continue
-        # A piece without an offset ends near zero at both sides, so that the move does not wrap a step.
+        # Without an offset both ends are near zero, so that the circular shift does not wrap a step.
         piece -= np.median(piece)
         peak = np.abs(piece).max()
         if peak == 0.0:
@@ -85,12 +85,12 @@ def _pieces(
 
 @dataclass(frozen=True)
 class Inverse:
-    """Deconvolution with a pulse, its largest swing staying where it is.
+    """Deconvolution with a pulse; its largest extremum keeps its position.
 
     Attributes:
-        spectrum: of the filter, over the frequencies of ``length`` samples.
-        length: samples that traces are padded to.
-        gain: standard deviation of filtered noise over that of the noise, which is white.
+        spectrum: of the filter, at the frequencies of ``length`` samples.
+        length: of the padded traces, samples.
+        gain: of the standard deviation of white noise.
     """
 
     spectrum: NDArray[np.complex128]
@@ -99,9 +99,9 @@ class Inverse:
 
     @classmethod
     def of(cls, dataset: Dataset) -> Inverse:
-        """The filter of a scan: with the recorded wavelet where there is one, else with ``measured_pulse``.
+        """The filter of a scan: with the recorded wavelet if present, else with ``measured_pulse``.
 
-        W = S* / (|S|² + ε max |S|²), so what is left of the pulse has no phase and a flat band.
+        W = S* / (|S|² + ε max |S|²), so that the filtered pulse has zero phase and a flat band.
 
         Raises:
             InvalidInput: as ``measured_pulse``; for a wavelet without a signal.
@@ -112,7 +112,7 @@ class Inverse:
             raise InvalidInput("acquisition/wavelet", "zeros", "samples of the pulse")
         length = 2 ** math.ceil(math.log2(dataset.waveform.object.shape[-1] + pulse.size))
         power = np.fft.rfft(pulse, length)
-        # Time counts from the largest swing, whatever the wavelet's own reference.
+        # Time is relative to the largest extremum, whatever the reference of the wavelet.
         power = power * np.exp(2j * np.pi * np.fft.rfftfreq(length) * int(np.argmax(np.abs(pulse))))
         level = WATER_LEVEL * float((np.abs(power) ** 2).max())
         spectrum = np.conj(power) / (np.abs(power) ** 2 + level)

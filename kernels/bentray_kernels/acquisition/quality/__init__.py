@@ -1,4 +1,4 @@
-"""What is wrong with a scan: checks of traces and of picks, each finding named, and what is done about it."""
+"""Quality control of scans: checks of traces and picks, findings, and their correction."""
 
 from .correction import corrected
 from .examination import Examined, examine, examine_slices

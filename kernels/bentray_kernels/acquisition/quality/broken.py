@@ -1,4 +1,4 @@
-"""Single traces that cannot be read: not finite, constant, cut off."""
+"""Unusable single traces: not finite, constant, clipped."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from ..dataset import Dataset
 from .finding import Finding
 from .measures import Measures
 
-# From this part of the pairs on, cut-off traces are a gain set wrong and not chance.
+# Fraction of clipped pairs above which the gain is too high.
 MOST_CLIPPED = 0.25
 
 
-def broken(dataset: Dataset, measures: Measures, which: str, known: Flags) -> list[Finding]:
-    """Traces with samples that are not finite, and constant ones.
+def find_broken(dataset: Dataset, measures: Measures, which: str, known: Flags) -> list[Finding]:
+    """Find traces with samples that are not finite, and constant ones.
 
     Args:
         dataset: of one slice.
         measures: of its traces.
         which: ``object`` or ``water``.
-        known: (ntx, nrx), pairs that another finding has left out already.
+        known: (ntx, nrx), pairs already left out by another finding.
     """
     findings = []
     other = (dataset.tx[:, None] != dataset.rx[None, :]) & ~known
@@ -39,13 +39,12 @@ def broken(dataset: Dataset, measures: Measures, which: str, known: Flags) -> li
     return findings
 
 
-def clipped(dataset: Dataset, measures: Measures, which: str) -> list[Finding]:
-    """Traces whose pulse was cut off; their times stay, for an onset lies before the peak, their amplitudes
-    do not mean anything."""
+def find_clipped(dataset: Dataset, measures: Measures, which: str) -> list[Finding]:
+    """Find clipped traces: times are valid, since the onset precedes the peak, amplitudes are not."""
     pairs = measures.clipped & (dataset.tx[:, None] != dataset.rx[None, :])
     if not pairs.any():
         return []
-    part = float(pairs.sum()) / max(int(measures.heard.sum()), 1)
+    part = float(pairs.sum()) / max(int(measures.detected.sum()), 1)
     words = f"{which}: {int(pairs.sum())} traces cut off at their highest or lowest value"
     many = ", a gain set too high" if part > MOST_CLIPPED else ""
     return [

@@ -1,4 +1,4 @@
-"""Travel times that others contradict: their neighbours, by whole cycles or otherwise, or their reverse."""
+"""Inconsistent travel times: cycle jumps and outliers among neighbours, and violations of reciprocity."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from ..dataset import Dataset
 from ..picking.consistency import OUTLYING, outliers, unreciprocal
 from .finding import Finding
 
-# A departure counts as whole cycles when it is this near to them, periods.
+# A departure counts as a cycle jump within this distance of whole periods.
 NEAR_A_CYCLE = 0.25
 
-# 90 % of a normal distribution lie within so many standard deviations.
+# 90 % of a normal distribution lie within this many standard deviations.
 NINETY = 1.645
 
 
-def contradictions(dataset: Dataset, delta: Floats) -> list[Finding]:
-    """Cycle jumps, outliers and pairs that differ from their reverse, each pair under one of them.
+def find_contradictions(dataset: Dataset, delta: Floats) -> list[Finding]:
+    """Find cycle jumps, outliers and violations of reciprocity, each pair in one of them.
 
     Args:
         dataset: of one slice.
@@ -33,7 +33,7 @@ def contradictions(dataset: Dataset, delta: Floats) -> list[Finding]:
     if period is not None:
         count = np.abs(departure[outlying]) / period
         cycles[outlying] = np.abs(count - np.rint(count)) <= NEAR_A_CYCLE
-    # What neighbours have taken out cannot speak against its reverse.
+    # Outliers are not compared with their reciprocal pair.
     differ = unreciprocal(dataset, np.where(outlying, np.nan, delta), skip)
     allowed = f"within {1e9 * skip:.0f} ns"
     return [
@@ -44,9 +44,9 @@ def contradictions(dataset: Dataset, delta: Floats) -> list[Finding]:
 
 
 def _usual(departure: Floats) -> float:
-    """What a pick may be off where no period says so, s: four standard deviations of nine in ten picks.
+    """Largest accepted departure without a known period, s: four standard deviations, from the 90 % quantile.
 
-    Times that were rounded to steps have no median departure, but nine in ten are no outliers.
+    The median departure of rounded times may be 0; the 90 % quantile is not affected by outliers.
     """
     size = np.abs(departure[np.isfinite(departure)])
     return OUTLYING * float(np.percentile(size, 90.0)) / NINETY if size.size else math.inf

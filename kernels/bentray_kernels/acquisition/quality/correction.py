@@ -1,4 +1,4 @@
-"""The dataset that goes on: what a report says is corrected or left out, and a refused scan does not."""
+"""Application of findings to a dataset: corrections, and masks of pairs left out."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ import numpy as np
 from ...arrays import Flags, Ints
 from ...errors import InvalidInput
 from ..dataset import Dataset
-from ..emissions import moved, turned
+from ..emissions import invert_polarity, reorder_channels
 from ..waveform import Waveform
 from .finding import Finding, Report
 from .time_zero import OBJECT, RECORDING
 
 
 def corrected(dataset: Dataset, report: Report) -> Dataset:
-    """The dataset with the report's corrections: dead pairs masked, channels put back, signs turned, offsets
-    taken off.
+    """The dataset with the report's corrections: dead pairs masked, channels exchanged, polarity and offsets
+    corrected.
 
     Args:
-        dataset: as it was examined.
-        report: of it.
+        dataset: as examined.
+        report: of the examination.
 
     Raises:
-        InvalidInput: for a refused scan, with the reason.
+        InvalidInput: for a rejected scan, with the finding.
     """
     refusal = report.refusal
     if refusal is not None:
@@ -52,13 +52,13 @@ def apply(dataset: Dataset, findings: Iterable[Finding]) -> Dataset:
 
 
 def stacked(dataset: Dataset, parts: list[Dataset]) -> Dataset:
-    """The slices of a dataset as one again."""
+    """Combine the slices of a dataset."""
 
     def several(name: str) -> np.ndarray | None:
         arrays = [getattr(part, name) for part in parts]
         if all(array is None for array in arrays):
             return None
-        # Slices in which nothing is wrong have no mask of their own.
+        # Slices without findings have no mask.
         shape = next(array.shape for array in arrays if array is not None)
         return np.stack([np.ones(shape, dtype=bool) if array is None else array for array in arrays])
 
@@ -92,25 +92,25 @@ def _corrected(dataset: Dataset, finding: Finding) -> Dataset:
         }
         return replace(dataset, **taken_off)
     if finding.check == "polarity":
-        return replace(dataset, waveform=_turned(dataset, finding))
-    return _put_back(dataset, finding)
+        return replace(dataset, waveform=_with_polarity(dataset, finding))
+    return _exchanged(dataset, finding)
 
 
-def _turned(dataset: Dataset, finding: Finding) -> Waveform | None:
+def _with_polarity(dataset: Dataset, finding: Finding) -> Waveform | None:
     traces = dataset.waveform
     if traces is None:
         return None
     where = _places(dataset, finding)
-    water = None if traces.water is None else turned(traces.water, where)
-    return replace(traces, object=turned(traces.object, where), water=water)
+    water = None if traces.water is None else invert_polarity(traces.water, where)
+    return replace(traces, object=invert_polarity(traces.object, where), water=water)
 
 
-def _put_back(dataset: Dataset, finding: Finding) -> Dataset:
-    """Two channels exchanged in everything that was recorded."""
-    order, axis = exchange(dataset, finding)
+def _exchanged(dataset: Dataset, finding: Finding) -> Dataset:
+    """Exchange two channels in all recorded data."""
+    order, axis = exchange_order(dataset, finding)
 
     def other(array: np.ndarray | None) -> np.ndarray | None:
-        return None if array is None else moved(array, order, axis)
+        return None if array is None else reorder_channels(array, order, axis)
 
     pairs = {
         name: other(getattr(dataset, name))
@@ -123,8 +123,8 @@ def _put_back(dataset: Dataset, finding: Finding) -> Dataset:
     return replace(dataset, waveform=traces, **pairs)  # type: ignore[arg-type]
 
 
-def exchange(dataset: Dataset, finding: Finding) -> tuple[Ints, int]:
-    """The order that puts two swapped channels back, and along which axis of (ntx, nrx)."""
+def exchange_order(dataset: Dataset, finding: Finding) -> tuple[Ints, int]:
+    """The order that exchanges two swapped channels, and its axis of (ntx, nrx)."""
     axis = 0 if finding.role == "emission" else 1
     element = dataset.tx if finding.role == "emission" else dataset.rx
     order = np.arange(len(element))

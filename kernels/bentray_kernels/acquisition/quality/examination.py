@@ -1,4 +1,4 @@
-"""All checks of a scan in their order: traces first, then channels, then the times picked from them."""
+"""Examination of a scan: checks of traces, channels and picked times, in this order."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from ...arrays import Flags, Floats
 from ..dataset import Dataset
 from ..picking.first_arrivals import pick
-from .contradictions import contradictions
+from .contradictions import find_contradictions
 from .correction import apply, stacked
-from .dead import dead
+from .dead import find_dead
 from .finding import Finding, Report
-from .recording import Measured, judged
-from .time_zero import object_scan
+from .recording import Measured, check_traces
+from .time_zero import find_time_shift
 
 OF_TIMES = ("time zero of the object scan", "cycle jumps", "outliers", "reciprocity")
 
@@ -26,8 +26,8 @@ class Examined:
     """A scan with its report.
 
     Attributes:
-        report: what was found.
-        picked: what goes on, with travel times; None for a refused scan.
+        report: the findings.
+        picked: the corrected dataset with travel times; None for a rejected scan.
     """
 
     report: Report
@@ -39,12 +39,12 @@ def examine(
 ) -> Examined:
     """Check a scan, correct what can be corrected, pick its times where it has none, and check those.
 
-    Every check looks at the data as the ones before it have left them.
+    Every check sees the data as corrected by the previous ones.
 
     Args:
         dataset: with traces or travel times.
-        picker: what reads times that are not there.
-        progress: called with (emissions gone through, in all), each as often as its traces are looked at.
+        picker: method for missing times.
+        progress: called with (emissions done, total); emissions count once for every pass over their traces.
 
     Raises:
         InvalidInput: for an unknown picker.
@@ -58,11 +58,11 @@ def examine_slices(
     picker: str = "aic",
     progress: Callable[[int, int], None] | None = None,
 ) -> Examined:
-    """As ``examine``, of slices that are given one after the other.
+    """As ``examine``, with slices from an iterator.
 
     Args:
-        dataset: the scan; its traces need not be there.
-        slices: all of them in order, each done with when the next is asked for; traces may be ``Emissions``.
+        dataset: the scan; without traces if they are only in ``slices``.
+        slices: all slices in order; each is released before the next one; traces may be ``Emissions``.
         picker, progress: as ``examine`` takes them.
 
     Raises:
@@ -85,7 +85,7 @@ def examine_slices(
     whole = [part for part in parts if part is not None]
     picked = None
     if len(whole) == len(parts):
-        # One slice keeps its truth and place; several lost them when they were cut.
+        # A single slice keeps its truth and position; several lose them when sliced.
         shown = whole[0] if dataset.slice_z_m is None else stacked(dataset, whole)
         picked = replace(shown, truth=dataset.truth, waveform=None)
     other = (dataset.tx[:, None] != dataset.rx[None, :]).sum() * dataset.slices
@@ -95,7 +95,7 @@ def examine_slices(
 
 
 def _times_read(dataset: Dataset) -> int:
-    """How often an emission of a slice is gone through: once a scan to measure it, once to pick it."""
+    """Number of passes over an emission of a slice: one per scan to measure it, one to pick it."""
     if dataset.waveform is None:
         return 0
     return 1 + (dataset.waveform.water is not None) + (not dataset.picked)
@@ -104,31 +104,31 @@ def _times_read(dataset: Dataset) -> int:
 def _slice(
     dataset: Dataset, picker: str, step: Callable[[], None]
 ) -> tuple[list[Finding], Dataset | None, tuple[str, ...]]:
-    """Findings of one slice, what goes on of it, and the checks made; ``step`` is called after emissions."""
+    """Findings of one slice, its corrected dataset, and the checks made; ``step`` is called per emission."""
     findings: list[Finding] = []
     checked: tuple[str, ...] = ()
     if dataset.waveform is not None:
-        findings, checked = judged(dataset, Measured.of(dataset, range(len(dataset.tx)), step))
+        findings, checked = check_traces(dataset, Measured.of(dataset, range(len(dataset.tx)), step))
     if any(finding.action == "refused" for finding in findings):
         return findings, None, checked
     dataset = apply(dataset, findings)
     if not dataset.picked:
         dataset = pick(dataset, picker, lambda done, total: step(), screened=False)
-    of_times = times_judged(dataset)
+    of_times = check_times(dataset)
     findings += of_times
     if any(finding.action == "refused" for finding in of_times):
         return findings, None, checked + OF_TIMES
     return findings, apply(replace(dataset, waveform=None), of_times), checked + OF_TIMES
 
 
-def times_judged(dataset: Dataset) -> list[Finding]:
+def check_times(dataset: Dataset) -> list[Finding]:
     """Findings of the travel times of one slice, in the order in which they are applied."""
     findings: list[Finding] = []
     if dataset.waveform is None and dataset.valid is None:
-        findings += dead(dataset, _heard(dataset, dataset.differential_tof()))
-    findings += object_scan(dataset, dataset.differential_tof())
+        findings += find_dead(dataset, _detected(dataset, dataset.differential_tof()))
+    findings += find_time_shift(dataset, dataset.differential_tof())
     left = apply(replace(dataset, waveform=None), findings)
-    later = contradictions(left, left.differential_tof())
+    later = find_contradictions(left, left.differential_tof())
     if not np.isfinite(apply(left, later).differential_tof()).any():
         later.append(
             Finding("travel times", "not one that can be used", "travel times of some pairs", "refused")
@@ -136,8 +136,8 @@ def times_judged(dataset: Dataset) -> list[Finding]:
     return findings + later
 
 
-def _heard(dataset: Dataset, delta: Floats) -> Flags:
-    """(ntx, nrx): pairs with a time; one way is enough."""
+def _detected(dataset: Dataset, delta: Floats) -> Flags:
+    """(ntx, nrx): pairs with a time in at least one direction."""
     known = np.isfinite(delta)
     elements = len(dataset.element_position_m)
     full = np.zeros((elements, elements), dtype=bool)

@@ -1,4 +1,4 @@
-"""One thing that a check found in a scan, and the report of all of them."""
+"""Findings of the checks of a scan, and the report of all of them."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from ...arrays import Flags
 Action = Literal["left out", "corrected", "refused", "reported"]
 Role = Literal["emission", "reception", ""]
 
-# Pairs that a report names one by one; of the others it gives the number.
+# Most pairs listed in a report; of the others it gives the number.
 MOST_NAMED = 20
 
-# What a line of no findings says.
+# Summary without findings.
 NOTHING_FOUND = "nothing found"
 
-# Findings that a line tells, and elements of each.
+# Most findings in a summary, and elements of each.
 MOST_TOLD = 8
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What a check found.
+    """The result of a failed check.
 
     Attributes:
         check: its name.
-        found: in words.
-        accepted: what would have passed, in words.
-        action: what is done: pairs are left out, the data corrected, the scan refused, or nothing.
-        elements: indices of the elements at fault.
-        role: in which they are, where it is one of the two.
-        pairs: (ntx, nrx), those at fault; None where whole elements or the whole scan are.
-        value: the figure that decided, in ``unit``; NaN where there is none.
+        found: message.
+        accepted: description of valid values.
+        action: pairs are left out, the data corrected, the scan refused, or the finding only reported.
+        elements: indices of the elements affected.
+        role: emission or reception, if only one is affected.
+        pairs: (ntx, nrx), those affected; None for whole elements or the whole scan.
+        value: the deciding value, in ``unit``; NaN if there is none.
         slice: axial index.
     """
 
@@ -52,7 +52,7 @@ class Finding:
     slice: int = 0
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON; of the pairs, as (emission, reception), the first few and the number."""
+        """Plain values for JSON, with the number of pairs and the first of them as (emission, reception)."""
         told: dict[str, Any] = {
             "check": self.check,
             "found": self.found,
@@ -76,11 +76,11 @@ class Report:
     """All findings of a scan, in the order of the checks.
 
     Attributes:
-        findings: none where nothing is wrong.
-        checked: names of the checks that were made; what the scan does not hold cannot be checked.
-        pairs: pairs of different elements, over all slices.
-        usable: those that go on.
-        picker: what read the times, empty where they came with the scan.
+        findings: empty for a valid scan.
+        checked: names of the checks made; missing data cannot be checked.
+        pairs: number of pairs of different elements, over all slices.
+        usable: number of pairs with valid times.
+        picker: method of the times, empty where they came with the scan.
     """
 
     findings: tuple[Finding, ...]
@@ -91,7 +91,7 @@ class Report:
 
     @property
     def refusal(self) -> Finding | None:
-        """The first finding that stops the scan, if one does."""
+        """The first finding that rejects the scan, if any."""
         return next((f for f in self.findings if f.action == "refused"), None)
 
     def to_dict(self) -> dict[str, Any]:
@@ -107,18 +107,18 @@ class Report:
 
     @property
     def verdict(self) -> str:
-        """``clean``, ``usable`` with what was found, or ``refused``."""
+        """``clean``, ``usable`` with findings, or ``refused``."""
         if self.refusal is not None:
             return "refused"
         return "usable" if self.findings else "clean"
 
 
 def words(findings: Sequence[Finding], *, stacked: bool = False) -> str:
-    """Findings in one line: what, of which elements, and what was done.
+    """Summarise findings in one line: check, elements, action.
 
     Args:
-        findings: none gives a line too.
-        stacked: whether to say of which slice each is.
+        findings: may be empty.
+        stacked: whether to name the slice of each.
     """
     if not findings:
         return NOTHING_FOUND

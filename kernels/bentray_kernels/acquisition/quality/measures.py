@@ -1,4 +1,4 @@
-"""What the checks ask of every trace, read one emission at a time."""
+"""Measures of every trace for the checks, computed one emission at a time."""
 
 from __future__ import annotations
 
@@ -12,46 +12,46 @@ from numpy.typing import NDArray
 from ...arrays import Flags, Floats
 from ..dataset import Dataset
 
-# Parts of a trace, the quietest of which tells its noise.
+# Parts of a trace, the quietest of which gives the noise.
 PARTS = 8
 
-# A pulse stands this many times above the quietest part; of noise alone the highest sample does not.
+# Lowest ratio of a pulse to the quietest part; the highest sample of pure noise is below.
 STANDS_OUT = 6.5
 
-# So many equal samples in a row at the height of the trace mean that it was cut off there.
+# Equal samples in a row at the maximum of a clipped trace.
 CUT_OFF_RUN = 3
 
 
 @dataclass(frozen=True)
 class Measures:
-    """Figures of the traces of one slice, all (ntx, nrx).
+    """Measures of the traces of one slice, all (ntx, nrx).
 
     Attributes:
         broken: a sample is not finite.
         constant: all samples are the same.
-        heard: there is a pulse.
-        clipped: it was cut off at both or one of its ends.
-        strongest_s: time of the crest of the envelope; NaN without a pulse.
+        detected: there is a pulse.
+        clipped: it is clipped at its maximum, minimum or both.
+        strongest_s: time of the maximum of the envelope; NaN without a pulse.
     """
 
     broken: Flags
     constant: Flags
-    heard: Flags
+    detected: Flags
     clipped: Flags
     strongest_s: Floats
 
     @classmethod
     def of(cls, traces: Iterable[NDArray[Any]], dataset: Dataset) -> Measures:
-        """The figures of the traces of emissions, (nrx, nt) each; only one is in memory as floating point."""
+        """Measures of the traces of emissions, (nrx, nt) each; converted to floating point one by one."""
         assert dataset.sampling_rate_hz is not None
         found = [_emission(np.asarray(emission)) for emission in traces]
-        broken, constant, heard, clipped, strongest = (np.stack(part) for part in zip(*found, strict=True))
-        time = np.where(heard, dataset.t0_s + strongest / dataset.sampling_rate_hz, np.nan)
-        return cls(broken, constant, heard, clipped, time)
+        broken, constant, detected, clipped, strongest = (np.stack(part) for part in zip(*found, strict=True))
+        time = np.where(detected, dataset.t0_s + strongest / dataset.sampling_rate_hz, np.nan)
+        return cls(broken, constant, detected, clipped, time)
 
     @classmethod
     def joined(cls, parts: Sequence[Measures]) -> Measures:
-        """The figures of all emissions from those of some each, in their order."""
+        """Concatenate the measures of parts of the emissions, in order."""
         names = [field.name for field in fields(cls)]
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
@@ -66,19 +66,19 @@ def _emission(traces: NDArray[Any]) -> tuple[Flags, Flags, Flags, Flags, Floats]
     peak = centred.max(axis=1)
     parts = np.array_split(centred, min(PARTS, x.shape[1]), axis=1)
     quiet = np.min([np.sqrt((part**2).mean(axis=1)) for part in parts], axis=0)
-    heard = (peak > STANDS_OUT * quiet) & ~broken & ~constant
-    # Small whole numbers repeat by themselves: only heights of many steps can be told to be cut off.
+    detected = (peak > STANDS_OUT * quiet) & ~broken & ~constant
+    # Small integers repeat by chance: clipping is detected only at amplitudes of many steps.
     steps = 20.0 if traces.dtype.kind == "i" else 0.0
-    clipped = heard & (peak > steps) & (_run(x, x.max(axis=1)) | _run(x, x.min(axis=1)))
-    # Of the swings themselves the strongest changes from pulse to pulse; their envelope has one crest.
+    clipped = detected & (peak > steps) & (_run(x, x.max(axis=1)) | _run(x, x.min(axis=1)))
+    # The strongest extremum differs between pulses; their envelope has one maximum.
     envelope = _envelope(x - offset)
-    return broken, constant, heard, clipped, _vertex(envelope, np.argmax(envelope, axis=1))
+    return broken, constant, detected, clipped, _vertex(envelope, np.argmax(envelope, axis=1))
 
 
 def _envelope(x: Floats) -> Floats:
     """Magnitude of the analytic signal along time, (traces, nt).
 
-    As ``scipy.signal.hilbert`` has it, which would bring 26 MB into every process that knows this module.
+    As ``scipy.signal.hilbert``, whose import would add 26 MB to every process that imports this module.
     """
     samples = x.shape[1]
     weight = np.zeros(samples)
@@ -100,7 +100,7 @@ def _run(x: Floats, height: Floats) -> Flags:
 
 
 def _vertex(size: Floats, at: NDArray[np.intp]) -> Floats:
-    """Place of the highest sample, to a fraction of one by a parabola."""
+    """Position of the highest sample, refined by a parabola."""
     row = np.arange(len(size))
     inner = np.clip(at, 1, size.shape[1] - 2) if size.shape[1] > 2 else at
     if size.shape[1] < 3:

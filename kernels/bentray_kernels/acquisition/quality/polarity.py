@@ -1,4 +1,4 @@
-"""Inverted elements: their water pulses are those of the others upside down."""
+"""Inverted polarity: elements whose water pulses have the opposite sign."""
 
 from __future__ import annotations
 
@@ -10,29 +10,28 @@ from ...arrays import Floats
 from ..dataset import Dataset
 from .finding import Finding, Role
 
-# Periods before and after the crest of the envelope that are compared.
+# Periods before and after the maximum of the envelope that are compared.
 REACH = 1.0
 
-# Part of an element's pulses that must be upside down.
+# Fraction of an element's pulses that must be inverted.
 MOST = 0.6
 
-# Pulses that an element must have for that.
+# Fewest pulses of an element for a decision.
 FEWEST = 4
 
 
-def polarity(dataset: Dataset, strongest_s: Floats) -> list[Finding]:
-    """Elements to turn over, in emission and in reception.
+def find_inverted(dataset: Dataset, strongest_s: Floats) -> list[Finding]:
+    """Find elements with inverted polarity, in emission and in reception.
 
-    Pulses are compared about the crests of their envelopes: these do not turn over with the pulse, and move
-    with an element that stands elsewhere than drawn.
+    Pulses are aligned at the maxima of their envelopes, which do not depend on polarity or position errors.
 
     Args:
         dataset: of one slice, with water traces, channels in their places, and a centre frequency.
-        strongest_s: (ntx, nrx), times of the crests; NaN where there is none.
+        strongest_s: (ntx, nrx), times of the maxima; NaN where there is none.
     """
     sign = _signs(dataset, strongest_s)
     findings = []
-    # An inverted receiver must not turn the emitters over, so both are found in turn.
+    # Alternate, so that an inverted receiver does not make the emitters appear inverted.
     emission, reception = np.ones(len(dataset.tx)), np.ones(len(dataset.rx))
     for _ in range(4):
         emission = _majority(sign * reception[None, :], 1)
@@ -60,14 +59,14 @@ def polarity(dataset: Dataset, strongest_s: Floats) -> list[Finding]:
 
 
 def _signs(dataset: Dataset, strongest_s: Floats) -> Floats:
-    """(ntx, nrx): likeness with the median pulse, from -1 to 1; NaN where there is no pulse to compare."""
+    """(ntx, nrx): correlation with the median pulse, from -1 to 1; NaN without a pulse."""
     assert dataset.waveform is not None
     assert dataset.waveform.water is not None
     assert dataset.sampling_rate_hz is not None
     assert dataset.center_frequency_hz is not None
     period = dataset.sampling_rate_hz / dataset.center_frequency_hz
     reach = math.ceil(REACH * period)
-    # Traces without a crest are not compared; any place will do.
+    # Traces without a maximum are not compared; any position will do.
     place = np.where(np.isfinite(strongest_s), strongest_s, dataset.t0_s) - dataset.t0_s
     place *= dataset.sampling_rate_hz
     nt = dataset.waveform.water.shape[-1]
@@ -94,7 +93,7 @@ def _signs(dataset: Dataset, strongest_s: Floats) -> Floats:
 
 
 def _majority(sign: Floats, axis: int) -> Floats:
-    """-1 for rows (axis 1) or columns (axis 0) of which most are upside down, else 1."""
+    """-1 for rows (axis 1) or columns (axis 0) of which most are inverted, else 1."""
     known = np.isfinite(sign)
     down = ((sign < -0.3) & known).sum(axis=axis) / np.maximum(known.sum(axis=axis), 1)
     return np.where((down > MOST) & (known.sum(axis=axis) >= FEWEST), -1.0, 1.0)

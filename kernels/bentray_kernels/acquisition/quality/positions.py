@@ -1,4 +1,4 @@
-"""Elements that stand elsewhere than drawn: water times that are off, alike in both directions."""
+"""Wrong element positions: water times that deviate equally in both directions."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from ..dataset import Dataset
 from .finding import Finding
 from .water_line import WaterLine
 
-# They may be off by this part of a wavelength. Noise-free pulses, and simulated waves, show a fiftieth.
+# Largest accepted deviation, wavelengths. Noise-free and simulated pulses have a fiftieth.
 LARGEST_OFF = 0.05
 
-# Pairs that were heard both ways, at least.
+# Fewest pairs with times in both directions.
 FEWEST = 20
 
 
-def positions(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list[Finding]:
-    """What the water's times are off the places of the elements, beyond their noise.
+def find_displaced(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list[Finding]:
+    """Find water times that deviate from the element positions by more than their noise.
 
-    An element that stands elsewhere, or is late, is so as emitter and as receiver; noise is not the same when
-    the two change places. So half the sum of both directions holds both, half the difference noise alone.
+    A position error or delay of an element is the same in emission and reception; noise is not. So half the
+    sum of both directions contains both, half the difference only noise.
 
     Args:
         dataset: of one slice, channels in their places, with a centre frequency.
-        strongest_s: (ntx, nrx), times of the water's crests; NaN where there is none.
+        strongest_s: (ntx, nrx), times of the water maxima; NaN where there is none.
         line: through them.
     """
     assert dataset.center_frequency_hz is not None

@@ -1,4 +1,4 @@
-"""What the traces of a slice show before times are read from them: faults of traces, channels and clock."""
+"""Checks of the traces of a slice before picking: faults of traces, channels and clock."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 from ...arrays import Flags, Floats
 from ..dataset import Dataset
-from .broken import broken, clipped
-from .correction import apply, exchange
-from .dead import dead
+from .broken import find_broken, find_clipped
+from .correction import apply, exchange_order
+from .dead import find_dead
 from .finding import Finding
 from .measures import Measures
-from .polarity import polarity
-from .positions import positions
+from .polarity import find_inverted
+from .positions import find_displaced
 from .sampling import frequency, sampling
-from .swapped import swapped
-from .time_zero import recording
+from .swapped import find_swapped
+from .time_zero import find_recording_shift
 from .water_line import WaterLine
 
 OF_TRACES = ("values", "constant traces", "clipping", "dead elements")
@@ -34,7 +34,7 @@ OF_WATER = (
 
 
 class Measured(NamedTuple):
-    """Figures of the traces of some emissions; None of a scan that is not there."""
+    """Measures of the traces of some emissions; None for a missing scan."""
 
     water: Measures | None
     object: Measures
@@ -43,7 +43,7 @@ class Measured(NamedTuple):
     def of(
         cls, dataset: Dataset, emissions: Sequence[int], done: Callable[[], None] = lambda: None
     ) -> Measured:
-        """Of one slice with traces, which may be ``Emissions``; ``done`` is called after each of a scan."""
+        """Measure a slice with traces, which may be ``Emissions``; ``done`` is called after each emission."""
         assert dataset.waveform is not None
 
         def read(traces: Any) -> Iterator[NDArray[Any]]:
@@ -60,12 +60,12 @@ class Measured(NamedTuple):
 
     @classmethod
     def joined(cls, parts: Sequence[Measured]) -> Measured:
-        """Of all emissions, from those of some each."""
+        """Concatenate the measures of parts of the emissions."""
         water = [part.water for part in parts if part.water is not None]
         return cls(Measures.joined(water) if water else None, Measures.joined([p.object for p in parts]))
 
 
-def judged(dataset: Dataset, measured: Measured) -> tuple[list[Finding], tuple[str, ...]]:
+def check_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], tuple[str, ...]]:
     """Findings of the traces, in the order in which they are applied, and the names of the checks made.
 
     Args:
@@ -83,7 +83,7 @@ def judged(dataset: Dataset, measured: Measured) -> tuple[list[Finding], tuple[s
 
 
 def _unpickable(dataset: Dataset) -> Finding | None:
-    """Why no times can be read from the traces, if so."""
+    """A finding if the traces cannot be picked."""
     assert dataset.waveform is not None
     if dataset.waveform.water is None:
         return Finding("water shot", "none", "the same scan without the object, or travel times", "refused")
@@ -93,16 +93,16 @@ def _unpickable(dataset: Dataset) -> Finding | None:
 
 
 def _of_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], Floats | None]:
-    """Faults that a trace shows by itself, in both scans, and the times of the water's crests."""
+    """Faults of single traces in both scans, and the times of the water maxima."""
     findings: list[Finding] = []
     for which, measures in (("water", measured.water), ("object", measured.object)):
         if measures is None:
             continue
         if which == "water" or measured.water is None:
-            findings += dead(dataset, measures.heard)
-        left_out = _left_out(findings, measures.heard)
-        findings += broken(dataset, measures, which, left_out)
-        findings += clipped(dataset, measures, which)
+            findings += find_dead(dataset, measures.detected)
+        left_out = _left_out(findings, measures.detected)
+        findings += find_broken(dataset, measures, which, left_out)
+        findings += find_clipped(dataset, measures, which)
     if measured.water is None:
         return findings, None
     valid, strongest = apply(dataset, findings).valid, _whole_crests(measured.water)
@@ -110,9 +110,10 @@ def _of_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], Flo
 
 
 def _whole_crests(water: Measures) -> Floats:
-    """Times of the crests, (ntx, nrx), s: where most pulses are whole, without those that were cut off.
+    """Times of the maxima, (ntx, nrx), s; where most pulses are complete, without clipped ones.
 
-    A cut crest is off by a part of a period, and near pairs are cut, for they are loud: the line would lean.
+    Clipped maxima are off by a fraction of a period, and strong near pairs are clipped: the fit of the line
+    would be biased.
     """
     whole = np.where(water.clipped, np.nan, water.strongest_s)
     most = 2 * np.isfinite(whole).sum() >= np.isfinite(water.strongest_s).sum()
@@ -120,20 +121,22 @@ def _whole_crests(water: Measures) -> Floats:
 
 
 def _of_water(dataset: Dataset, strongest: Floats) -> list[Finding]:
-    """Faults that the water shot shows against the geometry."""
+    """Faults of the water shot with respect to the geometry."""
     line = WaterLine.of(dataset, strongest)
     if line is None:
         return [Finding("water shot", "hardly a pulse in it", "pulses that crossed the water", "refused")]
     findings = sampling(dataset, line) + frequency(dataset)
     if findings or dataset.center_frequency_hz is None:
         return findings
-    exchanged = swapped(dataset, strongest, line)
+    exchanged = find_swapped(dataset, strongest, line)
     for finding in exchanged:
-        # The crests of the channels in their places.
-        order, axis = exchange(dataset, finding)
+        # The maxima after the exchange of channels.
+        order, axis = exchange_order(dataset, finding)
         strongest = np.take(strongest, order, axis=axis)
-    inverted = polarity(apply(dataset, exchanged), strongest)
-    return exchanged + inverted + recording(dataset, line) + positions(dataset, strongest, line)
+    inverted = find_inverted(apply(dataset, exchanged), strongest)
+    return (
+        exchanged + inverted + find_recording_shift(dataset, line) + find_displaced(dataset, strongest, line)
+    )
 
 
 def _left_out(findings: list[Finding], like: Flags) -> Flags:

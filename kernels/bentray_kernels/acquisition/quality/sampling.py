@@ -1,4 +1,4 @@
-"""The sampling rate against the water's speed, the centre frequency against the spectrum."""
+"""Checks of the sampling rate against the water speed, and of the centre frequency against the spectrum."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from ..dataset import Dataset
 from .finding import Finding
 from .water_line import WaterLine
 
-# Water, radius and clock together may be off by this part before a picture would be wrong throughout.
+# Largest accepted relative error of water speed, radius and clock together.
 LARGEST_SPEED_ERROR = 0.02
 
-# The centre frequency may be off by this factor before the windows of the pickers no longer fit.
+# Largest accepted factor between stated and measured centre frequency: the windows of pickers depend on it.
 LARGEST_FREQUENCY_FACTOR = 1.6
 
-# Emissions that the spectrum is averaged over.
+# Emissions averaged for the spectrum.
 EMISSIONS = 8
 
 
 def sampling(dataset: Dataset, line: WaterLine) -> list[Finding]:
-    """A clock, a geometry or a water that contradict each other: the scan is refused, nothing says which."""
+    """Inconsistent sampling rate, geometry or water speed: the scan is rejected."""
     ratio = line.speed_mps / dataset.water_speed_mps
     if abs(ratio - 1.0) <= LARGEST_SPEED_ERROR:
         return []
@@ -37,7 +37,7 @@ def sampling(dataset: Dataset, line: WaterLine) -> list[Finding]:
 
 
 def frequency(dataset: Dataset) -> list[Finding]:
-    """A centre frequency that the spectrum of the water traces does not have."""
+    """A centre frequency that differs from the spectrum of the water traces."""
     assert dataset.waveform is not None
     assert dataset.sampling_rate_hz is not None
     traces = dataset.waveform.water if dataset.waveform.water is not None else dataset.waveform.object
@@ -53,7 +53,7 @@ def frequency(dataset: Dataset) -> list[Finding]:
     if not power.any():
         return []
     of_power = np.fft.rfftfreq(traces.shape[-1], 1.0 / dataset.sampling_rate_hz)
-    # White noise lies under all frequencies alike; most of them hold nothing else.
+    # The median is the level of white noise: most frequencies contain nothing else.
     power = np.maximum(power - np.median(power), 0.0)
     strong = power >= 0.1 * power.max()
     middle = float((of_power * power)[strong].sum() / power[strong].sum())

@@ -1,4 +1,4 @@
-"""Swapped channels: two elements whose water times fit each other's places."""
+"""Swapped channels: two elements whose water times fit each other's positions."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from ..dataset import Dataset
 from .finding import Finding, Role
 from .water_line import WaterLine
 
-# An element is suspected when its times scatter by this part of a period, and so many times the usual.
+# An element is suspected if the deviations of its times exceed this fraction of a period and this multiple of
+# the usual deviation.
 SUSPECT_PERIODS = 0.15
 SUSPECT_TIMES = 4.0
 
-# Exchanged, both must scatter by less than this part of what they did.
+# After an exchange, the deviations of both must fall below this fraction of the previous ones.
 BETTER = 0.4
 
 
-def swapped(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list[Finding]:
-    """Pairs of channels to put back, first of receivers, then of emitters.
+def find_swapped(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list[Finding]:
+    """Find pairs of swapped channels, first receivers, then emitters.
 
     Args:
         dataset: of one slice, with a centre frequency.
@@ -57,7 +58,7 @@ def _period(dataset: Dataset) -> float:
 
 
 def _exchanged(times: Floats, expected: Floats, period: float) -> list[tuple[int, int, float]]:
-    """Columns (a, b) to exchange, and how they scatter now."""
+    """Columns (a, b) to exchange, and their present deviation."""
     own = np.array([_scatter(times[:, r] - expected[:, r]) for r in range(times.shape[1])])
     known = np.isfinite(own)
     if not known.any():
@@ -79,6 +80,6 @@ def _exchanged(times: Floats, expected: Floats, period: float) -> list[tuple[int
 
 
 def _scatter(off: Floats) -> float:
-    """Median size of what an element's times are off; NaN where few are known."""
+    """Median absolute deviation of an element's times; NaN where few are known."""
     off = off[np.isfinite(off)]
     return float(np.median(np.abs(off))) if off.size >= 4 else np.nan

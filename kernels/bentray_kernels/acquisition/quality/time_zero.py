@@ -1,4 +1,4 @@
-"""Time zero: of the recording, by the water's straight line; of the object's scan, by chords that miss it."""
+"""Time zero of the recording, from the water line, and of the object scan, from unobstructed pairs."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from .water_line import WaterLine
 RECORDING = "time zero of the recording"
 OBJECT = "time zero of the object scan"
 
-# Periods that the water's strongest swing may lie off the straight time: pickers look a little further.
+# Largest accepted delay of the water maximum, periods: the windows of pickers are a little wider.
 LARGEST_DELAY = 3.0
 
-# Chords that stay this part of the array's radius away from its centre are taken to miss the object.
+# Pairs whose chord stays this fraction of the radius away from the centre are assumed to miss the object.
 OUTSIDE = 0.88
 FEWEST = 12
 
-# Their median may be off zero by this part of a period; without a frequency, by this time, s.
+# Largest accepted median of their times, fraction of a period; without a frequency, s.
 LARGEST_OFFSET = 0.1
 LARGEST_OFFSET_S = 5e-8
 
 
-def recording(dataset: Dataset, line: WaterLine) -> list[Finding]:
-    """A start of the recording that is wrong by more than the pulse's own delay can be."""
+def find_recording_shift(dataset: Dataset, line: WaterLine) -> list[Finding]:
+    """Find a start of the recording that deviates by more than the delay of the pulse."""
     assert dataset.center_frequency_hz is not None
     if abs(line.intercept_s) <= LARGEST_DELAY / dataset.center_frequency_hz:
         return []
@@ -41,8 +41,8 @@ def recording(dataset: Dataset, line: WaterLine) -> list[Finding]:
     ]
 
 
-def object_scan(dataset: Dataset, delta: Floats) -> list[Finding]:
-    """A trigger that came earlier or later with the object than without: all times are off by as much.
+def find_time_shift(dataset: Dataset, delta: Floats) -> list[Finding]:
+    """Find a trigger offset of the object scan, which shifts all times equally.
 
     Args:
         dataset: of one slice.
@@ -70,7 +70,7 @@ def object_scan(dataset: Dataset, delta: Floats) -> list[Finding]:
 
 
 def _outside(dataset: Dataset) -> np.ndarray:
-    """(ntx, nrx): pairs whose chord stays near the rim; none where the array is no ring about its middle."""
+    """(ntx, nrx): pairs whose chord stays near the ring; none where the array is not a ring."""
     place = dataset.element_position_m[:, :2]
     centre = 0.5 * (place.min(axis=0) + place.max(axis=0))
     a = (place - centre)[dataset.tx][:, None, :]

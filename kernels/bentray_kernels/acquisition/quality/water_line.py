@@ -1,4 +1,4 @@
-"""Time against distance in water: the line that tells sampling rate and time zero, and what lies off it."""
+"""Line fit of time over distance in water: sampling rate, time zero, and residuals."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays import Floats
 from ..dataset import Dataset
 
-# Rounds of a straight line through the points within four robust deviations of the last one.
+# Iterations of a line fit to the points within four robust deviations of the previous line.
 ROUNDS = 6
 FEWEST = 8
 
@@ -20,8 +20,8 @@ class WaterLine:
 
     Attributes:
         speed_mps: apparent speed of the water.
-        intercept_s: delay of the crest behind the straight time, the pulse's own included.
-        residual_s: (ntx, nrx), from the line of the water's stated speed, the median taken off.
+        intercept_s: delay of the maximum after the straight time, including that of the pulse.
+        residual_s: (ntx, nrx), from the line of the stated water speed, minus the median.
     """
 
     speed_mps: float
@@ -30,7 +30,7 @@ class WaterLine:
 
     @classmethod
     def of(cls, dataset: Dataset, strongest_s: Floats) -> WaterLine | None:
-        """The line through the water's crests; None where too few were heard.
+        """The line through the water maxima; None with too few of them.
 
         Args:
             dataset: of one slice.

@@ -1,1 +1,1 @@
-"""Simulated scans of phantoms: travel times and attenuation, in a plane and of a volume."""
+"""Simulated scans of phantoms: travel times and attenuation, in 2-D and 3-D."""

@@ -18,8 +18,8 @@ def log_ratios(
 ) -> Floats:
     """ln(A_water / A_object) of the arrivals from one source (the data of phase 2, chapter 6.3).
 
-    Absorption alone: ∫ α ds along the bent ray less α_water times the straight distance. What refraction
-    adds by focusing the wave is left out.
+    Absorption only: ∫ α ds along the bent ray minus α_water times the straight distance. Focusing by
+    refraction is not included.
 
     Args:
         tof: (nx, ny[, nz]), s, from the source.

@@ -1,4 +1,4 @@
-"""What a simulated wave crosses: speed and attenuation on a fine grid, and what arrives through them."""
+"""Medium of a simulated scan: speed and attenuation on a fine grid, and the arrivals through them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class FineMedium:
     Attributes:
         speed: (nx, ny[, nz]), m/s.
         spacing: node spacing, m.
-        coupling_mps: speed of the water that the object replaces, m/s.
-        attenuation: as ``speed``, Np/m; None where amplitudes are not asked for.
+        coupling_mps: speed of the coupling water, m/s.
+        attenuation: as ``speed``, Np/m; None without amplitudes.
         coupling_np_m: attenuation of that water, Np/m.
     """
 
@@ -31,10 +31,10 @@ class FineMedium:
     coupling_np_m: float = 0.0
 
     def arrivals(self, elements: Floats, emitters: Ints) -> tuple[Floats, Floats | None]:
-        """What every element receives from some of them.
+        """Arrivals at every element from some of them.
 
-        The wave front marches by the heap (``hafmm``) and is read off the grid itself; inversions
-        here sweep and integrate along rays.
+        Travel times are those of ``hafmm``, interpolated on the grid; inversions use other solvers and
+        integrate along rays.
 
         Args:
             elements: (n, ndim), m, in the grid.
@@ -61,7 +61,7 @@ class FineMedium:
 
 
 def read(tof: Floats, spacing: float, source: Floats, points: Floats) -> Floats:
-    """Travel time between the nodes: T divided by the distance is smooth, so that is what is interpolated.
+    """Travel time between the nodes: T over the distance is smooth, and is interpolated.
 
     Args:
         tof: (nx, ny[, nz]), s.

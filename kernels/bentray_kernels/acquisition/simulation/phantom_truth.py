@@ -1,4 +1,4 @@
-"""What a phantom really is, for comparison with its image."""
+"""True values of a phantom, for comparison with its image."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Truth:
-    """What a phantom really is, on nodes ``origin_m + index * spacing_m`` in (x, y[, z]) order."""
+    """True values of a phantom, on nodes ``origin_m + index * spacing_m`` in (x, y[, z]) order."""
 
     sound_speed_mps: Floats
     spacing_m: tuple[float, ...]

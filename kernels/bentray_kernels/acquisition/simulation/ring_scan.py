@@ -1,4 +1,4 @@
-"""Ring scans of a phantom, made on a finer grid with another scheme than any inversion here uses."""
+"""Simulated ring scans of a phantom, on a finer grid and with another scheme than the inversions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Ring:
     """Equally spaced elements on a circle, each emitter and receiver.
 
     Attributes:
-        elements: how many.
+        elements: their number.
         radius_m: of the circle, m.
     """
 
@@ -38,15 +38,15 @@ class Ring:
 
 @dataclass(frozen=True)
 class TravelTimeScan:
-    """A scan to simulate: what, by which ring, how finely.
+    """A scan to simulate: phantom, ring and grid.
 
     Attributes:
-        phantom: sampled afresh on the fine grid, never interpolated from a coarse one.
+        phantom: sampled on the fine grid, not interpolated from a coarse one.
         ring: the elements.
         side_m: side of the square that holds both, m.
         nodes: nodes along the side of the grid that a reconstruction will use.
-        refinement: how many times finer the simulation is; at least 4, so that the inversion's own
-            discretisation cannot hide in the data.
+        refinement: factor between the grids; at least 4, so that the data do not contain the discretisation
+            error of the inversion.
     """
 
     phantom: EllipsePhantom | PhantomSlice

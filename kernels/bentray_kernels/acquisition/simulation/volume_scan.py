@@ -1,4 +1,4 @@
-"""Scans of a volume by a ring at several heights: wave fronts in each plane, or in space."""
+"""Simulated scans of a volume by a ring at several heights: 2-D wave fronts in each plane, or 3-D."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...phantoms import VolumePhantom
 from .fine_medium import FineMedium
 from .ring_scan import Ring, TravelTimeScan
 
-# Nodes of the coarse grid kept above the highest ring and below the lowest, for rays that leave the planes.
+# Nodes of the coarse grid above the highest ring and below the lowest, for rays that leave the planes.
 AXIAL_MARGIN_NODES = 3
 
 
@@ -22,14 +22,14 @@ class VolumeScan:
     """A ring moved along z, or as many rings at once (section 7.1).
 
     Attributes:
-        phantom: sampled afresh on the fine grid.
+        phantom: sampled on the fine grid.
         ring: the elements at each height.
-        z_m: heights of the ring, m, rising.
+        z_m: heights of the ring, m, ascending.
         side_m: side of the square that holds phantom and ring, m.
         nodes: nodes along the side of the grid that a reconstruction will use.
-        refinement: how many times finer the simulation is: at least 4 in planes, 2 in space, where each
-            doubling costs more than ten times the work.
-        three_d: wave fronts in space; else each plane is a world of its own.
+        refinement: factor between the grids: at least 4 in 2-D, 2 in 3-D, where each doubling costs more than
+            ten times the work.
+        three_d: 3-D wave fronts; else the planes are independent.
     """
 
     phantom: VolumePhantom
@@ -57,7 +57,7 @@ class VolumeScan:
             )
 
     def slice(self, index: int) -> TravelTimeScan:
-        """The scan of one plane as a world of its own."""
+        """The independent scan of one plane."""
         return TravelTimeScan(
             self.phantom.at(self.z_m[index]), self.ring, self.side_m, self.nodes, self.refinement
         )
@@ -88,6 +88,6 @@ class VolumeScan:
         coarse = self.side_m / (self.nodes - 1)
         first = self.z_m[0] - AXIAL_MARGIN_NODES * coarse
         height = self.z_m[-1] - self.z_m[0] + 2 * AXIAL_MARGIN_NODES * coarse
-        # A height that is a multiple of the spacing up to rounding needs no further plane.
+        # A height that is a multiple of the spacing within rounding needs no additional plane.
         steps = math.ceil(height * self.refinement / coarse - 1e-6)
         return np.asarray(first + np.arange(steps + 1) * (coarse / self.refinement))

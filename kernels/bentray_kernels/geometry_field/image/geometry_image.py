@@ -1,4 +1,4 @@
-"""Geometry images: a surface as a square picture of positions, with its normals and colours."""
+"""Geometry images: a surface as a square image of positions, with normals and colours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which point of a surface each pixel of a chart stands for."""
+"""Rasterisation of a chart: the surface point of each pixel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A geometry image as a mesh again: pixels joined to the seam, and the sides of the seam to each other."""
+"""Stitching of a geometry image into a mesh: pixels to the seam, and both sides of the seam."""
 
 from __future__ import annotations
 

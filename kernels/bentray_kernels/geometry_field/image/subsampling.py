@@ -1,4 +1,4 @@
-"""How few pixels a geometry image may have: halved until it departs too far from the surface."""
+"""Subsampling of geometry images: the resolution is halved until the geometric error is too large."""
 
 from __future__ import annotations
 

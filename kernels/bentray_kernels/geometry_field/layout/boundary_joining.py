@@ -1,4 +1,4 @@
-"""Boundaries joined by short cuts: afterwards a surface without handles has one boundary, and is a disk."""
+"""Short cuts between boundaries, after which a surface without handles is a disk."""
 
 from __future__ import annotations
 

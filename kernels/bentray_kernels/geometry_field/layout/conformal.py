@@ -1,4 +1,4 @@
-"""Conformal maps of a disk-like mesh to the plane, steered by the curvature of its boundary.
+"""Conformal flattening of a disk-like mesh with prescribed boundary curvature.
 
 Sawhney and Crane, "Boundary first flattening" (2017). With A the stiffness matrix of linear elements (the
 cotangent Laplacian, positive), a metric scaled by e^2u is flat where A·u = −K inside, K the angle defect, and
@@ -109,7 +109,7 @@ class Disk:
         return np.asarray(2.0 * np.pi * share / share.sum())
 
     def layout(self, turning: Floats) -> Floats:
-        """The flat layout whose boundary turns as told.
+        """The flat layout with the given boundary turning.
 
         Args:
             turning: (boundary,) rad, 2π together.
@@ -137,7 +137,7 @@ class Disk:
 
 
 def closed_curve(turning: Floats, lengths: Floats, weights: Floats) -> Floats:
-    """Corners of a polygon that turns as told, its sides changed as little as closing it takes.
+    """Corners of a closed polygon with the given turning and the least change of its sides.
 
     Args:
         turning: (n,) rad at each corner.

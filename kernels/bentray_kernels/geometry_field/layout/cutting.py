@@ -1,4 +1,4 @@
-"""Where to cut a surface open: through its handles, and out to where a flat layout would shrink it most."""
+"""Cuts of a surface: through its handles, and to the points of strongest shrinkage in the flat layout."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a flat layout of triangles distorts them: area, shape, flips, overlap."""
+"""Distortion of flat layouts: area, shape, flipped triangles, overlap."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Flat layouts that no triangle can spoil: what is left when a conformal one folds."""
+"""Tutte embedding: fold-free flat layouts for meshes whose conformal layout folds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A flat layout turned and scaled so that it fills the unit square as well as it can."""
+"""Rotation and scaling of a flat layout to fill the unit square."""
 
 from __future__ import annotations
 

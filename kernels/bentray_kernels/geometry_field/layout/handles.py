@@ -1,4 +1,4 @@
-"""Short loops through the handles of a surface: cut along them, it has no handle left."""
+"""Handle cutting: short loops through all handles of a surface."""
 
 from __future__ import annotations
 

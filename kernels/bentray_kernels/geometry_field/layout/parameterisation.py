@@ -1,4 +1,4 @@
-"""Charts: a surface cut to a disk and laid out on the unit square, keeping its angles."""
+"""Conformal parameterisation: a surface is cut to a disk and flattened onto the unit square."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ROUNDINGS = (0.03, 0.1, 0.25, 0.5, 1.0)
 
 @dataclass(frozen=True)
 class Parameterisation:
-    """A chart and what is known of it.
+    """A chart and its distortion.
 
     Attributes:
         chart: the mesh in the unit cube, and its layout.

@@ -1,31 +1,32 @@
-"""Where rays meet a mesh, from its outer field: the entry nearest to the ray, made accurate by its face.
+"""Accurate lookup in the outer field: a walk from the face of the nearest entry to the face that a ray hits.
 
-The entry gives the face that a ray close by meets, or just misses. The ray is cut with the plane of that
-face, and, where the point lies beside the face, with the planes of its neighbours in turn: mostly it ends in
-the face that the ray really meets, and the answer is exact. A walk that ends never tells a hit that is none.
+The entry gives the face that a nearby ray hits or just misses. The ray is intersected with the plane of that
+face and, if the point lies outside the face, with the planes of its neighbours: mostly the walk ends at the
+face that the ray really hits, and the result is exact. A completed walk never reports a false hit.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from ...arrays import Float32s, Int32s
 from ...compiled import kernel
 from ...float32 import real
 from ...meshes.face_plane import Meeting, beyond, meet_plane
-from ...meshes.surface import Reals, Surface, Words
+from ...meshes.surface import Surface
 from .cube import line_of, number_at
-from .outer_field import OuterField, beside
+from .outer_field import OuterField, boundary_face
 
 # Weights this far below 0 still lie in a face: float32 leaves gaps between faces otherwise.
 SLACK = real(1e-5)
 
-# The entry of a sample and itself: no line through the cube has it, so it stands for rays that miss.
+# The entry of a sample and itself, which no line through the cube has: it represents rays that miss.
 NOTHING = 0
 
-# Rays in flight: their loads from memory overlap.
+# Rays processed together, so that their memory loads overlap.
 TOGETHER = 256
 
-# Steps to neighbours: more help none of 10,000 rays of a mesh of 75,000 faces.
+# Most steps to neighbours; more do not change any of 10,000 rays on a mesh of 75,000 faces.
 STEPS = 32
 
 
@@ -42,7 +43,7 @@ def settle(
     dy: float,
     dz: float,
 ) -> tuple[int, float, float, float]:
-    """Walk from a face to the one that a ray meets.
+    """Walk from a face to the one that a ray hits.
 
     Args:
         surface: ``surface_of``.
@@ -74,12 +75,12 @@ def settle(
 def find(
     surface: Surface,
     field: OuterField,
-    origins: Reals,
-    directions: Reals,
+    origins: Float32s,
+    directions: Float32s,
     steps: int,
-    faces: Words,
-    distances: Reals,
-    weights: Reals,
+    faces: Int32s,
+    distances: Float32s,
+    weights: Float32s,
 ) -> None:
     """The first face on each of many rays that begin outside the cube or on it.
 
@@ -102,13 +103,13 @@ def find(
         enter(field.samples, origins, directions, start, place[:rays], near, far)
         still = 0
         for k in range(rays):
-            r, face = start + k, beside(tables[place[k]])
+            r, face = start + k, boundary_face(tables[place[k]])
             faces[r], distances[r], weights[0, r], weights[1, r] = -1, np.inf, 0.0, 0.0
             going[still], at[still] = k, face
             still += face >= 0
         for _ in range(steps + 1):
             left, still = still, 0
-            # One loop that computes alike for all rays, in vectors; one that sorts those out which go on.
+            # A vectorised loop over all rays, then a loop that selects the rays that continue.
             for i in range(left):
                 k = going[i]
                 a, first, second, third, determinant = meet(
@@ -133,7 +134,7 @@ def find(
 
 @kernel(inline="always")
 def enter(
-    n: int, origins: Reals, directions: Reals, start: int, place: Words, near: Reals, far: Reals
+    n: int, origins: Float32s, directions: Float32s, start: int, place: Int32s, near: Float32s, far: Float32s
 ) -> None:
     """Entries, or ``NOTHING``, and distances at which the cube begins and ends, of rays from ``start`` on."""
     count = 6 * n * n
@@ -148,7 +149,9 @@ def enter(
 
 
 @kernel(inline="always")
-def meet(triangles: Reals, face: int, origins: Reals, directions: Reals, near: float, r: int) -> Meeting:
+def meet(
+    triangles: Float32s, face: int, origins: Float32s, directions: Float32s, near: float, r: int
+) -> Meeting:
     """``meet_plane`` for ray r, from where it enters the cube at the distance ``near``."""
     dx, dy, dz = directions[0, r], directions[1, r], directions[2, r]
     sx, sy, sz = origins[0, r] + near * dx, origins[1, r] + near * dy, origins[2, r] + near * dz

@@ -1,4 +1,4 @@
-"""Cells of a table in which linear interpolation means something: those whose sixteen entries agree.
+"""Cells of a table that allow linear interpolation: those whose 16 entries agree.
 
 Entries agree when all of them meet the mesh, and at about the same distance.
 """
@@ -12,17 +12,17 @@ from ...compiled import kernel
 from ...float32 import real
 from .outer_field import OuterField
 
-# Entries agree when their places differ by at most so many distances of samples.
+# Entries agree if their positions differ by at most this many sample distances.
 APART = 3.0
 
-# What is known of the sixteen entries: none meets the mesh; all do, and agree; anything else.
+# State of the 16 entries: none hits the mesh; all do, and agree; anything else.
 NONE, AGREE, MIXED = 0, 1, 2
 
 
 def agreement(field: OuterField) -> NDArray[np.uint8]:
-    """``NONE``, ``AGREE`` or ``MIXED`` for the sixteen entries from each one on, (6n², 6n²) uint8.
+    """``NONE``, ``AGREE`` or ``MIXED`` for the 16 entries from each one on, (6n², 6n²) uint8.
 
-    The last samples of each face of the cube begin no sixteen; no lookup asks for theirs.
+    The last samples of each face of the cube have no following ones; no lookup uses them.
     """
     known = np.full(field.faces.shape, MIXED, dtype=np.uint8)
     _compare(field, real(APART / field.samples), known)

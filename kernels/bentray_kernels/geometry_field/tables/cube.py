@@ -1,4 +1,4 @@
-"""The samples of the unit cube's surface, in which lines through it are numbered, and where a ray meets it.
+"""Samples of the unit cube's surface, which index the lines through it, and its intersection with rays.
 
 Face k = 2a + b is the one across axis a at coordinate b; its x and y are the two other axes in their order.
 Each face has n² samples at the middles of its squares. A sample (x, y) of face k stands in a rectangle of

@@ -1,4 +1,4 @@
-"""The inner geometry field: what rays meet that leave the surface itself, to its inside or outside.
+"""The inner geometry field: the first hit of rays that leave the surface, to its inside or outside.
 
 Dissertation, section 5.2.2, names such a ray by the two points (s, t) of the surface between which it runs;
 but t is what is sought. Here s is one of the points spread over the surface, and t the sample of the cube by
@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, Int32s
 from ...compiled import kernel
 from ...errors import InvalidInput
 from ...meshes.intersector import WAITING, closest
-from ...meshes.surface import Surface, Words
+from ...meshes.surface import Surface
 from .cube import check_samples, samples
 
 
@@ -32,11 +32,11 @@ class InnerField(NamedTuple):
     """
 
     samples: int
-    starts: Words
-    faces: Words
+    starts: Int32s
+    faces: Int32s
 
 
-def spread_points(surface: Surface, divisions: int) -> tuple[Words, Words]:
+def spread_points(surface: Surface, divisions: int) -> tuple[Int32s, Int32s]:
     """Faces whose middles stand for all of the surface: one for each side of it in each small cube.
 
     Args:
@@ -67,7 +67,7 @@ def spread_points(surface: Surface, divisions: int) -> tuple[Words, Words]:
     return by_point[first].astype(np.int32), starts.astype(np.int32)
 
 
-def build_inner_rows(surface: Surface, n: int, points: Words) -> Words:
+def build_inner_rows(surface: Surface, n: int, points: Int32s) -> Int32s:
     """Rows of the table for some of the points: batches of them can be tasks of their own.
 
     Args:
@@ -87,7 +87,7 @@ def build_inner_rows(surface: Surface, n: int, points: Words) -> Words:
     return faces
 
 
-def inner_field(n: int, starts: Words, batches: list[Words]) -> InnerField:
+def inner_field(n: int, starts: Int32s, batches: list[Int32s]) -> InnerField:
     """Batches of rows, in order, as one table.
 
     Args:
@@ -106,7 +106,7 @@ def inner_field(n: int, starts: Words, batches: list[Words]) -> InnerField:
 
 
 @kernel
-def _fill_rows(surface: Surface, points: Words, places: Floats, faces: Words) -> None:
+def _fill_rows(surface: Surface, points: Int32s, places: Floats, faces: Int32s) -> None:
     waiting = np.empty(WAITING, dtype=np.int32)
     for row in range(len(points)):
         corners = surface.triangles[points[row]]

@@ -1,7 +1,7 @@
-"""The outer geometry field: for every pair of samples of the cube, what the ray between them meets.
+"""The outer geometry field: the first hit of the ray between every pair of samples of the cube.
 
-Dissertation, sections 5.2.2 and 5.3.3. The table keeps a face and a place on the ray, not (u, v): these
-follow from the face, and where two entries lie on two faces nothing is averaged that belongs apart.
+Dissertation, sections 5.2.2 and 5.3.3. The table contains a face and a position on the ray instead of (u, v),
+which follow from the face: so values of different faces are never averaged.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Float32s, Floats, Int32s
 from ...compiled import kernel
 from ...errors import InvalidInput
 from ...meshes.intersector import WAITING, closest
-from ...meshes.surface import Reals, Surface, Words
+from ...meshes.surface import Surface
 from .cube import check_samples, samples
 
 
@@ -24,16 +24,16 @@ class OuterField(NamedTuple):
     Attributes:
         samples: n along an edge of the cube.
         faces: (6n², 6n²) int32 by entry and exit: rows of ``Surface.triangles``; −1 where the ray meets none,
-            and −2 − f where a neighbouring entry meets the face f: ``beside`` tells it.
+            and −2 − f where a neighbouring entry meets the face f: ``boundary_face`` tells it.
         fractions: (6n², 6n²) float32: of the way from entry to exit, 1 where the ray meets none.
     """
 
     samples: int
-    faces: Words
-    fractions: Reals
+    faces: Int32s
+    fractions: Float32s
 
 
-def build_rows(surface: Surface, n: int, first: int, last: int) -> tuple[Words, Reals]:
+def build_rows(surface: Surface, n: int, first: int, last: int) -> tuple[Int32s, Float32s]:
     """Rows ``first`` to ``last`` − 1 of the table: batches of them can be tasks of their own.
 
     Args:
@@ -56,7 +56,7 @@ def build_rows(surface: Surface, n: int, first: int, last: int) -> tuple[Words, 
     return faces, fractions
 
 
-def outer_field(n: int, batches: list[tuple[Words, Reals]]) -> OuterField:
+def outer_field(n: int, batches: list[tuple[Int32s, Float32s]]) -> OuterField:
     """Batches of rows, in order, as one table.
 
     Raises:
@@ -71,14 +71,14 @@ def outer_field(n: int, batches: list[tuple[Words, Reals]]) -> OuterField:
 
 
 @kernel(inline="always")
-def beside(face: int) -> int:
-    """Where a walk may begin: at the entry's face, or at what a neighbouring entry meets; −1 for neither."""
+def boundary_face(face: int) -> int:
+    """The first face of a walk: of the entry, or of a neighbour at the silhouette; −1 for neither."""
     return face if face >= -1 else -2 - face
 
 
 @kernel
-def mark_borders(n: int, faces: Words) -> None:
-    """Let entries that meet nothing tell what one of their eight neighbours meets; twice is as once.
+def mark_borders(n: int, faces: Int32s) -> None:
+    """Mark entries without a hit with the face of one of their eight neighbours; idempotent.
 
     Args:
         n: samples along an edge of the cube.
@@ -100,14 +100,14 @@ def mark_borders(n: int, faces: Words) -> None:
 
 
 @kernel
-def _fill_rows(surface: Surface, places: Floats, first: int, faces: Words, fractions: Reals) -> None:
+def _fill_rows(surface: Surface, places: Floats, first: int, faces: Int32s, fractions: Float32s) -> None:
     waiting = np.empty(WAITING, dtype=np.int32)
     for row in range(len(faces)):
         s = (places[first + row, 0], places[first + row, 1], places[first + row, 2])
         for exit_ in range(len(places)):
             t = (places[exit_, 0], places[exit_, 1], places[exit_, 2])
             faces[row, exit_], fractions[row, exit_] = -1, 1.0
-            # A line along a face of the cube only touches what is inside.
+            # A line along a face of the cube only touches the inside.
             if (s[0] == t[0] and s[0] * (1.0 - s[0]) == 0.0) or (
                 (s[1] == t[1] and s[1] * (1.0 - s[1]) == 0.0) or (s[2] == t[2] and s[2] * (1.0 - s[2]) == 0.0)
             ):

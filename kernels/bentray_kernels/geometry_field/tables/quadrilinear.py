@@ -1,4 +1,4 @@
-"""The sixteen entries of a table about a line, and linear interpolation between them in four dimensions.
+"""Linear interpolation in four dimensions between the 16 entries of a table around a line.
 
 Dissertation, section 5.3.4. Its weights are ⌈x⌉ − x and x − ⌊x⌋, which lose every x that is a whole number;
 so the first of them is 1 − (x − ⌊x⌋) here.
@@ -6,9 +6,9 @@ so the first of them is 1 − (x − ⌊x⌋) here.
 
 from __future__ import annotations
 
+from ...arrays import Float32s
 from ...compiled import kernel
 from ...float32 import higher, lower, real, whole
-from ...meshes.surface import Reals
 
 # The entry with the lower samples; the way from there to the next sample in x₀, x₁, x₂, x₃.
 Corner = tuple[int, float, float, float, float]
@@ -16,7 +16,7 @@ Corner = tuple[int, float, float, float, float]
 
 @kernel(inline="always")
 def corner_of(n: int, s: int, sx: float, sy: float, t: int, tx: float, ty: float) -> Corner:
-    """The sixteen entries about a line, given where it enters and leaves as ``tables.cube.line_of`` does."""
+    """The 16 entries about a line, given where it enters and leaves as ``tables.cube.line_of`` does."""
     x0, a0 = _between(sx, n)
     x1, a1 = _between(sy, n)
     x2, a2 = _between(tx, n)
@@ -36,8 +36,8 @@ def _between(x: float, n: int) -> tuple[float, float]:
 
 
 @kernel(inline="always")
-def lerp4(entries: Reals, n: int, corner: Corner, channels: int, channel: int) -> float:
-    """One channel of a table, interpolated linearly in four dimensions; NaN where one of the sixteen is.
+def lerp4(entries: Float32s, n: int, corner: Corner, channels: int, channel: int) -> float:
+    """One channel of a table, interpolated linearly in four dimensions; NaN where one of the 16 is.
 
     Args:
         entries: the table in one dimension.
@@ -56,7 +56,7 @@ def lerp4(entries: Reals, n: int, corner: Corner, channels: int, channel: int) -
 
 
 @kernel(inline="always")
-def _lerp2(entries: Reals, n: int, at: int, a2: float, a3: float, channels: int, channel: int) -> float:
+def _lerp2(entries: Float32s, n: int, at: int, a2: float, a3: float, channels: int, channel: int) -> float:
     here, above = channels * at + channel, channels * (at + 6 * n) + channel
     first = entries[here] + a2 * (entries[here + channels] - entries[here])
     second = entries[above] + a2 * (entries[above + channels] - entries[above])

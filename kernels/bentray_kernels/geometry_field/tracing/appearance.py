@@ -1,4 +1,4 @@
-"""What a ray sees where it ends: normals, light on a surface, its texture, the ground, the environment."""
+"""Shading: normals, light and texture of surfaces, ground and environment."""
 
 from __future__ import annotations
 

@@ -1,18 +1,17 @@
-"""What a ray meets of one shape: asked of its fields, or of the exact intersector."""
+"""The first hit of a ray on one shape, from its fields or by exact intersection."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import Vector
+from ...arrays import Int32s, Vector
 from ...compiled import kernel
 from ...meshes.face_plane import meet_plane
 from ...meshes.intersector import closest
-from ...meshes.surface import Words
 from ..tables.accurate_lookup import STEPS, settle
 from ..tables.agreement import AGREE
 from ..tables.cube import line_of, number_at
-from ..tables.outer_field import beside
+from ..tables.outer_field import boundary_face
 from ..tables.quadrilinear import corner_of, lerp4
 from .packed_scene import World
 
@@ -29,7 +28,9 @@ Found = tuple[int, float, float, float]
 
 
 @kernel
-def exactly(world: World, shape: int, waiting: Words, origin: Vector, direction: Vector, left: int) -> Found:
+def intersect_exactly(
+    world: World, shape: int, waiting: Int32s, origin: Vector, direction: Vector, left: int
+) -> Found:
     """The first face of a shape by the exact intersector; ``left`` is the face that the ray leaves, or −1."""
     length = (direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2) ** 0.5
     begin = LEAST / length if left >= 0 else 0.0
@@ -42,7 +43,7 @@ def exactly(world: World, shape: int, waiting: Words, origin: Vector, direction:
 
 @kernel(inline="always")
 def from_outside(
-    world: World, shape: int, way: int, waiting: Words, origin: Vector, direction: Vector
+    world: World, shape: int, way: int, waiting: Int32s, origin: Vector, direction: Vector
 ) -> Found:
     """The first face of a shape on a ray that leaves another one, or the eye.
 
@@ -50,7 +51,7 @@ def from_outside(
         world: ``world_of``.
         shape: which of its shapes.
         way: of ``WAYS``.
-        waiting: room for the exact intersector.
+        waiting: traversal stack of the exact intersector.
         origin, direction: in the shape's unit cube.
     """
     none = (-1, np.inf, 0.0, 0.0)
@@ -61,9 +62,9 @@ def from_outside(
         return none
     n, start = world.shapes[shape, 1], world.shapes[shape, 2]
     if way == EXACT or n == 0:
-        return exactly(world, shape, waiting, origin, direction, -1)
+        return intersect_exactly(world, shape, waiting, origin, direction, -1)
     place = start + number_at(s, sx, sy, n) * (6 * n * n) + number_at(t, tx, ty, n)
-    face = world.faces[place] if way != WALK else beside(world.faces[place])
+    face = world.faces[place] if way != WALK else boundary_face(world.faces[place])
     if face < 0:
         return none
     length = far - near
@@ -84,7 +85,7 @@ def from_outside(
         first, second = inside(first, second)
     if near + distance < 0.0:
         # The ray starts within the cube, behind what the entry meets first.
-        return exactly(world, shape, waiting, origin, direction, -1)
+        return intersect_exactly(world, shape, waiting, origin, direction, -1)
     return face, near + distance, first, second
 
 
@@ -93,7 +94,7 @@ def from_the_surface(
     world: World,
     shape: int,
     way: int,
-    waiting: Words,
+    waiting: Int32s,
     origin: Vector,
     direction: Vector,
     left: int,
@@ -110,7 +111,7 @@ def from_the_surface(
     """
     n, start = world.shapes[shape, 3], world.shapes[shape, 4]
     if way == EXACT or n == 0:
-        return exactly(world, shape, waiting, origin, direction, left)
+        return intersect_exactly(world, shape, waiting, origin, direction, left)
     _, _, _, _, _, t, tx, ty = line_of(
         origin[0], origin[1], origin[2], direction[0], direction[1], direction[2]
     )
@@ -122,7 +123,7 @@ def from_the_surface(
             return face, distance, first, second
     if side < 0.0:
         # A ray inside a body meets it somewhere: the entry was one of a ray that passed a fold.
-        return exactly(world, shape, waiting, origin, direction, left)
+        return intersect_exactly(world, shape, waiting, origin, direction, left)
     return -1, np.inf, 0.0, 0.0
 
 

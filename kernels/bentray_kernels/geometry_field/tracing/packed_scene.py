@@ -1,4 +1,4 @@
-"""A scene as kernels read it: the arrays of all shapes one after the other."""
+"""A scene for compiled functions: the concatenated arrays of all shapes."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats, Ints
-from ...meshes.surface import Reals, Surface, Words
+from ...arrays import Float32s, Floats, Int32s, Ints
+from ...meshes.surface import Surface
 from ..tables.agreement import agreement
 from .scene import Scene, Shape
 
@@ -40,17 +40,17 @@ class World(NamedTuple):
 
     surface: Surface
     shapes: Ints
-    faces: Words
-    fractions: Reals
+    faces: Int32s
+    fractions: Float32s
     known: NDArray[np.uint8]
-    inner_faces: Words
-    starts: Words
+    inner_faces: Int32s
+    starts: Int32s
     to_local: Floats
     instances: Ints
     looks: Floats
-    pictures: Reals
+    pictures: Float32s
     textures: Ints
-    sky: Reals
+    sky: Float32s
     ground: Floats
     light: Floats
 
@@ -131,13 +131,13 @@ def _joined(arrays: Sequence[Any], kind: Any) -> Any:
     return np.concatenate([np.ravel(array) for array in arrays] or [np.zeros(1, dtype=kind)])
 
 
-def _shifted(tables: Sequence[tuple[Words, int]]) -> Words:
+def _shifted(tables: Sequence[tuple[Int32s, int]]) -> Int32s:
     """Tables of faces, counted through all shapes."""
     moved = [
         table if by == 0 else table + np.int32(by) * ((table >= 0).astype(np.int32) - (table < -1))
         for table, by in tables
     ]
-    joined: Words = _joined(moved, np.int32)
+    joined: Int32s = _joined(moved, np.int32)
     return joined
 
 

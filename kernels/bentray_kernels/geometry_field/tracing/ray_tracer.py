@@ -1,8 +1,8 @@
-"""Tracing rays through a scene: mirrored, refracted, mirrored by the same body again, to any depth.
+"""Recursive ray tracing of a scene with reflection, refraction and self-reflection, to any depth.
 
-Dissertation, section 5.3.2. Its ``TraceRay`` is written as a loop: one ray goes on from each surface, and
-what it finds is weighted by the shares on its way, so that the weights of a picture's colours sum to 1. What
-is left at the last depth sees the environment.
+Dissertation, section 5.3.2. Its ``TraceRay`` is a loop here: one ray continues from each surface, and its
+colour is weighted by the shares along the path, so that the weights of a pixel's colours sum to 1. At the
+last depth the rest of the weight gets the environment.
 """
 
 from __future__ import annotations
@@ -13,11 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Floats, Vector
+from ...arrays import Floats, Int32s, Vector
 from ...compiled import kernel
 from ...errors import InvalidInput
 from ...meshes.intersector import WAITING
-from ...meshes.surface import Words
 from ...refraction.backdrop import Colours
 from ...refraction.camera import Camera
 from ...refraction.optics import refracted
@@ -26,25 +25,25 @@ from .lookup_scene import WAYS, from_outside, from_the_surface
 from .packed_scene import SEES_ITSELF, SINGLE, World
 
 # Rows of the image traced in one call.
-STRIP = 16
+TILE_ROWS = 16
 
 # Numbers of what a ray meets besides instances.
 NOTHING, GROUND = -1, -2
 
-# Stands for the face that a ray leaves when its body is not there for it any more.
+# The face that a ray leaves if its body is ignored from there.
 UNSEEN = -2
 
 
 @dataclass(frozen=True)
 class TraceSettings:
-    """How a picture is made.
+    """Settings of a rendering.
 
     Attributes:
         rows, columns: pixels.
         depth: most surfaces at which a ray goes on; the dissertation has 2.
-        way: how fields are asked: "nearest", "linear", "plane", "walk"; "exact" for no field.
-        eye: the same for the first surface that the eye sees.
-        threads: strips of rows are traced in so many threads.
+        way: lookup method: "nearest", "linear", "plane", "walk"; "exact" without fields.
+        eye: the same for the first surface.
+        threads: number of threads for tiles of rows.
 
     Raises:
         InvalidInput: for a number out of range, or another name.
@@ -75,24 +74,24 @@ def trace(
         world: ``world_of`` a scene.
         camera: ``refraction.perspective`` or ``orthographic``.
         settings: the rest.
-        pause: called before every strip, maybe in another thread; what it raises ends the picture.
+        pause: called before every tile, possibly in another thread; an exception ends the rendering.
     """
     image = np.empty((settings.rows, settings.columns, 3), dtype=np.uint8)
     views = camera.origin, camera.direction
     ways = WAYS[settings.eye], WAYS[settings.way]
 
-    def strip(rows: slice) -> None:
+    def tile(rows: slice) -> None:
         pause()
         _trace_rows(world, views[0], views[1], *ways, settings.depth, rows.start, image.shape[0], image[rows])
 
     with ThreadPoolExecutor(settings.threads) as pool:
-        list(pool.map(strip, _strips(settings.rows)))
+        list(pool.map(tile, _tiles(settings.rows)))
     return image
 
 
-def _strips(rows: int) -> Iterator[slice]:
-    for first in range(0, rows, STRIP):
-        yield slice(first, min(first + STRIP, rows))
+def _tiles(rows: int) -> Iterator[slice]:
+    for first in range(0, rows, TILE_ROWS):
+        yield slice(first, min(first + TILE_ROWS, rows))
 
 
 @kernel
@@ -131,16 +130,16 @@ def along(views: Floats, u: float, v: float) -> Vector:
 
 @kernel
 def colour_of(
-    world: World, waiting: Words, origin: Vector, direction: Vector, eye: int, way: int, depth: int
+    world: World, waiting: Int32s, origin: Vector, direction: Vector, eye: int, way: int, depth: int
 ) -> Vector:
     """RGB at the end of a ray.
 
     Args:
         world: ``world_of``.
-        waiting: room for the exact intersector.
+        waiting: traversal stack of the exact intersector.
         origin, direction: m and a unit vector, in the world.
-        eye, way: how fields are asked by the first ray, and by those after it.
-        depth: most surfaces at which it goes on.
+        eye, way: lookup methods of the first ray, and of those after it.
+        depth: most surfaces at which it continues.
     """
     red, green, blue, weight = 0.0, 0.0, 0.0, 1.0
     # The instance and face that the ray leaves; within which instance it is.
@@ -189,7 +188,7 @@ def colour_of(
 @kernel(inline="always")
 def _nearest(
     world: World,
-    waiting: Words,
+    waiting: Int32s,
     origin: Vector,
     direction: Vector,
     way: int,

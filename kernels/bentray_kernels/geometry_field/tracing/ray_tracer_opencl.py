@@ -1,4 +1,4 @@
-"""The ray tracer on an OpenCL device: the pictures of ``ray_tracer.trace``, one work-item a pixel."""
+"""The ray tracer on an OpenCL device: the images of ``ray_tracer.trace``, one work-item per pixel."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ SOURCES = (
     "refraction/rays",
     "refraction/optics",
     "geometry_field/surface",
-    "geometry_field/asking",
-    "geometry_field/tracing",
+    "geometry_field/lookup_scene",
+    "geometry_field/ray_tracer",
 )
 
 # Pixels of a work-group.
@@ -32,20 +32,20 @@ GROUP = 64
 # Room for rounding at the far side of boxes, and a number whose reciprocal is finite.
 ROUNDING = {"float64": (1.0 + 8.0 * 2.0**-52, 1e300), "float32": (1.0 + 8.0 * 2.0**-23, 1e30)}
 
-# Pixels of the picture that is compared with the CPU's before a device is believed, and the share of them
-# that may differ by more than one level: rays at edges may go either way.
+# Pixels along the side of the self-test image, and the share of them that may differ by more than one level:
+# rays at edges may take either path.
 TRIED = 48
 ODD = {"float64": 0.01, "float32": 0.05}
 
 
 class OpenCLTracer:
-    """A world on a device. If the device fails its trial, ``ray_tracer.trace`` does the work.
+    """A world on a device; ``ray_tracer.trace`` replaces a device that fails its self-test.
 
     Args:
         world: ``world_of``; copied to the device, once.
         session: the device.
-        precision: of places and directions there, "float64" or "float32"; None for the better one that the
-            device has.
+        precision: of places and directions there, "float64" or "float32"; None for the best one of the
+            device.
 
     Raises:
         InvalidInput: for another precision.
@@ -77,7 +77,8 @@ class OpenCLTracer:
         """As ``tracing.ray_tracer.trace``; ``settings.threads`` counts only where the CPU takes over.
 
         Warns:
-            OpenCLFallbackWarning: once, where the device fails its trial and ``ray_tracer.trace`` takes over.
+            OpenCLFallbackWarning: once, where the device fails its self-test and ``ray_tracer.trace`` takes
+                over.
         """
         if self._fault is None:
             self._fault = self.fault_of(camera)
@@ -88,7 +89,7 @@ class OpenCLTracer:
         return trace(self.world, camera, settings) if self._fault else self.follow(camera, settings)
 
     def fault_of(self, camera: Camera) -> str:
-        """How the device differs from ``ray_tracer.trace`` in a small picture; empty where it does not."""
+        """Difference from ``ray_tracer.trace`` in a small image, as a message; empty if correct."""
         import pyopencl as cl
 
         settings = TraceSettings(TRIED, TRIED)
@@ -103,7 +104,7 @@ class OpenCLTracer:
         )
 
     def follow(self, camera: Camera, settings: TraceSettings) -> Colours:
-        """As ``trace``, but on the device, whatever it computes."""
+        """As ``trace``, on the device, without self-test."""
         image = np.empty((settings.rows, settings.columns, 3), dtype=np.uint8)
         kernel = self.session.kernel(SOURCES, "trace", *self._defines())
         with self.session.lock:
@@ -141,16 +142,16 @@ class OpenCLTracer:
 
 
 def on_the_device(world: World, precision: str | None = None) -> OpenCLTracer | None:
-    """The world on the chosen OpenCL device; None where no device can be trusted.
+    """The world on the chosen OpenCL device; None where no device passes its self-test.
 
     Args:
         world: to look at.
         precision: as in ``OpenCLTracer``.
 
     Raises:
-        InvalidInput: for another precision, or where ``BENTRAY_OPENCL_DEVICE`` names no one device.
+        InvalidInput: for another precision, or where ``BENTRAY_OPENCL_DEVICE`` does not match one device.
 
     Warns:
-        OpenCLFallbackWarning: once, where no device passes its trial; and where it cannot hold the world.
+        OpenCLFallbackWarning: once, where no device passes its self-test; and without enough memory.
     """
     return scene_or_warning(lambda session: OpenCLTracer(world, session, precision), "tracing.trace")

@@ -1,4 +1,4 @@
-"""A scene: shapes with their fields, instances of them, what each looks like, and what is around them."""
+"""A scene of meshes: shapes with their fields, instances, materials, ground and environment."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A linker for one object file: what PoCL needs of `ld` where the system has none.
+"""A minimal linker for one object file, for PoCL on systems without `ld`.
 
 ``ld … -o LIBRARY … OBJECT …`` makes a shared library for x86-64 Linux of one relocatable object as LLVM makes
 it of a kernel: code, constants, data, and calls of functions that the process has. Options and libraries are
@@ -41,7 +41,7 @@ class Symbol:
 
 @dataclass
 class Section:
-    """A part of the object that is kept; ``address`` is given when the library is laid out."""
+    """A section of the object; ``address`` is set by the layout of the library."""
 
     kind: int
     flags: int

@@ -1,4 +1,4 @@
-// What a device must get right before it is trusted: sqrt and fmin on doubles of one width, REAL.
+// Part of the self-test of a device: sqrt and fmin on doubles of one vector width, REAL.
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 

@@ -1,4 +1,4 @@
-// Value and gradient of a filtered grid at many points, one work-item a point; the last group has items left over.
+// Value and gradient of a filtered grid at many points, one work-item per point; the last group has idle items.
 //
 // REAL: float or double, of the coefficients and the sums. TAPS: nodes that a point reads along one axis.
 // WIDTH: numbers of a row of the tables (Stencil.weights).

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import Floats, Ints
-from ...rays.fan import Kind
+from ...rays.fan import RayKind
 from ..finite_frequency import front_smoothing, ray_slowness, width_in_nodes
 from ..problem import Problem
 from ..result import Sweep, residual_counts
@@ -106,7 +106,7 @@ def trace_rays(problem: Problem, settings: Settings, slowness: Floats, emitters:
 
     In an image without contrast, as the water that the first iteration begins with, rays are straight.
     """
-    rays: Kind = settings.rays if slowness.min() < slowness.max() else "straight"
+    rays: RayKind = settings.rays if slowness.min() < slowness.max() else "straight"
     return linearise(
         problem,
         ray_slowness(problem, settings, slowness),

@@ -14,7 +14,7 @@ from ...compiled import kernel
 from ...eikonal import solve
 from ...rays.bending import STRIDE, allocate_bending, bend
 from ...rays.descent import PARTS, empty_path, list_entries, merge_entries, trace_ray
-from ...rays.fan import Fan, Kind
+from ...rays.fan import Fan, RayKind
 from ...splines import coefficients
 from ..problem import Problem
 from ..sart.sart_update import smoothed
@@ -43,7 +43,7 @@ class Rows:
 
 
 def linearise(
-    problem: Problem, slowness: Floats, emitters: Ints, *, rays: Kind, eikonal: str, front: float = 0.0
+    problem: Problem, slowness: Floats, emitters: Ints, *, rays: RayKind, eikonal: str, front: float = 0.0
 ) -> Rows:
     """Rows of some emitters' rays through an image.
 
@@ -69,7 +69,7 @@ def linearise(
 
 
 def linearise_losses(
-    problem: Problem, slowness: Floats, emitters: Ints, *, rays: Kind, eikonal: str, front: float = 0.0
+    problem: Problem, slowness: Floats, emitters: Ints, *, rays: RayKind, eikonal: str, front: float = 0.0
 ) -> Rows:
     """As ``linearise`` for the amplitudes: the residual, Np, is what water along the same rays does not take.
 
@@ -92,7 +92,7 @@ def _trace(
     emitters: Ints,
     data: Floats,
     residual_of: Callable[[int, Ints, Floats, Floats, Floats], Floats],
-    rays: Kind,
+    rays: RayKind,
     eikonal: str,
     front: float,
 ) -> Rows:

@@ -6,14 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...arrays import Flags, Floats
+from ...arrays import Flags, Float32s, Floats
 from ...compiled import kernel
 from ...eikonal.deviation import SweepArrays, allocate_sweep_arrays, deviate
 from ...rays.vectorised import Bundle, allocate_bundle, back_project, interleave, trace_bundle
-
-Singles = NDArray[np.float32]
 
 # The Gaussian of an update ends at so many standard deviations.
 TRUNCATE = 4.0
@@ -34,9 +31,9 @@ class EmitterPass:
     shape: tuple[int, int]
     sheets: SweepArrays
     rays: Bundle
-    fields: Singles
-    readable: Singles
-    sums: Singles
+    fields: Float32s
+    readable: Float32s
+    sums: Float32s
 
     @classmethod
     def for_grid(cls, shape: tuple[int, int], receivers: int) -> EmitterPass:
@@ -128,7 +125,7 @@ class EmitterPass:
         )
 
 
-def gaussian(deviation: float) -> Singles:
+def gaussian(deviation: float) -> Float32s:
     """Weights of a Gaussian from its middle outwards; 1 for a deviation of 0."""
     if not deviation > 0.0:
         return np.ones(1, np.float32)
@@ -149,9 +146,9 @@ def _look(
     shape: tuple[int, int],
     at: SweepArrays,
     rays: Bundle,
-    fields: Singles,
-    readable: Singles,
-    sums: Singles,
+    fields: Float32s,
+    readable: Float32s,
+    sums: Float32s,
     left: Floats,
 ) -> None:
     x, y = source
@@ -193,17 +190,17 @@ def _look(
 
 @kernel
 def _update(
-    sums: Singles,
+    sums: Float32s,
     slowness: Floats,
     coverage: Floats,
     region: Flags,
     spacing: float,
     relaxation: float,
-    weights: Singles,
+    weights: Float32s,
     bounds: tuple[float, float],
     shape: tuple[int, int],
-    change: Singles,
-    scratch: Singles,
+    change: Float32s,
+    scratch: Float32s,
 ) -> None:
     zero = np.float32(0.0)
     for n in range(region.size):
@@ -220,7 +217,7 @@ def _update(
 
 
 @kernel
-def _smooth(image: Singles, weights: Singles, shape: tuple[int, int], scratch: Singles) -> None:
+def _smooth(image: Float32s, weights: Float32s, shape: tuple[int, int], scratch: Float32s) -> None:
     """Convolve with a symmetric kernel along both axes, in place; nodes on the rim go on beyond it."""
     nx, ny = shape
     reach = len(weights) - 1

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.acquisition.picking.cross_correlation import likeliest
+from bentray_kernels.acquisition.picking.cross_correlation import find_delay
 
 from ....effort import effort
 from ..traces import ricker
@@ -22,10 +22,10 @@ def trace(place: float, length: int = 240) -> np.ndarray:
 @settings(max_examples=effort(20, 40), deadline=None)
 def test_the_pulse_is_found_anywhere_in_noise(shift, gain, seed):
     noise = 0.1 * np.random.default_rng(seed).standard_normal(240)
-    found = likeliest(trace(100.0), gain * (trace(100.0 + shift) + noise), 90, 110, -30.0, 30.0, 0.1 * gain)
+    found = find_delay(trace(100.0), gain * (trace(100.0 + shift) + noise), 90, 110, -30.0, 30.0, 0.1 * gain)
     assert abs(found - shift) <= 1.5
 
 
 def test_silence_and_the_rim_are_no_answer():
-    assert np.isnan(likeliest(trace(100.0), np.zeros(240), 90, 110, -30.0, 30.0, 0.0))
-    assert np.isnan(likeliest(trace(100.0), trace(130.0), 90, 110, -30.0, 29.0, 0.0))
+    assert np.isnan(find_delay(trace(100.0), np.zeros(240), 90, 110, -30.0, 30.0, 0.0))
+    assert np.isnan(find_delay(trace(100.0), trace(130.0), 90, 110, -30.0, 29.0, 0.0))

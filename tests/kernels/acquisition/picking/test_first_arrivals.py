@@ -56,7 +56,7 @@ def test_a_weaker_pulse_is_picked_at_the_same_time_and_a_reversed_one_not_at_all
     dataset = scan(3.0e-7, gain=gain)
     delta = pick(dataset, picker).delta_tof_s[far(dataset)]
     if gain < 0:
-        # Its swings resemble the water's half a period off, which the likeness and the reach refuse.
+        # Its swings resemble the water's half a period off, which the correlation and the reach refuse.
         assert np.isnan(delta).mean() > 0.9
     else:
         np.testing.assert_allclose(delta, 3.0e-7, atol=0.02 / RATE_HZ)

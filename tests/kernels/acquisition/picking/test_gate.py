@@ -54,11 +54,11 @@ def test_the_noise_is_the_mean_power_of_noise_alone_and_its_likeness_along_frequ
     middle = np.full(600, 300.0)
     power, noise = gate.powers(traces, middle, 0.0)
     assert noise.mean() == pytest.approx(power.mean(), rel=0.06)
-    # Powers of a Gaussian value are alike as the square of the values.
+    # Powers of a Gaussian value are noise_correlation as the square of the values.
     found = np.corrcoef(power.T)
-    far = gate.alike < 0.2
+    far = gate.noise_correlation < 0.2
     assert np.abs(found[far]).max() < 0.4
-    assert np.abs(found - gate.alike**2)[~far].max() < 0.25
+    assert np.abs(found - gate.noise_correlation**2)[~far].max() < 0.25
 
 
 def test_pulses_that_are_not_whole_have_no_power():

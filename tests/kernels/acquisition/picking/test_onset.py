@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.acquisition.picking.cross_correlation import match
-from bentray_kernels.acquisition.picking.differential import LEAST_LIKENESS
+from bentray_kernels.acquisition.picking.cross_correlation import match_pulse
+from bentray_kernels.acquisition.picking.differential import MIN_CORRELATION
 from bentray_kernels.acquisition.picking.onset import aic, prepare, threshold
 from bentray_kernels.acquisition.picking.pickers import AIC, ENERGY_RATIO, STA_LTA, THRESHOLD, onset
 
@@ -25,16 +25,16 @@ def trace(place: float, length: int = 200) -> np.ndarray:
 @given(shift=st.floats(-12.0, 12.0))
 @settings(max_examples=effort(20, 30), deadline=None)
 def test_the_match_finds_a_shift_to_a_hundredth_of_a_sample(shift):
-    found, likeness = match(trace(90.0), 0.3 * trace(90.0 + shift), 82, 98, shift + 2.0, 4.0)
+    found, correlation = match_pulse(trace(90.0), 0.3 * trace(90.0 + shift), 82, 98, shift + 2.0, 4.0)
     assert found == pytest.approx(shift, abs=0.01)
-    assert likeness > 0.99
+    assert correlation > 0.99
 
 
 def test_the_match_refuses_what_lies_beyond_its_reach():
-    rising, _ = match(trace(90.0), trace(94.0), 82, 98, 0.0, 2.0)
+    rising, _ = match_pulse(trace(90.0), trace(94.0), 82, 98, 0.0, 2.0)
     assert np.isnan(rising)
-    _, likeness = match(trace(90.0), trace(97.0), 82, 98, 0.0, 2.0)
-    assert likeness < LEAST_LIKENESS
+    _, correlation = match_pulse(trace(90.0), trace(97.0), 82, 98, 0.0, 2.0)
+    assert correlation < MIN_CORRELATION
 
 
 @pytest.mark.parametrize("picker", [AIC, THRESHOLD, ENERGY_RATIO, STA_LTA])

@@ -1,4 +1,4 @@
-// The ray caster of refraction/caster.py, one work-item a ray; the last group has items left over.
+// The ray caster of refraction/caster.py, one work-item per ray; the last group has idle items.
 //
 // MOST_HALVINGS: as in isosurface/crossing.py.
 

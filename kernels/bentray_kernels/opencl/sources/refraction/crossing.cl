@@ -1,4 +1,4 @@
-// The first place where the field along a ray leaves an interval, as in isosurface/crossing.py.
+// The first point of a ray at which the field leaves an interval, as in isosurface/crossing.py.
 //
 // TOLERANCE, SHORTEST (nodes) and UNPROVED: as there.
 

@@ -1,4 +1,4 @@
-// A filtered volume read at a point of a ray, as splines/sampling.py does.
+// Interpolation of a volume at a point of a ray, as in splines/sampling.py.
 //
 // TAPS: nodes that a point reads along one axis. POWERS: of the weights' polynomials. WIDTH: numbers of a row
 // of the tables (Stencil.weights).

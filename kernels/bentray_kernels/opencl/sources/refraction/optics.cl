@@ -1,4 +1,4 @@
-// What an interface does to a ray, as in refraction/optics.py.
+// Refraction and reflection at an interface, as in refraction/optics.py.
 
 // The direction behind an interface, its share of the energy, and whether the ray passed.
 bool refract(Vector *direction, Vector normal, REAL ratio, REAL *weight)

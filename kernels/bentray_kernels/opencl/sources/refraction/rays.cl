@@ -1,4 +1,4 @@
-// Numbers, vectors and rays: what the other files of the ray caster are written in.
+// Numbers, vectors and rays for the other files of the ray caster.
 //
 // The caster is rays, field, roots, crossing, optics and caster, built in that order. A function does what the
 // one of its name does in isosurface or refraction.

@@ -1,4 +1,4 @@
-// Where the field along a ray takes a value, as in isosurface/roots.py. DEEPEST: steps of a root finder.
+// Roots of the field along a ray, as in isosurface/roots.py. DEEPEST: steps of a root finder.
 
 #if HOW == CERTAIN
 REAL newton(const Field *field, const Ray *ray, REAL target, REAL a, REAL value_a, REAL b, REAL value_b,

@@ -1,8 +1,8 @@
-"""The program that tries a device: run as a child process, which may abort, hang or compute nonsense.
+"""Self-test of a device, run as a child process, because drivers may abort, hang or compute wrong results.
 
-``python -m bentray_kernels.opencl.trial INDEX LABEL STAGE…`` prints one line of JSON for each stage,
-``{"stage", "fault"}``, the fault empty where the device was right. A device that ends the process leaves the
-line out.
+``python -m bentray_kernels.opencl.self_test INDEX LABEL STAGE…`` prints one line of JSON for each stage,
+``{"stage", "fault"}``, with an empty fault if the device is correct. A device that ends the process omits
+the line.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from .blocks import travel_times
 from .devices import find_devices
 from .session import Session, probe
 
-# Vectors of so many doubles are tried, each in a stage of its own.
+# Vector widths of doubles tested, each in its own stage.
 WIDTHS = (1, 2, 4, 8, 16)
 
-# What our kernels need; they use no vectors.
+# Stages that the kernels need; they use no vectors.
 NEEDED = ("double1", "solve")
 STAGES = (*NEEDED, *(f"double{width}" for width in WIDTHS[1:]))
 
 
 def fault_of(session: Session, stage: str) -> str:
-    """What the device does wrong in a stage; empty where it is right."""
+    """The fault of the device in a stage; empty if it is correct."""
     return _fault_of_solve(session) if stage == "solve" else _fault_of_width(session, int(stage[6:]))
 
 
@@ -37,7 +37,7 @@ def _fault_of_width(session: Session, width: int) -> str:
     a, b = rng.uniform(0.0, 1e6, (2, 256))
     a[::7], b[::5] = math.inf, 0.0
     root, lower = probe(session, width, a, b)
-    # Correctly rounded on all devices that we know, although OpenCL would allow more.
+    # Correctly rounded on all known devices, although OpenCL allows more.
     if not np.allclose(root, np.sqrt(a), rtol=1e-15, atol=0.0):
         return "wrong sqrt"
     return "" if np.array_equal(lower, np.minimum(a, b)) else "wrong fmin"
@@ -56,7 +56,7 @@ def _fault_of_solve(session: Session) -> str:
 
 
 def reference(crossing: Floats, source: tuple[int, ...]) -> Floats:
-    """First-order travel time in plain Python, by rounds over all nodes until none is earlier."""
+    """First-order travel time in plain Python, by iterations over all nodes until no time decreases."""
     time: Floats = np.full(crossing.shape, math.inf)
     time[source] = 0.0
     padded = np.pad(time, 1, constant_values=math.inf)
@@ -93,7 +93,7 @@ def _godunov(earliest: list[float], crossing: float) -> float:
 
 
 def main(arguments: list[str]) -> None:
-    """Try the stages named on the command line, one line on stdout each."""
+    """Run the stages named on the command line, one line on stdout each."""
     index, label, *stages = arguments
     device = next((device for device in find_devices() if device.index == int(index)), None)
     if device is None or device.label != label:

@@ -1,4 +1,4 @@
-// What a ray meets of one shape, after geometry_field/surface.cl; as geometry_field/asking.py.
+// The first hit of a ray on one shape, from its fields or exactly; as tracing/lookup_scene.py. After surface.cl.
 //
 // LEAST: as there.
 

@@ -1,4 +1,4 @@
-// The tracer of geometry_field/tracing.py, one work-item a pixel, after geometry_field/asking.cl.
+// The ray tracer of tracing/ray_tracer.py, one work-item per pixel; after lookup_scene.cl.
 
 #define NOTHING (-1)
 #define GROUND (-2)
