@@ -1,4 +1,4 @@
-"""R8 on wave-equation data: attenuation by waveforms, against amplitudes along rays."""
+"""R8 on wave-equation data: attenuation by full-waveform inversion and from amplitudes along rays."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ._lossy_scan import lossy_scan
 
-# A scan by another team's solver, which is not in the repository.
+# A scan simulated by another solver, not in the repository.
 OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
 
-# The scan of this frequency is there for its spectra; waveforms through so many waves would take minutes.
+# The scan of this frequency is used for its spectra; FWI over so many wavelengths would take minutes.
 FINE_HZ = 1e6
 
-# What R8 asks for, and above what a figure is told as experimental.
+# Goal of R8, and the error above which a result is marked as experimental.
 GOAL, EXPERIMENTAL = 0.3, 0.15
 
 
 def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """NRMSE inside the object by waveforms and by rays, of the true range; quick, of a small scan alone."""
+    """NRMSE inside the object by FWI and by rays, relative to the true range; quick: only of a small scan."""
     for name, dataset in scans(quick, progress):
-        images, took = by_rays(dataset, 48 if quick else 128, progress), ""
+        images, took = invert_amplitudes(dataset, 48 if quick else 128, progress), ""
         if dataset.center_frequency_hz != FINE_HZ:
-            images["waveforms"], seconds = by_waves(dataset, quick, progress)
+            images["waveforms"], seconds = invert_waveforms(dataset, quick, progress)
             took = f"; {seconds:.0f} core seconds of waveforms"
         found = {way: error(image, dataset) for way, image in images.items()}
-        told = ", ".join(f"{way} {value:.3f}" for way, value in found.items())
-        told += f"; one value everywhere {flat(next(iter(images.values())), dataset):.3f}{took}"
+        detail = ", ".join(f"{way} {value:.3f}" for way, value in found.items())
+        detail += f"; one value everywhere {flat(next(iter(images.values())), dataset):.3f}{took}"
         for way, value in found.items():
             mark = " (experimental)" if value > EXPERIMENTAL else ""
-            yield Row(f"R8 waves, {name}, {way}{mark}", value, GOAL, "<=", "of range", told)
+            yield Row(f"R8 waves, {name}, {way}{mark}", value, GOAL, "<=", "of range", detail)
 
 
 def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
-    """Names and scans, with the traces that losses leave, of all frequencies alike or in proportion."""
+    """Names and scans with loss, constant or proportional to the frequency."""
     small, usual, fine = (3e5, 0.05, 32, 16, 64), (4e5, 0.08, 64, 32, 128), (FINE_HZ, 0.08, 128, 64, 256)
     asked = [(small, False)] if quick else [(usual, False), (usual, True), (fine, True)]
     for (frequency, side, elements, emissions, nodes), proportional in asked:
@@ -57,8 +57,8 @@ def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
         yield "ring_wave_a 400 kHz", read_dataset(OTHERS)
 
 
-def by_waves(dataset: Dataset, quick: bool, progress: Step) -> tuple[Reconstruction, float]:
-    """The speed first, then the attenuation; and seconds of one core."""
+def invert_waveforms(dataset: Dataset, quick: bool, progress: Step) -> tuple[Reconstruction, float]:
+    """FWI of the speed, then of the attenuation; and the CPU time, s."""
     settings = Settings.of(method="waveform", nodes=48 if quick else 128, bands=3)
     picked = replace(pick(dataset), waveform=dataset.waveform)
     begun = time.process_time()
@@ -66,7 +66,7 @@ def by_waves(dataset: Dataset, quick: bool, progress: Step) -> tuple[Reconstruct
     return result, time.process_time() - begun
 
 
-def by_rays(dataset: Dataset, nodes: int, progress: Step) -> dict[str, Reconstruction]:
+def invert_amplitudes(dataset: Dataset, nodes: int, progress: Step) -> dict[str, Reconstruction]:
     """Along straight and bent rays: log ratios, these with the focusing of ray tubes off, and by spectra."""
     picked = replace(pick(dataset), waveform=dataset.waveform)
     ways = {
@@ -86,17 +86,17 @@ def by_rays(dataset: Dataset, nodes: int, progress: Step) -> dict[str, Reconstru
 def error(result: Reconstruction, dataset: Dataset) -> float:
     """Root mean square inside the object, over the range that is there (R8)."""
     assert result.attenuation is not None
-    true, inside = _there(result, dataset)
+    true, inside = _true_values(result, dataset)
     return float(np.sqrt(((result.attenuation - true)[inside] ** 2).mean()) / np.ptp(true[inside]))
 
 
 def flat(result: Reconstruction, dataset: Dataset) -> float:
-    """As ``error``, of an image that has the true mean everywhere and so shows nothing."""
-    true, inside = _there(result, dataset)
+    """As ``error`` for a constant image with the true mean."""
+    true, inside = _true_values(result, dataset)
     return float(true[inside].std() / np.ptp(true[inside]))
 
 
-def _there(result: Reconstruction, dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
+def _true_values(result: Reconstruction, dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
     """True attenuation at the image's nodes, and which of them count."""
     assert dataset.truth is not None
     assert dataset.truth.attenuation_np_m is not None

@@ -1,4 +1,4 @@
-"""Errors of every picker on scans that waves made, against the times of the wave front through the truth."""
+"""Errors of every picker on simulated wave scans, against travel times through the true image."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ._ideal_times import ideal
 
-# A scan by another team's solver, which is not in the repository.
+# A scan simulated by another solver, not in the repository.
 OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
 
-# A pulse sees the slowness averaged over about so many wavelengths, full width: its Fresnel zone.
+# Full width of the average of the slowness by a pulse, wavelengths: its Fresnel zone.
 SEEN_WAVELENGTHS = 2.0
 WIDTH_OVER_SIGMA = 2.355
 
-# Pairs nearer than this, m, cross water alone.
+# Pairs nearer than this, m, cross only water.
 NEAREST_M = 0.01
 
-# Trace noise, the median peak over its standard deviation, at which guided picks are compared with others.
+# SNR of the comparison of guided_rows and unguided picks: median peak over standard deviation of the noise.
 HARD_SNR = 4.0
 
 
 def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """Median, median deviation, 95 % and part picked for each picker; then guided picks in noise."""
+    """Median, MAD, 95 % quantile and picked fraction for each picker; then guided picks in noise."""
     name, dataset = scan(quick, progress)
-    true = seen(dataset)
+    true = blurred_times(dataset)
     for count, picker in enumerate(PICKERS):
         progress(count, len(PICKERS), f"picking, {picker}")
-        yield from told(f"picks {name}, {picker}", pick(dataset, picker).delta_tof_s, true, dataset)
-    yield from guided(name, dataset, true)
+        yield from pick_rows(f"picks {name}, {picker}", pick(dataset, picker).delta_tof_s, true, dataset)
+    yield from guided_rows(name, dataset, true)
 
 
 def scan(quick: bool, progress: Step) -> tuple[str, Dataset]:
-    """The other team's where it is there; else, and for a quick look, one of ours."""
+    """The external scan if present; else, and in a quick run, a simulated one."""
     if OTHERS.exists() and not quick:
         return "ring_wave_a", read_dataset(OTHERS)
     asked = WaveSimulationSettings(3e5, 0.05, 32, 16, nodes=64) if quick else WaveSimulationSettings()
@@ -53,8 +53,8 @@ def scan(quick: bool, progress: Step) -> tuple[str, Dataset]:
     return f"simulated {1e-3 * asked.frequency_hz:.0f} kHz", made
 
 
-def seen(dataset: Dataset) -> np.ndarray:
-    """(ntx, nrx), s: object minus water through the truth as wide as a pulse sees it."""
+def blurred_times(dataset: Dataset) -> np.ndarray:
+    """(ntx, nrx), s: object minus water through the true image, blurred to the width of the Fresnel zone."""
     assert dataset.truth is not None
     assert dataset.center_frequency_hz is not None
     truth = dataset.truth
@@ -64,8 +64,8 @@ def seen(dataset: Dataset) -> np.ndarray:
     return ideal(replace(dataset, truth=replace(truth, sound_speed_mps=wide)))
 
 
-def told(label: str, found: np.ndarray, true: np.ndarray, dataset: Dataset) -> Iterable[Row]:
-    """The rows of one set of picks; their goals are a tenth of a period and so on."""
+def pick_rows(label: str, found: np.ndarray, true: np.ndarray, dataset: Dataset) -> Iterable[Row]:
+    """The rows of one set of picks."""
     assert dataset.center_frequency_hz is not None
     period = 1e9 / dataset.center_frequency_hz
     asked = dataset.distance_m() > NEAREST_M
@@ -82,8 +82,8 @@ def told(label: str, found: np.ndarray, true: np.ndarray, dataset: Dataset) -> I
     yield Row(f"{label}, picked", known.size / error.size, 0.9, ">=", "of pairs", detail)
 
 
-def guided(name: str, dataset: Dataset, true: np.ndarray) -> Iterable[Row]:
-    """In noise: rms of picks about the arrivals that the image predicts, over that of picks without it."""
+def guided_rows(name: str, dataset: Dataset, true: np.ndarray) -> Iterable[Row]:
+    """In noise: rms error of guided picks over that of unguided ones."""
     settings = Settings.of(method="gauss-newton", rays="straight", attenuation=False, nodes=64)
     noisy = with_trace_noise(dataset, HARD_SNR)
     errors = [1e9 * (one.delta_tof_s - true) for one in (pick(noisy), reconstruct_guided(noisy, settings)[0])]
@@ -97,7 +97,7 @@ def guided(name: str, dataset: Dataset, true: np.ndarray) -> Iterable[Row]:
 
 
 def with_trace_noise(dataset: Dataset, snr: float) -> Dataset:
-    """White noise on both scans, as strong on every trace."""
+    """Add white noise of equal strength to all traces of both scans."""
     assert dataset.waveform is not None
     assert dataset.waveform.water is not None
     far = dataset.distance_m() > 0.9 * dataset.distance_m().max()

@@ -1,4 +1,4 @@
-"""The picture of waveforms: a gather with the picks, and every image with error and time, a row a scan."""
+"""Figure of full-waveform inversion: a gather with picks, and all images with errors and times."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..shared._small_png import small_png
 
 SHOWN = ("straight", "bent, wide", "waveform")
 
-# Of the gather's panel, over an image's.
+# Width of the gather's panel relative to an image.
 GATHER_WIDTH = 1.9
 
 # Of each picker's marks, and their sizes, points.
@@ -63,7 +63,7 @@ def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Any]]], seconds: str
 
 
 def gather(axes: Axes, name: str, dataset: Dataset) -> None:
-    """The traces of the first emission about their arrival in water, and what each picker reads of them."""
+    """The traces of the first emission around their arrival in water, with the picks of each picker."""
     assert dataset.waveform is not None
     assert dataset.sampling_rate_hz is not None
     assert dataset.center_frequency_hz is not None
@@ -82,7 +82,7 @@ def gather(axes: Axes, name: str, dataset: Dataset) -> None:
     shifted /= np.abs(shifted).max(axis=1, keepdims=True) + 1e-300
     extent = (0, len(shifted), 1e6 * late[0], 1e6 * late[-1])
     axes.imshow(shifted.T, aspect="auto", origin="lower", cmap="gray", vmin=-0.8, vmax=0.8, extent=extent)
-    # Smaller marks upon larger ones, so that pickers that agree are all seen.
+    # Smaller marks above larger ones, so that equal picks remain visible.
     for (picker, times), colour, size in zip(picks.items(), MARKS, SIZES, strict=True):
         receivers = np.arange(len(times)) + 0.5
         axes.plot(

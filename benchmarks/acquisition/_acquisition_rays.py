@@ -1,4 +1,4 @@
-"""R4 and R7: rays as wide as waves against thin and straight ones, by the same picks, and what auto takes."""
+"""R4 and R7: finite-frequency rays against thin and straight ones on the same picks; choices of auto."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from ._registration import registered
 DATA = Path(__file__).parents[3] / "shared" / "data"
 OTHERS, MEASURED = DATA / "ring_wave_a.h5", DATA / "openust_measured.h5"
 
-# Phantom of Table 6. A scan of f Hz on a side of s m is one of 2·f on s/2, so that sides are chosen by what
-# the simulation costs: 40, 78 and 91 wavelengths across the ring.
+# Phantom of Table 6. A scan of f Hz on a side of s m is equivalent to one of 2·f on s/2, so that sides are
+# chosen by the cost of the simulation: 40, 78 and 91 wavelengths across the ring.
 SCANS = (
     WaveSimulationSettings(5e5, 0.12, 128, 64),
     WaveSimulationSettings(1e6, 0.12, 128, 32),
@@ -38,7 +38,7 @@ SCANS = (
 QUICK = WaveSimulationSettings(3e5, 0.05, 32, 16, nodes=64)
 SNRS = (np.inf, 30.0, 10.0)
 
-# The region in which the authors of the measurement read their error, m.
+# Radius of the region in which the authors of the measurement evaluate their error, m.
 RADIUS_M = 0.0675
 
 
@@ -48,15 +48,15 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         name = f"simulated {1e-3 * asked.frequency_hz:.0f} kHz, {1e3 * asked.side_m:.0f} mm"
         clean = simulate(asked, lambda now, n=name: progress(now.done, now.total, n))
         for snr in (30.0,) if quick else SNRS:
-            told = name + (f", SNR {snr:g}" if snr < np.inf else ", no noise")
-            yield from judged(told, noisy(clean, snr), 48 if quick else 128)
+            detail = name + (f", SNR {snr:g}" if snr < np.inf else ", no noise")
+            yield from scan_rows(detail, noisy(clean, snr), 48 if quick else 128)
     if not quick and OTHERS.exists():
-        yield from judged("ring_wave_a 400 kHz", read_dataset(OTHERS), 128)
+        yield from scan_rows("ring_wave_a 400 kHz", read_dataset(OTHERS), 128)
     yield from measured(quick)
 
 
 def noisy(dataset: Dataset, snr: float) -> Dataset:
-    """White noise on the traces of object and water; ``snr`` as ``WaveSimulationSettings`` has it."""
+    """Add white noise to the traces of object and water; ``snr`` as in ``WaveSimulationSettings``."""
     traces = dataset.waveform
     assert traces is not None
     assert traces.water is not None
@@ -73,7 +73,7 @@ def noisy(dataset: Dataset, snr: float) -> Dataset:
     )
 
 
-def judged(name: str, dataset: Dataset, nodes: int) -> Iterable[Row]:
+def scan_rows(name: str, dataset: Dataset, nodes: int) -> Iterable[Row]:
     """The rows of one scan."""
     picked = replace(pick(dataset), waveform=None)
     plan = Settings.of(nodes=nodes, attenuation=False)
@@ -90,19 +90,19 @@ def judged(name: str, dataset: Dataset, nodes: int) -> Iterable[Row]:
     found = {
         way: error(reconstruct(picked, plan.changed(**changes)), dataset) for way, changes in ways.items()
     }
-    # It chooses by times, and hears the traces to say what waveforms would give.
+    # It chooses by times; the traces are used to estimate the benefit of FWI.
     advised = reconstruct(replace(picked, waveform=dataset.waveform), replace(plan, method="auto"))
     found["auto"] = error(advised, dataset)
     exact = replace(picked, delta_tof_s=ideal(dataset), sigma_s=None)
     found["ideal times"] = error(reconstruct(exact, plan.changed(**all_at_once)), dataset)
-    told = ", ".join(f"{way} {rms:.1f} m/s" for way, rms in found.items())
+    detail = ", ".join(f"{way} {rms:.1f} m/s" for way, rms in found.items())
     bent = min(found[way] for way in ways if way.startswith("bent"))
     fair = min(found[way] for way in ways if way.startswith("straight"))
-    yield Row(f"R4 {name}, bent over straight", bent / found["straight"], 0.9, "<=", "", told)
-    yield Row(f"R4 {name}, bent over ideal times", bent / found["ideal times"], 1.15, "<=", "", told)
+    yield Row(f"R4 {name}, bent over straight", bent / found["straight"], 0.9, "<=", "", detail)
+    yield Row(f"R4 {name}, bent over ideal times", bent / found["ideal times"], 1.15, "<=", "", detail)
     why = explain_trials(advised.trials)
     yield Row(f"R4 {name}, auto over straight", found["auto"] / found["straight"], 1.0, "<=", "", why)
-    yield Row(f"R4 {name}, auto over the best straight", found["auto"] / fair, 1.0, "<=", "", told)
+    yield Row(f"R4 {name}, auto over the best straight", found["auto"] / fair, 1.0, "<=", "", detail)
 
 
 def error(result: Reconstruction, dataset: Dataset) -> float:
@@ -112,7 +112,7 @@ def error(result: Reconstruction, dataset: Dataset) -> float:
 
 
 def measured(quick: bool) -> Iterable[Row]:
-    """R7: the measurement of open-UST, as ``auto`` has it; the truth serves registration and error alone."""
+    """R7: the open-UST measurement by ``auto``; the truth is used only for registration and error."""
     labels = "R7 open-UST, error", "R7 open-UST, time"
     if quick or not MEASURED.exists():
         why = "not in a quick run" if quick else "open-UST: the measurement is not there"
@@ -126,6 +126,6 @@ def measured(quick: bool) -> Iterable[Row]:
     seconds = time.perf_counter() - begun
     found = registered(result, dataset.truth, RADIUS_M)
     x, y = (1e3 * shift for shift in found.shift_m)
-    told = f"truth shifted by {x:.1f}, {y:.1f} mm; {explain_trials(result.trials)}"
-    yield Row(labels[0], found.rms_mps, 12.0, "<=", "m/s", told)
+    detail = f"truth shifted by {x:.1f}, {y:.1f} mm; {explain_trials(result.trials)}"
+    yield Row(labels[0], found.rms_mps, 12.0, "<=", "m/s", detail)
     yield Row(labels[1], seconds, 20.0, "<=", "s", "one process, trials included")

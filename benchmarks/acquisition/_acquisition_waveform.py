@@ -1,4 +1,4 @@
-"""R10: waveforms against straight, bent and ideal rays on scans that waves made."""
+"""R10: full-waveform inversion against straight, bent and ideal rays on simulated wave scans."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from ._ideal_times import ideal
 
 RESULTS = Path(__file__).parents[1] / "results"
 
-# A scan by another team's solver, which is not in the repository.
+# A scan simulated by another solver, not in the repository.
 OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
 
-# Two cores, as the target has it. The fourth band doubles the time and takes 3 % off the error.
+# Two cores, as in the target. The fourth band doubles the time and reduces the error by 3 %.
 WORKERS = 2
 WAVES = {"method": "waveform", "bands": 3}
 RAYS: dict[str, dict[str, Any]] = {
@@ -42,12 +42,12 @@ RAYS: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Made:
-    """An image with what it took.
+    """An image with its error and time.
 
     Attributes:
         result: the image.
         rms: its error, m/s.
-        seconds: wall-clock time, s; picking is part of that of waveforms alone.
+        seconds: wall-clock time, s; includes picking only for FWI.
     """
 
     result: Reconstruction
@@ -61,7 +61,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
     for name, dataset in scans(quick, progress):
         images = made(name, dataset, 48 if quick else 128, progress)
         shown[name] = dataset, images
-        yield from judged(name, images)
+        yield from scan_rows(name, images)
     if not quick:
         (RESULTS / "acquisition_waveform.png").write_bytes(
             picture(shown, "wall-clock seconds of two workers")
@@ -81,25 +81,25 @@ def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
 
 
 def made(name: str, dataset: Dataset, nodes: int, progress: Step) -> dict[str, Made]:
-    """Each way to an image of one scan; rays share their picks, and ``ideal`` has times without picking."""
+    """The image of each method for one scan; rays share their picks, ``ideal`` has exact times."""
     picked = pick(dataset)
     found = {}
     _, bent_as_waves, _ = finite_frequency_candidates(picked, Settings(nodes=nodes))
     for way, changes in {**RAYS, "bent, wide": bent_as_waves}.items():
-        found[way] = carried_out(
+        found[way] = reconstruct_on_workers(
             replace(picked, waveform=None), Settings.of(nodes=nodes, **changes), progress
         )
-    found["ideal times"] = carried_out(
+    found["ideal times"] = reconstruct_on_workers(
         replace(picked, delta_tof_s=ideal(dataset), sigma_s=None),
         Settings.of(nodes=nodes, **RAYS["bent, Gauss-Newton"]),
         progress,
     )
-    found["waveform"] = carried_out(dataset, Settings.of(nodes=nodes, **WAVES), progress)
+    found["waveform"] = reconstruct_on_workers(dataset, Settings.of(nodes=nodes, **WAVES), progress)
     return found
 
 
-def carried_out(dataset: Dataset, settings: Settings, progress: Step) -> Made:
-    """As the service does it: from a file, by worker processes."""
+def reconstruct_on_workers(dataset: Dataset, settings: Settings, progress: Step) -> Made:
+    """Reconstruct as the service does: from a file, by worker processes."""
     assert dataset.truth is not None
     with TemporaryDirectory() as folder, open_cluster(workers=WORKERS) as cluster:
         path = Path(folder) / "scan.h5"
@@ -112,13 +112,13 @@ def carried_out(dataset: Dataset, settings: Settings, progress: Step) -> Made:
     return Made(result, compare(result, dataset.truth, dataset.roi).rmse_mps, seconds)
 
 
-def judged(name: str, images: dict[str, Made]) -> Iterable[Row]:
+def scan_rows(name: str, images: dict[str, Made]) -> Iterable[Row]:
     """The rows of one scan."""
-    told = ", ".join(f"{way} {one.rms:.1f} m/s in {one.seconds:.0f} s" for way, one in images.items())
+    detail = ", ".join(f"{way} {one.rms:.1f} m/s in {one.seconds:.0f} s" for way, one in images.items())
     straight, waves, best = (images[way].rms for way in ("straight", "waveform", "ideal times"))
     load = f"{os.getloadavg()[0]:.1f}"
-    yield Row(f"R10 {name}, over straight", waves / straight, 0.65, "<=", "", told)
-    yield Row(f"R10 {name}, over straight, then", waves / straight, 0.5, "<=", "", told)
-    yield Row(f"R10 {name}, over ideal times", waves / best, 0.8, "<=", "", told)
+    yield Row(f"R10 {name}, over straight", waves / straight, 0.65, "<=", "", detail)
+    yield Row(f"R10 {name}, over straight, then", waves / straight, 0.5, "<=", "", detail)
+    yield Row(f"R10 {name}, over ideal times", waves / best, 0.8, "<=", "", detail)
     took = images["waveform"].seconds
     yield Row(f"R10 {name}, time", took, 300.0, "<=", "s", f"two workers, load at the end {load}")

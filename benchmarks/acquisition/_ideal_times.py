@@ -1,4 +1,4 @@
-"""Travel times that an ideal picker would read: of wave fronts through the truth itself."""
+"""Ideal travel times: Eikonal solutions through the true image."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy.ndimage import map_coordinates, zoom
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.eikonal import solve
 
-# Nodes along a side of the truth, at least; and water that is put around it for the ring.
+# Fewest nodes along a side of the true image, and width of the water around it for the ring.
 LEAST_NODES = 400
 
 

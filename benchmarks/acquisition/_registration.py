@@ -1,4 +1,4 @@
-"""The error of an image whose truth was drawn in other coordinates: shifted, and perhaps transposed."""
+"""Registration: error of an image whose truth is shifted and possibly transposed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Registered:
 
 
 def registered(image: Reconstruction, truth: Truth, radius_m: float) -> Registered:
-    """The error within a radius of the array's middle, the truth laid where it agrees best: no turn.
+    """The error within a radius of the array's centre, at the best shift of the truth, without rotation.
 
     Args:
         image: one slice.

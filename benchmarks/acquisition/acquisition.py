@@ -1,4 +1,4 @@
-"""From raw traces to images: the rows of the targets that begin with what an array recorded."""
+"""Benchmark from raw traces to images: picking, rays, attenuation, full-waveform inversion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scheduler and workers, each a process of this machine, and what sleeping tasks cost them."""
+"""A local scheduler with worker processes, and the cost of sleeping tasks."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ QUIET = [f"--dashboard-address={NO_DASHBOARD}", "--no-dashboard"]
 
 @dataclass(frozen=True)
 class Run:
-    """Sleeping tasks driven through a cluster.
+    """A run of sleeping tasks on a cluster.
 
     Attributes:
         workers: processes.
         length: of a task, s.
-        tasks: so many; 0: the cluster idled.
+        tasks: their number; 0 for an idle cluster.
         seconds: by the clock.
-        scheduler: seconds of a processor that the scheduler used.
-        driver: the same of the process that submits, as the service does.
+        scheduler: CPU time of the scheduler, s.
+        driver: CPU time of the submitting process, s.
     """
 
     workers: int
@@ -59,13 +59,13 @@ class Machine:
         self._start_worker = start_worker
 
     def grow_to(self, workers: int) -> None:
-        """Start what is missing, and wait until it has joined."""
+        """Start missing workers, and wait until they have joined."""
         for _ in range(workers - self._cluster.describe()["workers"]):
             self._start_worker()  # type: ignore[operator]
         self._cluster.client.wait_for_workers(workers, timeout=120)
 
     def run(self, work: Work, length: float, tasks: int) -> Run:
-        """Drive so many tasks as slices are driven: a few in flight, the state there and back with each."""
+        """Run tasks as for slices: a few in flight, with the state sent and returned with each."""
         client, workers = self._cluster.client, self._cluster.describe()["workers"]
         window, left = IN_FLIGHT * workers, deque(range(tasks))
         state = bytes(int(work.sent))
@@ -84,7 +84,7 @@ class Machine:
         return Run(workers, length, tasks, seconds, scheduler, driver)
 
     def idle(self, seconds: float) -> Run:
-        """What the heartbeats of the workers cost, once what was asked before has died away."""
+        """Cost of the heartbeats of idle workers."""
         time.sleep(SETTLE_S)
         before = self._spent()
         time.sleep(seconds)
@@ -98,7 +98,7 @@ class Machine:
 
 @contextmanager
 def machine(folder: Path) -> Iterator[Machine]:
-    """A scheduler on loopback without workers; everything ends with the block."""
+    """A scheduler on loopback without workers; all processes end with the context."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
     environment = {**os.environ, "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False"}
@@ -115,7 +115,7 @@ def machine(folder: Path) -> Iterator[Machine]:
         return psutil.Process(processes[-1].pid)
 
     address = f"tcp://127.0.0.1:{port}"
-    lanes = " ".join(f"{lane}={amount}" for lane, amount in RECONSTRUCTION.items())
+    resources = " ".join(f"{resource}={amount}" for resource, amount in RECONSTRUCTION.items())
     try:
         with ours():
             scheduler = start("scheduler", "--host=127.0.0.1", f"--port={port}")
@@ -124,7 +124,7 @@ def machine(folder: Path) -> Iterator[Machine]:
                     scheduler,
                     cluster,
                     lambda: start(
-                        "worker", address, "--no-nanny", f"--nthreads={THREADS}", f"--resources={lanes}"
+                        "worker", address, "--no-nanny", f"--nthreads={THREADS}", f"--resources={resources}"
                     ),
                 )
     finally:

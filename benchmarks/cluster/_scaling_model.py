@@ -1,4 +1,4 @@
-"""What one scheduler can feed, extrapolated from small runs: it spends time on tasks and on heartbeats."""
+"""Cost model of one scheduler, fitted to small runs: CPU time for tasks and heartbeats."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from ._scaling_work import Work
 
 DAY_S = 86_400.0
 
-# A queue before a processor that is busier than this grows without need: waits become tasks long.
+# Largest useful utilisation of a processor: above it, queues grow to the length of tasks.
 BUSY = 0.7
 
 
 def beats(workers: float) -> float:
-    """Heartbeats a second of so many workers: Dask lets each beat more rarely as they become more."""
+    """Heartbeats per second of all workers: Dask increases their interval with the number of workers."""
     return workers / float(heartbeat_interval(workers))
 
 
 @dataclass(frozen=True)
 class Model:
-    """Processor seconds that a cluster costs beside its kernels.
+    """CPU time of a cluster in addition to its kernels.
 
     Attributes:
         work: the tasks of one slice.
@@ -43,7 +43,7 @@ class Model:
 
     @classmethod
     def fitted(cls, work: Work, runs: Sequence[Run]) -> Model:
-        """Idle runs tell what heartbeats and seconds cost, never below 0; the rest is due to tasks."""
+        """Fit: idle runs give the cost of heartbeats and seconds, at least 0; the rest is due to tasks."""
         idle = [run for run in runs if not run.tasks]
         terms = np.array([[beats(run.workers) * run.seconds, run.seconds] for run in idle])
         beat, second = map(float, nnls(terms, np.array([run.scheduler for run in idle]))[0])
@@ -53,7 +53,7 @@ class Model:
         return cls(work, rest / tasks, beat, second, sum(run.driver for run in driven) / tasks)
 
     def scheduler_share(self, workers: float, length: float, used: float = 1.0) -> float:
-        """Of one processor, with so many workers at work ``used`` of the time on tasks of ``length`` s."""
+        """Share of one processor for workers that spend ``used`` of the time in tasks of ``length`` s."""
         tasks = workers * used / length
         return tasks * self.scheduler_task + beats(workers) * self.scheduler_beat + self.scheduler_idle
 
@@ -71,7 +71,7 @@ class Model:
         return low
 
     def length_for(self, workers: float) -> float:
-        """Shortest task, s, with which one scheduler feeds so many workers."""
+        """Shortest task, s, for which one scheduler serves so many workers."""
         left = BUSY - beats(workers) * self.scheduler_beat - self.scheduler_idle
         scheduler = workers * self.scheduler_task / left if left > 0 else np.inf
         return max(scheduler, workers * self.driver_task / BUSY)
@@ -81,6 +81,6 @@ class Model:
         return scans_a_day * slices * self.work.tasks * self.work.seconds / DAY_S / BUSY
 
     def most_scans_a_day(self, slices: int, length: float) -> float:
-        """Scans that one scheduler and one service pass on, however many workers there are."""
+        """Most scans a day of one scheduler and one service with unlimited workers."""
         seconds = slices * self.work.tasks * self.work.seconds
         return self.most_workers(length) * DAY_S / seconds

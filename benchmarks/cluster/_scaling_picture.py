@@ -1,4 +1,4 @@
-"""Two panels: rates measured with few workers beside the ideal, and how busy one scheduler is with many."""
+"""Figure of scaling: measured and ideal rates, and the utilisation of one scheduler with many workers."""
 
 from __future__ import annotations
 

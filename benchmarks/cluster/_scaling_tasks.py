@@ -1,4 +1,4 @@
-"""The task that stands in for a kernel: it moves the same bytes and takes the same time, but no processor."""
+"""A sleeping task in place of a kernel: same bytes and time, no CPU time."""
 
 from __future__ import annotations
 
@@ -6,6 +6,6 @@ import time
 
 
 def pause(seconds: float, sent: bytes, returned: int) -> bytes:
-    """Sleep, then give so many bytes back."""
+    """Sleep, then return ``returned`` bytes."""
     time.sleep(seconds)
     return bytes(returned)

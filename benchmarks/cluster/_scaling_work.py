@@ -1,4 +1,4 @@
-"""What one slice is made of, measured: its tasks, the time of a core and the bytes that each takes."""
+"""Measured tasks of one slice: number, CPU time and bytes."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Work:
     """The tasks of one slice.
 
     Attributes:
-        tasks: so many.
-        seconds: of a core, mean of a task.
+        tasks: their number.
+        seconds: CPU time, mean of a task.
         sent: bytes to a worker, mean of a task.
         returned: bytes from a worker, mean of a task.
     """

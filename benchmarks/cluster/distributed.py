@@ -1,4 +1,4 @@
-"""The cluster: scaling to two workers, cost of a task, renders beside a reconstruction, resuming, Table 8."""
+"""Cluster benchmark: scaling to two workers, task overhead, rendering under load, resuming, Table 8."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from bentray_workers.reconstruction.subdomains import solve_in_blocks
 
 from ..shared._made_up_scan import made_up_scan
 
-# Processes and blocks along each axis of Table 8's column; the machine may have fewer cores.
+# Processes and blocks along each axis in the column of Table 8; the machine may have fewer cores.
 PROCESSES: dict[int, tuple[int, int]] = {1: (1, 1), 2: (2, 1), 4: (2, 2), 8: (4, 2)}
 THEIRS_S = {128: 0.007, 256: 0.039}
 RUNS = 2
 
 
 def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """All rows, with the load that they began under: other processes cost scaling and pictures most."""
+    """All rows, with the load average at their start."""
     load = os.getloadavg()[0]
     for row in measured(quick, progress):
         yield replace(row, detail=f"{row.detail}; load average {load:.1f} at the start")
@@ -58,7 +58,7 @@ def measured(quick: bool, progress: Step) -> Iterable[Row]:
 
 
 def scaling(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
-    """Seconds on one worker over those on two, of slices and of one slice's emitters; R5's volume by SART."""
+    """Time on one worker over that on two, of slices and of one slice's emitters; R5's volume by SART."""
     nodes, elements = (64, 64) if quick else (128, 256)
     sart = Settings(nodes=nodes, iterations=2 if quick else 3)
     newton = Settings(nodes=nodes, iterations=4, method="gauss-newton")
@@ -86,7 +86,7 @@ def scaling(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
 
 
 def overhead(cluster: Cluster, folder: Path, count: int, progress: Step) -> Row:
-    """Seconds that a call costs beside its work, as the driver of reconstructions makes them."""
+    """Overhead of a task, s, submitted as in reconstructions."""
     progress(0, 1, "empty calls")
     empty_calls(cluster, folder, 50)
     per_call = empty_calls(cluster, folder, count) / count
@@ -109,7 +109,7 @@ def empty_calls(cluster: Cluster, folder: Path, count: int) -> float:
 
 
 def rendering(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Row:
-    """95th percentile of a slice's picture while a reconstruction fills the same workers."""
+    """95th percentile of the rendering time of a slice during a reconstruction on the same workers."""
     nodes, elements, slices = (64, 64, 8) if quick else (128, 256, 16)
     path = made_up_scan(folder / "beside.h5", elements, slices)
     picture = folder / "picture.h5"
@@ -143,7 +143,7 @@ def rendering(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Ro
 
 
 def resuming(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Row:
-    """Seconds of a run whose driver was torn away half-way and begun anew, over those of a whole one."""
+    """Time of a run that is interrupted half-way and resumed, over that of an uninterrupted one."""
     nodes = 64 if quick else 128
     path = made_up_scan(folder / "torn.h5", 64 if quick else 256, 8 if quick else 16)
     settings = Settings(nodes=nodes, iterations=3 if quick else 6)
@@ -207,7 +207,7 @@ def blocks(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
 
 
 def in_blocks(cluster: Cluster, *arguments: Any) -> Callable[[], object]:
-    """A solve whose blocks stay where they are."""
+    """A solve whose blocks stay on their workers."""
 
     return partial(solve_in_blocks, cluster.client, *arguments)
 

@@ -1,4 +1,4 @@
-"""How far one scheduler grows: sleeping tasks through 1 to 8 worker processes, and what follows for 1,000."""
+"""Scaling of one scheduler: sleeping tasks on 1 to 8 workers, extrapolated to 1,000."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PICTURE = Path(__file__).resolve().parents[2] / "deploy" / "scaling.png"
 
 
 def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """Costs a task, and what one scheduler can feed; the picture is drawn in a whole run only."""
+    """Cost of a task, and limits of one scheduler; the figure is drawn only in a full run."""
     scans = QUICK_SCANS if quick else SCANS
     progress(0, 3, "slices")
     works = [of_a_slice(nodes, elements, sweeps) for nodes, elements, sweeps, _ in scans]
@@ -64,7 +64,7 @@ def measured(work: Work, workers: tuple[int, ...], seconds: float) -> list[Run]:
 
 
 def costs(model: Model, runs: list[Run]) -> Iterable[Row]:
-    """What a task costs beside its kernel."""
+    """Overhead of a task."""
     work = model.work
     goal = 0.05 * 1e3 * work.seconds
     kernel = f"a task takes {1e3 * work.seconds:.0f} ms of a core"
@@ -80,7 +80,7 @@ def costs(model: Model, runs: list[Run]) -> Iterable[Row]:
 
 
 def limits(model: Model, nodes: int, slices: int) -> Iterable[Row]:
-    """Where one scheduler and one service that submits end, with scans of one size."""
+    """Limits of one scheduler and one service for scans of one size."""
     work, scan = model.work, f"{nodes}² by {slices}"
     tasks = (
         f"{work.tasks} tasks of {work.seconds:.2g} s a slice, {work.sent / 1e6:.2g} MB there and as much back"

@@ -1,4 +1,4 @@
-"""The other packages that solve the Eikonal equation, behind one call each; a missing one is left out."""
+"""Adapters of other Eikonal solvers; packages that are not installed are omitted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The picture of wave fronts over the speed and of errors in log colour, one column a method."""
+"""Figure of wave fronts and of errors in log colour, one column per method."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from .eikonal import Problem
 ERROR = "magma"
 PANEL_IN = (1.85, 2.25)
 
-# Told apart from every colour of the errors.
+# Distinct from every colour of the errors.
 RING = "#2ec4ff"
 
-# Decades of error that the colours tell apart, below the worst.
+# Decades of error shown below the largest.
 DECADES = 4
 
 

@@ -1,4 +1,4 @@
-"""Table 1 of the targets: Eikonal solvers and rays against the packages that are installed beside us."""
+"""Table 1 of the targets: Eikonal solvers and rays against other packages."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ def gradient(n: int, ndim: int) -> Problem:
 def breast(n: int, refinement: int, *, sharp: bool = False) -> Problem:
     """Table 6 in water 1500, a ring of 256 receivers; the reference comes from a finer grid.
 
-    The edges are blurred by a Gaussian of ``EDGE_M``: so the grid and the finer one sample the same medium,
-    and what differs is the solvers' error. Sharp edges are a staircase of its own on every grid.
+    The edges are blurred by a Gaussian of ``EDGE_M``, so that both grids sample the same medium and differ
+    only by the errors of the solvers. Sharp edges have a different staircase on every grid.
     """
     phantom = table6(1500.0)
     spacing = TABLE6_SIDE_M / (n - 1)
@@ -81,7 +81,7 @@ def breast(n: int, refinement: int, *, sharp: bool = False) -> Problem:
 
 
 def alternate(runs: dict[str, Callable[[], object]], repeats: int = REPEATS) -> dict[str, float]:
-    """Least seconds of each, taken in the order A B A B …, after one call each that is not counted."""
+    """Least time of each, s, in the order A B A B …, after one warm-up call each."""
     for run in runs.values():
         run()
     least = dict.fromkeys(runs, float("inf"))
@@ -101,7 +101,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         accurate,
         sweeping,
         along_rays,
-        lanes,
+        batches,
     ]
     if not quick:
         parts += [tracing, threads, three_dimensions, sharp_edges, robustness]
@@ -120,7 +120,7 @@ def against(
     ours: Callable[[], object],
     goal: float,
 ) -> Iterable[Row]:
-    """A row a peer: its seconds over ours on one problem."""
+    """A row per peer: its time over ours on one problem."""
     for name in names:
         if name not in peers:
             yield Row(f"{target} {name}", None, goal, ">=", "", missing[name])
@@ -170,7 +170,7 @@ def accurate(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
 
 
 def sweeping(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
-    """E3: first-order fast sweeping against whatever the peers do by default."""
+    """E3: first-order fast sweeping against the defaults of the peers."""
     problems = [(gradient(256, 2), 3.0)]
     if not quick:
         problems += [(gradient(1024, 2), 4.0), (gradient(128, 3), 4.0)]
@@ -210,7 +210,7 @@ def along_rays(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
     detail = f"ring rms, ns: ours {ours * 1e9:.2f}; {listed}"
     least = alternate({"ours": lambda: ray_times(p), best: lambda: peers[best](p.speed, p.spacing, p.node)})
     seconds = f"ours {least['ours'] * 1e3:.1f} ms with 255 rays, {best} {least[best] * 1e3:.1f} ms without"
-    # Bent rays are the high-accuracy mode: supersampling the wave front that guides them changes nothing.
+    # Bent rays are the high-accuracy mode: supersampling their travel time does not change the result.
     finer = rms(ray_times(p, supersample=2) - p.exact)
     for target, error_goal, time_goal in (("E4", 0.5, 1.0), ("E5", 0.15, 2.5)):
         yield Row(f"{target} error", ours / errors[best], error_goal, "<=", "", detail)
@@ -218,7 +218,7 @@ def along_rays(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
         yield Row(f"{target} time", least["ours"] / least[best], time_goal, "<=", "", seconds)
 
 
-def lanes(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
+def batches(peers: dict, missing: dict, quick: bool) -> Iterable[Row]:
     """E7: many sources in one call, one core."""
     p = gradient(256, 2)
     sources = np.random.default_rng(0).uniform(0.05, 0.95, (64, 2))

@@ -1,4 +1,4 @@
-"""What each method gets wrong on two problems, in figures and in one picture of wave fronts and errors."""
+"""Errors of every Eikonal method on two problems, with a figure of wave fronts and errors."""
 
 from __future__ import annotations
 

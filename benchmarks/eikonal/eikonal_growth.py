@@ -1,4 +1,4 @@
-"""How time and memory of every method on the CPU grow with the grid, in two and three dimensions."""
+"""Complexity: growth of time and memory with the grid, for every CPU method in 2-D and 3-D."""
 
 from __future__ import annotations
 
@@ -60,8 +60,7 @@ def growth_of_time(name: str, ndim: int, sides: tuple[int, ...]) -> Row:
 def least_seconds(p: Problem, name: str) -> float:
     """Least time of two or more solves that together take ``LEAST_SECONDS``.
 
-    It is the processor's time: equal to the clock's on an idle machine, and unlike it on a busy one free of
-    the turns that others take, which long solves meet and short ones slip between.
+    It is CPU time, which does not depend on the load of the machine.
     """
     taken: list[float] = []
     while len(taken) < 2 or sum(taken) < LEAST_SECONDS:

@@ -1,4 +1,4 @@
-"""All lookups of one mesh, and what the geometry image makes of the published ones."""
+"""All lookups of one mesh, and the evaluation of published ones in the geometry image."""
 
 from __future__ import annotations
 

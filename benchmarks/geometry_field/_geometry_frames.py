@@ -1,4 +1,4 @@
-"""Frames of a scene with geometry fields: seconds here, through OpenCL, and how far fields are from exact."""
+"""Frame rates of a scene with geometry fields on CPU and OpenCL, and differences from exact intersection."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def rows(quick: bool) -> Iterable[Row]:
     yield Row("frames, fields over exact", seconds["exact"] / seconds["walk"], 1.0, ">=", "", detail)
     labels = (("frames, OpenCL", INTERACTIVE, ">=", "1/s"), ("frames, OpenCL odd pixels", ODD, "<=", "%"))
     if "OpenCL" not in runs:
-        reason = "; ".join(str(remark.message) for remark in caught) or "the device fails its trial"
+        reason = "; ".join(str(remark.message) for remark in caught) or "the device fails its self-test"
         yield from (Row(label, None, goal, op, unit, reason) for label, goal, op, unit in labels)
     else:
         off = np.abs(runs["OpenCL"]().astype(int) - runs["walk"]()).max(axis=2) > 1

@@ -1,4 +1,4 @@
-"""The picture of geometry images: positions, normals, the surface that comes back, and its stretch."""
+"""Figure of geometry images: positions, normals, reconstructed surface and stretch."""
 
 from __future__ import annotations
 

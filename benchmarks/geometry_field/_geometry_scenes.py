@@ -1,4 +1,4 @@
-"""Scenes of chapter 5: mirrors, glass and bodies that see themselves, before a landscape made by code."""
+"""Scenes of chapter 5: mirrors, glass and self-reflection, before a procedural landscape."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def sphere_at(x: float, y: float, size: float, material: Material, lift: float =
     return Instance(ball(), placed((x, y, 0.5 * size + lift), size), material)
 
 
-def seen_from(eye: tuple[float, float, float], to: tuple[float, float, float], degrees: float) -> Camera:
+def camera_at(eye: tuple[float, float, float], to: tuple[float, float, float], degrees: float) -> Camera:
     return perspective(eye, to, (0.0, 0.0, 1.0), degrees)
 
 
@@ -98,7 +98,7 @@ def two_in_a_mirror() -> tuple[Scene, Camera]:
         standing(-0.95, -0.5, 0.85, 150.0, Material(colour=CLAY)),
         standing(0.95, -0.5, 0.8, 220.0, Material(colour=RED)),
     )
-    return Scene(instances, landscape(), GROUND), seen_from((0.0, -4.2, 1.7), (0.0, 0.0, 0.6), 40.0)
+    return Scene(instances, landscape(), GROUND), camera_at((0.0, -4.2, 1.7), (0.0, 0.0, 0.6), 40.0)
 
 
 def in_a_ring() -> tuple[Scene, Camera]:
@@ -109,7 +109,7 @@ def in_a_ring() -> tuple[Scene, Camera]:
         standing(-0.1, -0.75, 0.6, 170.0, Material(colour=BLUE)),
         standing(0.0, 0.4, 0.5, 90.0, Material(colour=RED)),
     )
-    return Scene(instances, landscape(), GROUND), seen_from((0.3, -3.6, 1.6), (0.0, 0.1, 0.75), 38.0)
+    return Scene(instances, landscape(), GROUND), camera_at((0.3, -3.6, 1.6), (0.0, 0.1, 0.75), 38.0)
 
 
 def two_mirrors() -> tuple[Scene, Camera]:
@@ -118,7 +118,7 @@ def two_mirrors() -> tuple[Scene, Camera]:
         sphere_at(-0.57, 0.1, 1.1, Material(colour=RED, mirror=0.7)),
         sphere_at(0.57, -0.15, 1.1, Material(colour=BLUE, mirror=0.7)),
     )
-    return Scene(instances, landscape(), GROUND), seen_from((0.0, -3.4, 1.3), (0.0, 0.0, 0.5), 38.0)
+    return Scene(instances, landscape(), GROUND), camera_at((0.0, -3.4, 1.3), (0.0, 0.0, 0.5), 38.0)
 
 
 def mirrored_body() -> tuple[Scene, Camera]:
@@ -127,18 +127,18 @@ def mirrored_body() -> tuple[Scene, Camera]:
         sphere_at(0.62, 0.2, 1.2, Material(colour=(0.95, 0.95, 0.9), mirror=0.85)),
         standing(-0.6, -0.1, 1.1, 120.0, Material(colour=CLAY, mirror=0.5)),
     )
-    return Scene(instances, landscape(), GROUND), seen_from((0.0, -3.6, 1.4), (0.05, 0.0, 0.6), 38.0)
+    return Scene(instances, landscape(), GROUND), camera_at((0.0, -3.6, 1.4), (0.05, 0.0, 0.6), 38.0)
 
 
 def glass(shape: str, refraction: str) -> tuple[Scene, Camera]:
     """Figure 27, first and second row."""
     material = Material(colour=(0.9, 0.95, 1.0), glass=0.95, refraction=refraction)
     if shape == "ball":
-        return Scene((sphere_at(0.0, 0.0, 1.2, material, 0.4),), landscape()), seen_from(
+        return Scene((sphere_at(0.0, 0.0, 1.2, material, 0.4),), landscape()), camera_at(
             (0, -3.2, 1.2), (0, 0, 1.0), 32.0
         )
     made = (standing(0.0, 0.0, 1.3, 160.0, material),)
-    return Scene(made, landscape()), seen_from((0.0, -3.2, 0.9), (0.0, 0.0, 0.6), 32.0)
+    return Scene(made, landscape()), camera_at((0.0, -3.2, 0.9), (0.0, 0.0, 0.6), 32.0)
 
 
 def self_reflection(itself: bool, others: bool) -> tuple[Scene, Camera]:
@@ -148,7 +148,7 @@ def self_reflection(itself: bool, others: bool) -> tuple[Scene, Camera]:
     instances = [standing(-0.45, 0.0, 1.3, 150.0, mirror)]
     if others:
         instances.append(sphere_at(0.7, -0.45, 0.6, Material(colour=BLUE, mirror=0.4)))
-    return Scene(tuple(instances), landscape() if others else dark), seen_from(
+    return Scene(tuple(instances), landscape() if others else dark), camera_at(
         (0, -3.2, 1.3), (0, 0, 0.6), 34.0
     )
 

@@ -1,4 +1,4 @@
-"""Exact ray/mesh intersectors to compare with, one thread each: Embree by three ways, and ours."""
+"""Exact ray-mesh intersectors, one thread each: Embree through three packages, and ours."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Linear interpolation of the position on the ray, in cells whose entries agree.
 
-The sixteen entries about a ray are averaged where they agree; (u, v) and the normal follow from the face.
+The 16 entries about a ray are averaged where they agree; (u, v) and the normal follow from the face.
 Other rays are intersected with the plane of the face of their nearest entry.
 """
 

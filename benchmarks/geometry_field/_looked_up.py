@@ -1,4 +1,4 @@
-"""Figure 25: a body as the eye's rays find it in its field, by the published lookups and by ours."""
+"""Figure 25: a body rendered by the published lookups and by ours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The nearest entry and one cut with its plane: one place of memory a ray, however many faces the mesh has.
+"""Plane lookup: intersection with the plane of the nearest entry, one memory access per ray for any mesh.
 
 An entry holds the plane of the face that it meets: a normal in two numbers of 16 bits (Meyer et al., On
 floating-point normal vectors, 2010, octahedral) and its distance from the cube's corner 0.
@@ -18,12 +18,12 @@ from bentray_kernels.geometry_field.tables.cube import samples
 from bentray_kernels.geometry_field.tables.outer_field import OuterField
 from bentray_kernels.meshes.surface import Surface
 
-# Half of what two bytes count to: what the components of a normal add up to.
+# Half the range of 16 bits: the sum of the components of a normal.
 HALF = 32767
 
 
 class PlaneTable(NamedTuple):
-    """Planes n · p = w by entry and exit, and what to tell where a ray does not meet its own within the cube.
+    """Planes n · p = w by entry and exit, and fractions for rays that miss their plane inside the cube.
 
     Attributes:
         samples: n along an edge of the cube.
@@ -64,7 +64,7 @@ def _fill(surface: Surface, field: OuterField, places: Floats, offsets: Float32s
             px, py, pz = t[3] - t[0], t[4] - t[1], t[5] - t[2]
             qx, qy, qz = t[6] - t[0], t[7] - t[1], t[8] - t[2]
             normals[at + 1] = _packed(py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx)
-            # Of the rounded normal, through the very point that the entry's ray meets.
+            # With the rounded normal, through the exact intersection of the entry's ray.
             x, y, z = _unpacked(normals[at + 1])
             way = field.fractions[i, j]
             offsets[at] = (
@@ -76,7 +76,7 @@ def _fill(surface: Surface, field: OuterField, places: Floats, offsets: Float32s
 
 @kernel
 def find_by_plane(table: PlaneTable, origins: Float32s, directions: Float32s, distances: Float32s) -> None:
-    """How far away each of many rays meets the mesh, that begin outside the cube or on it.
+    """Distances of the first hits of many rays that begin outside the cube or on it.
 
     Args:
         table: ``plane_table``.
@@ -94,7 +94,7 @@ def find_by_plane(table: PlaneTable, origins: Float32s, directions: Float32s, di
             x, y, z = _unpacked(table.normals[2 * at + 1])
             along = x * directions[0, r] + y * directions[1, r] + z * directions[2, r]
             distance = (offset - (x * origins[0, r] + y * origins[1, r] + z * origins[2, r])) / along
-            # No branch hangs on whether a ray meets the mesh; one on whether its cut is of no use: few are.
+            # No branch for rays that miss; one for the few whose plane intersection is invalid.
             meets = offset < np.inf
             if meets and not near[k] <= distance <= far[k]:
                 distance = near[k] + table.fractions[at] * (far[k] - near[k])

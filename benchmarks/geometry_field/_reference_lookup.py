@@ -1,7 +1,7 @@
-"""The dissertation's own lookups: (u, v) of the nearest entry, and interpolated linearly in four dimensions.
+"""Reference lookups of the dissertation: (u, v) of the nearest entry, or 4-D linear interpolation.
 
-Section 5.3.4. They are kept to be compared with: an average of (u, v) means nothing where the entries lie on
-both sides of a seam or of a silhouette.
+Section 5.3.4, for comparison: an average of (u, v) is meaningless where the entries lie on both sides of a
+seam or silhouette.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def _copy_nearest(n: int, table: Ints, origins: Float32s, directions: Float32s, 
 
 @kernel
 def linear_uv(n: int, table: Float32s, origins: Float32s, directions: Float32s, uv: Float32s) -> None:
-    """(u, v) averaged over the sixteen entries about each ray, with the published weights.
+    """(u, v) averaged over the 16 entries about each ray, with the published weights.
 
     Entries that meet nothing are left out; where the nearest one meets nothing, so does the ray.
 

@@ -1,4 +1,4 @@
-"""Figures 25 to 27 of the dissertation on our meshes, in one picture, and what fields change in each."""
+"""Figures 25 to 27 of the dissertation on our meshes, and the pixels changed by fields."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figure 31 of the dissertation and its errors: theirs beside ours, in figures and in one picture."""
+"""Figure 31 of the dissertation and its errors, compared with ours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures 32 and 33 of the dissertation and its errors: theirs beside ours, with SNR 10, in one picture."""
+"""Figures 32 and 33 of the dissertation and their errors, compared with ours, with SNR 10."""
 
 from __future__ import annotations
 

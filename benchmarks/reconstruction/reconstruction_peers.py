@@ -1,4 +1,4 @@
-"""R6: what other ways make of the travel times of one slice that nothing was tuned on, and in what time."""
+"""R6: other reconstruction methods on the travel times of an untuned slice: errors and times."""
 
 from __future__ import annotations
 
@@ -75,11 +75,11 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         for k, name in enumerate(_tomography_peers.PEERS):
             progress(k, len(_tomography_peers.PEERS), f"{name}, {water}")
             theirs = run_peer(peers[name], dataset, tiny) if name in peers else None
-            yield from beside(f"{name}, {water}", theirs, ours[first], first, missing.get(name, ""))
+            yield from peer_rows(f"{name}, {water}", theirs, ours[first], first, missing.get(name, ""))
     progress(1, 1, "done")
 
 
-def beside(label: str, theirs: Found | None, ours: Found, method: str, reason: str) -> Iterable[Row]:
+def peer_rows(label: str, theirs: Found | None, ours: Found, method: str, reason: str) -> Iterable[Row]:
     """A peer's error and time over ours."""
     targets = f"R6 rmse below {label}", f"R6 time below {label}"
     if theirs is None:

@@ -1,4 +1,4 @@
-"""R5 and rows 3 and 4 of Table 8: seconds of whole volumes slice by slice, where they go, how they grow."""
+"""R5 and rows 3 and 4 of Table 8: time of whole volumes slice by slice, its parts and its growth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""R9: the Table 7 phantom scanned in space, slice by slice against fully three-dimensional."""
+"""R9: the 3-D breast phantom (Table 7) scanned in 3-D, reconstructed slice by slice and in 3-D."""
 
 from __future__ import annotations
 

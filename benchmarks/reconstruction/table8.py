@@ -1,4 +1,4 @@
-"""Table 8 of the dissertation, its two rows of one projection: their seconds beside ours, cell by cell."""
+"""Table 8 of the dissertation, the two rows of one projection: their times and ours."""
 
 from __future__ import annotations
 

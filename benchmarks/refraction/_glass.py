@@ -1,4 +1,4 @@
-"""The volumes of chapters 3 and 4 as glass before a backdrop, for the sheets of their figures."""
+"""The volumes of chapters 3 and 4 as glass before a backdrop, for their figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ball that all renderers refract: where its rays end exactly, and how far from there they were put."""
+"""The refracting ball of all renderers: exact end points of its rays, and errors."""
 
 from __future__ import annotations
 

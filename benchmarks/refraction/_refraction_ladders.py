@@ -1,4 +1,4 @@
-"""Tables 2, 3 and 4 of the dissertation: candidate cells and frame times, theirs beside ours."""
+"""Tables 2, 3 and 4 of the dissertation: candidate cells and frame times, theirs and ours."""
 
 from __future__ import annotations
 

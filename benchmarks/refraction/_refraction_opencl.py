@@ -1,4 +1,4 @@
-"""Frames of the refracting ball through OpenCL, beside those of the compiled caster in the same run."""
+"""Frame rates of the refracting ball with OpenCL and with the compiled caster in the same run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures 7 to 9 of the dissertation on our volumes, in one picture, and what its supersampling costs."""
+"""Figures 7 to 9 of the dissertation on our volumes, and the cost of supersampling."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Table 3 of the targets, V2 to V6: refraction against renderers of volumes, and chapter 4's tables."""
+"""Table 3 of the targets, V2 to V6: refraction against other volume renderers, and chapter 4's tables."""
 
 from __future__ import annotations
 

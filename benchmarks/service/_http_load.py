@@ -1,4 +1,4 @@
-"""A bounded load over loopback: so many callers in threads, each with one connection, for so many seconds."""
+"""HTTP load over loopback: a number of client threads, each with one connection, for a fixed time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scan of many gigabytes, sent by tus; the memory of the service and of the process that reads it."""
+"""Upload of a scan of many gigabytes by tus, and peak memory of the service and of the reading process."""
 
 from __future__ import annotations
 

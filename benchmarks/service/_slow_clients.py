@@ -1,4 +1,4 @@
-"""Clients that send a byte a second: connections with a large body announced, kept alive by one thread."""
+"""Slow clients: connections that send one byte per second of a large body, in one thread."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The service under load: large uploads, slow clients, and three kinds of requests beside a long job."""
+"""The service under load: large uploads, slow clients, and three kinds of requests during a long job."""
 
 from __future__ import annotations
 

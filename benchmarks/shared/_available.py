@@ -1,4 +1,4 @@
-"""Which of the peers can be imported here; a missing one is left out, with the reason."""
+"""Installed peer packages, and the reasons for missing ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sheet of small pictures in rows, each with its name."""
+"""Contact sheet of small images in rows, with their names."""
 
 from __future__ import annotations
 

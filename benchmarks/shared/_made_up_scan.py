@@ -1,4 +1,4 @@
-"""A ring's scan of smooth delays that nothing had to be simulated for, written where workers read it."""
+"""A synthetic ring scan of smooth delays without a simulation, written to a file for workers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures small enough for the repository, in full colour: a palette would falsify a colour bar."""
+"""Small PNG files in full colour: a palette would falsify colour bars."""
 
 from __future__ import annotations
 

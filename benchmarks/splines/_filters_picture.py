@@ -1,4 +1,4 @@
-"""Figure 1 again: what the filters let pass, of values and of slopes, against frequency."""
+"""Figure 1: frequency response of the filters, for values and slopes."""
 
 from __future__ import annotations
 

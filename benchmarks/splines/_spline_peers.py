@@ -1,4 +1,4 @@
-"""The other packages that read a cubic B-spline, behind one call each; a missing one is left out."""
+"""Adapters of other cubic B-spline packages; packages that are not installed are omitted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Table 3 of the targets, V1 and V7: splines against the packages that read them, and chapter 3's angles."""
+"""Table 3 of the targets, V1 and V7: splines against other packages, and the gradient angles of chapter 3."""
 
 from __future__ import annotations
 

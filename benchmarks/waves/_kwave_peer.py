@@ -1,4 +1,4 @@
-"""k-Wave's solver in Python, behind one call: traces of a point source in the terms of our simulator."""
+"""Adapter of k-Wave in Python: traces of a point source as from our simulator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The picture of the wave simulator beside k-Wave: traces over each other, differences, delays."""
+"""Figure of the wave simulator and k-Wave: traces, differences, delays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One emission through water or a breast, as two simulators give it, and how far their traces are apart."""
+"""One emission through water or a breast by two simulators, and the differences of their traces."""
 
 from __future__ import annotations
 

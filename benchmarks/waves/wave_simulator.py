@@ -1,4 +1,4 @@
-"""The wave simulator against k-Wave: its dispersion beside the stated one, what else is left, its time."""
+"""The wave simulator against k-Wave: dispersion, remaining differences, time."""
 
 from __future__ import annotations
 
