@@ -33,9 +33,9 @@ def loader(monkeypatch, tmp_path):
     monkeypatch.setattr(platforms, "SYSTEM", str(tmp_path / "vendors"))
     for word in platforms.SYSTEM_VARIABLES:
         monkeypatch.delenv(word, raising=False)
-    platforms._ask_first.cache_clear()
+    platforms._register_intel.cache_clear()
     yield loader
-    platforms._ask_first.cache_clear()
+    platforms._register_intel.cache_clear()
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ ZEN_5 = OLD | {"f16c", "fma", "avx2", "abm", "bmi1", "bmi2", "avx512f", "avx512b
 # The function that asks LLVM for the processor's name answers as on AMD family 26; then the device is tried.
 UNKNOWN_PROCESSOR = """
 import ctypes, struct, sys
-from bentray_kernels.opencl import devices, trial
+from bentray_kernels.opencl import devices, self_test
 from bentray_kernels.opencl.session import Session
 
 library, how = sys.argv[1:]
@@ -41,7 +41,7 @@ if how == "as it comes":
 assert device.version.endswith("-generic")
 session = Session(device)
 for stage in ("double1", "solve", "double16"):
-    print(stage, trial.fault_of(session, stage) or "right", flush=True)
+    print(stage, self_test.fault_of(session, stage) or "right", flush=True)
 """
 
 
@@ -94,7 +94,7 @@ def test_our_linker_is_offered_after_what_the_user_has_set(monkeypatch):
     monkeypatch.setenv("COMPILER_PATH", "/usr/local/cross")
     monkeypatch.setenv("BENTRAY_PYTHON", "")
     for _ in range(2):
-        pocl._offer_linker()
+        pocl._provide_linker()
     first, ours = os.environ["COMPILER_PATH"].split(":")
     assert first == "/usr/local/cross"
     assert os.access(Path(ours, "ld"), os.X_OK)

@@ -9,7 +9,12 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.tables.cube import samples
-from bentray_kernels.geometry_field.tables.outer_field import OuterField, beside, build_rows, outer_field
+from bentray_kernels.geometry_field.tables.outer_field import (
+    OuterField,
+    boundary_face,
+    build_rows,
+    outer_field,
+)
 from bentray_kernels.meshes.surface import surface_of
 
 from ...meshes.test_intersector import by_brute_force
@@ -81,7 +86,7 @@ def test_entries_beside_a_hit_tell_where_a_walk_may_begin():
                     if there:
                         around.add(int(field.faces[(to, j) if axis == 0 else (i, to)]))
         hits = {face for face in around if face >= 0}
-        assert beside(field.faces[i, j]) in (hits or {-1})
+        assert boundary_face(field.faces[i, j]) in (hits or {-1})
         beyond += bool(hits)
     assert beyond > 100
 
