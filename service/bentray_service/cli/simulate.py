@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
@@ -11,14 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bentray_kernels.errors import InvalidInput
-
 from .options.paths import output_file
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from bentray_workers.simulation.plane import SimulationSettings
-    from bentray_workers.simulation.volume import VolumeSimulationSettings
+    from bentray_kernels.acquisition import Dataset
+    from bentray_workers.simulation.request import Simulated
+    from bentray_workers.simulation.waves import WaveSimulationSettings
 
 
 class Phantom(StrEnum):
@@ -44,8 +42,9 @@ def simulate(
     elements: Annotated[int, typer.Option(help="Transducers of a ring; each sends and receives.")] = 256,
     coupling: Annotated[float, typer.Option(help="Speed of the water, m/s.")] = 1500.0,
     refinement: Annotated[
-        int, typer.Option(help="Refinement of the simulation grid over the image grid.")
-    ] = 4,
+        int | None,
+        typer.Option(show_default="4", help="Refinement of the simulation grid over the image grid."),
+    ] = None,
     slices: Annotated[
         int | None, typer.Option(show_default="40", help="table7: number of ring heights, one node apart.")
     ] = None,
@@ -96,76 +95,69 @@ def simulate(
     path = output_file(output, force=force)
 
     from bentray_workers.files.dataset import read_dataset
-    from bentray_workers.simulation.plane import SimulationSettings
+    from bentray_workers.simulation.request import AskedSimulation
     from bentray_workers.simulation.simulation_run import simulate_to_file
-    from bentray_workers.simulation.volume import VolumeSimulationSettings
+    from bentray_workers.simulation.waves import WaveSimulationSettings
 
-    own_of_waves = {"--frequency": frequency, "--emissions": emissions, "--side": side}
-    if waveform:
-        times = {"--slices": slices, "--array": array, "--three-d": three_d or None, "--noise-ns": noise_ns}
-        _refuse("without --waveform", {**times, "--attenuation": attenuation or None})
-        from .wave_simulation import simulate_to
-
-        asked = {
-            "frequency_hz": frequency,
-            "emissions": emissions,
-            "side_m": side,
-            "nodes": nodes,
-            "snr": snr,
-        }
-        asked |= {"elements": elements, "coupling_mps": coupling, "seed": seed}
-        given = {name: value for name, value in asked.items() if value is not None}
-        simulate_to(path, given, in_space=phantom is Phantom.TABLE7, as_json=as_json)
-        return
-    _refuse("with --waveform", own_of_waves)
-    both: dict[str, Any] = {
+    request: dict[str, Any] = {
         "nodes": nodes,
         "elements": elements,
         "coupling_mps": coupling,
         "refinement": refinement,
-        "attenuation": attenuation,
-        "snr": snr,
+        "slices": slices,
+        "array": array,
+        "three_d": three_d or None,
+        "noise_s": None if noise_ns is None else noise_ns * 1e-9,
         "seed": seed,
+        "attenuation": attenuation or None,
+        "snr": snr,
+        "frequency_hz": frequency,
+        "emissions": emissions,
+        "side_m": side,
     }
-    settings: SimulationSettings | VolumeSimulationSettings
+    settings = AskedSimulation(phantom=phantom.value, waveform=waveform, **request).chosen()
     started = time.perf_counter()
     with progress_bar("Simulating") as step:
-        if phantom is Phantom.TABLE7:
-            _refuse("--phantom is table6", {"--noise-ns": noise_ns})
-            own: dict[str, Any] = {"slices": slices, "array": array and array.value}
-            own = {name: value for name, value in own.items() if value is not None}
-            settings = VolumeSimulationSettings(**both, **own, three_d=three_d)
-        else:
-            _refuse(
-                "--phantom is table7", {"--slices": slices, "--array": array, "--three-d": three_d or None}
-            )
-            settings = SimulationSettings(**both, noise_s=(noise_ns or 0.0) * 1e-9)
         simulate_to_file(None, settings, path, on_progress=lambda now: step(now.done, now.total, "tasks"))
     seconds = time.perf_counter() - started
     dataset = read_dataset(path, traces=False)
+    waves = settings if isinstance(settings, WaveSimulationSettings) else None
     if as_json:
-        print_json({"output": str(path), "seconds": round(seconds, 3), "settings": asdict(settings)})
+        found = {"output": str(path), "seconds": round(seconds, 3), "settings": asdict(settings)}
+        if waves is not None:
+            found["phase_speed_error"] = dict(zip(("centre", "highest"), waves.dispersion, strict=True))
+        print_json(found)
         return
-    rows = [*_rows(settings, dataset.radius_m or 0.0), ("time", f"{seconds:.1f} s")]
-    print_table(dataset.title, ("figure", "value"), rows)
+    rows = _rows(settings) if waves is None else _wave_rows(waves, dataset)
+    radius = ("ring", f"{1e3 * (dataset.radius_m or 0.0):.1f} mm radius")
+    coupled = ("coupling", f"{settings.coupling_mps:g} m/s")
+    print_table(dataset.title, ("figure", "value"), [radius, coupled, *rows, ("time", f"{seconds:.1f} s")])
     print_lines([str(path)])
 
 
-def _refuse(unless: str, given: Mapping[str, object]) -> None:
-    for option, value in given.items():
-        if value is not None:
-            raise InvalidInput(option, value, f"nothing, unless {unless}")
-
-
-def _rows(settings: SimulationSettings | VolumeSimulationSettings, radius_m: float) -> list[tuple[str, str]]:
+def _rows(settings: Simulated) -> list[tuple[str, str]]:
+    from bentray_workers.simulation.plane import SimulationSettings
     from bentray_workers.simulation.volume import VolumeSimulationSettings
 
-    rows = [("elements", f"{settings.elements} on a ring of {radius_m * 1e3:.1f} mm radius")]
+    rows = [("elements", str(settings.elements))]
     noise = "none" if settings.snr is None else f"1/{settings.snr:g} of the signal"
     if isinstance(settings, VolumeSimulationSettings):
-        how = "rings at all heights at once" if settings.array == "rings" else "the ring at each in turn"
-        fronts = "wave fronts in space" if settings.three_d else "each slice by itself"
-        rows.append(("slices", f"{settings.slices}, {how}, {fronts}"))
-    elif settings.noise_s:
+        array = "rings at all heights" if settings.array == "rings" else "one moving ring"
+        fronts = "3-D wave fronts" if settings.three_d else "2-D wave fronts"
+        rows.append(("slices", f"{settings.slices}, {array}, {fronts}"))
+    elif isinstance(settings, SimulationSettings) and settings.noise_s:
         noise = f"{settings.noise_s * 1e9:g} ns"
-    return [*rows, ("coupling", f"{settings.coupling_mps:g} m/s"), ("noise", noise)]
+    return [*rows, ("noise", noise)]
+
+
+def _wave_rows(settings: WaveSimulationSettings, dataset: Dataset) -> list[tuple[str, str]]:
+    centre, highest = settings.dispersion
+    return [
+        ("elements", f"{settings.elements}, {settings.emissions} of them emit"),
+        ("pulse", f"{1e-3 * settings.frequency_hz:g} kHz"),
+        ("traces", f"{settings.samples} samples at {1e-6 * (dataset.sampling_rate_hz or 0.0):.3g} MHz"),
+        ("grid", f"{settings.told_grid} nodes of {1e3 * settings.spacing_m:.3g} mm"),
+        ("time step", f"{1e9 * settings.step_s:.3g} ns"),
+        ("dispersion", f"phase speed error {centre:.1e} at the centre, {highest:.1e} at the upper end"),
+        ("noise", "none" if settings.snr is None else f"1/{settings.snr:g} of the pulse in water"),
+    ]
