@@ -12,39 +12,37 @@ from bentray_kernels.errors import InvalidInput
 LISTED = {"mesh": "meshes", "field": "geometry-fields"}
 
 
-class UnknownId(InvalidInput):
+class Refusal(InvalidInput):
+    """A refusal whose constructor takes other arguments than the three parts; it is pickled by these."""
+
+    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
+        return InvalidInput, (self.field, self.value, self.accepted)
+
+
+class UnknownId(Refusal):
     """Nothing of this kind has this id."""
 
     def __init__(self, field: str, value: str) -> None:
         listed = LISTED.get(field, f"{field}s")
         super().__init__(field, repr(value[:80]), f"the id of a {field} that exists; see GET /v1/{listed}")
 
-    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
-        return InvalidInput, (self.field, self.value, self.accepted)
 
-
-class Deleted(InvalidInput, FileNotFoundError):  # noqa: N818 - a refusal, like the others
+class Deleted(Refusal, FileNotFoundError):  # noqa: N818 - a refusal, like the others
     """It was deleted while the request was on its way."""
 
     def __init__(self, name: str) -> None:
         InvalidInput.__init__(self, "id", f"{name}, which has been deleted", "an id of what is there")
 
-    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
-        return InvalidInput, (self.field, self.value, self.accepted)
 
-
-class Damaged(InvalidInput):
+class Damaged(Refusal):
     """What lies on the disk is not what was stored."""
 
     def __init__(self, name: str, found: str) -> None:
         accepted = "the bytes that were stored: restore its file from a backup, or delete it and make it anew"
         super().__init__("stored data", f"{name}, {found}", accepted)
 
-    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
-        return InvalidInput, (self.field, self.value, self.accepted)
 
-
-class WrongMediaType(InvalidInput):
+class WrongMediaType(Refusal):
     """The Content-Type of the request is not one that the route takes."""
 
     def __init__(self, found: str | None, accepted: Sequence[str]) -> None:
@@ -127,7 +125,7 @@ class NotAllowed(InvalidInput):
     """The caller is known, and may not do this."""
 
 
-class TooOften(InvalidInput):
+class TooOften(Refusal):
     """The tenant asks more often than it may.
 
     Attributes:
@@ -147,7 +145,7 @@ class QuotaUsedUp(InvalidInput):
     """The tenant stores as much as it may."""
 
 
-class NoSuchPart(InvalidInput):
+class NoSuchPart(Refusal):
     """A part of a file was asked for that begins beyond its end.
 
     Attributes:
@@ -159,7 +157,7 @@ class NoSuchPart(InvalidInput):
         self.size = size
 
 
-class NoAnimation(InvalidInput):
+class NoAnimation(Refusal):
     """The job is none of kind refraction, or has no result."""
 
     def __init__(self, job_id: str, kind: str, state: str) -> None:
@@ -170,33 +168,27 @@ class StorageFull(InvalidInput):
     """The disk of the service is full."""
 
 
-class StorageAway(InvalidInput):
+class StorageAway(Refusal):
     """The bucket that keeps the files does not answer, or refuses."""
 
     def __init__(self, found: str) -> None:
         super().__init__("storage", found, "another try, once it answers again")
 
 
-class DatabaseAway(InvalidInput, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
+class DatabaseAway(Refusal, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
     """The database does not answer, is held by another program, or has too many waiting for it already."""
 
     def __init__(self, found: str) -> None:
         InvalidInput.__init__(self, "database", found, "another try, once it answers again")
 
-    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
-        return InvalidInput, (self.field, self.value, self.accepted)
 
-
-class DatabaseFull(StorageFull, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
+class DatabaseFull(Refusal, StorageFull, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
     """The disk of the database is full."""
 
     def __init__(self) -> None:
         InvalidInput.__init__(
             self, "database", "no space to write a row", "a larger disk, or other files gone"
         )
-
-    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
-        return InvalidInput, (self.field, self.value, self.accepted)
 
 
 class Busy(InvalidInput):

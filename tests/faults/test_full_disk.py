@@ -36,7 +36,7 @@ def test_a_job_waits_for_room(tmp_path, small_disk, scan, scan_file):
         assert np.array_equal(found.speed, reconstruct(scan, from_stored(PLAN)).speed)
         with sqlite3.connect(small_disk / "bentray.sqlite") as database:
             notes = [note for (note,) in database.execute("SELECT note FROM events ORDER BY number")]
-        assert "the disk is full; it goes on once there is room" in notes
+        assert "the disk is full; the job continues once there is space" in notes
         wait_until(lambda: machine.http.get("/health/ready").is_success)
     finally:
         machine.close()

@@ -22,9 +22,9 @@ class ClientError(Exception):
         super().__init__(message)
         self.status = status
         self.problem = problem
-        self.field = problem and problem.field
-        self.found = problem and problem.found
-        self.accepted = problem and problem.accepted
+        self.field: str | None = getattr(problem, "field", None)
+        self.found: str | None = getattr(problem, "found", None)
+        self.accepted: str | None = getattr(problem, "accepted", None)
         self.upload: str | None = None
         self.retry_after_s: float | None = None
 

@@ -231,37 +231,25 @@ class Runner:
         except Cancelled:
             if not reporter.lost:
                 self._settle(job_id, lambda: self._stopped(job_id, files, reporter))
-        except AWAY as error:
-            log.warning("%s waits for its workers: %s", job_id, error)
-            self._settle(
-                job_id,
-                lambda: self._queue.release(job_id, "the workers were away; it goes on when they are back"),
-            )
+        except (*AWAY, DatabaseAway, StorageAway) as error:
+            kinds = ((DatabaseAway, "database"), (StorageAway, "storage"), (Exception, "workers"))
+            away = next(name for kind, name in kinds if isinstance(error, kind))
+            reason = f"no answer from the {away}; the job continues when available"
+            self._put_back(job_id, reason, error)
             self._leaving.wait(IDLE_SECONDS)
-        except DatabaseAway as error:
-            log.warning("%s waits for the database: %s", job_id, error)
-            self._settle(
-                job_id,
-                lambda: self._queue.release(job_id, "the database was away; it goes on when it is back"),
-            )
-        except StorageAway as error:
-            log.warning("%s waits for the storage: %s", job_id, error)
-            self._settle(
-                job_id,
-                lambda: self._queue.release(job_id, "the storage was away; it goes on when it is back"),
-            )
         except Exception as error:
             if isinstance(error, OSError) and error.errno in FULL and not self._has_room():
-                log.warning("%s waits for room on the disk", job_id)
-                self._settle(
-                    job_id,
-                    lambda: self._queue.release(job_id, "the disk is full; it goes on once there is room"),
-                )
+                self._put_back(job_id, "the disk is full; the job continues once there is space", error)
                 return
             problem = explain(job_id, error).model_dump(exclude_none=True)
             self._settle(job_id, lambda: self._failed(job_id, files, reporter, problem))
         else:
             self._settle(job_id, lambda: self._succeeded(job_id, files, reporter, kind, result, target))
+
+    def _put_back(self, job_id: str, reason: str, error: BaseException) -> None:
+        """Queue a job again for a reason that is no fault of the job."""
+        log.warning("%s waits: %s (%s)", job_id, reason, error)
+        self._settle(job_id, lambda: self._queue.release(job_id, reason))
 
     def _keep(self, target: Path, reporter: Reporter) -> None:
         """Keep a result for good before a row tells of it, however long the store is away.

@@ -156,7 +156,7 @@ def test_a_full_disk_is_waited_for(start, uploaded, submitted, until, work, monk
     runner.notify()
     assert until(http, job["id"])["state"] == "succeeded"
     notes = [event["note"] for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
-    assert notes[2] == "the disk is full; it goes on once there is room"
+    assert notes[2] == "the disk is full; the job continues once there is space"
 
 
 @pytest.mark.parametrize("error", [CommClosedError("gone"), FutureCancelledError("key", "lost")])
@@ -171,7 +171,7 @@ def test_a_lost_scheduler_costs_no_job(start, uploaded, submitted, until, work, 
     work.error = None
     assert until(http, job["id"])["state"] == "succeeded"
     notes = {event["note"] for event in http.app.state.parts.jobs.events(LOCAL, job["id"])}
-    assert "the workers were away; it goes on when they are back" in notes
+    assert "no answer from the workers; the job continues when available" in notes
 
 
 def test_what_is_left_of_jobs_goes_with_their_end(start, uploaded, submitted, until, work):

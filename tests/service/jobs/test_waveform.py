@@ -83,7 +83,9 @@ def test_a_torn_job_gives_the_image_of_one_process(http, torn, tmp_path):
     gone, restored = torn
     assert set(gone) < set(restored), "rays and waves were gone on from"
     events = http.app.state.parts.jobs.events(LOCAL, job["id"])
-    assert "the workers were away; it goes on when they are back" in {event["note"] for event in events}
+    assert "no answer from the workers; the job continues when available" in {
+        event["note"] for event in events
+    }
 
     expected = reconstruct(replace(pick(scan()), waveform=scan().waveform), Settings.of(**ASKED))
     answer = http.get(f"/v1/volumes/{job['volume']}/data", params={"format": "npy"})
