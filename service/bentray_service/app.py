@@ -18,7 +18,7 @@ from . import __version__
 from .access.audit import Audit
 from .access.key_watch import KeyWatch
 from .access.quota import Quota
-from .access.sign_in import Door
+from .access.sign_in import SignIn
 from .compute import Cluster, Compute
 from .files.checked_store import CheckedStore
 from .files.data_folder import Files, lock
@@ -28,12 +28,12 @@ from .files.orphans import Orphans
 from .files.private import private_files
 from .guard import Guard
 from .housekeeping import Housekeeper
-from .ingest.append import Hold
-from .ingest.canonical import Limits
+from .ingest.append import UploadLocks
+from .ingest.canonical import IngestLimits
 from .ingest.fair_queue import FairQueue, readers_at_once
-from .ingest.reader import UploadReader
+from .ingest.reader import UploadIngest
 from .ingest.upload_limits import UploadLimits
-from .jobs.feed import Feed
+from .jobs.feed import EventFeed
 from .jobs.kinds import KINDS
 from .jobs.runner import Runner
 from .metrics import Metrics
@@ -52,7 +52,7 @@ from .routes import (
     tus,
     volumes,
 )
-from .rows.ages import Ages
+from .rows.ages import ExpiryMarks
 from .rows.checksums import Checksums
 from .rows.database import open_database
 from .rows.job_queue import Queue
@@ -63,10 +63,10 @@ from .rows.stored_tables import Datasets, GeometryFields, Meshes, UploadedTable,
 from .rows.uploads import Uploads
 from .settings import ServiceSettings
 from .web import errors
-from .web.description import Described
+from .web.description import OpenApiApp
 from .web.headers import SecurityHeaders
 from .web.request_id import RequestIds
-from .web.request_rate import Pace
+from .web.request_rate import RequestRate
 from .web.tus_headers import TusHeaders
 from .wiring import Parts
 
@@ -80,7 +80,7 @@ DESCRIPTION = (
 # needs the database.
 CLOSED: Any = {
     "dependencies": [Depends(HTTPBearer(auto_error=False, description="A key, where one is asked for."))],
-    "responses": errors.described(401, 403, 429, 503),
+    "responses": errors.problems(401, 403, 429, 503),
 }
 
 
@@ -103,19 +103,19 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
         finally:
             await run_in_threadpool(stack.close)
 
-    app = Described(
+    app = OpenApiApp(
         title="Bentray",
         version=__version__,
         description=DESCRIPTION,
         lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
-        responses=errors.described("default"),
+        responses=errors.problems("default"),
     )
     # Set by whoever stops the server, so that endless answers end before it waits for them.
     app.state.leaving = threading.Event()
-    errors.install(app, tuple(KINDS))
-    app.add_middleware(Pace, seconds=settings.upload_patience_s)
+    errors.install_handlers(app, tuple(KINDS))
+    app.add_middleware(RequestRate, seconds=settings.upload_patience_s)
     app.add_middleware(TusHeaders)
     app.add_middleware(Guard)
     app.add_middleware(SecurityHeaders)
@@ -153,7 +153,7 @@ def _open(
     orphans.begin()
     quota = Quota(database, settings.max_tenant_bytes)
     quota.begin(files, alone=settings.database_url is None)
-    door = Door(settings, Keys(database))
+    sign_in = SignIn(settings, Keys(database))
     if cluster is None:
         cluster = stack.enter_context(
             open_cluster(
@@ -165,7 +165,7 @@ def _open(
                 tls=settings.tls_dir,
             )
         )
-    queue, compute = Queue(database), Compute(cluster, store.bring)
+    queue, compute = Queue(database), Compute(cluster, store.fetch)
     runner = Runner(
         queue,
         files,
@@ -178,17 +178,17 @@ def _open(
     )
     runner.start()
     stack.callback(runner.stop)
-    pieces, deletion, hold = Uploads(database), Deletion(database, files), Hold()
+    pieces, deletion, hold = Uploads(database), Deletion(database, files), UploadLocks()
     stores: dict[str, UploadedTable[Any]] = {
         "dataset": Datasets(database),
         "volume": Volumes(database),
         "mesh": Meshes(database),
     }
-    limits = Limits(settings.ingest_memory_bytes, settings.ingest_seconds, files.scratch)
+    limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, files.scratch)
     ingest_queue = FairQueue(readers_at_once(settings.ingest_memory_bytes))
     ingest_queue.start()
     stack.callback(ingest_queue.stop)
-    reader = UploadReader(pieces, files, stores, limits, settings.upload_keep_s, ingest_queue, quota)
+    reader = UploadIngest(pieces, files, stores, limits, settings.upload_keep_s, ingest_queue, quota)
     reader.start()
     stack.callback(reader.stop)
     housekeeper = Housekeeper(
@@ -197,7 +197,7 @@ def _open(
         deletion,
         hold,
         quota,
-        Ages(database),
+        ExpiryMarks(database),
         ObservedTime(database),
         orphans,
         settings.keep_days,
@@ -205,9 +205,9 @@ def _open(
     )
     housekeeper.start()
     stack.callback(housekeeper.stop)
-    pictures = Pictures(cluster, store.bring)
+    pictures = Pictures(cluster, store.fetch)
     stack.callback(pictures.stop)
-    threads: dict[str, Runner | UploadReader] = {"runner": runner, "reader": reader}
+    threads: dict[str, Runner | UploadIngest] = {"runner": runner, "reader": reader}
     readiness = Readiness(database, files, compute, threads, settings.min_free_bytes)
     stack.callback(readiness.stop)
     return Parts(
@@ -231,9 +231,9 @@ def _open(
         compute=compute,
         pictures=pictures,
         runner=runner,
-        door=door,
+        sign_in=sign_in,
         key_watch=KeyWatch(Keys(database)),
-        feed=Feed(Jobs(database), leaving.is_set),
+        feed=EventFeed(Jobs(database), leaving.is_set),
         audit=Audit(files.audit),
         readiness=readiness,
     )

@@ -61,5 +61,5 @@ def _signature(kind: type[Any]) -> inspect.Signature:
     return inspect.Signature(found)
 
 
-AskedView = Annotated[RefractionView, Depends(asked_of(RefractionView))]
-AskedFieldView = Annotated[FieldView, Depends(asked_of(FieldView))]
+ViewParameters = Annotated[RefractionView, Depends(asked_of(RefractionView))]
+FieldViewParameters = Annotated[FieldView, Depends(asked_of(FieldView))]

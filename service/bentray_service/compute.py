@@ -42,13 +42,13 @@ class Cluster(Protocol):
 class Compute:
     """The worker pool of this service."""
 
-    def __init__(self, cluster: Cluster, bring: Callable[[Path], Path]) -> None:
+    def __init__(self, cluster: Cluster, fetch: Callable[[Path], Path]) -> None:
         """Args:
         cluster: with the pool.
-        bring: lets what a task is to read lie at its path; see ``Store.bring``.
+        bring: lets what a task is to read lie at its path; see ``Store.fetch``.
         """
         self._cluster = cluster
-        self._bring = bring
+        self._fetch = fetch
 
     @property
     def client(self) -> Any:
@@ -79,7 +79,7 @@ class Compute:
         except (OSError, TimeoutError):
             # The scheduler is gone; the job waits until it is back, on workers of which nothing is known.
             offers = ()
-        known = counts_in(self._bring(path)) if counts is None else DatasetCounts(**counts)
+        known = counts_in(self._fetch(path)) if counts is None else DatasetCounts(**counts)
         return planning.plan(known.summary(settings), settings, offers).to_dict()
 
     def plan_simulation(self, asked: PhantomScan) -> dict[str, Any]:

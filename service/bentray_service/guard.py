@@ -14,7 +14,7 @@ from bentray_kernels.errors import InvalidInput
 
 from .access.caller import Caller
 from .access.key_watch import answer_while_valid
-from .web.errors import refused
+from .web.errors import problem_response
 from .wiring import Parts
 
 log = logging.getLogger("bentray.access")
@@ -36,14 +36,14 @@ class Guard:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        seen = _Seen(scope)
+        seen = _RequestLog(scope)
         caller = None
         try:
             if not _public(scope["path"]):
-                caller = await run_in_threadpool(_let_in, scope, seen)
+                caller = await run_in_threadpool(_authenticate, scope, seen)
                 scope.setdefault("state", {})["caller"] = caller
         except InvalidInput as error:
-            await refused(error, scope["path"])(scope, receive, seen.sending(send))
+            await problem_response(error, scope["path"])(scope, receive, seen.sending(send))
         else:
             given = scope, seen.receiving(receive), seen.sending(send)
             if caller is not None and caller.how == "key":
@@ -51,14 +51,14 @@ class Guard:
             else:
                 await self.app(*given)
         finally:
-            seen.tell()
+            seen.log_request()
 
 
-def _let_in(scope: Scope, seen: _Seen) -> Caller:
-    door = _parts(scope).door
+def _authenticate(scope: Scope, seen: _RequestLog) -> Caller:
+    sign_in = _parts(scope).sign_in
     headers, peer = Headers(scope=scope), scope.get("client")
-    seen.caller = door.caller(headers, peer[0] if peer else "")
-    door.check(seen.caller, scope["method"], scope["path"])
+    seen.caller = sign_in.caller(headers, peer[0] if peer else "")
+    sign_in.check(seen.caller, scope["method"], scope["path"])
     return seen.caller
 
 
@@ -70,7 +70,7 @@ def _parts(scope: Scope) -> Parts:
     return cast(Parts, scope["app"].state.parts)
 
 
-class _Seen:
+class _RequestLog:
     """What went past of one request."""
 
     def __init__(self, scope: Scope) -> None:
@@ -99,7 +99,7 @@ class _Seen:
 
         return counted
 
-    def tell(self) -> None:
+    def log_request(self) -> None:
         """A line for the log, and an entry for the audit where somebody was let in."""
         route = str(getattr(self._scope.get("route"), "path", UNMATCHED))
         figures: dict[str, Any] = {
@@ -113,7 +113,7 @@ class _Seen:
             who = {"tenant": self.caller.tenant, "how": self.caller.how, "who": self.caller.who}
             figures |= who
             number = self._scope["state"]["request_id"]
-            _parts(self._scope).audit.note({"request": number, **figures, "ids": self._ids()})
+            _parts(self._scope).audit.append({"request": number, **figures, "ids": self._ids()})
         seconds = round(time.perf_counter() - self._begun, 4)
         words = "%s %s %d in %.3f s"
         log.info(

@@ -11,11 +11,11 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from .access.quota import Quota
 from .files.data_folder import Files
-from .files.deletion import Deletion, Stored
+from .files.deletion import Deletion, StoredItem
 from .files.orphans import Orphans
-from .ingest.append import Hold, remove
-from .refusals import DatabaseAway, InUse, Locked, StorageAway, UnknownId
-from .rows.ages import Aged, Ages
+from .ingest.append import UploadLocks, remove
+from .refusals import DatabaseUnavailable, InUse, Locked, StorageUnavailable, UnknownId
+from .rows.ages import ExpiredItem, ExpiryMarks
 from .rows.observed_time import ObservedTime
 from .rows.records import UploadRow
 from .rows.uploads import Uploads
@@ -48,9 +48,9 @@ class Housekeeper:
         uploads: Uploads,
         files: Files,
         deletion: Deletion,
-        hold: Hold,
+        hold: UploadLocks,
         quota: Quota,
-        ages: Ages,
+        ages: ExpiryMarks,
         observed: ObservedTime,
         orphans: Orphans,
         keep_days: float | None,
@@ -99,9 +99,9 @@ class Housekeeper:
                     self._files.store.tidy(self._leaving.is_set)
                     self._orphans.sweep(self._leaving.is_set)
                     tidied = time.monotonic()
-            except DatabaseAway as error:
+            except DatabaseUnavailable as error:
                 log.warning("what is old waits: %s", error)
-            except (SQLAlchemyError, OSError, StorageAway):
+            except (SQLAlchemyError, OSError, StorageUnavailable):
                 log.exception("what is old could not be removed; trying again in %g s", INTERVAL_SECONDS)
             if self._leaving.wait(INTERVAL_SECONDS):
                 return
@@ -109,11 +109,11 @@ class Housekeeper:
     def sweep(self) -> None:
         """Mark what is too old now, and remove what has been so for long enough."""
         now = self._now()
-        uploads = {Aged(row["tenant"], UPLOAD, row["id"]): row for row in self._uploads.expired(now)}
-        stored: dict[Aged, Stored] = {}
+        uploads = {ExpiredItem(row["tenant"], UPLOAD, row["id"]): row for row in self._uploads.expired(now)}
+        stored: dict[ExpiredItem, StoredItem] = {}
         if self._keep_days is not None:
             old = self._deletion.older_than(now - DAY_S * self._keep_days)
-            stored = {Aged(one.tenant, one.what, one.id): one for one in old}
+            stored = {ExpiredItem(one.tenant, one.what, one.id): one for one in old}
         for aged, seconds in self._ages.mark({*uploads, *stored}, self._observed.count()).items():
             if aged.what == UPLOAD and seconds >= self._upload_wait_s:
                 try:
@@ -138,7 +138,7 @@ class Housekeeper:
         self._last = wall, steady
         return wall
 
-    def _delete(self, stored: Stored) -> None:
+    def _delete(self, stored: StoredItem) -> None:
         try:
             self._deletion.delete(stored)
             log.info("%s of %s was kept long enough", stored.id, stored.tenant)

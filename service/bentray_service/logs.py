@@ -49,7 +49,7 @@ def without_secrets(text: str) -> str:
     return text
 
 
-class Words(logging.Formatter):
+class TextFormatter(logging.Formatter):
     """For a terminal; what a client sent cannot begin a line of its own."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - the name of the library
@@ -67,7 +67,7 @@ class Words(logging.Formatter):
         return without_secrets(said)
 
 
-class Lines(logging.Formatter):
+class JsonFormatter(logging.Formatter):
     """JSON, one object a line."""
 
     def format(self, record: logging.LogRecord) -> str:
@@ -95,7 +95,7 @@ class _Stderr(logging.Handler):
             self.handleError(record)
 
 
-class Seldom(logging.Filter):
+class RateLimitFilter(logging.Filter):
     """Lets each kind of line through once in ``SELDOM_S``, with the number of those that were held back."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -132,7 +132,7 @@ def configured(form: Literal["text", "json"]) -> Iterator[None]:
     handlers of its own, as Dask does, is imported.
     """
     handler = _Stderr()
-    handler.setFormatter(Words() if form == "text" else Lines())
+    handler.setFormatter(TextFormatter() if form == "text" else JsonFormatter())
     root, own, closed = (logging.getLogger(name) for name in (None, "bentray", CLOSED))
     known = [logging.getLogger(name) for name in list(logging.Logger.manager.loggerDict)]
     before = [(logger, logger.handlers[:], logger.propagate, logger.level) for logger in (root, *known)]
@@ -144,7 +144,7 @@ def configured(form: Literal["text", "json"]) -> Iterator[None]:
     if form == "json":
         own.setLevel(logging.INFO)
     closed.setLevel(logging.WARNING)
-    seldom, provoked = Seldom(), [logging.getLogger(name) for name in PROVOKED]
+    seldom, provoked = RateLimitFilter(), [logging.getLogger(name) for name in PROVOKED]
     for logger in provoked:
         logger.addFilter(seldom)
     try:

@@ -57,7 +57,7 @@ class Metrics:
 
     def watch(self, parts: Parts) -> None:
         """Tell of an open service, too; read when it is asked for."""
-        self.registry.register(_Parts(parts))
+        self.registry.register(_ServiceCollector(parts))
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
         """ASGI middleware that counts and times requests."""
@@ -103,7 +103,7 @@ def _route(scope: Scope) -> str:
     return str(getattr(scope.get("route"), "path", UNMATCHED))
 
 
-class _Parts(Collector):
+class _ServiceCollector(Collector):
     """Reads the parts of a service when Prometheus asks; what cannot be read is left out."""
 
     def __init__(self, parts: Parts) -> None:

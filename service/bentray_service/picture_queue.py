@@ -13,7 +13,7 @@ from itertools import count
 
 from bentray_workers.cluster.capacities import WorkerCapacity
 
-from .refusals import TooOften
+from .refusals import RateLimited
 from .rows.tenants import Tenant
 
 # A picture that would be done later than this, by what is known of those before it, is refused, s.
@@ -137,11 +137,11 @@ class PictureQueue:
         if all_of_them and late > 0.0:
             found = f"{held} pictures of this tenant in hand, {all_of_them} in all"
             accepted = f"pictures that can be drawn in about {LATEST_S:g} s; see Retry-After"
-            raise TooOften("pictures", found, accepted, min(LATEST_S, max(1.0, late)))
+            raise RateLimited("pictures", found, accepted, min(LATEST_S, max(1.0, late)))
         if held >= MOST_OF_TENANT or all_of_them >= MOST_IN_ALL:
             found = f"{held} in hand of this tenant, {all_of_them} in all"
             accepted = f"fewer than {MOST_OF_TENANT} of a tenant and {MOST_IN_ALL} in all; see Retry-After"
-            raise TooOften("pictures", found, accepted, 1.0)
+            raise RateLimited("pictures", found, accepted, 1.0)
 
     def _assign(self) -> None:
         """Give free workers to those who wait, first to the tenant whose last turn is longest ago."""

@@ -55,13 +55,13 @@ class Pictures:
     itself; TooOften where too much waits already; Busy where it was not done in time.
     """
 
-    def __init__(self, cluster: Cluster, bring: Callable[[Path], Path]) -> None:
+    def __init__(self, cluster: Cluster, fetch: Callable[[Path], Path]) -> None:
         """Args:
         cluster: with the workers.
-        bring: lets what a task is to read lie at its path; see ``Store.bring``.
+        bring: lets what a task is to read lie at its path; see ``Store.fetch``.
         """
         self._cluster = cluster
-        self._bring = bring
+        self._fetch = fetch
         self._threads = ThreadPoolExecutor(THREADS, "pictures")
         self._asker = ThreadPoolExecutor(1, "workers")
         self._asking: asyncio.Future[dict[str, WorkerCapacity]] | None = None
@@ -167,12 +167,12 @@ class Pictures:
         picture_cost.check_memory(field, found, cost, list(workers.values()))
         try:
             async with self._queue.admitted(tenant, cost.seconds), asyncio.timeout(RENDER_SECONDS):
-                tasks = tasks_of(await self._in_thread(lambda: self._bring(path)))
+                tasks = tasks_of(await self._in_thread(lambda: self._fetch(path)))
                 try:
                     return await _Run(self, tenant, cost, dict(how or {})).all(tasks)
                 except (InvalidInput, FileNotFoundError):
                     # What is deleted or damaged meanwhile is told as that, not as a worker sees it.
-                    await self._in_thread(lambda: self._bring(path))
+                    await self._in_thread(lambda: self._fetch(path))
                     raise
         except TimeoutError:
             raise Busy(

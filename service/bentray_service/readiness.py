@@ -14,7 +14,7 @@ from bentray_kernels.errors import InvalidInput
 
 from .compute import Compute
 from .files.data_folder import Files
-from .ingest.reader import UploadReader
+from .ingest.reader import UploadIngest
 from .jobs.runner import Runner
 from .refusals import NotReady
 from .rows.database import Database
@@ -24,7 +24,7 @@ WITHIN_S = 3.0
 
 
 @dataclass(frozen=True)
-class Seen:
+class ReadinessReport:
     """What a look gave.
 
     Attributes:
@@ -46,7 +46,7 @@ class Readiness:
         database: Database,
         files: Files,
         compute: Compute,
-        threads: Mapping[str, Runner | UploadReader],
+        threads: Mapping[str, Runner | UploadIngest],
         min_free_bytes: int,
     ) -> None:
         """Args:
@@ -57,21 +57,21 @@ class Readiness:
         self._database, self._files, self._compute = database, files, compute
         self._threads, self._min_free_bytes = threads, min_free_bytes
         self._pool = ThreadPoolExecutor(1, "readiness")
-        self._looking: asyncio.Future[Seen] | None = None
+        self._inspecting: asyncio.Future[ReadinessReport] | None = None
         # What the thread looks at now.
         self._part = "service"
 
-    async def seen(self) -> Seen:
+    async def report(self) -> ReadinessReport:
         """What a look gives that is under way, or a new one.
 
         Raises:
             NotReady: naming the part that does not answer in time.
         """
-        if self._looking is None or self._looking.done():
-            self._looking = asyncio.get_running_loop().run_in_executor(self._pool, self._look)
+        if self._inspecting is None or self._inspecting.done():
+            self._inspecting = asyncio.get_running_loop().run_in_executor(self._pool, self._inspect)
         try:
             async with asyncio.timeout(WITHIN_S):
-                return await asyncio.shield(self._looking)
+                return await asyncio.shield(self._inspecting)
         except TimeoutError:
             raise NotReady([(self._part, f"no answer in {WITHIN_S:g} s", "an answer in that time")]) from None
 
@@ -79,7 +79,7 @@ class Readiness:
         """Look no more; a look that still waits for a part is left behind."""
         self._pool.shutdown(wait=False, cancel_futures=True)
 
-    def _look(self) -> Seen:
+    def _inspect(self) -> ReadinessReport:
         faults: list[tuple[str, str, str]] = []
         self._part = "database"
         try:
@@ -102,4 +102,4 @@ class Readiness:
         for part, owner in self._threads.items():
             if not owner.alive():
                 faults.append((part, "a thread has ended", "every thread alive; start the service anew"))
-        return Seen(tuple(faults), workers, free)
+        return ReadinessReport(tuple(faults), workers, free)

@@ -57,7 +57,7 @@ class TooLarge(InvalidInput):
     """The body is larger than the service takes."""
 
 
-class TooSlow(InvalidInput):
+class BodyTimeout(InvalidInput):
     """The body hardly comes."""
 
 
@@ -73,7 +73,7 @@ class UnknownMethod(InvalidInput):
     """The method is one that nothing here knows."""
 
 
-class HeadTooLarge(InvalidInput):
+class HeadersTooLarge(InvalidInput):
     """The head of the request is too long."""
 
 
@@ -105,7 +105,7 @@ class InUse(InvalidInput):
     """A job that is not at its end needs it."""
 
 
-class Finished(InvalidInput):
+class JobFinished(InvalidInput):
     """The job has ended, so nothing can be asked of it any more."""
 
 
@@ -117,15 +117,15 @@ class QueueFull(InvalidInput):
     """So many jobs wait already that no more are taken for now."""
 
 
-class NotLetIn(InvalidInput):
+class NotAuthenticated(InvalidInput):
     """The caller is not known."""
 
 
-class NotAllowed(InvalidInput):
+class Forbidden(InvalidInput):
     """The caller is known, and may not do this."""
 
 
-class TooOften(Refusal):
+class RateLimited(Refusal):
     """The tenant asks more often than it may.
 
     Attributes:
@@ -141,11 +141,11 @@ class TooManyStreams(InvalidInput):
     """So many event streams are open that no more are taken for now."""
 
 
-class QuotaUsedUp(InvalidInput):
+class QuotaExceeded(InvalidInput):
     """The tenant stores as much as it may."""
 
 
-class NoSuchPart(Refusal):
+class RangeNotSatisfiable(Refusal):
     """A part of a file was asked for that begins beyond its end.
 
     Attributes:
@@ -168,14 +168,14 @@ class StorageFull(InvalidInput):
     """The disk of the service is full."""
 
 
-class StorageAway(Refusal):
+class StorageUnavailable(Refusal):
     """The bucket that keeps the files does not answer, or refuses."""
 
     def __init__(self, found: str) -> None:
         super().__init__("storage", found, "another try, once it answers again")
 
 
-class DatabaseAway(Refusal, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
+class DatabaseUnavailable(Refusal, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
     """The database does not answer, is held by another program, or has too many waiting for it already."""
 
     def __init__(self, found: str) -> None:

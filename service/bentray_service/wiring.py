@@ -11,16 +11,16 @@ from .access.audit import Audit
 from .access.caller import Caller
 from .access.key_watch import KeyWatch
 from .access.quota import Quota
-from .access.sign_in import Door
+from .access.sign_in import SignIn
 from .compute import Compute
 from .files.data_folder import Files
 from .files.deletion import Deletion
 from .housekeeping import Housekeeper
-from .ingest.append import Hold
+from .ingest.append import UploadLocks
 from .ingest.fair_queue import FairQueue
-from .ingest.reader import UploadReader
+from .ingest.reader import UploadIngest
 from .ingest.upload_limits import UploadLimits
-from .jobs.feed import Feed
+from .jobs.feed import EventFeed
 from .jobs.runner import Runner
 from .pictures import Pictures
 from .readiness import Readiness
@@ -51,15 +51,15 @@ class Parts:
     upload_limits: UploadLimits
     ingest_queue: FairQueue
     deletion: Deletion
-    hold: Hold
-    reader: UploadReader
+    hold: UploadLocks
+    reader: UploadIngest
     housekeeper: Housekeeper
     compute: Compute
     pictures: Pictures
     runner: Runner
-    door: Door
+    sign_in: SignIn
     key_watch: KeyWatch
-    feed: Feed
+    feed: EventFeed
     audit: Audit
     readiness: Readiness
 
@@ -88,6 +88,6 @@ async def _tenant(request: Request) -> Tenant:
 
 
 Service = Annotated[Parts, Depends(_service)]
-Asking = Annotated[Caller, Depends(_caller)]
+CurrentCaller = Annotated[Caller, Depends(_caller)]
 # Whose request it is; every query takes it.
 CallerTenant = Annotated[Tenant, Depends(_tenant)]

@@ -7,8 +7,8 @@ import pytest
 from distributed import batched
 
 from bentray_service import logs
-from bentray_service.logs import Lines, Words, about
-from bentray_service.rows.api_key import Token
+from bentray_service.logs import JsonFormatter, TextFormatter, about
+from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.tenants import Tenant
 
@@ -40,9 +40,9 @@ def test_a_line_says_what_it_is_about(lines):
     assert "request" not in outside
 
 
-@pytest.mark.parametrize("formatter", [Words(), Lines()])
+@pytest.mark.parametrize("formatter", [TextFormatter(), JsonFormatter()])
 def test_no_secret_in_any_line(formatter):
-    token = Token.new()
+    token = ApiKey.new()
     secret = token.shown().rpartition("_")[2]
     words = f"{token.shown()} at postgresql+psycopg://bentray:p%40ss@db/x"
     try:
@@ -58,10 +58,10 @@ def test_no_secret_in_any_line(formatter):
 
 
 def test_nobody_forges_a_line():
-    shown = Words().format(record("GET %s", "/x\nWARNING all is well\x1b[2K"))
+    shown = TextFormatter().format(record("GET %s", "/x\nWARNING all is well\x1b[2K"))
     assert len(shown.splitlines()) == 1
     assert "\x1b" not in shown
-    assert len(Lines().format(record("GET %s", "/x\n{}")).splitlines()) == 1
+    assert len(JsonFormatter().format(record("GET %s", "/x\n{}")).splitlines()) == 1
 
 
 def test_afterwards_all_is_as_before():
@@ -90,9 +90,9 @@ def test_connections_that_close_at_a_stop_show_no_traceback(form, capsys):
 
 
 def test_requests_and_jobs_can_be_followed_and_no_key_is_told(start, uploaded, submitted, until, work, lines):
-    http, token = start(), Token.new()
+    http, token = start(), ApiKey.new()
     Keys(http.app.state.parts.database).add(token, Tenant("local"), "one", ("read", "write"))
-    http.app.state.parts.door._no_keys_until = 0.0
+    http.app.state.parts.sign_in._no_keys_until = 0.0
     http.headers["Authorization"] = f"Bearer {token.shown()}"
     dataset = uploaded(http)
     work.error = RuntimeError("a fault")
@@ -113,7 +113,7 @@ def test_requests_and_jobs_can_be_followed_and_no_key_is_told(start, uploaded, s
 
 def test_what_clients_bring_about_is_told_once_a_minute(capsys):
     now = [0.0]
-    seldom = logs.Seldom(lambda: now[0])
+    seldom = logs.RateLimitFilter(lambda: now[0])
 
     def passes(words, *given, name="asyncio", level=logging.WARNING):
         record = logging.LogRecord(name, level, __file__, 1, words, given, None)

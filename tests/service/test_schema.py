@@ -16,7 +16,7 @@ import pytest
 import trimesh
 
 from bentray_service.openapi import description
-from bentray_service.rows.api_key import Token
+from bentray_service.rows.api_key import ApiKey
 
 from ..effort import effort
 
@@ -62,7 +62,7 @@ phases = { coverage = { enabled = false } }
 @pytest.fixture
 def attack(serve, scan, tmp_path) -> Callable[..., tuple[int, str]]:
     """Run schemathesis with options against a service that asks for a key and holds one of most things."""
-    token = Token.new()
+    token = ApiKey.new()
     key = tmp_path / "key"
     key.touch(0o600)
     key.write_text(token.shown())

@@ -38,7 +38,7 @@ class Audit:
         self._folder = folder
         self._now = now
 
-    def note(self, entry: Entry) -> None:
+    def append(self, entry: Entry) -> None:
         """Append one entry; what cannot be stored is in the log at least."""
         if (entry["method"], entry["route"]) in LEFT_OUT:
             return

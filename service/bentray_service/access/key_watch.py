@@ -11,9 +11,9 @@ import anyio
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ..refusals import DatabaseAway, NotLetIn
+from ..refusals import DatabaseUnavailable, NotAuthenticated
 from ..rows.keys import Keys
-from ..web.errors import refused
+from ..web.errors import problem_response
 
 log = logging.getLogger("bentray.access")
 
@@ -32,14 +32,14 @@ class KeyWatch:
     def __init__(self, keys: Keys) -> None:
         self._keys = keys
         self._under_way: dict[str, set[Callable[[], None]]] = {}
-        self._looking: asyncio.Task[None] | None = None
+        self._polling: asyncio.Task[None] | None = None
 
     @contextmanager
     def during(self, key_id: str, end: Callable[[], None]) -> Iterator[None]:
         """In the block ``end`` is called, at most once, if the key ends."""
         self._under_way.setdefault(key_id, set()).add(end)
-        if self._looking is None:
-            self._looking = asyncio.create_task(self._look())
+        if self._polling is None:
+            self._polling = asyncio.create_task(self._poll())
         try:
             yield
         finally:
@@ -48,7 +48,7 @@ class KeyWatch:
             if not mine:
                 self._under_way.pop(key_id, None)
 
-    async def _look(self) -> None:
+    async def _poll(self) -> None:
         # A thread of its own, which nothing else can hold.
         limiter = anyio.CapacityLimiter(1)
         try:
@@ -60,14 +60,14 @@ class KeyWatch:
                     ended = await anyio.to_thread.run_sync(
                         self._keys.ended, list(self._under_way), limiter=limiter
                     )
-                except (SQLAlchemyError, DatabaseAway) as error:
+                except (SQLAlchemyError, DatabaseUnavailable) as error:
                     log.warning("whether keys were revoked could not be read: %s", error)
                     continue
                 for key_id in ended:
                     for end in self._under_way.pop(key_id, set()):
                         end()
         finally:
-            self._looking = None
+            self._polling = None
 
 
 async def answer_while_valid(
@@ -80,7 +80,7 @@ async def answer_while_valid(
     """
     cancelling = anyio.CancelScope()
     ended = begun = events = replaced = complete = False
-    refusal = NotLetIn("Authorization", "a key that was revoked or expired meanwhile", "a valid key")
+    refusal = NotAuthenticated("Authorization", "a key that was revoked or expired meanwhile", "a valid key")
 
     def end() -> None:
         nonlocal ended
@@ -99,7 +99,7 @@ async def answer_while_valid(
         if message["type"] == "http.response.start":
             if ended:
                 replaced = True
-                await refused(refusal, scope["path"])(scope, receive, send)
+                await problem_response(refusal, scope["path"])(scope, receive, send)
                 cancelling.cancel()
                 return
             begun = True

@@ -12,12 +12,12 @@ MANY = 10_000
 
 
 @dataclass
-class _Bucket:
+class _TokenBucket:
     left: float
     seen: float
 
 
-class Rates:
+class RequestRates:
     """Counts requests of each tenant.
 
     Args:
@@ -29,7 +29,7 @@ class Rates:
         self.per_minute = per_minute
         self._clock = clock
         self._lock = threading.Lock()
-        self._buckets: dict[str, _Bucket] = {}
+        self._buckets: dict[str, _TokenBucket] = {}
 
     def take(self, tenant: str) -> float:
         """0 where a request may go on; else the seconds until one may."""
@@ -39,14 +39,14 @@ class Rates:
             now = self._clock()
             if len(self._buckets) >= MANY:
                 self._forget(now)
-            bucket = self._buckets.setdefault(tenant, _Bucket(self.per_minute, now))
+            bucket = self._buckets.setdefault(tenant, _TokenBucket(self.per_minute, now))
             bucket.left, bucket.seen = self._level(bucket, now), now
             if bucket.left < 1.0:
                 return (1.0 - bucket.left) * 60.0 / self.per_minute
             bucket.left -= 1.0
             return 0.0
 
-    def _level(self, bucket: _Bucket, now: float) -> float:
+    def _level(self, bucket: _TokenBucket, now: float) -> float:
         return min(float(self.per_minute), bucket.left + (now - bucket.seen) * self.per_minute / 60.0)
 
     def _forget(self, now: float) -> None:

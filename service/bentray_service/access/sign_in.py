@@ -10,14 +10,14 @@ from starlette.datastructures import Headers
 
 from bentray_kernels.errors import InvalidInput
 
-from ..refusals import NotAllowed, NotLetIn, TooOften
-from ..rows.api_key import PREFIX, Token
+from ..refusals import Forbidden, NotAuthenticated, RateLimited
+from ..rows.api_key import PREFIX, ApiKey
 from ..rows.keys import Keys
 from ..rows.tenants import LOCAL, tenant_of_user
 from ..settings import ServiceSettings
-from ..web.addresses import is_loopback, named_loopback, networks, within
+from ..web.addresses import is_loopback, names_loopback, networks, within
 from .caller import ANYONE, SCOPES, USUAL, Caller, scope_of
-from .request_rates import Rates
+from .request_rates import RequestRates
 
 log = logging.getLogger("bentray.access")
 
@@ -30,7 +30,7 @@ WAYS_IN = (
 )
 
 
-class Door:
+class SignIn:
     """Lets callers in.
 
     Without any key and without trusted proxies, a service that listens on loopback is open: everybody who
@@ -45,8 +45,8 @@ class Door:
         self._keys = keys
         self._trusted = networks(settings.trusted_proxies or "")
         self._user_header = settings.proxy_user_header
-        self._requests = Rates(settings.requests_per_minute)
-        self._renders = Rates(settings.renders_per_minute)
+        self._requests = RequestRates(settings.requests_per_minute)
+        self._renders = RequestRates(settings.renders_per_minute)
         self._no_keys_until = -math.inf
         if settings.first_key_file is not None and not keys.any():
             self._take_first_key(settings)
@@ -83,7 +83,7 @@ class Door:
             user = users[0].strip()
             return Caller(tenant_of_user(user), "proxy", user, frozenset(USUAL))
         found = "nothing" if not scheme else "something that is no key"
-        raise NotLetIn("Authorization", found, "Bearer and a key; see `bentray keys create`")
+        raise NotAuthenticated("Authorization", found, "Bearer and a key; see `bentray keys create`")
 
     def check(self, caller: Caller, method: str, path: str) -> None:
         """Refuse what is beyond the caller's scopes, or too often.
@@ -94,7 +94,7 @@ class Door:
         needed = scope_of(method, path)
         if needed not in caller.scopes:
             has = ", ".join(sorted(caller.scopes))
-            raise NotAllowed("scope", has, f"{needed}, to {SCOPES[needed]}")
+            raise Forbidden("scope", has, f"{needed}, to {SCOPES[needed]}")
         self._take(self._requests, "requests", caller)
 
     def check_render(self, caller: Caller) -> None:
@@ -105,26 +105,30 @@ class Door:
         """
         self._take(self._renders, "renders", caller)
 
-    def _take(self, rates: Rates, what: str, caller: Caller) -> None:
+    def _take(self, rates: RequestRates, what: str, caller: Caller) -> None:
         wait_s = rates.take(caller.tenant) if caller.how != "open" else 0.0
         if wait_s > 0.0:
-            raise TooOften(what, f"more than {rates.per_minute} a minute", "fewer; see Retry-After", wait_s)
+            raise RateLimited(
+                what, f"more than {rates.per_minute} a minute", "fewer; see Retry-After", wait_s
+            )
 
     def _neighbour(self, headers: Headers) -> Caller:
         # A page of another site can make a browser on this machine ask, by a name that it lets mean
         # 127.0.0.1 or by a form; neither names loopback itself.
         for name in ("host", "origin"):
             given = headers.get(name)
-            if given is not None and not named_loopback(given):
+            if given is not None and not names_loopback(given):
                 accepted = "localhost or 127.0.0.1; from elsewhere a key is needed (`bentray keys create`)"
-                raise NotAllowed(name.title(), repr(given[:80]), accepted)
+                raise Forbidden(name.title(), repr(given[:80]), accepted)
         return ANYONE
 
     def _key_holder(self, given: str) -> Caller:
-        token = Token.of(given)
+        token = ApiKey.of(given)
         row = None if token is None else self._keys.owner(token)
         if row is None:
-            raise NotLetIn("Authorization", "a key that is unknown, revoked or expired", "a valid key")
+            raise NotAuthenticated(
+                "Authorization", "a key that is unknown, revoked or expired", "a valid key"
+            )
         return Caller(row["tenant"], "key", row["id"], frozenset(row["scopes"]))
 
     def _take_first_key(self, settings: ServiceSettings) -> None:
@@ -135,6 +139,6 @@ class Door:
         except (OSError, UnicodeDecodeError) as error:
             found = f"{path} ({getattr(error, 'strerror', None) or 'no text'})"
             raise InvalidInput("BENTRAY_FIRST_KEY_FILE", found, "a file with a key") from error
-        token = Token.given("BENTRAY_FIRST_KEY_FILE", text)
+        token = ApiKey.given("BENTRAY_FIRST_KEY_FILE", text)
         self._keys.add(token, LOCAL, "first", tuple(SCOPES))
         log.warning("the first key, %s of the tenant %s, was taken from %s", token.id, LOCAL, path)

@@ -25,7 +25,7 @@ from . import (
     verify,
     worker,
 )
-from .options.repeated_words import SpacingInRow
+from .options.repeated_words import RepeatedSpacing
 from .output.exit_codes import Commands
 from .output.terminal import show_our_warnings_in_a_line
 
@@ -58,7 +58,7 @@ for command in (
     verify.verify,
 ):
     app.command()(command)
-app.command(cls=SpacingInRow)(render.render)
+app.command(cls=RepeatedSpacing)(render.render)
 app.add_typer(keys.keys, name="keys")
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .options.field_options import AskedField, with_field_options
+from .options.field_options import FieldOptions, with_field_options
 from .options.paths import input_file, output_folder
 from .output.terminal import AsJson, Step, print_json, print_lines, print_table, progress_bar
 
@@ -26,7 +26,7 @@ ACCEPTED = "a triangle mesh: PLY, OBJ, OFF, STL, glTF or GLB"
 def geometry_field(
     mesh: Annotated[Path, typer.Argument(help="Triangle mesh: PLY, OBJ, OFF, STL, glTF or GLB.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
-    asked: AskedField,
+    asked: FieldOptions,
     as_json: AsJson = False,
 ) -> None:
     """Build the geometry field of a mesh and render it into OUTPUT.

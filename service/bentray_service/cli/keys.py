@@ -51,14 +51,14 @@ def create(
     Example:  bentray keys create --tenant clinic --name scanner --expires 90d
     """
     from ..access.caller import checked_scopes
-    from ..rows.api_key import Token
+    from ..rows.api_key import ApiKey
     from ..rows.tenants import checked_tenant
 
     asked, whose = checked_scopes(scopes), checked_tenant(tenant)
     if not (1 <= len(name) <= LONGEST_NAME and name.isprintable()):
         raise InvalidInput("name", repr(name[:LONGEST_NAME]), f"1 to {LONGEST_NAME} printable characters")
     until = None if expires is None else time.time() + _seconds(expires)
-    token = Token.new()
+    token = ApiKey.new()
     with _opened(data) as store:
         row = store.add(token, whose, name, asked, until)
     if as_json:

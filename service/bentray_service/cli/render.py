@@ -15,7 +15,7 @@ import typer
 from bentray_kernels.errors import InvalidInput
 
 from .options.paths import check_apart, input_file, output_file
-from .options.view_options import AskedView, with_view_options
+from .options.view_options import ViewOptions, with_view_options
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ ROWS, RAYS = 16, 2**15
 PHANTOM_SIDE_M = 0.1
 
 
-class Phantom(StrEnum):
+class SampledPhantom(StrEnum):
     """Volumes that need no file."""
 
     SPHERE = "sphere"
@@ -44,11 +44,13 @@ class Phantom(StrEnum):
 @with_view_options
 def render(
     output: Annotated[Path, typer.Option("--output", "-o", help="Image file to write (PNG).")],
-    asked: AskedView,
+    asked: ViewOptions,
     file: Annotated[
         Path | None, typer.Argument(help="Volume file; the format is detected from its content.")
     ] = None,
-    phantom: Annotated[Phantom | None, typer.Option(help="Phantom to render instead of a file.")] = None,
+    phantom: Annotated[
+        SampledPhantom | None, typer.Option(help="Phantom to render instead of a file.")
+    ] = None,
     nodes: Annotated[int, typer.Option(min=8, max=512, help="Nodes per side of the phantom.")] = 64,
     position_map: Annotated[
         Path | None,
@@ -122,7 +124,7 @@ def _refuse(given: dict[str, object]) -> None:
             raise InvalidInput(option, value, "nothing with --phantom: it tells its own")
 
 
-def _sampled(phantom: Phantom, nodes: int) -> Volume:
+def _sampled(phantom: SampledPhantom, nodes: int) -> Volume:
     from bentray_kernels.phantoms import (
         ONE_HOLE,
         TWO_HOLES,
@@ -133,11 +135,11 @@ def _sampled(phantom: Phantom, nodes: int) -> Volume:
     )
     from bentray_workers.files.volume import Volume
 
-    fields: dict[Phantom, CubeField] = {
-        Phantom.SPHERE: FringeSphere(0.6, 0.06),
-        Phantom.ONE_HOLE: ONE_HOLE,
-        Phantom.TWO_HOLES: TWO_HOLES,
-        Phantom.MARSCHNER_LOBB: MarschnerLobb(),
+    fields: dict[SampledPhantom, CubeField] = {
+        SampledPhantom.SPHERE: FringeSphere(0.6, 0.06),
+        SampledPhantom.ONE_HOLE: ONE_HOLE,
+        SampledPhantom.TWO_HOLES: TWO_HOLES,
+        SampledPhantom.MARSCHNER_LOBB: MarschnerLobb(),
     }
     return Volume.of(sampled(fields[phantom], nodes), (PHANTOM_SIDE_M / (nodes - 1),) * 3, title=phantom)
 

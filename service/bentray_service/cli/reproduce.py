@@ -60,7 +60,9 @@ def reproduce(
         print_json({"result": str(record), "scan": str(source), "differences": found, "versions": other})
     else:
         print_table(
-            f"{record.name}, made again", ("array", "difference"), [(k, told(v)) for k, v in found.items()]
+            f"{record.name}, made again",
+            ("array", "difference"),
+            [(k, difference_text(v)) for k, v in found.items()],
         )
         print_lines(f"{name}: {was['then']} then, {was['now']} now" for name, was in other.items())
     if any(found.values()):
@@ -91,7 +93,7 @@ def compared(before: Reconstruction, after: Reconstruction) -> dict[str, Any]:
     return found
 
 
-def told(difference: float | str | None) -> str:
+def difference_text(difference: float | str | None) -> str:
     """In words."""
     if difference is None:
         return "the same, bit for bit"

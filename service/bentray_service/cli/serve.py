@@ -120,7 +120,7 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
                 print_lines([json.dumps(here)])
             if self.started:
                 _say(settings, f"Bentray is at {url} (data in {settings.data_dir}); Ctrl-C stops it.")
-                _say(settings, _reach(asks=not made.state.parts.door.open()))
+                _say(settings, _reach(asks=not made.state.parts.sign_in.open()))
 
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
             made.state.leaving.set()

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from bentray_workers.simulation.waves import WaveSimulationSettings
 
 
-class Phantom(StrEnum):
+class BreastPhantom(StrEnum):
     """The phantoms by the tables of the dissertation."""
 
     TABLE6 = "table6"
@@ -36,8 +36,9 @@ class Array(StrEnum):
 def simulate(
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset file to write (HDF5).")],
     phantom: Annotated[
-        Phantom, typer.Option(help="2-D breast phantom (Li 2008, Table 6) or 3-D breast phantom (Table 7).")
-    ] = Phantom.TABLE6,
+        BreastPhantom,
+        typer.Option(help="2-D breast phantom (Li 2008, Table 6) or 3-D breast phantom (Table 7)."),
+    ] = BreastPhantom.TABLE6,
     nodes: Annotated[int, typer.Option(help="Nodes per side of the image that the scan is made for.")] = 128,
     elements: Annotated[int, typer.Option(help="Transducers of a ring; each sends and receives.")] = 256,
     coupling: Annotated[float, typer.Option(help="Speed of the water, m/s.")] = 1500.0,

@@ -14,7 +14,7 @@ from . import flows
 from .connection import Connection, document
 from .errors import ClientError, from_response, no_answer
 from .saving import saving
-from .steps import CHUNK_BYTES, Ask, Fetch, Flow, Listen, Pause, Step
+from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, PauseStep, RequestStep, Step
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -80,14 +80,14 @@ class AsyncClient(Connection):
                     answer, error = None, failure
 
     async def _do(self, step: Step, streams: AsyncExitStack, listening: dict[str, AsyncIterator[str]]) -> Any:
-        if isinstance(step, Pause):
+        if isinstance(step, PauseStep):
             return await anyio.sleep(step.seconds)
-        if isinstance(step, Ask):
+        if isinstance(step, RequestStep):
             content = None if step.body is None else _awaited(step.body())
             async with self._answer(step.method, step.path, content=content, **step.options) as response:
                 await response.aread()
                 return response
-        if isinstance(step, Fetch):
+        if isinstance(step, DownloadStep):
             async with self._answer("GET", step.path, **step.options) as response:
                 with saving(step, response) as save:
                     async for chunk in response.aiter_bytes(CHUNK_BYTES):
@@ -96,7 +96,7 @@ class AsyncClient(Connection):
         return await self._listen(step, streams, listening)
 
     async def _listen(
-        self, step: Listen, streams: AsyncExitStack, listening: dict[str, AsyncIterator[str]]
+        self, step: EventStep, streams: AsyncExitStack, listening: dict[str, AsyncIterator[str]]
     ) -> str | None:
         if step.path not in listening:
             answer = self._answer("GET", step.path, timeout=step.seconds)

@@ -14,7 +14,7 @@ from . import flows
 from .connection import Connection, document
 from .errors import ClientError, from_response, no_answer
 from .saving import saving
-from .steps import CHUNK_BYTES, Ask, Fetch, Flow, Listen, Pause, Step
+from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, PauseStep, RequestStep, Step
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -78,21 +78,21 @@ class Client(Connection):
                     answer, error = None, failure
 
     def _do(self, step: Step, streams: ExitStack, listening: dict[str, Iterator[str]]) -> Any:
-        if isinstance(step, Pause):
+        if isinstance(step, PauseStep):
             return time.sleep(step.seconds)
-        if isinstance(step, Ask):
+        if isinstance(step, RequestStep):
             content = None if step.body is None else step.body()
             with self._answer(step.method, step.path, content=content, **step.options) as response:
                 response.read()
                 return response
-        if isinstance(step, Fetch):
+        if isinstance(step, DownloadStep):
             with self._answer("GET", step.path, **step.options) as response, saving(step, response) as save:
                 for chunk in response.iter_bytes(CHUNK_BYTES):
                     save(chunk)
             return None
         return self._listen(step, streams, listening)
 
-    def _listen(self, step: Listen, streams: ExitStack, listening: dict[str, Iterator[str]]) -> str | None:
+    def _listen(self, step: EventStep, streams: ExitStack, listening: dict[str, Iterator[str]]) -> str | None:
         if step.path not in listening:
             response = streams.enter_context(self._answer("GET", step.path, timeout=step.seconds))
             listening[step.path] = response.iter_lines()

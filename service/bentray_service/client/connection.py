@@ -12,7 +12,7 @@ import httpx
 
 from bentray_kernels.errors import InvalidInput
 
-from .patience import PATIENCE_S, Patience
+from .patience import PATIENCE_S, Retries
 
 CONNECT_S = 10.0
 
@@ -54,7 +54,7 @@ class Connection:
             raise InvalidInput("url", repr(url), "a web address, such as http://127.0.0.1:8000")
         self.url = url.rstrip("/")
         self.poll_s = poll_s
-        self._patience = Patience(patience_s, on_wait)
+        self._patience = Retries(patience_s, on_wait)
         key = key or os.environ.get("BENTRAY_KEY")
         self._options: dict[str, Any] = {
             "base_url": self.url,

@@ -15,8 +15,8 @@ from ..routes.models.surface_records import MeshRecord
 from .connection import Connection
 from .errors import ClientError
 from .results import Result, read_result
-from .steps import Ask, Fetch, Flow
-from .uploading import PLACES, Kind, OnBytes, send_file
+from .steps import DownloadStep, Flow, RequestStep
+from .uploading import PLACES, OnBytes, UploadKind, send_file
 from .waiting import wait_for
 
 Format = Literal["hdf5", "h5", "nifti", "metaimage", "mat", "npy"]
@@ -34,7 +34,7 @@ def upload(
     path: Path | str,
     on_progress: OnBytes | None = None,
     *,
-    kind: Kind = "dataset",
+    kind: UploadKind = "dataset",
     resume: str | None = None,
     **metadata: str,
 ) -> Flow[Uploaded]:
@@ -100,12 +100,12 @@ def volume(connection: Connection, volume_id: str) -> Flow[VolumeRecord]:
 def slice_png(connection: Connection, /, volume_id: str, **how: str | float) -> Flow[bytes]:
     """One slice as PNG; ``how``: index, quantity, low, high, colormap."""
     path = f"/v1/volumes/{volume_id}/slice.png"
-    return bytes((yield Ask("GET", path, {"params": how}, repeatable=True)).content)
+    return bytes((yield RequestStep("GET", path, {"params": how}, repeatable=True)).content)
 
 
 def download(connection: Connection, volume_id: str, format: Format, path: Path | str) -> Flow[Path]:  # noqa: A002
     """Fetch a result into ``path``; the file is there whole or not at all."""
-    yield Fetch(f"/v1/volumes/{volume_id}/data", {"params": {"format": format}}, Path(path))
+    yield DownloadStep(f"/v1/volumes/{volume_id}/data", {"params": {"format": format}}, Path(path))
     return Path(path)
 
 
@@ -113,7 +113,7 @@ def download_dataset(
     connection: Connection, dataset_id: str, path: Path | str, on_progress: OnBytes | None = None
 ) -> Flow[Path]:
     """Fetch a scan, uploaded or simulated, into ``path``; ``on_progress`` as of ``upload``."""
-    yield Fetch(f"/v1/datasets/{dataset_id}/file", {}, Path(path), on_progress)
+    yield DownloadStep(f"/v1/datasets/{dataset_id}/file", {}, Path(path), on_progress)
     return Path(path)
 
 
@@ -130,16 +130,16 @@ def delete(connection: Connection, stored_id: str) -> Flow[None]:
     kind = PREFIXES.get(stored_id.partition("-")[0])
     if kind is None:
         raise ClientError(f"{stored_id!r} is not the id of a dataset, a volume or a mesh")
-    yield Ask("DELETE", f"{PLACES[kind]}/{stored_id}")
+    yield RequestStep("DELETE", f"{PLACES[kind]}/{stored_id}")
 
 
 def _record(model: type[Record], method: str, path: str) -> Flow[Record]:
-    answer = yield Ask(method, path, repeatable=method == "GET")
+    answer = yield RequestStep(method, path, repeatable=method == "GET")
     return model.model_validate_json(answer.content)
 
 
 def _start(request: dict[str, Any]) -> Flow[JobRecord]:
     """Start a job; its key makes sure that it is one, however often the request has to be sent."""
     options = {"json": request, "headers": {"Idempotency-Key": str(uuid.uuid4())}}
-    answer = yield Ask("POST", "/v1/jobs", options, repeatable=True)
+    answer = yield RequestStep("POST", "/v1/jobs", options, repeatable=True)
     return JobRecord.model_validate_json(answer.content)

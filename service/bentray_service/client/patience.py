@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from .errors import ClientError, NoAnswer
-from .steps import Ask, Fetch, Flow, Pause, Step
+from .steps import DownloadStep, Flow, PauseStep, RequestStep, Step
 
 T = TypeVar("T")
 
@@ -27,7 +27,7 @@ def away(error: ClientError) -> bool:
     return isinstance(error, NoAnswer) or error.status in (*AWAY, ERROR)
 
 
-class Patience:
+class Retries:
     """How long one client goes on asking.
 
     A service that has never answered is given up at once: its address may be wrong.
@@ -60,7 +60,7 @@ class Patience:
     def _done(self, step: Step) -> Flow[Any]:
         begun, pause, errors, waits = time.monotonic(), FIRST_PAUSE_S, 0, False
         last = begun + self._seconds
-        if isinstance(step, Ask) and step.until is not None:
+        if isinstance(step, RequestStep) and step.until is not None:
             last = min(last, step.until)
         while True:
             try:
@@ -76,10 +76,10 @@ class Patience:
                 if not waits:
                     self._say(f"{error}; trying again for up to {last - begun:.0f} s.")
                 waits = True
-                yield Pause(pause)
+                yield PauseStep(pause)
                 pause = min(2.0 * pause, LONGEST_PAUSE_S)
             else:
-                self._answered |= not isinstance(step, Pause)
+                self._answered |= not isinstance(step, PauseStep)
                 if waits:
                     self._say("The service answers again.")
                 return answer
@@ -91,7 +91,7 @@ class Patience:
 
 def repeatable(step: Step, error: ClientError) -> bool:
     """Whether a step that failed may be done again without doing anything twice."""
-    if not isinstance(step, Ask | Fetch) or not away(error):
+    if not isinstance(step, RequestStep | DownloadStep) or not away(error):
         return False
     never_sent = isinstance(error, NoAnswer) and not error.sent
-    return never_sent or isinstance(step, Fetch) or step.repeatable
+    return never_sent or isinstance(step, DownloadStep) or step.repeatable

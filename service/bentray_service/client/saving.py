@@ -9,11 +9,11 @@ from contextlib import contextmanager
 import httpx
 
 from .errors import ClientError
-from .steps import Fetch
+from .steps import DownloadStep
 
 
 @contextmanager
-def saving(step: Fetch, response: httpx.Response) -> Iterator[Callable[[bytes], None]]:
+def saving(step: DownloadStep, response: httpx.Response) -> Iterator[Callable[[bytes], None]]:
     """What the chunks are given to; on leaving, the file takes the target's place.
 
     Args:

@@ -17,7 +17,7 @@ CHUNK_BYTES = 1024 * 1024
 
 
 @dataclass(frozen=True)
-class Ask:
+class RequestStep:
     """A request; its answer is the response, read, once it is a success.
 
     Attributes:
@@ -37,7 +37,7 @@ class Ask:
 
 
 @dataclass(frozen=True)
-class Fetch:
+class DownloadStep:
     """Download into a file, which is there whole or not at all; no answer.
 
     Attributes:
@@ -53,7 +53,7 @@ class Fetch:
 
 
 @dataclass(frozen=True)
-class Listen:
+class EventStep:
     """Wait for the next line of a stream of events, which is opened at the first time.
 
     The answer is the line, or None when the stream has ended.
@@ -68,11 +68,11 @@ class Listen:
 
 
 @dataclass(frozen=True)
-class Pause:
+class PauseStep:
     """Wait so long; no answer."""
 
     seconds: float
 
 
-Step = Ask | Fetch | Listen | Pause
+Step = RequestStep | DownloadStep | EventStep | PauseStep
 Flow: TypeAlias = Generator[Step, Any, T]

@@ -13,9 +13,9 @@ from bentray_kernels.errors import InvalidInput
 
 from ..routes.models.upload_records import UploadRecord
 from .errors import ClientError, NoAnswer, from_problem
-from .steps import CHUNK_BYTES, Ask, Flow, Pause
+from .steps import CHUNK_BYTES, Flow, PauseStep, RequestStep
 
-Kind = Literal["dataset", "volume", "mesh"]
+UploadKind = Literal["dataset", "volume", "mesh"]
 OnBytes = Callable[[int, int], None]
 
 # Where each kind is found.
@@ -32,7 +32,7 @@ PIECE = {"Content-Type": "application/offset+octet-stream"}
 
 
 def send_file(
-    path: Path, on_progress: OnBytes | None, kind: Kind, resume: str | None, said: Mapping[str, str]
+    path: Path, on_progress: OnBytes | None, kind: UploadKind, resume: str | None, said: Mapping[str, str]
 ) -> Flow[httpx.Response]:
     """Upload a file; the result is the answer with the record of what it became."""
     if kind not in PLACES:
@@ -57,7 +57,7 @@ def _begin(total: int, said: Mapping[str, str]) -> Flow[str]:
     metadata = ",".join(f"{name} {base64.b64encode(text.encode()).decode()}" for name, text in said.items())
     headers = {**TUS, "Upload-Length": str(total), "Upload-Metadata": metadata}
     # One that is begun twice is forgotten, and ends by itself.
-    answer = yield Ask("POST", "/v1/uploads", {"headers": headers}, repeatable=True)
+    answer = yield RequestStep("POST", "/v1/uploads", {"headers": headers}, repeatable=True)
     return httpx.URL(answer.headers["Location"]).path
 
 
@@ -66,7 +66,7 @@ def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Fl
     failures, reached, pause = 0, -1, FIRST_PAUSE_S
     while True:
         try:
-            there = yield Ask("HEAD", place, {"headers": TUS}, repeatable=True)
+            there = yield RequestStep("HEAD", place, {"headers": TUS}, repeatable=True)
             offset, length = int(there.headers["Upload-Offset"]), int(there.headers["Upload-Length"])
             if length != total:
                 raise ClientError(f"{path} has {total} bytes; the upload at {place} is one of {length}")
@@ -75,7 +75,7 @@ def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Fl
             if offset == total:
                 return
             headers = {**TUS, **PIECE, "Upload-Offset": str(offset), "Content-Length": str(total - offset)}
-            yield Ask("PATCH", place, {"headers": headers}, _chunks(path, offset, total, on_progress))
+            yield RequestStep("PATCH", place, {"headers": headers}, _chunks(path, offset, total, on_progress))
             return
         except ClientError as error:
             # Locked: the service has not noticed yet that the connection before is gone.
@@ -84,7 +84,7 @@ def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Fl
             failures += 1
             if failures == TRIES:
                 raise
-        yield Pause(pause)
+        yield PauseStep(pause)
         pause = min(2.0 * pause, LONGEST_PAUSE_S)
 
 
@@ -92,13 +92,13 @@ def _read(place: str) -> Flow[httpx.Response]:
     """Wait until the service has read the upload."""
     pause = FIRST_LOOK_S
     while True:
-        record = UploadRecord.model_validate_json((yield Ask("GET", place, repeatable=True)).content)
+        record = UploadRecord.model_validate_json((yield RequestStep("GET", place, repeatable=True)).content)
         if record.state == "done":
-            result: httpx.Response = yield Ask("GET", record.links["result"], repeatable=True)
+            result: httpx.Response = yield RequestStep("GET", record.links["result"], repeatable=True)
             return result
         if record.state == "refused":
             raise from_problem(record.problem)
-        yield Pause(pause)
+        yield PauseStep(pause)
         pause = min(1.5 * pause, LONGEST_LOOK_S)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from ..routes.models.records import JobRecord
 from .errors import ClientError, from_problem
-from .steps import Ask, Flow, Listen, Pause
+from .steps import EventStep, Flow, PauseStep, RequestStep
 
 # The service says something at least every 15 s; a proxy that keeps events back never does.
 SILENCE_S = 40.0
@@ -22,7 +22,7 @@ def wait_for(
     deadline = None if timeout_s is None else time.monotonic() + timeout_s
     place, broken = f"/v1/jobs/{job_id}", 0
     while True:
-        answer = yield Ask("GET", place, repeatable=True, until=deadline)
+        answer = yield RequestStep("GET", place, repeatable=True, until=deadline)
         job = JobRecord.model_validate_json(answer.content)
         if on_progress is not None:
             on_progress(job)
@@ -44,13 +44,13 @@ def wait_for(
                 continue
             except ClientError:
                 broken += 1
-        yield Pause(poll_s)
+        yield PauseStep(poll_s)
 
 
 def _news(place: str, seconds: float, deadline: float | None) -> Flow[bool]:
     """Wait for an event or for the deadline; false when the stream has ended, as it does with the job."""
     while deadline is None or time.monotonic() <= deadline:
-        line = yield Listen(place, seconds)
+        line = yield EventStep(place, seconds)
         if line is None:
             return False
         if line.startswith("data:"):

@@ -1,4 +1,4 @@
-"""Objects under one prefix of an S3 bucket, through s3fs; what goes wrong there is ``StorageAway``."""
+"""Objects under one prefix of an S3 bucket, through s3fs; what goes wrong there is ``StorageUnavailable``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import aiohttp
 from botocore.exceptions import BotoCoreError, ClientError
 from s3fs import S3FileSystem
 
-from ..refusals import StorageAway
+from ..refusals import StorageUnavailable
 
 log = logging.getLogger("bentray.storage")
 
@@ -37,7 +37,7 @@ OWN = (errno.ENOSPC, errno.EDQUOT)
 
 
 @dataclass(frozen=True)
-class Held:
+class BucketObject:
     """An object: its key below the prefix, its size and when it was last written, s since 1970."""
 
     key: str
@@ -78,12 +78,12 @@ class Bucket:
         with self._watched(may_miss=True):
             self._s3.get_file(self._place(key), str(path))
 
-    def note(self, key: str, told: Mapping[str, str]) -> None:
+    def put_metadata(self, key: str, told: Mapping[str, str]) -> None:
         """Write an object that is nothing but what is ``told`` beside it."""
         with self._watched():
             self._call("put_object", Key=self._prefix + key, Body=b"", Metadata=dict(told))
 
-    def told(self, key: str) -> dict[str, str] | None:
+    def metadata(self, key: str) -> dict[str, str] | None:
         """What was told beside an object, and its size as ``size``; None when there is none."""
         try:
             with self._watched(may_miss=True):
@@ -92,7 +92,7 @@ class Bucket:
             return None
         return {**found["Metadata"], "size": str(found["ContentLength"])}
 
-    def listed(self, under: str = "") -> Iterator[Held]:
+    def listed(self, under: str = "") -> Iterator[BucketObject]:
         """All objects whose keys begin so."""
         more: dict[str, str] = {}
         while True:
@@ -100,7 +100,7 @@ class Bucket:
                 page = self._call("list_objects_v2", Prefix=self._prefix + under, **more)
             for one in page.get("Contents", ()):
                 key = str(one["Key"]).removeprefix(self._prefix)
-                yield Held(key, int(one["Size"]), one["LastModified"].timestamp())
+                yield BucketObject(key, int(one["Size"]), one["LastModified"].timestamp())
             if not page.get("IsTruncated"):
                 return
             more = {"ContinuationToken": page["NextContinuationToken"]}
@@ -117,7 +117,7 @@ class Bucket:
 
     @contextmanager
     def _watched(self, *, may_miss: bool = False) -> Iterator[None]:
-        """Turn what goes wrong into ``StorageAway``; that an object is not there, only where it has to be."""
+        """Turn errors into ``StorageUnavailable``, also a missing object unless ``may_miss``."""
         try:
             yield
         except (OSError, ValueError, BotoCoreError, ClientError, aiohttp.ClientError) as error:
@@ -126,7 +126,9 @@ class Bucket:
                 raise
             # Callers are told neither address nor key.
             log.warning("%s: %s: %s", self.url, type(error).__name__, error)
-            raise StorageAway(f"the bucket does not do what it is asked ({type(error).__name__})") from error
+            raise StorageUnavailable(
+                f"the bucket does not do what it is asked ({type(error).__name__})"
+            ) from error
 
     def _call(self, method: str, **how: Any) -> Any:
         return self._s3.call_s3(method, Bucket=self._name, **how, timeout=ANSWER_S)

@@ -11,12 +11,12 @@ from collections.abc import Callable, Collection
 from concurrent.futures import Future
 from pathlib import Path
 
-from ..refusals import StorageAway
-from ..rows.live_ids import Known, Name
+from ..refusals import StorageUnavailable
+from ..rows.live_ids import LiveIds, Name
 from .bucket import Bucket
 from .cache import Cache
 from .disk import bytes_in
-from .packing import packed, told_of, unpack
+from .packing import metadata_of, packed, unpack
 from .tenant_files import KEPT
 
 log = logging.getLogger("bentray.storage")
@@ -39,7 +39,7 @@ class BucketStore:
     checked against the SHA-256 that was written beside it.
     """
 
-    def __init__(self, root: Path, bucket: Bucket, mark: str, known: Known, cache_bytes: int) -> None:
+    def __init__(self, root: Path, bucket: Bucket, mark: str, known: LiveIds, cache_bytes: int) -> None:
         """Args:
         root: the data folder.
         bucket: which holds ``mark`` under ``MARK``.
@@ -62,15 +62,15 @@ class BucketStore:
     def publish(self, path: Path) -> None:
         key = self._key(path)
         with packed(path, self._root / "scratch") as whole:
-            told = told_of(path, whole)
-            held = self._bucket.told(key)
+            told = metadata_of(path, whole)
+            held = self._bucket.metadata(key)
             if held is None or held.get("sha256") != told["sha256"]:
                 self._bucket.put(whole, key, told)
                 self._count(path, whole.stat().st_size)
         self._cache.use(path)
         self._make_room(0)
 
-    def bring(self, path: Path) -> Path:
+    def fetch(self, path: Path) -> Path:
         if self._cache.use(path):
             return path
         with self._lock:
@@ -94,14 +94,14 @@ class BucketStore:
                 del self._coming[path]
         return path
 
-    def again(self, path: Path) -> bool:
+    def refetch(self, path: Path) -> bool:
         self._cache.clear([path])
-        self.bring(path)
+        self.fetch(path)
         return True
 
     def remove(self, paths: Collection[Path]) -> None:
         if fault := self.fault():
-            raise StorageAway(fault)
+            raise StorageUnavailable(fault)
         # In this order, so that who publishes what lies there by itself can see that it is gone.
         self._cache.clear(paths)
         self._bucket.remove([self._key(path) for path in paths])
@@ -122,14 +122,14 @@ class BucketStore:
     def fault(self) -> str | None:
         with self._asking:
             if time.monotonic() - self._asked >= FRESH_S:
-                self._fault, self._asked = self._look(), time.monotonic()
+                self._fault, self._asked = self._probe(), time.monotonic()
             return self._fault
 
     def tidy(self, stop: Callable[[], bool]) -> None:
         """Remove what was forgotten, and publish what lies in the data folder only, as from before there was
         a bucket."""
         held = {one.key: one.changed for one in self._bucket.listed("tenants/")}
-        lying = list(self._cache.lying())
+        lying = list(self._cache.stored_paths())
         # Asked for last: what came meanwhile has a row, or is young.
         names, now = self._known.names(), time.time()
         unknown = (key for key in held if _name(key) not in names)
@@ -154,10 +154,10 @@ class BucketStore:
 
     def _fetch(self, path: Path) -> None:
         key = self._key(path)
-        told = self._bucket.told(key)
+        told = self._bucket.metadata(key)
         if told is None:
-            if fault := self._look():
-                raise StorageAway(fault)
+            if fault := self._probe():
+                raise StorageUnavailable(fault)
             raise FileNotFoundError(errno.ENOENT, "it is not in the bucket", key)
         self._make_room(int(told["size"]))
         whole = self._root / "scratch" / f"{secrets.token_hex(8)}.coming"
@@ -172,7 +172,7 @@ class BucketStore:
 
     def _make_room(self, wanted: int) -> None:
         self._cache.make_room(
-            wanted, self._known.needed, lambda path: self._bucket.told(self._key(path)) is not None
+            wanted, self._known.needed, lambda path: self._bucket.metadata(self._key(path)) is not None
         )
 
     def _count(self, path: Path, size: int) -> None:
@@ -180,10 +180,10 @@ class BucketStore:
             if (found := self._sums.get(path.parents[1])) is not None:
                 self._sums[path.parents[1]] = found[0], found[1] + size
 
-    def _look(self) -> str | None:
+    def _probe(self) -> str | None:
         try:
-            told = self._bucket.told(MARK)
-        except StorageAway as error:
+            told = self._bucket.metadata(MARK)
+        except StorageUnavailable as error:
             return error.value
         if told is None or told.get("database") != self._mark:
             return "the bucket is not there, or not the one of this database any more"

@@ -21,7 +21,7 @@ RECENT_S = 300.0
 
 
 @dataclass
-class Thing:
+class CachedItem:
     """A thing with all that was made of it; ``used`` is when it was last asked for, s since 1970."""
 
     paths: list[Path] = field(default_factory=list)
@@ -86,13 +86,13 @@ class Cache:
             else:
                 gone.unlink()
 
-    def lying(self) -> Iterator[Path]:
+    def stored_paths(self) -> Iterator[Path]:
         """Every file or folder that is whole."""
         for folder in self._root.glob("tenants/*/*"):
             if folder.name in (*KEPT, *MADE_OF_THEM):
                 yield from (path for path in folder.iterdir() if path.suffix != ".partial")
 
-    def _drop(self, thing: Thing) -> bool:
+    def _drop(self, thing: CachedItem) -> bool:
         """Remove a thing, unless somebody asked for it meanwhile."""
         with self._lock:
             for path in thing.paths:
@@ -101,15 +101,15 @@ class Cache:
             self.clear(thing.paths)
         return True
 
-    def _things(self) -> dict[tuple[str, str], Thing]:
+    def _things(self) -> dict[tuple[str, str], CachedItem]:
         """By tenant and id."""
-        found: dict[tuple[str, str], Thing] = {}
-        for path in self.lying():
+        found: dict[tuple[str, str], CachedItem] = {}
+        for path in self.stored_paths():
             try:
                 state = path.stat()
             except FileNotFoundError:
                 continue
-            thing = found.setdefault((path.parts[-3], path.name.partition(".")[0]), Thing())
+            thing = found.setdefault((path.parts[-3], path.name.partition(".")[0]), CachedItem())
             thing.paths.append(path)
             thing.size += bytes_in(path) if path.is_dir() else state.st_size
             thing.used = max(thing.used, state.st_atime)

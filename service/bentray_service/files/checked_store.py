@@ -12,7 +12,7 @@ from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 
-from ..refusals import Damaged, DatabaseAway, DatabaseFull, Deleted
+from ..refusals import Damaged, DatabaseFull, DatabaseUnavailable, Deleted
 from ..rows.checksums import Checksums
 from ..rows.digests import Digest, digest_of, stamp_of
 from ..rows.records import ChecksumRow
@@ -45,10 +45,10 @@ class CheckedStore:
     def publish(self, path: Path) -> None:
         tenant, name, place = self._named(path)
         # Before it is kept: from then on somebody may read it.
-        self._checksums.note(tenant, name, place, digest_of(path), as_written=True)
+        self._checksums.record(tenant, name, place, digest_of(path), as_written=True)
         self._inner.publish(path)
 
-    def bring(self, path: Path) -> Path:
+    def fetch(self, path: Path) -> Path:
         """See :class:`Store`.
 
         Raises:
@@ -57,11 +57,11 @@ class CheckedStore:
         """
         if path.parent.name not in KEPT:
             # On its way, as the work folder of a job that reads nothing else: it has no checksum.
-            return self._inner.bring(path)
+            return self._inner.fetch(path)
         tenant, name, place = self._named(path)
         row = self._checksums.get(tenant, name)
         try:
-            self._inner.bring(path)
+            self._inner.fetch(path)
             if row is None:
                 self._first_seen(tenant, name, place, path)
             elif row["damaged"] is not None or not self._is_sound(path, row):
@@ -81,13 +81,13 @@ class CheckedStore:
     def remove(self, paths: Collection[Path]) -> None:
         # First, so that whoever misses a file sees that it was to go.
         for tenant, named in groupby(sorted(map(self._named, paths)), key=itemgetter(0)):
-            self._checksums.forget(tenant, [name for _, name, _ in named])
+            self._checksums.delete(tenant, [name for _, name, _ in named])
         self._inner.remove(paths)
         for path in paths:
             self._compared.pop(path, None)
 
-    def again(self, path: Path) -> bool:
-        return self._inner.again(path)
+    def refetch(self, path: Path) -> bool:
+        return self._inner.refetch(path)
 
     def bytes_used(self, folder: Path) -> int:
         return self._inner.bytes_used(folder)
@@ -118,7 +118,7 @@ class CheckedStore:
         with self._alone(path):
             stamp, found = stamp_of(path), digest_of(path)
             self._compared[path] = found.sha256, stamp
-        if not self._checksums.note_first_seen(tenant, name, place, found):
+        if not self._checksums.record_first_seen(tenant, name, place, found):
             self._compared.pop(path, None)
             raise Deleted(name)
         log.info("%s of %s had no checksum yet; it is taken as it is", name, tenant)
@@ -130,7 +130,7 @@ class CheckedStore:
             Damaged: where there is none.
         """
         self._compared.pop(path, None)
-        whole = self._is_sound(path, row) or (self._inner.again(path) and self._is_sound(path, row))
+        whole = self._is_sound(path, row) or (self._inner.refetch(path) and self._is_sound(path, row))
         if not whole:
             found = digest_of(path)
             other = f"{found.bytes} bytes in place of {row['bytes']}"
@@ -141,7 +141,7 @@ class CheckedStore:
     def _damaged(self, row: ChecksumRow, found: str) -> Damaged:
         if row["damaged"] is None:
             log.error("%s of %s is damaged: %s", row["id"], row["tenant"], found)
-            with suppress(DatabaseAway, DatabaseFull):
+            with suppress(DatabaseUnavailable, DatabaseFull):
                 self._checksums.damaged(row["tenant"], row["id"], time.time())
         return Damaged(row["id"], found)
 

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from sqlalchemy import ColumnElement, Connection, Table, and_, delete, or_, select, update
 
-from ..refusals import DatabaseAway, InUse, StorageAway, UnknownId
+from ..refusals import DatabaseUnavailable, InUse, StorageUnavailable, UnknownId
 from ..rows import usage
-from ..rows.checksums import forget
+from ..rows.checksums import delete_checksums
 from ..rows.database import Database
 from ..rows.ids import checked
 from ..rows.schema import (
@@ -31,7 +31,7 @@ from .data_folder import Files
 log = logging.getLogger("bentray.storage")
 
 
-class Stored(NamedTuple):
+class StoredItem(NamedTuple):
     """One thing that can be deleted; ``what`` is ``dataset``, ``volume``, ``mesh`` or ``job``."""
 
     tenant: Tenant
@@ -55,7 +55,7 @@ class Deletion:
         self._database = database
         self._files = files
 
-    def delete(self, stored: Stored) -> None:
+    def delete(self, stored: StoredItem) -> None:
         """Delete one thing and all that was made of it.
 
         Raises:
@@ -66,7 +66,7 @@ class Deletion:
         name = checked(stored.what, stored.id)
         if fault := self._files.store.fault():
             # Said before the database is held.
-            raise StorageAway(fault)
+            raise StorageUnavailable(fault)
         with self._database.write() as connection:
             if not any(_has(connection, table, stored.tenant, name) for table in _TABLES[stored.what]):
                 raise UnknownId(stored.what, stored.id)
@@ -81,10 +81,10 @@ class Deletion:
             usage.forget(connection, stored.tenant, [name, *results, *fields, *gone])
         try:
             self._files.of(stored.tenant).remove([name, *results, *fields, *gone])
-        except (StorageAway, DatabaseAway, OSError):
+        except (StorageUnavailable, DatabaseUnavailable, OSError):
             log.warning("files of %s stay until they are found as orphans", stored.id, exc_info=True)
 
-    def older_than(self, time: float) -> Iterator[Stored]:
+    def older_than(self, time: float) -> Iterator[StoredItem]:
         """What every tenant has from before a time, in seconds since 1970."""
         for what, tables in _TABLES.items():
             for table in tables:
@@ -92,9 +92,9 @@ class Deletion:
                 query = select(table.c.tenant, table.c.id).where(old)
                 with self._database.read() as connection:
                     found = connection.execute(query).all()
-                yield from (Stored(Tenant(tenant), what, name) for tenant, name in found)
+                yield from (StoredItem(Tenant(tenant), what, name) for tenant, name in found)
 
-    def _refuse_unfinished(self, connection: Connection, stored: Stored, gone: Collection[str]) -> None:
+    def _refuse_unfinished(self, connection: Connection, stored: StoredItem, gone: Collection[str]) -> None:
         needing = jobs.c.id.in_(gone), jobs.c.state.not_in(ENDED)
         busy = connection.execute(select(jobs.c.id, jobs.c.state).where(*needing)).first()
         if busy is not None:
@@ -162,7 +162,7 @@ def _forget(
     """Delete the rows, those that point at others first."""
     mine = geometry_fields.c.tenant == tenant, geometry_fields.c.id.in_(fields)
     connection.execute(delete(geometry_fields).where(*mine))
-    forget(connection, tenant, {*names, *fields, *gone})
+    delete_checksums(connection, tenant, {*names, *fields, *gone})
     connection.execute(delete(too_old).where(too_old.c.tenant == tenant, too_old.c.id.in_(names)))
     connection.execute(delete(events).where(events.c.job_id.in_(gone)))
     connection.execute(delete(volumes).where(volumes.c.id.in_(names)))

@@ -20,12 +20,12 @@ class LocalStore:
         """What writes a file makes its content durable; this does so for its name."""
         sync(path.parent)
 
-    def bring(self, path: Path) -> Path:
+    def fetch(self, path: Path) -> Path:
         if not path.exists():
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
         return path
 
-    def again(self, path: Path) -> bool:
+    def refetch(self, path: Path) -> bool:
         return False
 
     def remove(self, paths: Collection[Path]) -> None:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from bentray_kernels.errors import InvalidInput
 
-from ..refusals import StorageAway
+from ..refusals import StorageUnavailable
 from ..rows.database import Database
 from ..rows.database_id import mark_of
-from ..rows.live_ids import Known
+from ..rows.live_ids import LiveIds
 from .local_store import LocalStore
 from .store import Store
 
@@ -39,15 +39,15 @@ def open_store(url: str | None, root: Path, database: Database, cache_bytes: int
         raise InvalidInput(FIELD, found, "an address once bentray[s3] is installed") from error
     bucket, mark = Bucket(url), mark_of(database)
     try:
-        told = bucket.told(MARK)
+        told = bucket.metadata(MARK)
         if told is None and next(bucket.listed(), None) is not None:
             raise InvalidInput(FIELD, f"{url}, where other things lie", "a prefix that nothing else uses")
         if told is not None and told.get("database") != mark:
             found = f"{url}, which belongs to another database than BENTRAY_DATABASE_URL"
             raise InvalidInput(FIELD, found, "a prefix of its own for every database")
         # Also where it is there: that shows that the bucket can be written.
-        bucket.note(MARK, {"database": mark})
-    except StorageAway as error:
+        bucket.put_metadata(MARK, {"database": mark})
+    except StorageUnavailable as error:
         found = f"{url} ({error.value})"
         raise InvalidInput(FIELD, found, "a bucket that can be read and written") from error
-    return BucketStore(root, bucket, mark, Known(database), cache_bytes)
+    return BucketStore(root, bucket, mark, LiveIds(database), cache_bytes)

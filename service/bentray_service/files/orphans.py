@@ -14,7 +14,7 @@ from bentray_workers.files.atomic import write_bytes
 
 from ..rows.database import Database
 from ..rows.database_id import mark_of
-from ..rows.live_ids import Known
+from ..rows.live_ids import LiveIds
 from ..rows.schema import about
 from ..rows.tenants import Tenant
 from .data_folder import Files
@@ -48,7 +48,7 @@ class Orphans:
         """
         self._files = files
         self._database = database
-        self._known = Known(database)
+        self._known = LiveIds(database)
         self._kinds = (*KEPT, *BESIDE) if keeps else BESIDE
         self._clock = clock
         self._seen: dict[Path, float] = {}

@@ -35,7 +35,7 @@ def packed(path: Path, scratch: Path) -> Iterator[Path]:
         whole.unlink(missing_ok=True)
 
 
-def told_of(path: Path, whole: Path) -> dict[str, str]:
+def metadata_of(path: Path, whole: Path) -> dict[str, str]:
     """What to tell beside ``whole``, so that ``unpack`` can check it and make ``path`` again."""
     with whole.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
@@ -49,7 +49,7 @@ def unpack(whole: Path, told: Mapping[str, str], path: Path) -> None:
     Raises:
         ValueError: when it is not what was told of it.
     """
-    if told_of(whole, whole)["sha256"] != told.get("sha256"):
+    if metadata_of(whole, whole)["sha256"] != told.get("sha256"):
         raise ValueError(f"{path.name} has another SHA-256 than when it was written")
     ready = whole
     try:

@@ -48,7 +48,7 @@ def scrub(files: Files, checksums: Checksums, orphans: Orphans) -> Iterator[Find
             yield Finding(tenant, place, "orphan")
             continue
         try:
-            files.store.bring(files.of(tenant).root / place)
+            files.store.fetch(files.of(tenant).root / place)
         except Damaged as error:
             yield Finding(tenant, place, "damaged", error.value.partition(", ")[2])
         except Deleted:

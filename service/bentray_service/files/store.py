@@ -21,7 +21,7 @@ class Store(Protocol):
             StorageAway: when it cannot be kept now; what lies there stays.
         """
 
-    def bring(self, path: Path) -> Path:
+    def fetch(self, path: Path) -> Path:
         """Let a thing lie at ``path``, to be read in the minutes that follow, and return the path.
 
         Raises:
@@ -29,11 +29,11 @@ class Store(Protocol):
             StorageAway: when it cannot be fetched now.
         """
 
-    def again(self, path: Path) -> bool:
+    def refetch(self, path: Path) -> bool:
         """Let another copy lie at ``path`` in place of one that is damaged; whether there is one.
 
         Raises:
-            FileNotFoundError, StorageAway: as ``bring``.
+            FileNotFoundError, StorageAway: as ``fetch``.
         """
 
     def remove(self, paths: Collection[Path]) -> None:

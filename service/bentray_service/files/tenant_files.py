@@ -29,7 +29,7 @@ class TenantFiles:
     geometry field, ``work/`` one for each job that is not at its end, with its checkpoints. An upload is a
     dataset, a volume or a mesh, as its id tells.
 
-    What is in ``KEPT`` may lie in a store only: ``Store.bring`` lets it lie at its path again.
+    What is in ``KEPT`` may lie in a store only: ``Store.fetch`` lets it lie at its path again.
     """
 
     def __init__(self, root: Path, store: Store) -> None:

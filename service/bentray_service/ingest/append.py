@@ -21,7 +21,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.atomic import sync, write_bytes
 
 from ..refusals import Locked, UnknownChecksum, WrongChecksum
-from .receive import pour
+from .receive import write_body
 
 # Each with the form of its digest in base 64.
 ALGORITHMS = {
@@ -55,7 +55,7 @@ class Checksum:
         return cls(algorithm, base64.b64decode(text))
 
 
-class Hold:
+class UploadLocks:
     """Who is at work on which upload: one at a time."""
 
     def __init__(self) -> None:
@@ -108,7 +108,7 @@ async def append(
     try:
         await run_in_threadpool(file.seek, offset)
         accepted = f"at most {length - offset} bytes, up to the Upload-Length of {length}"
-        size = await pour(stream, file, length - offset, accepted, digest)
+        size = await write_body(stream, file, length - offset, accepted, digest)
         if checksum is not None and digest is not None:
             if not hmac.compare_digest(digest.digest(), checksum.digest):
                 found = base64.b64encode(digest.digest()).decode()
@@ -120,7 +120,7 @@ async def append(
     return offset + size
 
 
-def size_of(path: Path) -> int:
+def received_bytes(path: Path) -> int:
     """Bytes that are there and count, of a file that is not made before the first of them."""
     # Asked before and after, for a piece may begin or end meanwhile.
     before = _unverified_from(path)

@@ -12,7 +12,7 @@ from .sandbox import ingest
 
 
 @dataclass(frozen=True)
-class Limits:
+class IngestLimits:
     """Of an ingest process.
 
     Attributes:
@@ -30,7 +30,7 @@ def make_canonical(
     source: Path,
     result_id: str,
     files: TenantFiles,
-    limits: Limits,
+    limits: IngestLimits,
     given: Mapping[str, Any],
     reserve: Callable[[int], None],
     started: Callable[[int], None] = lambda process_id: None,

@@ -47,12 +47,12 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, required=True)
     parser.add_argument("--given", type=json.loads, required=True, help="what the user says of the file")
     asked = parser.parse_args()
-    limit(asked.memory, asked.seconds, PACKING * asked.source.stat().st_size)
-    answer = convert(asked.what, asked.source, asked.target, asked.given, reserve)
+    limit_resources(asked.memory, asked.seconds, PACKING * asked.source.stat().st_size)
+    answer = convert_upload(asked.what, asked.source, asked.target, asked.given, request_space)
     sys.stdout.write(json.dumps(answer) + "\n")
 
 
-def limit(memory_bytes: int, seconds: float, file_bytes: int = 0) -> None:
+def limit_resources(memory_bytes: int, seconds: float, file_bytes: int = 0) -> None:
     """Bound this process, before it imports or opens anything; files may have ``file_bytes``, if more."""
     cpu = math.ceil(seconds)
     for what, amount in (
@@ -67,7 +67,7 @@ def limit(memory_bytes: int, seconds: float, file_bytes: int = 0) -> None:
         resource.setrlimit(what, (allowed, allowed))
 
 
-def reserve(size: int) -> None:
+def request_space(size: int) -> None:
     """Tell the service how large the canonical file will be at most, and wait for its word."""
     sys.stdout.write(json.dumps({"reserve": size}) + "\n")
     sys.stdout.flush()
@@ -76,7 +76,7 @@ def reserve(size: int) -> None:
         raise SystemExit(1)
 
 
-def convert(
+def convert_upload(
     what: str,
     source: Path,
     target: Path,

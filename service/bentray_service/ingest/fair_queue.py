@@ -28,7 +28,7 @@ def readers_at_once(memory_bytes: int) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class _Task:
+class _QueuedRead:
     work: Callable[[], Any]
     future: Future[Any]
 
@@ -45,7 +45,7 @@ class FairQueue:
 
     def __init__(self, at_once: int) -> None:
         self.share = max(1, at_once - 1)
-        self._waiting: dict[Tenant, deque[_Task]] = {}
+        self._waiting: dict[Tenant, deque[_QueuedRead]] = {}
         # When each tenant was served last, as a number that grows.
         self._served: Counter[Tenant] = Counter()
         self._turn = 0
@@ -77,7 +77,7 @@ class FairQueue:
 
     def submit(self, tenant: Tenant, work: Callable[[], Any]) -> Future[Any]:
         """Let ``work`` be done in the tenant's turn; cancelling the future before that leaves the queue."""
-        task = _Task(work, Future())
+        task = _QueuedRead(work, Future())
         with self._changed:
             self._waiting.setdefault(tenant, deque()).append(task)
             self._changed.notify()
@@ -91,7 +91,7 @@ class FairQueue:
         with self._changed:
             return len(self._waiting.get(tenant, ()))
 
-    def _leave(self, tenant: Tenant, task: _Task) -> None:
+    def _leave(self, tenant: Tenant, task: _QueuedRead) -> None:
         with self._changed:
             tasks = self._waiting.get(tenant)
             if tasks is not None and task in tasks:
@@ -119,7 +119,7 @@ class FairQueue:
                 # Another thread may have passed this tenant by, with nobody else there.
                 self._changed.notify_all()
 
-    def _take(self) -> tuple[Tenant, _Task] | None:
+    def _take(self) -> tuple[Tenant, _QueuedRead] | None:
         """The next, which counts as at work from now on."""
         able = [tenant for tenant in self._waiting if self._working[tenant] < self.share]
         if self._leaving or not able:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import logging
 import os
 import secrets
@@ -22,17 +21,17 @@ from bentray_kernels.errors import InvalidInput
 
 from ..access.quota import Quota
 from ..files.data_folder import Files
-from ..refusals import StorageAway, StorageFull, UnknownId
+from ..refusals import StorageFull, StorageUnavailable, UnknownId
+from ..rows.digests import digest_of
 from ..rows.records import UploadRow
 from ..rows.stored_tables import UploadedTable
 from ..rows.tenants import Tenant
 from ..rows.uploads import Uploads
-from ..web.errors import INTERNAL, from_exception, make
+from ..web.errors import INTERNAL, make_problem, problem_of
 from ..web.problem import Problem
-from .append import discard_unverified, size_of
-from .canonical import Limits, make_canonical
+from .append import discard_unverified, received_bytes
+from .canonical import IngestLimits, make_canonical
 from .fair_queue import FairQueue
-from .receive import BATCH_BYTES
 
 log = logging.getLogger("bentray.ingest")
 
@@ -43,7 +42,7 @@ PATIENCE_SECONDS = 30.0
 STOP_SECONDS = 30.0
 
 
-class UploadReader:
+class UploadIngest:
     """Puts uploads into the queue of the readers, the oldest first, a few of each tenant at a time.
 
     What a service that died was reading is read again.
@@ -54,7 +53,7 @@ class UploadReader:
         uploads: Uploads,
         files: Files,
         stores: Mapping[str, UploadedTable[Any]],
-        limits: Limits,
+        limits: IngestLimits,
         keep_s: float,
         queue: FairQueue,
         quota: Quota,
@@ -90,8 +89,8 @@ class UploadReader:
             path = self._files.of(row["tenant"]).upload(row["id"])
             discard_unverified(path)
             # It died between the last byte and saying so.
-            if size_of(path) == row["length"]:
-                self._uploads.arrived(row["id"])
+            if received_bytes(path) == row["length"]:
+                self._uploads.mark_complete(row["id"])
         self._thread.start()
 
     def notify(self) -> None:
@@ -168,10 +167,10 @@ class UploadReader:
             problem = self._refusal(row, tenant, store, path)
             if problem is not None:
                 if not self._leaving.is_set():
-                    self._uploads.refuse(row["id"], problem.model_dump(exclude_none=True), self._keep_s)
+                    self._uploads.mark_refused(row["id"], problem.model_dump(exclude_none=True), self._keep_s)
                     path.unlink(missing_ok=True)
                 return
-        self._uploads.done(row["id"], self._keep_s)
+        self._uploads.mark_done(row["id"], self._keep_s)
         path.unlink(missing_ok=True)
 
     def _refusal(
@@ -190,17 +189,19 @@ class UploadReader:
                 partial(self._quota.resize, tenant, row["result_id"]),
                 partial(self._started, row["id"]),
             )
-            store.add(tenant, row["result_id"], size=row["length"], sha256=digest_of(path), summary=summary)
-        except (StorageAway, StorageFull, SQLAlchemyError):
+            store.add(
+                tenant, row["result_id"], size=row["length"], sha256=digest_of(path).sha256, summary=summary
+            )
+        except (StorageUnavailable, StorageFull, SQLAlchemyError):
             raise
         except InvalidInput as error:
-            return from_exception(error, instance)
+            return problem_of(error, instance)
         except Exception:
             # The thread must outlive what nobody foresaw, and the next upload may be a better one.
             number = secrets.token_hex(8)
             log.exception("%s could not be read [%s]", row["id"], number)
             words = f"an error of the service, not of the file; it is in the log under {number}"
-            return make(INTERNAL, words, instance=instance, correlation_id=number)
+            return make_problem(INTERNAL, words, instance=instance, correlation_id=number)
         finally:
             with self._lock:
                 self._children.pop(row["id"], None)
@@ -224,12 +225,3 @@ class UploadReader:
 def _end(process_id: int) -> None:
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process_id, signal.SIGKILL)
-
-
-def digest_of(path: Path) -> str:
-    """SHA-256 of a file, in hexadecimal."""
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while piece := file.read(BATCH_BYTES):
-            digest.update(piece)
-    return digest.hexdigest()

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from starlette.concurrency import run_in_threadpool
 
-from ..refusals import EmptyBody, QuotaUsedUp, StorageFull, TooLarge
+from ..refusals import EmptyBody, QuotaExceeded, StorageFull, TooLarge
 
 # Chunks wait as they came, which saves copying them together; a client may send tiny ones.
 BATCH_BYTES, BATCH_CHUNKS = 4 * 1024 * 1024, 1024
@@ -57,10 +57,10 @@ async def receive(
     if announced is not None and announced > limit:
         raise TooLarge("body", f"{announced} bytes", accepted)
     digest = hashlib.sha256()
-    growing = _Reserved(announced or 0, limit, reserve)
+    growing = _GrowingReservation(announced or 0, limit, reserve)
     file = await run_in_threadpool(path.open, "xb", 0)
     try:
-        size = await pour(stream, file, limit, accepted, digest, growing.make_room)
+        size = await write_body(stream, file, limit, accepted, digest, growing.make_room)
     finally:
         await run_in_threadpool(file.close)
     if not size:
@@ -68,7 +68,7 @@ async def receive(
     return Received(size, digest.hexdigest())
 
 
-async def pour(
+async def write_body(
     stream: AsyncIterator[bytes],
     file: FileIO,
     limit: int,
@@ -94,7 +94,7 @@ async def pour(
     Raises:
         TooLarge, StorageFull: as their names say.
     """
-    size, batch, held, behind = 0, [], 0, _Behind(file, digest, make_room)
+    size, batch, held, behind = 0, [], 0, _BatchWriter(file, digest, make_room)
     try:
         try:
             async for chunk in stream:
@@ -120,7 +120,7 @@ async def pour(
     return size
 
 
-class _Reserved:
+class _GrowingReservation:
     """What is reserved for a body; one without a length has twice as much each time, so that few calls do."""
 
     def __init__(self, reserved: int, limit: int, reserve: Callable[[int], None]) -> None:
@@ -135,7 +135,7 @@ class _Reserved:
         for wanted in (min(2 * size, self._limit), size):
             try:
                 self._reserve(wanted)
-            except QuotaUsedUp:
+            except QuotaExceeded:
                 if wanted == size:
                     raise
             else:
@@ -143,7 +143,7 @@ class _Reserved:
                 return
 
 
-class _Behind:
+class _BatchWriter:
     """Writes a batch in a thread while the next one comes.
 
     Attributes:

@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ..access.request_rates import Rates
-from ..refusals import Busy, TooOften
+from ..access.request_rates import RequestRates
+from ..refusals import Busy, RateLimited
 from ..rows.tenants import Tenant
 
 # Each has a connection, and a file of which it reserved the bytes; few of them are read at a time.
@@ -33,7 +33,7 @@ class UploadLimits:
         self._in_all = in_all
         self._lock = threading.Lock()
         self._there: Counter[Tenant] = Counter()
-        self._begun = Rates(begun_per_minute)
+        self._begun = RequestRates(begun_per_minute)
 
     def check_begin(self, tenant: Tenant) -> None:
         """Refuse an upload in pieces that is begun too soon after others.
@@ -44,7 +44,7 @@ class UploadLimits:
         wait_s = self._begun.take(tenant)
         if wait_s > 0.0:
             found = f"more than {self._begun.per_minute} begun in a minute"
-            raise TooOften("uploads", found, "fewer; see Retry-After", wait_s)
+            raise RateLimited("uploads", found, "fewer; see Retry-After", wait_s)
 
     @contextmanager
     def __call__(self, tenant: Tenant) -> Iterator[None]:
@@ -58,7 +58,7 @@ class UploadLimits:
             own, all_of_them = self._there[tenant], self._there.total()
             if own >= self._of_tenant:
                 accepted = f"at most {self._of_tenant} of a tenant at a time; try again later"
-                raise TooOften("uploads", f"{own} on their way", accepted, AGAIN_S)
+                raise RateLimited("uploads", f"{own} on their way", accepted, AGAIN_S)
             if all_of_them >= self._in_all:
                 accepted = f"at most {self._in_all} at a time; try again later"
                 raise Busy("uploads", f"{all_of_them} on their way", accepted)

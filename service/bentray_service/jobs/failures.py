@@ -10,27 +10,29 @@ from distributed import KilledWorker
 
 from bentray_kernels.errors import InvalidInput
 
-from ..web.errors import FAILED, INTERNAL, from_exception, make
+from ..web.errors import FAILED, INTERNAL, make_problem, problem_of
 from ..web.problem import Problem
 
 log = logging.getLogger("bentray.jobs")
 
-CRASHED = make(FAILED, "the service died while it ran this job, several times; the job is not tried again")
+CRASHED = make_problem(
+    FAILED, "the service died while it ran this job, several times; the job is not tried again"
+)
 
 
 def explain(job_id: str, error: BaseException) -> Problem:
     """The problem to store with a failed job; what nobody foresaw goes to the log under a number."""
     instance = f"/v1/jobs/{job_id}"
     if isinstance(error, InvalidInput):
-        return from_exception(error, instance)
+        return problem_of(error, instance)
     if isinstance(error, MemoryError):
-        return make(FAILED, "the memory ran out: use fewer nodes or fewer slices", instance=instance)
+        return make_problem(FAILED, "the memory ran out: use fewer nodes or fewer slices", instance=instance)
     if isinstance(error, KilledWorker):
         words = "the workers that ran this job died one after the other, most often for lack of memory"
-        return make(FAILED, words, instance=instance)
+        return make_problem(FAILED, words, instance=instance)
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return make(FAILED, "the disk of the service is full", instance=instance)
+        return make_problem(FAILED, "the disk of the service is full", instance=instance)
     number = secrets.token_hex(8)
     log.error("job %s failed [%s]", job_id, number, exc_info=error)
     words = f"an error of the service, not of the data; it is in the log under {number}"
-    return make(INTERNAL, words, instance=instance, correlation_id=number)
+    return make_problem(INTERNAL, words, instance=instance, correlation_id=number)

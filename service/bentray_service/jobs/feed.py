@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 import anyio
 from sqlalchemy.exc import SQLAlchemyError
 
-from ..refusals import DatabaseAway, TooManyStreams
+from ..refusals import DatabaseUnavailable, TooManyStreams
 from ..rows.jobs import Jobs
 from ..rows.records import EventRow, JobProgress
 from ..rows.tenants import Tenant
@@ -43,13 +43,13 @@ class WatchedJob:
         self.watchers = 0
         self._news = asyncio.Event()
 
-    async def news(self, seconds: float) -> None:
+    async def wait_for_change(self, seconds: float) -> None:
         """Wait until something has changed, at most so long."""
         with suppress(TimeoutError):
             async with asyncio.timeout(seconds):
                 await self._news.wait()
 
-    def tell(self) -> None:
+    def notify(self) -> None:
         """Wake all who wait."""
         self._news.set()
         self._news = asyncio.Event()
@@ -60,10 +60,10 @@ class WatchedJob:
         self.row, self.gone = row, row is None
         self.events += events
         if changed:
-            self.tell()
+            self.notify()
 
 
-class Feed:
+class EventFeed:
     """Watches jobs while anybody wants to know of them; everything here is done by the event loop."""
 
     def __init__(self, jobs: Jobs, leaving: Callable[[], bool]) -> None:
@@ -75,7 +75,7 @@ class Feed:
         self.leaving = leaving
         self._watched: dict[str, WatchedJob] = {}
         self._streams: Counter[Tenant] = Counter()
-        self._looking: asyncio.Task[None] | None = None
+        self._polling: asyncio.Task[None] | None = None
         self._asked = asyncio.Event()
 
     @contextmanager
@@ -95,8 +95,8 @@ class Feed:
         watched.watchers += 1
         if watched.row is None:
             self._asked.set()
-        if self._looking is None:
-            self._looking = asyncio.create_task(self._look())
+        if self._polling is None:
+            self._polling = asyncio.create_task(self._poll())
         try:
             yield watched
         finally:
@@ -107,7 +107,7 @@ class Feed:
             if not self._streams[tenant]:
                 del self._streams[tenant]
 
-    async def _look(self) -> None:
+    async def _poll(self) -> None:
         # A thread of its own, which nothing else can hold.
         limiter = anyio.CapacityLimiter(1)
         try:
@@ -118,18 +118,18 @@ class Feed:
                     job_id: one.events[-1]["number"] if one.events else 0 for job_id, one in watched.items()
                 }
                 try:
-                    found, events = await anyio.to_thread.run_sync(self._jobs.news, known, limiter=limiter)
-                except (SQLAlchemyError, DatabaseAway) as error:
+                    found, events = await anyio.to_thread.run_sync(self._jobs.updates, known, limiter=limiter)
+                except (SQLAlchemyError, DatabaseUnavailable) as error:
                     log.warning("jobs that are watched could not be read: %s", error)
                 else:
                     for job_id, one in watched.items():
                         one.update(found.get(job_id), events.get(job_id, []))
                 if self.leaving():
                     for one in self._watched.values():
-                        one.tell()
+                        one.notify()
                 await asyncio.sleep(min(SOONEST_SECONDS, INTERVAL_SECONDS))
                 with suppress(TimeoutError):
                     async with asyncio.timeout(INTERVAL_SECONDS):
                         await self._asked.wait()
         finally:
-            self._looking = None
+            self._polling = None

@@ -12,7 +12,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.tomography.result import Progress, Sweep
 
-from ..refusals import DatabaseAway
+from ..refusals import DatabaseUnavailable
 from ..rows.job_queue import Queue
 from .kinds import finite
 
@@ -66,7 +66,7 @@ class Reporter:
             return
         try:
             self.flush()
-        except DatabaseAway:
+        except DatabaseUnavailable:
             # A database that is away for a while must not cost a job; the next report says the same.
             pass
         except SQLAlchemyError:
@@ -80,7 +80,7 @@ class Reporter:
         self._written = self._clock()
         history: list[dict[str, Any]] = [
             {**asdict(sweep), "residual_rms_s": finite(sweep.residual_rms_s)}
-            for sweep in thinned(kept.history)
+            for sweep in thin_history(kept.history)
         ]
         self._queue.progress(self._job_id, kept.done, kept.total, history, kept.phase)
         self._pending = None
@@ -89,12 +89,12 @@ class Reporter:
         """The job has kept something to go on from: say so once, and now and then how much that takes."""
         try:
             if not self._further:
-                self._queue.got_further(self._job_id)
+                self._queue.reset_attempts(self._job_id)
                 self._further = True
             if self._clock() - self._measured >= MEASURE_SECONDS:
                 self._measured = self._clock()
-                self._queue.took(self._job_id, self._taken())
-        except DatabaseAway:
+                self._queue.record_size(self._job_id, self._taken())
+        except DatabaseUnavailable:
             pass
         except SQLAlchemyError:
             log.warning("that %s got further could not be stored", self._job_id, exc_info=True)
@@ -106,17 +106,17 @@ class Reporter:
         if self._clock() - self._asked >= INTERVAL_SECONDS:
             self._asked = self._clock()
             try:
-                told = self._queue.told(self._job_id)
+                told = self._queue.held_state(self._job_id)
                 self.lost = told is None
                 self._stopped = told != "running"
-            except DatabaseAway:
+            except DatabaseUnavailable:
                 pass
             except SQLAlchemyError:
                 log.warning("whether %s is cancelled could not be read", self._job_id, exc_info=True)
         return self._stopped
 
 
-def thinned(history: Sequence[Sweep]) -> Sequence[Sweep]:
+def thin_history(history: Sequence[Sweep]) -> Sequence[Sweep]:
     """At most ``MOST_SWEEPS`` of a history, evenly, with the first and the last."""
     if len(history) <= MOST_SWEEPS:
         return history

@@ -25,7 +25,7 @@ from ..files.data_folder import Files
 from ..files.disk import bytes_in
 from ..files.tenant_files import TenantFiles
 from ..logs import about
-from ..refusals import Damaged, DatabaseAway, DatabaseFull, StorageAway
+from ..refusals import Damaged, DatabaseFull, DatabaseUnavailable, StorageUnavailable
 from ..rows.job_queue import LEASE_S, Queue
 from ..rows.records import JobRow
 from ..rows.schema import ENDED
@@ -121,7 +121,7 @@ class Runner:
             try:
                 self._queue.renew(self._held())
                 self._recover()
-            except DatabaseAway as error:
+            except DatabaseUnavailable as error:
                 log.warning("the leases could not be renewed: %s", error)
             except SQLAlchemyError:
                 log.exception("the leases could not be renewed")
@@ -153,7 +153,7 @@ class Runner:
             try:
                 if self._begin():
                     continue
-            except DatabaseAway:
+            except DatabaseUnavailable:
                 # The thread must outlive it; that it is away is in the log already, once.
                 pass
             except Exception:
@@ -203,10 +203,10 @@ class Runner:
         kind = KINDS[job["kind"]]
         target = kind.target(files, job)
         try:
-            source = self._files.store.bring(kind.source(files, job))
+            source = self._files.store.fetch(kind.source(files, job))
             try:
                 # Another job may have made the same, and a kind may then take it as it is.
-                self._files.store.bring(target)
+                self._files.store.fetch(target)
             except FileNotFoundError:
                 pass
             except Damaged:
@@ -231,8 +231,12 @@ class Runner:
         except Cancelled:
             if not reporter.lost:
                 self._settle(job_id, lambda: self._stopped(job_id, files, reporter))
-        except (*AWAY, DatabaseAway, StorageAway) as error:
-            kinds = ((DatabaseAway, "database"), (StorageAway, "storage"), (Exception, "workers"))
+        except (*AWAY, DatabaseUnavailable, StorageUnavailable) as error:
+            kinds = (
+                (DatabaseUnavailable, "database"),
+                (StorageUnavailable, "storage"),
+                (Exception, "workers"),
+            )
             away = next(name for kind, name in kinds if isinstance(error, kind))
             reason = f"no answer from the {away}; the job continues when available"
             self._put_back(job_id, reason, error)
@@ -260,7 +264,7 @@ class Runner:
         while True:
             try:
                 return self._files.store.publish(target)
-            except StorageAway as error:
+            except StorageUnavailable as error:
                 log.warning("%s waits for the storage: %s", target.name, error)
                 if self._leaving.wait(STORE_SECONDS) or reporter.stop():
                     raise Cancelled from error
@@ -270,7 +274,7 @@ class Runner:
         if self._leaving.is_set():
             self._queue.release(job_id, "the service was stopped")
         else:
-            self._queue.cancelled(job_id)
+            self._queue.mark_cancelled(job_id)
         if self._queue.state(job_id) in ENDED:
             files.drop_work(job_id)
 
@@ -292,13 +296,13 @@ class Runner:
         # One that has no row is one file.
         size = target.stat().st_size if result is None else 0
         if not self._queue.succeed(job_id, result, kind.table, size):
-            if self._queue.told(job_id) is None:
+            if self._queue.held_state(job_id) is None:
                 # Another service runs it by now, and writes the same file.
                 return
-            with suppress(StorageAway):
+            with suppress(StorageUnavailable):
                 # What stays is found as an orphan.
                 kind.discard(files, target)
-            self._queue.cancelled(job_id)
+            self._queue.mark_cancelled(job_id)
         files.drop_work(job_id)
 
     def _settle(self, job_id: str, write_the_end: Callable[[], None]) -> None:
@@ -311,7 +315,7 @@ class Runner:
         while True:
             try:
                 return write_the_end()
-            except (DatabaseAway, DatabaseFull):
+            except (DatabaseUnavailable, DatabaseFull):
                 if self._leaving.wait(IDLE_SECONDS):
                     raise
             except SQLAlchemyError as error:

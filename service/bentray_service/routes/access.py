@@ -7,8 +7,8 @@ from typing import Literal
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from ..web.errors import described
-from ..wiring import Asking, Service
+from ..web.errors import problems
+from ..wiring import CurrentCaller, Service
 
 router = APIRouter(prefix="/v1/access", tags=["access"])
 
@@ -29,8 +29,8 @@ class AccessRecord(BaseModel):
     renders_per_minute: int = Field(description="Pictures among them that may be drawn; 0: any number.")
 
 
-@router.get("", responses=described(503))
-def show_access(service: Service, caller: Asking) -> AccessRecord:
+@router.get("", responses=problems(503))
+def show_access(service: Service, caller: CurrentCaller) -> AccessRecord:
     """Who the caller is, and what it may do and store."""
     settings, limited = service.settings, caller.how != "open"
     used = service.quota.of(caller.tenant)

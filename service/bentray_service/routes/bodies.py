@@ -17,7 +17,7 @@ Limit = Annotated[int, Query(ge=1, le=1000, description="At most so many.")]
 LONGEST_JSON = 64 * 1024
 
 
-def only(*accepted: str) -> Callable[[Request], None]:
+def accept_media_types(*accepted: str) -> Callable[[Request], None]:
     """A dependency that refuses every Content-Type but these.
 
     Raises:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Depends, Request, Response, status
 
-from ..files.deletion import Stored
-from ..web.errors import described
+from ..files.deletion import StoredItem
+from ..web.errors import problems
 from ..wiring import CallerTenant, Service
 from . import quality
-from .bodies import Limit, only
+from .bodies import Limit, accept_media_types
 from .downloads import download, download_of
 from .models.records import DatasetList, DatasetRecord
 from .records import dataset_record
-from .uploads import body_of, take_in
+from .uploads import body_of, receive_upload
 
 HDF5 = "application/x-hdf5"
 MEDIA_TYPES = (HDF5, "application/octet-stream")
@@ -24,21 +24,21 @@ router.include_router(quality.router)
 @router.post(
     "",
     status_code=status.HTTP_201_CREATED,
-    dependencies=[Depends(only(*MEDIA_TYPES))],
+    dependencies=[Depends(accept_media_types(*MEDIA_TYPES))],
     openapi_extra=body_of("dataset", MEDIA_TYPES),
-    responses=described(413, 415, 422, 503, 507),
+    responses=problems(413, 415, 422, 503, 507),
 )
 async def upload_dataset(
     request: Request, response: Response, service: Service, tenant: CallerTenant
 ) -> DatasetRecord:
     """Upload a scan. A process of its own reads it and stores it in canonical form, or says why not."""
-    row = await take_in(request, service, tenant, service.datasets, {})
+    row = await receive_upload(request, service, tenant, service.datasets, {})
     record = dataset_record(row)
     response.headers["Location"] = record.links["self"]
     return record
 
 
-@router.get("", responses=described(422))
+@router.get("", responses=problems(422))
 def list_datasets(
     service: Service,
     tenant: CallerTenant,
@@ -48,7 +48,7 @@ def list_datasets(
     return DatasetList(datasets=[dataset_record(row) for row in service.datasets.newest(tenant, limit)])
 
 
-@router.get("/{dataset_id}", responses=described(404))
+@router.get("/{dataset_id}", responses=problems(404))
 def show_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> DatasetRecord:
     """One dataset."""
     return dataset_record(service.datasets.get(tenant, dataset_id))
@@ -58,7 +58,7 @@ def show_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> Dat
 @router.get(
     "/{dataset_id}/file",
     response_class=Response,
-    responses={**download_of(HDF5), **described(404, 503)},
+    responses={**download_of(HDF5), **problems(404, 503)},
 )
 def dataset_file(dataset_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
     """The scan as an HDF5 file in the upload format: what a simulation made, or what was read of an upload.
@@ -66,11 +66,11 @@ def dataset_file(dataset_id: str, request: Request, service: Service, tenant: Ca
     A download that broke off goes on with Range, and If-Range with the ETag of the first answer.
     """
     row = service.datasets.get(tenant, dataset_id)
-    path = service.files.store.bring(service.files.of(tenant).dataset(row["id"]))
+    path = service.files.store.fetch(service.files.of(tenant).dataset(row["id"]))
     return download(request, path, repr((row["id"], row["sha256"])), HDF5)
 
 
-@router.delete("/{dataset_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409, 503))
+@router.delete("/{dataset_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
 def delete_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> None:
     """Delete a scan, its jobs, and the volumes that they made; not while a job needs it."""
-    service.deletion.delete(Stored(tenant, "dataset", dataset_id))
+    service.deletion.delete(StoredItem(tenant, "dataset", dataset_id))

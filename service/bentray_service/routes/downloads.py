@@ -12,8 +12,8 @@ from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from starlette.types import Receive, Scope, Send
 
-from ..refusals import Deleted, NoSuchPart
-from ..web.errors import described
+from ..refusals import Deleted, RangeNotSatisfiable
+from ..web.errors import problems
 
 # One part; of several at once, or of a form that nobody knows, the whole file is sent, as RFC 9110 allows.
 ONE_PART = re.compile(r"bytes=(\d*)-(\d*)")
@@ -26,7 +26,7 @@ def download_of(*media_types: str) -> dict[int | str, dict[str, Any]]:
         200: {"content": content, "description": "The file."},
         206: {"content": content, "description": "The part that Range asked for."},
         304: {"description": "The file that the client has is still right."},
-        **described(416),
+        **problems(416),
     }
 
 
@@ -75,7 +75,7 @@ def tag_of(path: Path, seed: str) -> str:
         raise Deleted(path.name.partition(".")[0]) from error
 
 
-def size_of(path: Path) -> int:
+def file_bytes(path: Path) -> int:
     """Bytes of a file; raises Deleted when there is none any more."""
     try:
         return path.stat().st_size
@@ -137,5 +137,5 @@ def _part_asked_for(request: Request, tag: str, size: int) -> bool:
         return False
     begins_inside = int(first) < size if first else int(last) > 0
     if not begins_inside:
-        raise NoSuchPart(found.group(), size)
+        raise RangeNotSatisfiable(found.group(), size)
     return True

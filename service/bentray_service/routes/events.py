@@ -12,10 +12,10 @@ from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
-from ..jobs.feed import Feed, WatchedJob
+from ..jobs.feed import EventFeed, WatchedJob
 from ..rows.schema import ENDED
 from ..rows.tenants import Tenant
-from ..web.errors import described
+from ..web.errors import problems
 from ..wiring import CallerTenant, Service
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
@@ -29,7 +29,10 @@ MEDIA_TYPE = "text/event-stream"
 @router.get(
     "/{job_id}/events",
     response_class=StreamingResponse,
-    responses={200: {"content": {MEDIA_TYPE: {}}, "description": "The events."}, **described(404, 422, 429)},
+    responses={
+        200: {"content": {MEDIA_TYPE: {}}, "description": "The events."},
+        **problems(404, 422, 429),
+    },
 )
 def job_events(
     job_id: str,
@@ -52,7 +55,7 @@ def job_events(
 class _Stream(Response):
     """The answer; its place among the streams is taken when it begins and given back however it ends."""
 
-    def __init__(self, feed: Feed, tenant: Tenant, job_id: str, last: int) -> None:
+    def __init__(self, feed: EventFeed, tenant: Tenant, job_id: str, last: int) -> None:
         super().__init__(media_type=MEDIA_TYPE)
         self._feed = feed
         self._of = tenant, job_id
@@ -65,7 +68,7 @@ class _Stream(Response):
             await stream(scope, receive, send)
 
 
-async def _told(feed: Feed, job: WatchedJob, last: int) -> AsyncIterator[str]:
+async def _told(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterator[str]:
     told: dict[str, Any] = {}
     spoken = time.monotonic()
     while not feed.leaving() and not job.gone:
@@ -90,7 +93,7 @@ async def _told(feed: Feed, job: WatchedJob, last: int) -> AsyncIterator[str]:
         elif row["state"] in ENDED:
             return
         else:
-            await job.news(SILENCE_SECONDS)
+            await job.wait_for_change(SILENCE_SECONDS)
 
 
 def _event(name: str, data: dict[str, Any], number: int | None = None) -> str:

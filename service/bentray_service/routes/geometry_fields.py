@@ -5,9 +5,9 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from ..asked_view import AskedFieldView
+from ..asked_view import FieldViewParameters
 from ..rows.tenants import Tenant
-from ..web.errors import described
+from ..web.errors import problems
 from ..wiring import CallerTenant, Parts, Service
 from .bodies import Limit
 from .models.surface_records import FieldList, FieldRecord
@@ -17,7 +17,7 @@ from .records import field_record
 router = APIRouter(prefix="/v1/geometry-fields", tags=["geometry-fields"])
 
 
-@router.get("", responses=described(422))
+@router.get("", responses=problems(422))
 def list_fields(
     service: Service,
     tenant: CallerTenant,
@@ -28,7 +28,7 @@ def list_fields(
     return FieldList(geometry_fields=[field_record(row) for row in rows])
 
 
-@router.get("/{field_id}", responses=described(404))
+@router.get("/{field_id}", responses=problems(404))
 def show_field(field_id: str, service: Service, tenant: CallerTenant) -> FieldRecord:
     """One geometry field: its sizes, its errors and how long it took."""
     return field_record(service.geometry_fields.get(tenant, field_id))
@@ -37,7 +37,7 @@ def show_field(field_id: str, service: Service, tenant: CallerTenant) -> FieldRe
 @router.head("/{field_id}/image.png", include_in_schema=False)
 @router.get("/{field_id}/image.png", response_class=Response, responses=PICTURE)
 async def image_png(
-    field_id: str, request: Request, service: Service, tenant: CallerTenant, view: AskedFieldView
+    field_id: str, request: Request, service: Service, tenant: CallerTenant, view: FieldViewParameters
 ) -> Response:
     """A scene with the mesh as mirror, glass or clay, its rays answered by the field, traced by a worker.
 

@@ -7,7 +7,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from pydantic import BaseModel, Field
 
 from ..refusals import NotReady
-from ..web.errors import described
+from ..web.errors import problems
 from ..wiring import parts_of
 
 router = APIRouter(prefix="/health", tags=["health"])
@@ -36,10 +36,10 @@ async def live() -> Alive:
     return Alive()
 
 
-@router.get("/ready", responses=described(503))
+@router.get("/ready", responses=problems(503))
 async def ready(request: Request) -> Ready:
     """Whether uploads and jobs can be served now; each fault is named."""
-    seen = await parts_of(request).readiness.seen()
+    seen = await parts_of(request).readiness.report()
     if seen.faults:
         raise NotReady(seen.faults)
     return Ready(workers=seen.workers, free_bytes=seen.free_bytes)

@@ -10,9 +10,9 @@ from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, 
 
 from ..jobs.kinds import KINDS
 from ..refusals import NoAnimation
-from ..web.errors import described
+from ..web.errors import problems
 from ..wiring import CallerTenant, Service
-from .bodies import Limit, SmallBody, only
+from .bodies import Limit, SmallBody, accept_media_types
 from .downloads import download, download_of
 from .models.records import JobList, JobRecord, State
 from .records import job_record
@@ -41,8 +41,8 @@ else:
 @router.post(
     "",
     status_code=status.HTTP_202_ACCEPTED,
-    dependencies=[Depends(only("application/json"))],
-    responses=described(400, 404, 409, 413, 415, 422, 429, 503, 507),
+    dependencies=[Depends(accept_media_types("application/json"))],
+    responses=problems(400, 404, 409, 413, 415, 422, 429, 503, 507),
 )
 def start_job(
     asked: JobRequest,
@@ -78,7 +78,7 @@ def start_job(
     return job
 
 
-@router.get("", responses=described(404, 422))
+@router.get("", responses=problems(404, 422))
 def list_jobs(
     service: Service,
     tenant: CallerTenant,
@@ -97,7 +97,7 @@ def list_jobs(
     return JobList(jobs=shown, next=f"/v1/jobs?{given}")
 
 
-@router.get("/{job_id}", responses=described(404))
+@router.get("/{job_id}", responses=problems(404))
 def show_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
     """One job: its state, its progress and the residual of every sweep so far."""
     return job_record(service.jobs.get(tenant, job_id))
@@ -106,7 +106,7 @@ def show_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
 @router.post(
     "/{job_id}/cancel",
     status_code=status.HTTP_202_ACCEPTED,
-    responses=described(404, 409),
+    responses=problems(404, 409),
 )
 def cancel_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
     """Ask a job to stop. A queued one ends at once, a running one within a second or so."""
@@ -117,7 +117,7 @@ def cancel_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord
 @router.get(
     "/{job_id}/animation",
     response_class=Response,
-    responses={**download_of(*ANIMATIONS.values()), **described(404, 409, 503)},
+    responses={**download_of(*ANIMATIONS.values()), **problems(404, 409, 503)},
 )
 def animation(job_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
     """The pictures of a job of kind refraction, once it has succeeded.
@@ -128,5 +128,5 @@ def animation(job_id: str, request: Request, service: Service, tenant: CallerTen
     if job["kind"] != "refraction" or job["state"] != "succeeded":
         raise NoAnimation(job["id"], job["kind"], job["state"])
     extension = job["settings"]["format"]
-    path = service.files.store.bring(service.files.of(tenant).animation(job["id"], extension))
+    path = service.files.store.fetch(service.files.of(tenant).animation(job["id"], extension))
     return download(request, path, repr((job["id"], job["finished"])), ANIMATIONS[extension])

@@ -14,16 +14,16 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.rendering.isosurface_mesh import MOST_STEP, check_nodes, largest_bytes
 
 from ..compute import check_renderable
-from ..files.deletion import Stored
+from ..files.deletion import StoredItem
 from ..rows.ids import new_id
 from ..rows.records import MeshRow
-from ..web.errors import described
-from ..wiring import Asking, CallerTenant, Service
-from .bodies import Limit, only
+from ..web.errors import problems
+from ..wiring import CallerTenant, CurrentCaller, Service
+from .bodies import Limit, accept_media_types
 from .models.surface_records import MeshList, MeshRecord
 from .pictures import while_connected
 from .records import mesh_record
-from .uploads import body_of, take_in
+from .uploads import body_of, receive_upload
 
 MEDIA_TYPES = (
     "application/octet-stream",
@@ -39,9 +39,9 @@ router = APIRouter(prefix="/v1", tags=["meshes"])
 @router.post(
     "/meshes",
     status_code=status.HTTP_201_CREATED,
-    dependencies=[Depends(only(*MEDIA_TYPES))],
+    dependencies=[Depends(accept_media_types(*MEDIA_TYPES))],
     openapi_extra=body_of("mesh", MEDIA_TYPES),
-    responses=described(413, 415, 422, 503, 507),
+    responses=problems(413, 415, 422, 503, 507),
 )
 async def upload_mesh(
     request: Request,
@@ -51,13 +51,13 @@ async def upload_mesh(
     title: Annotated[str, Query(max_length=200, description="What it is.")] = "",
 ) -> MeshRecord:
     """Upload a mesh. A process of its own reads it and makes one sound surface of it, or says why not."""
-    row = await take_in(request, service, tenant, service.meshes, {"title": title})
+    row = await receive_upload(request, service, tenant, service.meshes, {"title": title})
     record = mesh_record(row)
     response.headers["Location"] = record.links["self"]
     return record
 
 
-@router.get("/meshes", responses=described(422))
+@router.get("/meshes", responses=problems(422))
 def list_meshes(
     service: Service,
     tenant: CallerTenant,
@@ -67,24 +67,22 @@ def list_meshes(
     return MeshList(meshes=[mesh_record(row) for row in service.meshes.newest(tenant, limit)])
 
 
-@router.get("/meshes/{mesh_id}", responses=described(404))
+@router.get("/meshes/{mesh_id}", responses=problems(404))
 def show_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> MeshRecord:
     """One mesh: its size, its handles and holes, and what was repaired."""
     return mesh_record(service.meshes.get(tenant, mesh_id))
 
 
-@router.delete(
-    "/meshes/{mesh_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409, 503)
-)
+@router.delete("/meshes/{mesh_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
 def delete_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> None:
     """Delete a mesh, its geometry fields and the jobs that made them; not while a job needs it."""
-    service.deletion.delete(Stored(tenant, "mesh", mesh_id))
+    service.deletion.delete(StoredItem(tenant, "mesh", mesh_id))
 
 
 @router.post(
     "/volumes/{volume_id}/mesh",
     status_code=status.HTTP_201_CREATED,
-    responses=described(404, 422, 429, 503, 507),
+    responses=problems(404, 422, 429, 503, 507),
 )
 async def mesh_of_volume(
     volume_id: str,
@@ -92,7 +90,7 @@ async def mesh_of_volume(
     response: Response,
     service: Service,
     tenant: CallerTenant,
-    caller: Asking,
+    caller: CurrentCaller,
     iso: Annotated[
         float | None, Query(description="In the unit of the volume; without it the middle of its range.")
     ] = None,
@@ -107,7 +105,7 @@ async def mesh_of_volume(
     if iso is not None and not (math.isfinite(iso) and low <= iso < high):
         raise InvalidInput("iso", iso, f"{low:g} to less than {high:g}, the range of the volume")
     mesh_id, files = new_id("mesh"), service.files.of(tenant)
-    service.door.check_render(caller)
+    service.sign_in.check_render(caller)
     path = files.volume(volume["id"])
 
     def store(made: Path, summary: dict[str, Any]) -> MeshRow:

@@ -11,7 +11,7 @@ from fastapi import Request, Response
 from starlette.requests import ClientDisconnect
 
 from .. import __version__
-from ..web.errors import described
+from ..web.errors import problems
 from ..wiring import caller_of, parts_of
 
 Made = TypeVar("Made")
@@ -20,7 +20,7 @@ Made = TypeVar("Made")
 PICTURE: dict[int | str, dict[str, Any]] = {
     200: {"content": {"image/png": {}}, "description": "The picture."},
     304: {"description": "The picture that the client has is still right."},
-    **described(404, 422, 429, 503),
+    **problems(404, 422, 429, 503),
 }
 
 
@@ -47,7 +47,7 @@ async def picture(
         # That of the empty body; the picture's is not known before it is drawn.
         del answer.headers["content-length"]
         return answer
-    parts_of(request).door.check_render(caller_of(request))
+    parts_of(request).sign_in.check_render(caller_of(request))
     return Response(await while_connected(request, draw()), media_type="image/png", headers=headers)
 
 

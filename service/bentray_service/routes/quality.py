@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from ..web.errors import described
+from ..web.errors import problems
 from ..wiring import CallerTenant, Service, caller_of, parts_of
 from .models.quality_records import QualityRecord
 from .pictures import PICTURE, picture, while_connected
@@ -20,15 +20,15 @@ Picker = Annotated[
 ]
 
 
-async def admitted(request: Request) -> None:
+async def check_render_rate(request: Request) -> None:
     """A scan is examined where a picture may be drawn: it takes a worker for seconds."""
-    parts_of(request).door.check_render(caller_of(request))
+    parts_of(request).sign_in.check_render(caller_of(request))
 
 
 @router.get(
     "/{dataset_id}/quality",
-    responses=described(404, 422, 429, 503),
-    dependencies=[Depends(admitted)],
+    responses=problems(404, 422, 429, 503),
+    dependencies=[Depends(check_render_rate)],
 )
 async def show_quality(
     dataset_id: str, request: Request, service: Service, tenant: CallerTenant, picker: Picker = "aic"
@@ -41,9 +41,7 @@ async def show_quality(
 
 
 @router.head("/{dataset_id}/quality.png", include_in_schema=False)
-@router.get(
-    "/{dataset_id}/quality.png", response_class=Response, responses={**PICTURE, **described(404, 422)}
-)
+@router.get("/{dataset_id}/quality.png", response_class=Response, responses={**PICTURE, **problems(404, 422)})
 async def quality_png(
     dataset_id: str, request: Request, service: Service, tenant: CallerTenant, picker: Picker = "aic"
 ) -> Response:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from ..asked_view import AskedView
+from ..asked_view import ViewParameters
 from ..compute import check_renderable
 from ..wiring import CallerTenant, Service
 from .pictures import PICTURE, picture
@@ -20,7 +20,7 @@ async def refraction_png(
     request: Request,
     service: Service,
     tenant: CallerTenant,
-    view: AskedView,
+    view: ViewParameters,
 ) -> Response:
     """A volume as glass before a backdrop, or its surface, cast by a worker.
 

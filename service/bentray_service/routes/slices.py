@@ -27,7 +27,7 @@ router = APIRouter()
 COLOUR_SCHEMA = cast("dict[str, Any]", COLOUR_VALUE.schema)
 
 
-async def asked_look(
+async def read_look(
     colormap: Annotated[
         str,
         Query(
@@ -62,7 +62,7 @@ async def slice_png(
     request: Request,
     service: Service,
     tenant: CallerTenant,
-    look: Annotated[SliceStyle, Depends(asked_look)],
+    look: Annotated[SliceStyle, Depends(read_look)],
     axis: Annotated[Literal["x", "y", "z"], Query(description="The axis that the slice cuts across.")] = "z",
     index: Annotated[
         int | None, Query(ge=0, description="Along this axis; the middle slice without it.")

@@ -15,14 +15,14 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Request, Response, status
 from starlette.concurrency import run_in_threadpool
 
-from ..ingest.append import ALGORITHMS, CHECKSUM, Checksum, append, size_of
+from ..ingest.append import ALGORITHMS, CHECKSUM, Checksum, append, received_bytes
 from ..refusals import StorageFull, TooLarge, WrongOffset, WrongProtocol
 from ..rows.records import UploadRow
 from ..rows.tenants import Tenant
-from ..web.errors import described
+from ..web.errors import problems
 from ..web.tus_headers import PLACE, VERSION
 from ..wiring import CallerTenant, Parts, Service
-from .bodies import only
+from .bodies import accept_media_types
 from .models.upload_records import UploadRecord
 from .records import result_link, upload_record
 from .upload_metadata import METADATA, read_metadata
@@ -40,20 +40,20 @@ Version = Annotated[
 ]
 
 
-def speaks_tus(tus_resumable: Version) -> None:
+def check_tus_version(tus_resumable: Version) -> None:
     """A dependency that refuses every other version of the protocol."""
     if tus_resumable != VERSION:
         raise WrongProtocol("Tus-Resumable", repr(tus_resumable), VERSION)
 
 
 router = APIRouter(prefix=PLACE, tags=["uploads"])
-Spoken = Depends(speaks_tus)
+TusVersion = Depends(check_tus_version)
 BYTES = {"schema": {"type": "string", "format": "binary"}}
 BODY = {"requestBody": {"required": True, "content": {MEDIA_TYPE: BYTES}}}
 
 
 @router.options("", status_code=status.HTTP_204_NO_CONTENT)
-def what_is_possible(service: Service) -> Response:
+def show_upload_options(service: Service) -> Response:
     """What of tus there is."""
     return Response(
         status_code=status.HTTP_204_NO_CONTENT,
@@ -68,10 +68,10 @@ def what_is_possible(service: Service) -> Response:
 @router.post(
     "",
     status_code=status.HTTP_201_CREATED,
-    dependencies=[Spoken],
-    responses=described(412, 413, 422, 503, 507),
+    dependencies=[TusVersion],
+    responses=problems(412, 413, 422, 503, 507),
 )
-def begin_upload(
+def create_upload(
     response: Response,
     service: Service,
     tenant: CallerTenant,
@@ -105,8 +105,8 @@ def begin_upload(
     return record
 
 
-@router.head("/{upload_id}", dependencies=[Spoken], responses=described(404, 412), include_in_schema=False)
-def how_far(upload_id: str, service: Service, tenant: CallerTenant) -> Response:
+@router.head("/{upload_id}", dependencies=[TusVersion], responses=problems(404, 412), include_in_schema=False)
+def show_upload_offset(upload_id: str, service: Service, tenant: CallerTenant) -> Response:
     """How many bytes are there, and what has become of them."""
     row = service.uploads.get(tenant, upload_id)
     headers = {
@@ -123,7 +123,7 @@ def how_far(upload_id: str, service: Service, tenant: CallerTenant) -> Response:
     return Response(headers=headers)
 
 
-@router.get("/{upload_id}", responses=described(404))
+@router.get("/{upload_id}", responses=problems(404))
 def show_upload(upload_id: str, service: Service, tenant: CallerTenant) -> UploadRecord:
     """One upload: how far it is, and what it became or why it was refused."""
     row = service.uploads.get(tenant, upload_id)
@@ -133,11 +133,11 @@ def show_upload(upload_id: str, service: Service, tenant: CallerTenant) -> Uploa
 @router.patch(
     "/{upload_id}",
     status_code=status.HTTP_204_NO_CONTENT,
-    dependencies=[Spoken, Depends(only(MEDIA_TYPE))],
+    dependencies=[TusVersion, Depends(accept_media_types(MEDIA_TYPE))],
     openapi_extra=BODY,
-    responses=described(400, 404, 408, 409, 412, 413, 415, 422, 423, 460, 507),
+    responses=problems(400, 404, 408, 409, 412, 413, 415, 422, 423, 460, 507),
 )
-async def send_piece(
+async def append_upload(
     upload_id: str,
     request: Request,
     service: Service,
@@ -175,7 +175,7 @@ async def send_piece(
                 keep_s = service.settings.upload_keep_s
                 expires = await run_in_threadpool(service.uploads.keep, upload_id, keep_s)
             if offset == length:
-                await run_in_threadpool(service.uploads.arrived, upload_id)
+                await run_in_threadpool(service.uploads.mark_complete, upload_id)
                 service.reader.notify()
     headers = {"Upload-Offset": str(offset), "Upload-Expires": http_date(expires)}
     return Response(status_code=status.HTTP_204_NO_CONTENT, headers=headers)
@@ -184,10 +184,10 @@ async def send_piece(
 @router.delete(
     "/{upload_id}",
     status_code=status.HTTP_204_NO_CONTENT,
-    dependencies=[Spoken],
-    responses=described(404, 409, 412, 422, 423),
+    dependencies=[TusVersion],
+    responses=problems(404, 409, 412, 422, 423),
 )
-def end_upload(upload_id: str, service: Service, tenant: CallerTenant) -> None:
+def delete_upload(upload_id: str, service: Service, tenant: CallerTenant) -> None:
     """Forget an upload and what came of it; what it has become stays."""
     service.uploads.get(tenant, upload_id)
     with service.hold(upload_id):
@@ -201,7 +201,7 @@ def offset_of(service: Parts, tenant: Tenant, row: UploadRow) -> int:
     """
     if row["state"] != "receiving":
         return int(row["length"])
-    return size_of(service.files.of(tenant).upload(row["id"]))
+    return received_bytes(service.files.of(tenant).upload(row["id"]))
 
 
 def http_date(seconds: float) -> str:

@@ -11,7 +11,7 @@ from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
-from ..ingest.canonical import Limits, make_canonical
+from ..ingest.canonical import IngestLimits, make_canonical
 from ..ingest.child import ACCEPTED
 from ..ingest.fair_queue import FairQueue
 from ..ingest.receive import Received, receive
@@ -31,11 +31,11 @@ Made = TypeVar("Made")
 def body_of(what: str, media_types: tuple[str, ...]) -> dict[str, Any]:
     """How OpenAPI describes the body of an upload."""
     content = {media: {"schema": {"type": "string", "format": "binary"}} for media in media_types}
-    described = ACCEPTED[what][0].upper() + ACCEPTED[what][1:] + "."
-    return {"requestBody": {"required": True, "description": described, "content": content}}
+    problems = ACCEPTED[what][0].upper() + ACCEPTED[what][1:] + "."
+    return {"requestBody": {"required": True, "description": problems, "content": content}}
 
 
-async def take_in(
+async def receive_upload(
     request: Request,
     service: Parts,
     tenant: Tenant,
@@ -59,7 +59,7 @@ async def take_in(
     resize = partial(quota.resize, tenant, upload_id)
 
     def check_and_store(received: Received) -> Record:
-        limits = Limits(settings.ingest_memory_bytes, settings.ingest_seconds, service.files.scratch)
+        limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, service.files.scratch)
         summary = make_canonical(what, path, upload_id, files, limits, given, resize)
         return table.add(tenant, upload_id, size=received.size, sha256=received.sha256, summary=summary)
 
@@ -70,12 +70,12 @@ async def take_in(
                     request.stream(), wanted, path, settings.max_upload_bytes, ACCEPTED[what], resize
                 )
                 work = partial(check_and_store, received)
-                return await in_turn(request, service.ingest_queue, tenant, work)
+                return await run_in_turn(request, service.ingest_queue, tenant, work)
             finally:
                 await run_in_threadpool(path.unlink, missing_ok=True)
 
 
-async def in_turn(request: Request, queue: FairQueue, tenant: Tenant, work: Callable[[], Made]) -> Made:
+async def run_in_turn(request: Request, queue: FairQueue, tenant: Tenant, work: Callable[[], Made]) -> Made:
     """What ``work`` returns, once it is the tenant's turn.
 
     Args:

@@ -12,9 +12,9 @@ from bentray_workers.files.volume_export import FORMATS, largest_bytes
 
 from .. import __version__
 from ..refusals import UnknownId
-from ..web.errors import described
+from ..web.errors import problems
 from ..wiring import CallerTenant, Service, caller_of, parts_of
-from .downloads import download, download_of, headers_of, size_of, tag_of, unchanged
+from .downloads import download, download_of, file_bytes, headers_of, tag_of, unchanged
 from .pictures import while_connected
 
 HDF5 = "application/x-hdf5"
@@ -28,7 +28,7 @@ router = APIRouter()
     response_class=Response,
     responses={
         **download_of(HDF5, *sorted({one.media_type for one in FORMATS.values()})),
-        **described(404, 422, 429, 503, 507),
+        **problems(404, 422, 429, 503, 507),
     },
 )
 async def volume_data(
@@ -54,7 +54,7 @@ async def volume_data(
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     files = service.files.of(tenant)
     # For other formats too: what is made of a volume stays as long as it does.
-    path = await run_in_threadpool(service.files.store.bring, files.volume(volume["id"]))
+    path = await run_in_threadpool(service.files.store.fetch, files.volume(volume["id"]))
     seed = repr((volume["id"], volume["created"], "hdf5" if format == "h5" else format))
     if format in ("hdf5", "h5"):
         return download(request, path, seed, HDF5)
@@ -68,7 +68,7 @@ async def volume_data(
     if not made.exists():
         if request.method == "HEAD":
             return _not_made(tag, chosen.media_type, name)
-        parts_of(request).door.check_render(caller_of(request))
+        parts_of(request).sign_in.check_render(caller_of(request))
         most = largest_bytes(volume["shape"], uploaded="job_id" not in volume)
         async with service.quota.reserved(tenant, made.name, most):
             try:
@@ -77,7 +77,7 @@ async def volume_data(
                 # Of a volume that was deleted meanwhile nothing is wrong but that it is not there.
                 await run_in_threadpool(service.volumes.get, tenant, volume["id"])
                 raise
-            await run_in_threadpool(service.quota.stored, tenant, made.name, size_of(made))
+            await run_in_threadpool(service.quota.stored, tenant, made.name, file_bytes(made))
     answer = download(request, made, seed, chosen.media_type, name, tag)
     try:
         await run_in_threadpool(service.volumes.get, tenant, volume["id"])

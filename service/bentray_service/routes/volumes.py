@@ -8,15 +8,15 @@ from fastapi import APIRouter, Depends, Query, Request, Response, status
 
 from bentray_workers.files.volume_formats import RAW_TYPES
 
-from ..files.deletion import Stored
-from ..web.errors import described
+from ..files.deletion import StoredItem
+from ..web.errors import problems
 from ..wiring import CallerTenant, Service
 from . import slices, volume_data
-from .bodies import Limit, only
+from .bodies import Limit, accept_media_types
 from .models.records import VolumeList, VolumeRecord
 from .records import volume_record
 from .upload_metadata import SHAPE, SPACING, volume_given
-from .uploads import body_of, take_in
+from .uploads import body_of, receive_upload
 
 MEDIA_TYPES = ("application/octet-stream", "application/x-npy", "application/x-hdf5")
 
@@ -28,9 +28,9 @@ router.include_router(volume_data.router)
 @router.post(
     "",
     status_code=status.HTTP_201_CREATED,
-    dependencies=[Depends(only(*MEDIA_TYPES))],
+    dependencies=[Depends(accept_media_types(*MEDIA_TYPES))],
     openapi_extra=body_of("volume", MEDIA_TYPES),
-    responses=described(413, 415, 422, 503, 507),
+    responses=problems(413, 415, 422, 503, 507),
 )
 async def upload_volume(
     request: Request,
@@ -65,13 +65,13 @@ async def upload_volume(
 ) -> VolumeRecord:
     """Upload a volume. Its content tells the format; a process of its own reads it, or says why not."""
     given = volume_given(title, spacing_m, shape, dtype)
-    row = await take_in(request, service, tenant, service.volumes, given)
+    row = await receive_upload(request, service, tenant, service.volumes, given)
     record = volume_record(row)
     response.headers["Location"] = record.links["self"]
     return record
 
 
-@router.get("", responses=described(422))
+@router.get("", responses=problems(422))
 def list_volumes(
     service: Service,
     tenant: CallerTenant,
@@ -81,13 +81,13 @@ def list_volumes(
     return VolumeList(volumes=[volume_record(row) for row in service.volumes.newest(tenant, limit)])
 
 
-@router.get("/{volume_id}", responses=described(404))
+@router.get("/{volume_id}", responses=problems(404))
 def show_volume(volume_id: str, service: Service, tenant: CallerTenant) -> VolumeRecord:
     """Shape, axes, spacing, origin and range of one volume."""
     return volume_record(service.volumes.get(tenant, volume_id))
 
 
-@router.delete("/{volume_id}", status_code=status.HTTP_204_NO_CONTENT, responses=described(404, 409, 503))
+@router.delete("/{volume_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
 def delete_volume(volume_id: str, service: Service, tenant: CallerTenant) -> None:
     """Delete a volume, the job that made it and its turntables; not while a job needs it."""
-    service.deletion.delete(Stored(tenant, "volume", volume_id))
+    service.deletion.delete(StoredItem(tenant, "volume", volume_id))

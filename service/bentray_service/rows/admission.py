@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from ..refusals import DatabaseAway
+from ..refusals import DatabaseUnavailable
 
 # The service answers requests by 40 threads: some are left for what needs no database.
 MOST_AT_ONCE = 32
@@ -42,9 +42,9 @@ class Admission:
         """
         with self._changed:
             if self._slow() and len(self._inside) >= MOST_WHILE_SLOW:
-                raise DatabaseAway(f"{len(self._inside)} requests that wait for a slow database")
+                raise DatabaseUnavailable(f"{len(self._inside)} requests that wait for a slow database")
             if not self._changed.wait_for(lambda: len(self._inside) < MOST_AT_ONCE, PLACE_SECONDS):
-                raise DatabaseAway(f"{len(self._inside)} requests that wait for the database")
+                raise DatabaseUnavailable(f"{len(self._inside)} requests that wait for the database")
             number = next(self._numbers)
             self._inside[number] = self._clock()
         try:

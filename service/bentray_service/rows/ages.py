@@ -12,7 +12,7 @@ from .schema import too_old
 from .tenants import Tenant
 
 
-class Aged(NamedTuple):
+class ExpiredItem(NamedTuple):
     """Something that has an age; ``what`` is ``dataset``, ``volume``, ``mesh``, ``job`` or ``upload``."""
 
     tenant: Tenant
@@ -20,7 +20,7 @@ class Aged(NamedTuple):
     id: str
 
 
-class Ages:
+class ExpiryMarks:
     """Marks what was found to be too old, with the time observed by then, see :class:`ObservedTime`.
 
     The clock of the machine, by which ages are told, may be wrong for a while; so nothing goes before its age
@@ -30,7 +30,7 @@ class Ages:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def mark(self, found: Collection[Aged], observed_s: float) -> dict[Aged, float]:
+    def mark(self, found: Collection[ExpiredItem], observed_s: float) -> dict[ExpiredItem, float]:
         """Mark all that is too old now, and take back the marks of what is not any more.
 
         Args:
@@ -43,7 +43,7 @@ class Ages:
         now = set(found)
         with self._database.write() as connection:
             rows = connection.execute(select(too_old)).all()
-            marked = {Aged(Tenant(row.tenant), row.what, row.id): row.noticed_s for row in rows}
+            marked = {ExpiredItem(Tenant(row.tenant), row.what, row.id): row.noticed_s for row in rows}
             for one in marked.keys() - now:
                 mine = too_old.c.tenant == one.tenant, too_old.c.id == one.id
                 connection.execute(delete(too_old).where(*mine))

@@ -17,7 +17,7 @@ PATTERN = re.compile(r"bentray_([0-9a-f]{12})_([0-9a-f]{40})")
 
 
 @dataclass(frozen=True, repr=False)
-class Token:
+class ApiKey:
     """A key as its owner holds it; it shows itself to nobody by accident.
 
     Attributes:
@@ -28,18 +28,18 @@ class Token:
     _secret: str
 
     @classmethod
-    def new(cls) -> Token:
+    def new(cls) -> ApiKey:
         """A key that nobody has."""
         return cls(secrets.token_hex(6), secrets.token_hex(20))
 
     @classmethod
-    def of(cls, text: str) -> Token | None:
+    def of(cls, text: str) -> ApiKey | None:
         """The key that ``text`` is, if it has the form of one."""
         found = PATTERN.fullmatch(text)
         return None if found is None else cls(found[1], found[2])
 
     @classmethod
-    def given(cls, field: str, text: str) -> Token:
+    def given(cls, field: str, text: str) -> ApiKey:
         """The same.
 
         Raises:

@@ -24,7 +24,7 @@ class Checksums:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def note(self, tenant: Tenant, name: str, path: str, found: Digest, *, as_written: bool) -> None:
+    def record(self, tenant: Tenant, name: str, path: str, found: Digest, *, as_written: bool) -> None:
         """Store what a thing holds, in place of what it held before.
 
         Args:
@@ -35,9 +35,9 @@ class Checksums:
             as_written: whether that is known to be as it was written.
         """
         with self._database.write() as connection:
-            _note(connection, tenant, name, path, found, as_written)
+            _record(connection, tenant, name, path, found, as_written)
 
-    def note_first_seen(self, tenant: Tenant, name: str, path: str, found: Digest) -> bool:
+    def record_first_seen(self, tenant: Tenant, name: str, path: str, found: Digest) -> bool:
         """The same of a thing from before there were checksums; False, and no row, if it has been deleted.
 
         Its file may still lie there: rows go first.
@@ -51,7 +51,7 @@ class Checksums:
                 for table in STORED
             )
             if known:
-                _note(connection, tenant, name, path, found, as_written=False)
+                _record(connection, tenant, name, path, found, as_written=False)
             return known
 
     def get(self, tenant: Tenant, name: str) -> ChecksumRow | None:
@@ -71,13 +71,13 @@ class Checksums:
         with self._database.write() as connection:
             connection.execute(update(checksums).where(*mine).values(damaged=since))
 
-    def forget(self, tenant: Tenant, names: Collection[str]) -> None:
+    def delete(self, tenant: Tenant, names: Collection[str]) -> None:
         """Delete the rows of things with these ids."""
         with self._database.write() as connection:
-            forget(connection, tenant, names)
+            delete_checksums(connection, tenant, names)
 
 
-def _note(
+def _record(
     connection: Connection, tenant: Tenant, name: str, path: str, found: Digest, as_written: bool
 ) -> None:
     now: Plain = {"path": path, "bytes": found.bytes, "sha256": found.sha256, "noted": time.time()}
@@ -87,6 +87,6 @@ def _note(
         connection.execute(insert(checksums).values(tenant=tenant, id=name, **now))
 
 
-def forget(connection: Connection, tenant: Tenant, names: Collection[str]) -> None:
+def delete_checksums(connection: Connection, tenant: Tenant, names: Collection[str]) -> None:
     """The same in the transaction of the caller."""
     connection.execute(delete(checksums).where(checksums.c.tenant == tenant, checksums.c.id.in_(names)))

@@ -15,7 +15,7 @@ from sqlalchemy.engine import make_url
 
 from bentray_kernels.errors import InvalidInput
 
-from ..refusals import DatabaseAway, DatabaseFull
+from ..refusals import DatabaseFull, DatabaseUnavailable
 from . import schema
 from .admission import MOST_AT_ONCE, Admission
 from .migration import SQLITE_PRAGMAS, STEPS, migrate
@@ -37,7 +37,7 @@ FULL = ("database or disk is full", "No space left on device")
 class Database:
     """One engine and the two ways to use it.
 
-    Both raise ``DatabaseAway`` while the database does not answer or is held by another program, and
+    Both raise ``DatabaseUnavailable`` while the database does not answer or is held by another program, and
     ``DatabaseFull`` where it has no space; a write has not happened then, unless the connection broke just
     when it was to become durable.
     """
@@ -125,7 +125,7 @@ def _options(address: str) -> dict[str, Any]:
     }
 
 
-def _refusal(error: exc.SQLAlchemyError) -> DatabaseAway | DatabaseFull | None:
+def _refusal(error: exc.SQLAlchemyError) -> DatabaseUnavailable | DatabaseFull | None:
     """What to tell of an error that says more about the database than about the statement; None of others."""
     if isinstance(error, exc.DBAPIError):
         if any(words in str(error.orig) for words in FULL):
@@ -133,8 +133,8 @@ def _refusal(error: exc.SQLAlchemyError) -> DatabaseAway | DatabaseFull | None:
         if not (error.connection_invalidated or isinstance(error, exc.OperationalError | exc.InterfaceError)):
             return None
         if "locked" in str(error.orig) or "lock timeout" in str(error.orig):
-            return DatabaseAway(f"locked by another program for more than {BUSY_SECONDS:g} s")
-    return DatabaseAway("no answer")
+            return DatabaseUnavailable(f"locked by another program for more than {BUSY_SECONDS:g} s")
+    return DatabaseUnavailable("no answer")
 
 
 def _engine(address: str, pragmas: tuple[str, ...], *, patient: bool = True) -> Engine:
@@ -178,9 +178,9 @@ def _finite(value: Any) -> Any:
 
 
 def _connect_patiently(_dialect: object, _record: object, words: list[Any], how: dict[str, Any]) -> Any:
-    from .postgresql_patience import PatientConnection
+    from .postgresql_patience import TimeoutConnection
 
-    connection = PatientConnection.connect(*words, **how)
+    connection = TimeoutConnection.connect(*words, **how)
     connection.execute(f"SET lock_timeout = '{BUSY_SECONDS:g}s'")
     connection.commit()
     return connection

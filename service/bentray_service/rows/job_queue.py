@@ -40,7 +40,7 @@ class Queue:
         with self._database.read() as connection:
             return str(connection.execute(select(jobs.c.state).where(jobs.c.id == job_id)).scalar_one())
 
-    def told(self, job_id: str) -> str | None:
+    def held_state(self, job_id: str) -> str | None:
         """The state of a job that this service runs; None when it has lost the job to another."""
         with self._database.read() as connection:
             return connection.execute(select(jobs.c.state).where(self._held(job_id))).scalar_one_or_none()
@@ -102,12 +102,12 @@ class Queue:
             mine = jobs.c.id.in_(held), jobs.c.lease_owner == self._owner, jobs.c.state.in_(RUNNING)
             connection.execute(update(jobs).where(*mine).values(lease_until=time.time() + LEASE_S))
 
-    def got_further(self, job_id: str) -> None:
+    def reset_attempts(self, job_id: str) -> None:
         """A job that has kept something is no job that kills its service: its attempts count anew."""
         with self._database.write() as connection:
             connection.execute(update(jobs).where(self._held(job_id), jobs.c.attempts > 1).values(attempts=1))
 
-    def took(self, job_id: str, size: int) -> None:
+    def record_size(self, job_id: str, size: int) -> None:
         """Store how many bytes a running job takes by now, where that is more than was reserved for it."""
         with self._database.write() as connection:
             mine = select(jobs.c.tenant).where(self._held(job_id))
@@ -157,7 +157,7 @@ class Queue:
             note, now = str(problem["detail"])[:500], time.time()
             self._end(connection, job_id, RUNNING, "failed", note, finished=now, error=problem)
 
-    def cancelled(self, job_id: str) -> None:
+    def mark_cancelled(self, job_id: str) -> None:
         """End a job that has stopped as it was asked to."""
         with self._database.write() as connection:
             self._end(connection, job_id, RUNNING, "cancelled", finished=time.time())

@@ -31,7 +31,7 @@ def change(
         where.append(only)
     changed = connection.execute(update(jobs).where(*where).values(state=after, **values))
     if changed.rowcount:
-        tell(connection, job_id, after, note)
+        append_event(connection, job_id, after, note)
         if after in ENDED:
             mine = select(jobs.c.tenant).where(jobs.c.id == job_id).scalar_subquery()
             reserved = storage.c.tenant == mine, storage.c.name == job_id, storage.c.reserved
@@ -39,6 +39,6 @@ def change(
     return bool(changed.rowcount)
 
 
-def tell(connection: Connection, job_id: str, state: str, note: str = "") -> None:
+def append_event(connection: Connection, job_id: str, state: str, note: str = "") -> None:
     """Append an event."""
     connection.execute(insert(schema.events).values(job_id=job_id, time=time.time(), state=state, note=note))

@@ -12,10 +12,10 @@ from typing import cast
 from sqlalchemy import Connection, func, insert, select
 from sqlalchemy.exc import IntegrityError
 
-from ..refusals import Finished, KeyReused, QueueFull, UnknownId
+from ..refusals import JobFinished, KeyReused, QueueFull, UnknownId
 from . import schema, usage
 from .ids import checked, new_id
-from .job_states import change, tell
+from .job_states import append_event, change
 from .records import EventRow, JobProgress, JobRow, Plain
 from .schema import ENDED, jobs
 from .stored_tables import TenantTable
@@ -105,7 +105,7 @@ class Jobs(TenantTable[JobRow]):
                     created=time.time(),
                 )
             )
-            tell(connection, job_id, "queued")
+            append_event(connection, job_id, "queued")
         return self.get(tenant, job_id)
 
     def newest(
@@ -147,7 +147,7 @@ class Jobs(TenantTable[JobRow]):
         )
         return cast(list[EventRow], self._database.rows(mine))
 
-    def news(self, known: Mapping[str, int]) -> tuple[dict[str, JobProgress], dict[str, list[EventRow]]]:
+    def updates(self, known: Mapping[str, int]) -> tuple[dict[str, JobProgress], dict[str, list[EventRow]]]:
         """How jobs are, and their events after those that are known, whoever's they are.
 
         Args:
@@ -195,7 +195,7 @@ class Jobs(TenantTable[JobRow]):
             if state is None:
                 raise UnknownId("job", job_id)
             if state in ENDED:
-                raise Finished("state", state, "queued or running; the job has ended")
+                raise JobFinished("state", state, "queued or running; the job has ended")
             change(connection, job_id, ("queued",), "cancelled", finished=time.time())
             change(connection, job_id, ("running",), "cancelling")
         return self.get(tenant, job_id)

@@ -13,7 +13,7 @@ from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
 from bentray_kernels.errors import InvalidInput
 
-from .api_key import Token
+from .api_key import ApiKey
 from .database import Database
 from .records import KeyRow
 from .schema import keys
@@ -32,7 +32,7 @@ class Keys:
         self._database = database
 
     def add(
-        self, token: Token, tenant: Tenant, name: str, scopes: Sequence[str], expires: float | None = None
+        self, token: ApiKey, tenant: Tenant, name: str, scopes: Sequence[str], expires: float | None = None
     ) -> KeyRow:
         """Store a key, without its secret.
 
@@ -53,7 +53,7 @@ class Keys:
         with self._database.read() as connection:
             return connection.execute(select(keys.c.number).limit(1)).first() is not None
 
-    def owner(self, token: Token) -> KeyRow | None:
+    def owner(self, token: ApiKey) -> KeyRow | None:
         """The row of a key that is valid now; None for one that is unknown, revoked or expired."""
         row = self._find(token.id)
         # Compared in constant time, and against nothing as long as against something.

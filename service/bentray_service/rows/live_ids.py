@@ -12,7 +12,7 @@ from .schema import ENDED, datasets, geometry_fields, jobs, meshes, uploaded_vol
 Name = tuple[str, str]
 
 
-class Known:
+class LiveIds:
     """Asks for all tenants at once; no caller's request comes here."""
 
     def __init__(self, database: Database) -> None:

@@ -11,7 +11,7 @@ from psycopg.abc import PQGen
 ANSWER_SECONDS = 10.0
 
 
-class PatientConnection(psycopg.Connection[Any]):
+class TimeoutConnection(psycopg.Connection[Any]):
     """Every statement, commit and rollback gives up after ``ANSWER_SECONDS``; the connection is closed then.
 
     A limit that the server keeps is of no use while the server itself is stopped.

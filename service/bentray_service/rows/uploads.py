@@ -8,7 +8,7 @@ from typing import Any, cast
 from sqlalchemy import ColumnElement, Connection, func, insert, select, update
 from sqlalchemy import delete as delete_from
 
-from ..refusals import TooOften
+from ..refusals import RateLimited
 from . import usage
 from .ids import new_id
 from .records import Plain, UploadRow
@@ -100,15 +100,15 @@ class Uploads(TenantTable[UploadRow]):
         self._change(upload_id, expires=expires)
         return expires
 
-    def arrived(self, upload_id: str) -> None:
+    def mark_complete(self, upload_id: str) -> None:
         """All of it is there."""
         self._change(upload_id, state="reading")
 
-    def done(self, upload_id: str, keep_s: float) -> None:
+    def mark_done(self, upload_id: str, keep_s: float) -> None:
         """It has become what it was sent as."""
         self._change(upload_id, state="done", expires=time.time() + keep_s)
 
-    def refuse(self, upload_id: str, problem: Plain, keep_s: float) -> None:
+    def mark_refused(self, upload_id: str, problem: Plain, keep_s: float) -> None:
         """It cannot be read."""
         self._change(upload_id, released=True, state="refused", problem=problem, expires=time.time() + keep_s)
 
@@ -134,7 +134,7 @@ def _check_begun(connection: Connection, tenant: Tenant) -> None:
     count = connection.execute(select(func.count()).where(*begun)).scalar_one()
     if count >= MOST_BEGUN:
         accepted = f"fewer than {MOST_BEGUN} of a tenant at a time; end those that are no longer needed"
-        raise TooOften("uploads", f"{count} that are begun and not whole", accepted, AGAIN_S)
+        raise RateLimited("uploads", f"{count} that are begun and not whole", accepted, AGAIN_S)
 
 
 def _release(connection: Connection, upload_id: str) -> None:

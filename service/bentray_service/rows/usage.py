@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import ColumnElement, Connection, delete, func, insert, not_, or_, select, update
 
-from ..refusals import QuotaUsedUp
+from ..refusals import QuotaExceeded
 from .schema import storage
 from .tenants import Tenant
 
@@ -63,7 +63,7 @@ def reserve(
     _take_turn(connection, tenant)
     used = usage_of(connection, tenant, name)
     if used.stored + used.reserved + size > most:
-        raise QuotaUsedUp(
+        raise QuotaExceeded(
             "storage",
             f"{used.stored} bytes stored, {used.reserved} reserved, {size} more asked for",
             f"at most {most} bytes for a tenant (BENTRAY_MAX_TENANT_BYTES); delete something",

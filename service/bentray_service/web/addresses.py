@@ -24,7 +24,7 @@ def is_loopback(host: str) -> bool:
     return all(ipaddress.ip_address(str(one[4][0]).partition("%")[0]).is_loopback for one in found)
 
 
-def named_loopback(host: str) -> bool:
+def names_loopback(host: str) -> bool:
     """Whether a Host or Origin header names this machine, as ``localhost:8000``; no name is looked up."""
     name = host.rpartition("://")[2]
     bare = name[1:].partition("]")[0] if name.startswith("[") else name.partition(":")[0]

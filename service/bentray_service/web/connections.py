@@ -27,7 +27,7 @@ IPV6_PREFIX = 64
 
 
 @dataclass(frozen=True)
-class Limits:
+class ConnectionLimits:
     """Numbers of open connections: in all, of one address, and beyond them for short questions."""
 
     most: int
@@ -35,13 +35,13 @@ class Limits:
     spare: int
 
     @classmethod
-    def of(cls, descriptors: int, in_use: int, of_address: int | None) -> Limits:
+    def of(cls, descriptors: int, in_use: int, of_address: int | None) -> ConnectionLimits:
         """What ``descriptors``, of which some are in use, suffice for."""
         most = max(1, min(MOST, (descriptors - in_use - KEPT - SPARE) // EACH))
         return cls(most, min(most, of_address or max(1, most // PART)), SPARE)
 
 
-class Connection(Protocol):
+class CountedConnection(Protocol):
     """One that is counted."""
 
     def drop(self) -> None:
@@ -59,7 +59,7 @@ class Connections:
         limits: may be set anew.
     """
 
-    def __init__(self, limits: Limits, trusted: tuple[Network, ...] = ()) -> None:
+    def __init__(self, limits: ConnectionLimits, trusted: tuple[Network, ...] = ()) -> None:
         """Args:
         limits: see there.
         trusted: proxies, which bring the requests of many: for each of them only the limit in all holds.
@@ -67,15 +67,15 @@ class Connections:
         self.limits = limits
         self._trusted = trusted
         # Per address, in the order in which they came or fell silent.
-        self._open: dict[str, dict[Connection, None]] = {}
-        self._silent: dict[str, dict[Connection, None]] = {}
-        self._spare: dict[Connection, str] = {}
-        self._where: dict[Connection, str] = {}
+        self._open: dict[str, dict[CountedConnection, None]] = {}
+        self._silent: dict[str, dict[CountedConnection, None]] = {}
+        self._spare: dict[CountedConnection, str] = {}
+        self._where: dict[CountedConnection, str] = {}
 
     def __len__(self) -> int:
         return len(self._where)
 
-    def add(self, one: Connection, address: str) -> bool:
+    def add(self, one: CountedConnection, address: str) -> bool:
         """Count a new connection; whether it is spare."""
         group = _group(address)
         self._where[one] = group
@@ -95,17 +95,17 @@ class Connections:
             self._silent.setdefault(group, {})[one] = None
         return full
 
-    def busy(self, one: Connection) -> None:
+    def busy(self, one: CountedConnection) -> None:
         """A request has come."""
         _take_out(self._silent, self._where.get(one), one)
 
-    def silent(self, one: Connection) -> None:
+    def silent(self, one: CountedConnection) -> None:
         """It has been answered, and no other has come."""
         group = self._where.get(one)
         if group is not None and one not in self._spare:
             self._silent.setdefault(group, {})[one] = None
 
-    def remove(self, one: Connection) -> None:
+    def remove(self, one: CountedConnection) -> None:
         """It is closed; may be called more than once."""
         group = self._where.pop(one, None)
         self._spare.pop(one, None)
@@ -119,10 +119,10 @@ class Connections:
             return True
         return False
 
-    def _take_spare(self, one: Connection, group: str) -> None:
+    def _take_spare(self, one: CountedConnection, group: str) -> None:
         if len(self._spare) >= self.limits.spare:
             # The oldest of whoever has the most: an answer on one of these takes no time.
-            groups: dict[str, dict[Connection, None]] = {}
+            groups: dict[str, dict[CountedConnection, None]] = {}
             for other, its in self._spare.items():
                 groups.setdefault(its, {})[other] = None
             oldest = next(iter(groups[_longest(groups)]))
@@ -131,11 +131,13 @@ class Connections:
         self._spare[one] = group
 
 
-def _longest(groups: Mapping[str, dict[Connection, None]]) -> str:
+def _longest(groups: Mapping[str, dict[CountedConnection, None]]) -> str:
     return max(groups, key=lambda group: len(groups[group]))
 
 
-def _take_out(groups: dict[str, dict[Connection, None]], group: str | None, one: Connection) -> None:
+def _take_out(
+    groups: dict[str, dict[CountedConnection, None]], group: str | None, one: CountedConnection
+) -> None:
     if group is not None and group in groups:
         groups[group].pop(one, None)
         if not groups[group]:

@@ -7,7 +7,7 @@ from typing import Any
 from fastapi import FastAPI
 
 
-class Described(FastAPI):
+class OpenApiApp(FastAPI):
     """An application whose description calls no parameter null.
 
     A parameter that may be left out has the default None in Python, which FastAPI describes as null; a query

@@ -36,7 +36,7 @@ METHODS = ("DELETE", "GET", "HEAD", "OPTIONS", "PATCH", "POST", "PUT")
 
 
 @dataclass(frozen=True)
-class Kind:
+class ProblemType:
     """A kind of problem: its HTTP status, the last part of its address and its title."""
 
     status: int
@@ -44,60 +44,64 @@ class Kind:
     title: str
 
 
-PROBLEMS: Mapping[type[Exception], Kind] = {
-    InvalidInput: Kind(422, "invalid-input", "A value cannot be used"),
-    refusals.UnknownId: Kind(404, "unknown-id", "There is nothing with this id"),
-    refusals.Deleted: Kind(404, "deleted", "It has been deleted"),
-    refusals.Damaged: Kind(500, "stored-data-damaged", "What was stored has changed on the disk"),
-    refusals.WrongMediaType: Kind(415, "wrong-media-type", "The media type is not accepted"),
-    refusals.EmptyBody: Kind(422, "empty-body", "The request has no body"),
-    refusals.TooLarge: Kind(413, "too-large", "The body is too large"),
-    refusals.TooSlow: Kind(408, "too-slow", "The body came too slowly"),
-    refusals.TinyChunks: Kind(400, "tiny-chunks", "The body comes in too many small chunks"),
-    refusals.MalformedRequest: Kind(400, "malformed-request", "The request is no HTTP"),
-    refusals.UnknownMethod: Kind(501, "unknown-method", "The method is unknown"),
-    refusals.HeadTooLarge: Kind(431, "head-too-large", "The head of the request is too long"),
-    refusals.TooManyConnections: Kind(503, "too-many-connections", "Too many connections are open"),
-    refusals.WrongProtocol: Kind(412, "wrong-protocol", "The upload protocol is another"),
-    refusals.WrongOffset: Kind(409, "wrong-offset", "The upload stands elsewhere"),
-    refusals.Locked: Kind(423, "locked", "Another request is at work on it"),
+PROBLEMS: Mapping[type[Exception], ProblemType] = {
+    InvalidInput: ProblemType(422, "invalid-input", "A value cannot be used"),
+    refusals.UnknownId: ProblemType(404, "unknown-id", "There is nothing with this id"),
+    refusals.Deleted: ProblemType(404, "deleted", "It has been deleted"),
+    refusals.Damaged: ProblemType(500, "stored-data-damaged", "What was stored has changed on the disk"),
+    refusals.WrongMediaType: ProblemType(415, "wrong-media-type", "The media type is not accepted"),
+    refusals.EmptyBody: ProblemType(422, "empty-body", "The request has no body"),
+    refusals.TooLarge: ProblemType(413, "too-large", "The body is too large"),
+    refusals.BodyTimeout: ProblemType(408, "too-slow", "The body came too slowly"),
+    refusals.TinyChunks: ProblemType(400, "tiny-chunks", "The body comes in too many small chunks"),
+    refusals.MalformedRequest: ProblemType(400, "malformed-request", "The request is no HTTP"),
+    refusals.UnknownMethod: ProblemType(501, "unknown-method", "The method is unknown"),
+    refusals.HeadersTooLarge: ProblemType(431, "head-too-large", "The head of the request is too long"),
+    refusals.TooManyConnections: ProblemType(503, "too-many-connections", "Too many connections are open"),
+    refusals.WrongProtocol: ProblemType(412, "wrong-protocol", "The upload protocol is another"),
+    refusals.WrongOffset: ProblemType(409, "wrong-offset", "The upload stands elsewhere"),
+    refusals.Locked: ProblemType(423, "locked", "Another request is at work on it"),
     # The number is that of tus, which HTTP does not know.
-    refusals.WrongChecksum: Kind(460, "wrong-checksum", "What came is not what was sent"),
-    refusals.UnknownChecksum: Kind(400, "unknown-checksum", "The checksum is of an unknown kind"),
-    refusals.InUse: Kind(409, "in-use", "A job needs it"),
-    refusals.Finished: Kind(409, "job-finished", "The job has ended already"),
-    refusals.KeyReused: Kind(409, "key-reused", "The key belongs to another request"),
-    refusals.QueueFull: Kind(429, "queue-full", "Too many jobs wait"),
-    refusals.NotLetIn: Kind(401, "not-let-in", "A key is needed"),
-    refusals.NotAllowed: Kind(403, "not-allowed", "This is not allowed"),
-    refusals.TooOften: Kind(429, "too-often", "Too many requests"),
-    refusals.TooManyStreams: Kind(429, "too-many-streams", "Too many event streams are open"),
-    refusals.QuotaUsedUp: Kind(507, "quota-used-up", "The tenant stores as much as it may"),
-    refusals.NoSuchPart: Kind(416, "no-such-part", "The part of the file is not there"),
-    refusals.NoAnimation: Kind(409, "no-animation", "The job has no animation"),
-    refusals.StorageFull: Kind(507, "storage-full", "The disk of the service is full"),
-    refusals.StorageAway: Kind(503, "storage-away", "The storage of the service does not answer"),
-    refusals.DatabaseAway: Kind(503, "database-away", "The database of the service does not answer"),
-    refusals.Busy: Kind(503, "busy", "No worker was free in time"),
-    refusals.NotReady: Kind(503, "not-ready", "The service cannot work now"),
+    refusals.WrongChecksum: ProblemType(460, "wrong-checksum", "What came is not what was sent"),
+    refusals.UnknownChecksum: ProblemType(400, "unknown-checksum", "The checksum is of an unknown kind"),
+    refusals.InUse: ProblemType(409, "in-use", "A job needs it"),
+    refusals.JobFinished: ProblemType(409, "job-finished", "The job has ended already"),
+    refusals.KeyReused: ProblemType(409, "key-reused", "The key belongs to another request"),
+    refusals.QueueFull: ProblemType(429, "queue-full", "Too many jobs wait"),
+    refusals.NotAuthenticated: ProblemType(401, "not-let-in", "A key is needed"),
+    refusals.Forbidden: ProblemType(403, "not-allowed", "This is not allowed"),
+    refusals.RateLimited: ProblemType(429, "too-often", "Too many requests"),
+    refusals.TooManyStreams: ProblemType(429, "too-many-streams", "Too many event streams are open"),
+    refusals.QuotaExceeded: ProblemType(507, "quota-used-up", "The tenant stores as much as it may"),
+    refusals.RangeNotSatisfiable: ProblemType(416, "no-such-part", "The part of the file is not there"),
+    refusals.NoAnimation: ProblemType(409, "no-animation", "The job has no animation"),
+    refusals.StorageFull: ProblemType(507, "storage-full", "The disk of the service is full"),
+    refusals.StorageUnavailable: ProblemType(
+        503, "storage-away", "The storage of the service does not answer"
+    ),
+    refusals.DatabaseUnavailable: ProblemType(
+        503, "database-away", "The database of the service does not answer"
+    ),
+    refusals.Busy: ProblemType(503, "busy", "No worker was free in time"),
+    refusals.NotReady: ProblemType(503, "not-ready", "The service cannot work now"),
 }
 # What may go well after a while.
 LATER = (
     refusals.Busy,
-    refusals.DatabaseAway,
+    refusals.DatabaseUnavailable,
     refusals.QueueFull,
-    refusals.StorageAway,
+    refusals.StorageUnavailable,
     refusals.TooManyConnections,
     refusals.TooManyStreams,
 )
-INVALID_REQUEST = Kind(422, "invalid-request", "The request is not as it should be")
-UNREADABLE = Kind(400, "unreadable-body", "The body cannot be read")
-NOT_FOUND = Kind(404, "not-found", "There is nothing at this address")
-INTERNAL = Kind(500, "internal", "The service failed")
-FAILED = Kind(500, "job-failed", "The job failed")
+INVALID_REQUEST = ProblemType(422, "invalid-request", "The request is not as it should be")
+UNREADABLE = ProblemType(400, "unreadable-body", "The body cannot be read")
+NOT_FOUND = ProblemType(404, "not-found", "There is nothing at this address")
+INTERNAL = ProblemType(500, "internal", "The service failed")
+FAILED = ProblemType(500, "job-failed", "The job failed")
 
 
-def make(kind: Kind, detail: str, faults: Sequence[Fault] = (), **more: Any) -> Problem:
+def make_problem(kind: ProblemType, detail: str, faults: Sequence[Fault] = (), **more: Any) -> Problem:
     """A problem of one kind; the first fault also stands at the top level."""
     first = faults[0].model_dump() if faults else {}
     return Problem(
@@ -105,14 +109,14 @@ def make(kind: Kind, detail: str, faults: Sequence[Fault] = (), **more: Any) -> 
     )
 
 
-def from_exception(error: InvalidInput, instance: str | None = None) -> Problem:
+def problem_of(error: InvalidInput, instance: str | None = None) -> Problem:
     """The problem that says what an :class:`InvalidInput` (or a refusal) says."""
     kind = next(PROBLEMS[cls] for cls in type(error).__mro__ if cls in PROBLEMS)
     fault = Fault(field=error.field, found=error.value, accepted=error.accepted)
-    return make(kind, str(error), [fault], instance=instance)
+    return make_problem(kind, str(error), [fault], instance=instance)
 
 
-def described(*statuses: int | str) -> dict[int | str, dict[str, Any]]:
+def problems(*statuses: int | str) -> dict[int | str, dict[str, Any]]:
     """The problems of a route, for its OpenAPI description."""
     content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
     titles: dict[int | str, list[str]] = {"default": ["A problem"]}
@@ -153,14 +157,16 @@ def fault_of(error: Mapping[str, Any], job_kinds: Sequence[str] = ()) -> Fault:
     return Fault(field=".".join(where), found=_short(error["input"]), accepted=accepted)
 
 
-def install(app: FastAPI, job_kinds: Sequence[str] = ()) -> None:
+def install_handlers(app: FastAPI, job_kinds: Sequence[str] = ()) -> None:
     """Make every error of ``app`` a problem; ``job_kinds`` are the accepted kinds of job."""
 
     def invalid_request(request: Request, error: Exception) -> Response:
         assert isinstance(error, RequestValidationError)
         faults = [fault_of(one, job_kinds) for one in error.errors()]
         words = "; ".join(f"{one.field}: found {one.found}; accepted: {one.accepted}" for one in faults)
-        return _respond(make(INVALID_REQUEST, words, faults, errors=faults, instance=request.url.path))
+        return _respond(
+            make_problem(INVALID_REQUEST, words, faults, errors=faults, instance=request.url.path)
+        )
 
     app.add_exception_handler(InvalidInput, _refused)
     app.add_exception_handler(refusals.NotReady, _not_ready)
@@ -179,35 +185,37 @@ def _respond(problem: Problem, headers: Mapping[str, str] | None = None) -> Resp
 
 def _refused(request: Request, error: Exception) -> Response:
     assert isinstance(error, InvalidInput)
-    return refused(error, request.url.path)
+    return problem_response(error, request.url.path)
 
 
-def refused(error: InvalidInput, path: str | None) -> Response:
+def problem_response(error: InvalidInput, path: str | None) -> Response:
     """The answer that says what an :class:`InvalidInput` (or a refusal) says."""
     headers: dict[str, str] = {}
     if isinstance(error, LATER):
         headers["Retry-After"] = RETRY_AFTER
-    if isinstance(error, refusals.TooOften):
+    if isinstance(error, refusals.RateLimited):
         headers["Retry-After"] = str(math.ceil(error.wait_s))
-    if isinstance(error, refusals.NotLetIn):
+    if isinstance(error, refusals.NotAuthenticated):
         headers["WWW-Authenticate"] = 'Bearer realm="bentray"'
-    if isinstance(error, refusals.NoSuchPart):
+    if isinstance(error, refusals.RangeNotSatisfiable):
         headers["Content-Range"] = f"bytes */{error.size}"
-    return _respond(from_exception(error, path), headers)
+    return _respond(problem_of(error, path), headers)
 
 
 def _of_the_system(request: Request, error: Exception) -> Response:
     """A full disk, whatever was to be written; all else is unexpected."""
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         full = refusals.StorageFull("disk", "no space left", "another try, once there is room")
-        return refused(full, request.url.path)
+        return problem_response(full, request.url.path)
     raise error
 
 
 def _not_ready(request: Request, error: Exception) -> Response:
     assert isinstance(error, refusals.NotReady)
     faults = [Fault(field=part, found=found, accepted=needed) for part, found, needed in error.faults]
-    problem = make(PROBLEMS[refusals.NotReady], str(error), faults, errors=faults, instance=request.url.path)
+    problem = make_problem(
+        PROBLEMS[refusals.NotReady], str(error), faults, errors=faults, instance=request.url.path
+    )
     return _respond(problem, {"Retry-After": "5"})
 
 
@@ -215,20 +223,22 @@ def _http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     path = request.url.path
     if error.status_code == NOT_FOUND.status:
-        return _respond(make(NOT_FOUND, f"nothing is at {path}; /docs lists every address", instance=path))
+        return _respond(
+            make_problem(NOT_FOUND, f"nothing is at {path}; /docs lists every address", instance=path)
+        )
     if error.status_code == UNREADABLE.status:
         fault = Fault(
             field="body", found="no readable JSON", accepted="a JSON object in UTF-8, not nested deeply"
         )
         words = f"{fault.field}: found {fault.found}; accepted: {fault.accepted}"
-        return _respond(make(UNREADABLE, words, [fault], instance=path))
+        return _respond(make_problem(UNREADABLE, words, [fault], instance=path))
     phrase = HTTPStatus(error.status_code).phrase
-    kind = Kind(error.status_code, phrase.lower().replace(" ", "-"), phrase)
+    kind = ProblemType(error.status_code, phrase.lower().replace(" ", "-"), phrase)
     if error.status_code != HTTPStatus.METHOD_NOT_ALLOWED:
-        return _respond(make(kind, str(error.detail), instance=path), error.headers)
+        return _respond(make_problem(kind, str(error.detail), instance=path), error.headers)
     allowed = ", ".join(_methods(request))
     detail = f"{request.method} is not possible at {path}; accepted: {allowed}"
-    return _respond(make(kind, detail, instance=path), {"Allow": allowed})
+    return _respond(make_problem(kind, detail, instance=path), {"Allow": allowed})
 
 
 def _methods(request: Request) -> list[str]:
@@ -258,7 +268,7 @@ def _unexpected(request: Request, error: Exception) -> Response:
     detail = f"an error of the service, not of the request; it is in the log under {number}"
     # This answer passes by every middleware.
     headers = {**SECURITY, REQUEST_ID: number}
-    return _respond(make(INTERNAL, detail, instance=request.url.path, correlation_id=number), headers)
+    return _respond(make_problem(INTERNAL, detail, instance=request.url.path, correlation_id=number), headers)
 
 
 def _short(value: object) -> str:

@@ -9,8 +9,8 @@ from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
 
 from ..refusals import TooManyConnections
 from .connections import Connections
-from .errors import refused
-from .unread_bodies import ClosesUnread, last
+from .errors import problem_response
+from .unread_bodies import UnreadBodies, last
 
 # In which so much of an answer must be taken, or its rest: who does not read holds a file open.
 ANSWER_S = 60.0
@@ -20,7 +20,7 @@ SHORT = ("/health/live", "/health/ready")
 JOB = "/v1/jobs/job-"
 
 
-class BoundedProtocol(ClosesUnread):
+class CountedProtocol(UnreadBodies):
     """One connection, which is counted."""
 
     _spare = False
@@ -91,7 +91,7 @@ class BoundedProtocol(ClosesUnread):
                 return
             found = f"more than {most.of_address} of your address, or {most.most} in all"
             error = TooManyConnections("connections", found, "fewer, each used again; see Retry-After")
-            await refused(error, scope["path"])(scope, receive, send_last)
+            await problem_response(error, scope["path"])(scope, receive, send_last)
 
         return answer
 

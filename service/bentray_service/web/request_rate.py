@@ -6,16 +6,16 @@ import asyncio
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ..refusals import TooSlow
+from ..refusals import BodyTimeout
 
 # So many bytes must come in the time allowed, or the rest of the body.
 LEAST_BYTES = 64 * 1024
 
 
-class Pace:
+class RequestRate:
     """ASGI middleware: of every body, ``LEAST_BYTES`` or the end must come in each ``seconds``.
 
-    Otherwise whoever reads the body gets :class:`TooSlow`.
+    Otherwise whoever reads the body gets :class:`BodyTimeout`.
     """
 
     def __init__(self, app: ASGIApp, seconds: float) -> None:
@@ -40,7 +40,7 @@ class Pace:
             except TimeoutError:
                 found = f"{came} bytes in {self._seconds:g} s"
                 accepted = f"at least {LEAST_BYTES} bytes in {self._seconds:g} s (BENTRAY_UPLOAD_PATIENCE_S)"
-                raise TooSlow("body", found, accepted) from None
+                raise BodyTimeout("body", found, accepted) from None
             came += len(message.get("body", b""))
             ended = not message.get("more_body", False)
             if came >= LEAST_BYTES:

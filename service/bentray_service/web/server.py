@@ -11,8 +11,8 @@ import uvicorn
 from ..settings import ServiceSettings
 from . import descriptors
 from .addresses import networks
-from .connections import Connections, Limits
-from .protocol import BoundedProtocol
+from .connections import ConnectionLimits, Connections
+from .protocol import CountedProtocol
 
 # What requests under way may take once the service is told to stop, s: an upload that never ends must not
 # keep it from stopping, and a client goes on with what it sent by tus.
@@ -31,7 +31,7 @@ class Server(uvicorn.Server):
         self.connections = Connections(self._limits(0), networks(settings.trusted_proxies or ""))
         config = uvicorn.Config(
             app,
-            http=cast("type[Any]", partial(BoundedProtocol, self.connections)),
+            http=cast("type[Any]", partial(CountedProtocol, self.connections)),
             # Nobody speaks WebSocket here; and what asyncio does with sockets is what ours is made for.
             ws="none",
             loop="asyncio",
@@ -50,5 +50,5 @@ class Server(uvicorn.Server):
         await super().startup(sockets)
         self.connections.limits = self._limits(descriptors.in_use())
 
-    def _limits(self, in_use: int) -> Limits:
-        return Limits.of(self._descriptors, in_use, self._of_address)
+    def _limits(self, in_use: int) -> ConnectionLimits:
+        return ConnectionLimits.of(self._descriptors, in_use, self._of_address)

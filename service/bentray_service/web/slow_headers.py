@@ -11,8 +11,8 @@ from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
 from bentray_kernels.errors import InvalidInput
 
-from ..refusals import HeadTooLarge, MalformedRequest, UnknownMethod
-from .errors import METHODS, refused
+from ..refusals import HeadersTooLarge, MalformedRequest, UnknownMethod
+from .errors import METHODS, problem_response
 
 # Within it the whole head of a request must be there.
 HEAD_S = 10.0
@@ -26,7 +26,7 @@ READ_BYTES = 64 * 1024
 REQUEST_LINE = re.compile(rb"(?:\r?\n)*([!#$%&'*+.^_`|~0-9A-Za-z-]+) [!-~]+ HTTP/\d\.\d\r?\n")
 
 
-class HeadInTime(HttpToolsProtocol):
+class HeaderTimeout(HttpToolsProtocol):
     """HTTP/1.1 as Uvicorn speaks it by httptools, with a time and a length within which each head must come.
 
     What cannot be parsed is refused with a problem. Headers that follow a body are dropped: they came after
@@ -160,7 +160,7 @@ class HeadInTime(HttpToolsProtocol):
         if self.answering():
             self.cycle.keep_alive = False
             return
-        self.transport.write(_written(refused(error, None)))
+        self.transport.write(_written(problem_response(error, None)))
         self.leave()
 
     def leave(self) -> None:
@@ -183,7 +183,7 @@ class HeadInTime(HttpToolsProtocol):
 
 def _check_length(head: int) -> None:
     if head > LONGEST_HEAD:
-        raise HeadTooLarge("head", f"more than {LONGEST_HEAD} bytes", f"at most {LONGEST_HEAD} bytes")
+        raise HeadersTooLarge("head", f"more than {LONGEST_HEAD} bytes", f"at most {LONGEST_HEAD} bytes")
 
 
 def _malformed(reason: str) -> MalformedRequest:

@@ -11,7 +11,7 @@ from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
 from bentray_kernels.errors import InvalidInput
 
 from ..refusals import TinyChunks
-from .slow_headers import HeadInTime
+from .slow_headers import HeaderTimeout
 
 # What the application is woken for at once, bytes; for less, after so many seconds.
 ENOUGH_BYTES = 16 * 1024
@@ -22,7 +22,7 @@ FREE_CHUNKS = 1024
 LEAST_MEAN_BYTES = 512
 
 
-class PatientBodies(HeadInTime):
+class MergedChunks(HeaderTimeout):
     """Hands bodies to the application in large pieces, and a refusal in place of one that is not worth it."""
 
     _chunked = False

@@ -12,7 +12,7 @@ from typing import Any, cast
 
 from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
 
-from .small_chunks import PatientBodies
+from .small_chunks import MergedChunks
 
 # How long and how much is thrown away at most.
 LINGER_S = 2.0
@@ -21,7 +21,7 @@ LINGER_BYTES = 8 * 1024 * 1024
 CLOSE = (b"connection", b"close")
 
 
-class ClosesUnread(PatientBodies):
+class UnreadBodies(MergedChunks):
     """Says ``Connection: close`` in such an answer, and does it."""
 
     _leaving = False
@@ -99,7 +99,7 @@ def last(message: Any) -> Any:
 class _Closing:
     """The transport as an answer sees it."""
 
-    def __init__(self, protocol: ClosesUnread) -> None:
+    def __init__(self, protocol: UnreadBodies) -> None:
         self._protocol = protocol
         self.write = protocol.transport.write
         self.is_closing = protocol.transport.is_closing

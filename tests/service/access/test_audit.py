@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import pytest
 
 from bentray_service.access.audit import Audit, entries
-from bentray_service.rows.api_key import Token
+from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.tenants import Tenant
 
@@ -22,7 +22,7 @@ def test_a_file_a_day_only_appended_to_and_closed_to_others(tmp_path):
     days = [datetime(2026, 11, day, 12, tzinfo=UTC) for day in (21, 21, 22)]
     audit = Audit(tmp_path, lambda: days.pop(0))
     for _ in range(3):
-        audit.note(ENTRY)
+        audit.append(ENTRY)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["2026-11-21.jsonl", "2026-11-22.jsonl"]
     assert all(path.stat().st_mode & 0o077 == 0 for path in tmp_path.iterdir())
     assert [entry["time"][:10] for entry in entries(tmp_path)] == ["2026-11-21", "2026-11-21", "2026-11-22"]
@@ -30,16 +30,16 @@ def test_a_file_a_day_only_appended_to_and_closed_to_others(tmp_path):
 
 def test_a_torn_line_is_passed_over_and_said(tmp_path, caplog):
     audit = Audit(tmp_path)
-    audit.note(ENTRY)
+    audit.append(ENTRY)
     path = next(tmp_path.iterdir())
     path.write_bytes(path.read_bytes() + b'{"time": "2026\xff\n')
-    audit.note(ENTRY)
+    audit.append(ENTRY)
     assert len(list(entries(tmp_path))) == 2
     assert f"{path.name}:2 is torn" in caplog.text
 
 
 def test_what_cannot_be_stored_is_in_the_log(tmp_path, caplog):
-    Audit(tmp_path / "gone").note(ENTRY)
+    Audit(tmp_path / "gone").append(ENTRY)
     assert '"ids": ["ds-1"]' in caplog.text
     assert caplog.records[-1].levelno == logging.ERROR
 
@@ -47,14 +47,14 @@ def test_what_cannot_be_stored_is_in_the_log(tmp_path, caplog):
 @pytest.fixture
 def key(start):
     """A service, and the headers of a caller of acme."""
-    http, token = start(), Token.new()
+    http, token = start(), ApiKey.new()
     Keys(http.app.state.parts.database).add(token, Tenant("acme"), "one", ("read", "write"))
     return http, {"Authorization": f"Bearer {token.shown()}"}, token
 
 
 def test_reads_and_writes_are_told_with_their_ids(key, scan, monkeypatch):
     http, auth, token = key
-    http.app.state.parts.door._no_keys_until = 0.0
+    http.app.state.parts.sign_in._no_keys_until = 0.0
     content, media = scan().read_bytes(), {"Content-Type": "application/x-hdf5"}
     made = http.post("/v1/datasets", content=content, headers={**auth, **media, "X-Request-ID": "from-me"})
     dataset = made.json()["id"]

@@ -27,7 +27,7 @@ from bentray_kernels.tomography.settings import Settings
 from bentray_service.app import create_app
 from bentray_service.routes.models.surface_records import FieldErrors, FieldSeconds, FieldSizes, Repairs
 from bentray_service.rows import schema
-from bentray_service.rows.api_key import Token
+from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.ids import new_id, volume_of
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.tenants import Tenant
@@ -75,7 +75,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
             ("metrics", ACME, ("metrics",)),
             ("other", OTHER, ("read", "write")),
         ):
-            token = Token.new()
+            token = ApiKey.new()
             keys.add(token, tenant, name, scopes)
             auth[name] = {"Authorization": f"Bearer {token.shown()}"}
         yield Place(http, folder, _stored(app, http, auth["acme"]), auth)
@@ -220,7 +220,7 @@ def test_everything_is_described(place: Place) -> None:
 
 def test_a_stranger_is_sent_away_unread(place: Place) -> None:
     before, public = stored(place), set()
-    invented = {"Authorization": f"Bearer {Token.new().shown()}"}
+    invented = {"Authorization": f"Bearer {ApiKey.new().shown()}"}
     garbled = {"Authorization": "Bearer bentray_é"}
     for path in {*(asked.path for asked in operations(place)), "/v1/nowhere", "/nowhere", "//v1/jobs"}:
         if path.startswith("/health/"):

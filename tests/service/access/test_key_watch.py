@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bentray_service.access import key_watch
-from bentray_service.rows.api_key import Token
+from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.database import open_database
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.tenants import LOCAL
@@ -33,7 +33,7 @@ def keys(tmp_path):
 @pytest.fixture
 def held(keys):
     """Two keys, of one tenant."""
-    tokens = [Token.new(), Token.new()]
+    tokens = [ApiKey.new(), ApiKey.new()]
     for number, token in enumerate(tokens):
         keys.add(token, LOCAL, f"key {number}", ("read", "write"))
     return tokens

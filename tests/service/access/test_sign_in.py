@@ -4,9 +4,9 @@ import pytest
 from starlette.datastructures import Headers
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.access.sign_in import Door
-from bentray_service.refusals import NotAllowed, NotLetIn, TooOften
-from bentray_service.rows.api_key import Token
+from bentray_service.access.sign_in import SignIn
+from bentray_service.refusals import Forbidden, NotAuthenticated, RateLimited
+from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.database import open_database
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.tenants import LOCAL, Tenant
@@ -24,27 +24,27 @@ def keys(tmp_path):
 
 
 @pytest.fixture
-def door(keys, tmp_path):
-    return lambda **settings: Door(ServiceSettings(data_dir=tmp_path, **settings), keys)
+def sign_in(keys, tmp_path):
+    return lambda **settings: SignIn(ServiceSettings(data_dir=tmp_path, **settings), keys)
 
 
 def bearer(token):
     return Headers({"Authorization": f"Bearer {token.shown()}"})
 
 
-def test_without_keys_everyone_on_this_machine_is_local(door):
-    caller = door().caller(Headers({"host": "127.0.0.1:8000"}), NEAR)
+def test_without_keys_everyone_on_this_machine_is_local(sign_in):
+    caller = sign_in().caller(Headers({"host": "127.0.0.1:8000"}), NEAR)
     assert (caller.tenant, caller.how) == (LOCAL, "open")
     assert caller.scopes == {"read", "write", "metrics"}
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "nowhere.invalid"])
-def test_others_are_never_let_in_without_keys(door, keys, host):
+def test_others_are_never_let_in_without_keys(sign_in, keys, host):
     with pytest.raises(InvalidInput, match=f"host: found {host}.*bentray keys create"):
-        door(host=host)
-    door(host=host, **PROXIED)
-    keys.add(Token.new(), LOCAL, "one", ("read",))
-    door(host=host)
+        sign_in(host=host)
+    sign_in(host=host, **PROXIED)
+    keys.add(ApiKey.new(), LOCAL, "one", ("read",))
+    sign_in(host=host)
 
 
 @pytest.mark.parametrize(
@@ -55,112 +55,112 @@ def test_others_are_never_let_in_without_keys(door, keys, host):
         {"origin": "null"},
     ],
 )
-def test_a_page_elsewhere_cannot_make_a_browser_ask_an_open_service(door, headers):
-    with pytest.raises(NotAllowed):
-        door().caller(Headers(headers), NEAR)
+def test_a_page_elsewhere_cannot_make_a_browser_ask_an_open_service(sign_in, headers):
+    with pytest.raises(Forbidden):
+        sign_in().caller(Headers(headers), NEAR)
 
 
 @pytest.mark.parametrize("host", ["localhost", "LOCALHOST:80", "127.0.0.1", "127.8.9.1:1", "[::1]:8000"])
-def test_names_of_this_machine(door, host):
-    assert door().caller(Headers({"host": host, "origin": f"http://{host}"}), NEAR).how == "open"
+def test_names_of_this_machine(sign_in, host):
+    assert sign_in().caller(Headers({"host": host, "origin": f"http://{host}"}), NEAR).how == "open"
 
 
-def test_from_the_first_key_on_it_is_closed_for_good(door, keys, monkeypatch):
+def test_from_the_first_key_on_it_is_closed_for_good(sign_in, keys, monkeypatch):
     monkeypatch.setattr("bentray_service.access.sign_in.NO_KEYS_S", 0.0)
-    found, token = door(), Token.new()
+    found, token = sign_in(), ApiKey.new()
     assert found.open()
     keys.add(token, Tenant("acme"), "one", ("read",))
-    with pytest.raises(NotLetIn):
+    with pytest.raises(NotAuthenticated):
         found.caller(Headers({"host": "localhost"}), NEAR)
     caller = found.caller(bearer(token), FAR)
     assert (caller.tenant, caller.how, caller.who, caller.scopes) == ("acme", "key", token.id, {"read"})
     keys.revoke(token.id)
     for _ in range(2):
-        with pytest.raises(NotLetIn, match="unknown, revoked or expired"):
+        with pytest.raises(NotAuthenticated, match="unknown, revoked or expired"):
             found.caller(bearer(token), FAR)
-        with pytest.raises(NotLetIn):
+        with pytest.raises(NotAuthenticated):
             found.caller(Headers({"host": "localhost"}), NEAR)
 
 
-def test_a_refusal_does_not_repeat_the_secret(door, keys):
-    keys.add(Token.new(), LOCAL, "one", ("read",))
-    wrong = Token.new()
+def test_a_refusal_does_not_repeat_the_secret(sign_in, keys):
+    keys.add(ApiKey.new(), LOCAL, "one", ("read",))
+    wrong = ApiKey.new()
     for given in (wrong.shown(), wrong.shown()[:-1]):
-        with pytest.raises(NotLetIn) as refusal:
-            door().caller(Headers({"Authorization": f"Bearer {given}"}), NEAR)
+        with pytest.raises(NotAuthenticated) as refusal:
+            sign_in().caller(Headers({"Authorization": f"Bearer {given}"}), NEAR)
         assert given[-30:] not in str(refusal.value)
 
 
-def test_a_user_is_believed_of_trusted_proxies_alone(door):
-    found, named = door(**PROXIED), Headers({"X-Forwarded-User": "alice@example.org"})
+def test_a_user_is_believed_of_trusted_proxies_alone(sign_in):
+    found, named = sign_in(**PROXIED), Headers({"X-Forwarded-User": "alice@example.org"})
     for address in (FAR, "10.1.2.3", "::ffff:10.1.2.3"):
         caller = found.caller(named, address)
         assert (caller.tenant, caller.how, caller.who) == ("alice@example.org", "proxy", "alice@example.org")
         assert "metrics" not in caller.scopes
     for address in (NEAR, "192.0.2.8", "", "testclient"):
-        with pytest.raises(NotLetIn):
+        with pytest.raises(NotAuthenticated):
             found.caller(named, address)
 
 
 @pytest.mark.parametrize("users", [[], [""], ["  "], ["alice", "mallory"]])
-def test_a_proxy_that_names_nobody_or_two_brings_nobody_in(door, users):
+def test_a_proxy_that_names_nobody_or_two_brings_nobody_in(sign_in, users):
     raw = [(b"x-forwarded-user", user.encode()) for user in users]
-    with pytest.raises(NotLetIn):
-        door(**PROXIED).caller(Headers(raw=raw), FAR)
+    with pytest.raises(NotAuthenticated):
+        sign_in(**PROXIED).caller(Headers(raw=raw), FAR)
 
 
-def test_a_key_comes_through_a_proxy_too_and_another_bearer_is_the_proxys_own(door, keys):
-    found, token = door(**PROXIED), Token.new()
+def test_a_key_comes_through_a_proxy_too_and_another_bearer_is_the_proxys_own(sign_in, keys):
+    found, token = sign_in(**PROXIED), ApiKey.new()
     keys.add(token, Tenant("acme"), "one", ("read",))
     assert found.caller(bearer(token), FAR).tenant == "acme"
     oidc = Headers({"Authorization": "Bearer eyJhbGciOi", "X-Forwarded-User": "alice"})
     assert found.caller(oidc, FAR).tenant == "alice"
-    with pytest.raises(NotLetIn):
+    with pytest.raises(NotAuthenticated):
         found.caller(
-            Headers({"Authorization": f"Bearer {Token.new().shown()}", "X-Forwarded-User": "alice"}), FAR
+            Headers({"Authorization": f"Bearer {ApiKey.new().shown()}", "X-Forwarded-User": "alice"}), FAR
         )
 
 
 @pytest.mark.parametrize("proxies", ["proxy.example", "10.0.0.1/8", "10.0.0.0/33"])
-def test_proxies_that_are_no_addresses(door, proxies):
+def test_proxies_that_are_no_addresses(sign_in, proxies):
     with pytest.raises(InvalidInput, match="BENTRAY_TRUSTED_PROXIES"):
-        door(trusted_proxies=proxies)
+        sign_in(trusted_proxies=proxies)
 
 
-def test_rates_are_of_a_tenant_and_not_at_an_open_door(door, keys):
-    found, callers = door(requests_per_minute=2, renders_per_minute=1), []
+def test_rates_are_of_a_tenant_and_not_at_an_open_door(sign_in, keys):
+    found, callers = sign_in(requests_per_minute=2, renders_per_minute=1), []
     anyone = found.caller(Headers({}), NEAR)
     for _ in range(9):
         found.check(anyone, "GET", "/v1/jobs")
     for tenant in ("acme", "acme", "other"):
-        token = Token.new()
+        token = ApiKey.new()
         keys.add(token, Tenant(tenant), "one", ("read",))
-        callers.append(door().caller(bearer(token), NEAR))
+        callers.append(sign_in().caller(bearer(token), NEAR))
     found.check(callers[0], "GET", "/v1/jobs")
     found.check(callers[1], "GET", "/v1/jobs")
-    with pytest.raises(TooOften) as refusal:
+    with pytest.raises(RateLimited) as refusal:
         found.check(callers[0], "GET", "/v1/jobs")
     assert 0.0 < refusal.value.wait_s <= 30.0
     found.check(callers[2], "GET", "/v1/jobs")
     found.check_render(callers[0])
-    with pytest.raises(TooOften, match="renders"):
+    with pytest.raises(RateLimited, match="renders"):
         found.check_render(callers[1])
 
 
-def test_the_first_key_is_taken_once(door, keys, tmp_path):
-    token, path = Token.new(), tmp_path / "key"
+def test_the_first_key_is_taken_once(sign_in, keys, tmp_path):
+    token, path = ApiKey.new(), tmp_path / "key"
     path.write_text(token.shown() + "\n")
     for _ in range(2):
-        found = door(host="0.0.0.0", first_key_file=path)
+        found = sign_in(host="0.0.0.0", first_key_file=path)
         assert found.caller(bearer(token), FAR).scopes == {"read", "write", "metrics"}
     keys.revoke(token.id)
-    with pytest.raises(NotLetIn):
-        door(host="0.0.0.0", first_key_file=path).caller(bearer(token), FAR)
+    with pytest.raises(NotAuthenticated):
+        sign_in(host="0.0.0.0", first_key_file=path).caller(bearer(token), FAR)
 
 
 @pytest.mark.parametrize("content", [None, b"", b"bentray_0_1", b"\xff\xfe"])
-def test_a_first_key_that_is_none(door, tmp_path, content):
+def test_a_first_key_that_is_none(sign_in, tmp_path, content):
     if content is not None:
         (tmp_path / "key").write_bytes(content)
     with pytest.raises(InvalidInput, match="BENTRAY_FIRST_KEY_FILE"):
-        door(first_key_file=tmp_path / "key")
+        sign_in(first_key_file=tmp_path / "key")

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from typer.testing import Result
 
-from bentray_service.rows.api_key import Token
+from bentray_service.rows.api_key import ApiKey
 
 Run = Callable[..., Result]
 
@@ -24,7 +24,7 @@ def made(bentray: Run, data: Path, *words: object) -> dict[str, Any]:
 
 def test_made_listed_and_revoked(bentray: Run, tmp_path: Path) -> None:
     key = made(bentray, tmp_path, "--tenant", "clinic", "--expires", "90d", "--scopes", "read")
-    assert Token.of(key["key"]) is not None
+    assert ApiKey.of(key["key"]) is not None
     assert (key["tenant"], key["scopes"], key["state"]) == ("clinic", ["read"], "valid")
     made(bentray, tmp_path)
     listed = bentray("keys", "list", "--data", tmp_path, "--tenant", "clinic", "--json")
@@ -41,7 +41,7 @@ def test_made_listed_and_revoked(bentray: Run, tmp_path: Path) -> None:
 
 def test_only_the_key_is_on_stdout(bentray: Run, tmp_path: Path) -> None:
     result = bentray("keys", "create", "--name", "one", "--data", tmp_path)
-    assert Token.of(result.stdout.removesuffix("\n")) is not None
+    assert ApiKey.of(result.stdout.removesuffix("\n")) is not None
     assert "not shown again" in result.stderr
 
 

@@ -6,7 +6,7 @@ import pytest
 from bentray_kernels.eikonal import methods
 from bentray_kernels.errors import InvalidInput
 from bentray_service.client import Client, ClientError
-from bentray_service.rows.api_key import Token
+from bentray_service.rows.api_key import ApiKey
 from bentray_workers.files.dataset import read_dataset
 
 
@@ -114,7 +114,7 @@ def test_what_is_no_web_address_is_refused(url):
 
 
 def test_a_key_is_given_or_in_the_environment(serve, tmp_path, monkeypatch):
-    key = Token.new().shown()
+    key = ApiKey.new().shown()
     (tmp_path / "key").write_text(key)
     address = serve(first_key_file=tmp_path / "key")
     with Client(address) as nobody, pytest.raises(ClientError, match="A key is needed") as refusal:

@@ -20,14 +20,14 @@ from bentray_service.app import create_app
 from bentray_service.client import AsyncClient, Client, ClientError, flows, patience, uploading
 from bentray_service.client.connection import Connection
 from bentray_service.client.errors import NoAnswer
-from bentray_service.client.patience import Patience
-from bentray_service.client.steps import Ask, Fetch, Pause
+from bentray_service.client.patience import Retries
+from bentray_service.client.steps import DownloadStep, PauseStep, RequestStep
 from bentray_service.settings import ServiceSettings
 
 from .cutting_proxy import cutting
 
-LOOK = Ask("GET", "/v1/jobs/job-1", repeatable=True)
-CANCEL = Ask("POST", "/v1/jobs/job-1/cancel")
+LOOK = RequestStep("GET", "/v1/jobs/job-1", repeatable=True)
+CANCEL = RequestStep("POST", "/v1/jobs/job-1/cancel")
 GONE, REFUSED = NoAnswer("gone"), NoAnswer("refused", sent=False)
 
 HERE = Connection("http://localhost:8000")
@@ -45,7 +45,7 @@ class Walk:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, seconds: float = 300.0) -> None:
         self.now, self.pauses, self.told = 1000.0, [], list[str]()
         monkeypatch.setattr(patience, "time", SimpleNamespace(monotonic=lambda: self.now))
-        self._patience = Patience(seconds, self.told.append)
+        self._patience = Retries(seconds, self.told.append)
         self.ask(LOOK, "first")
 
     def ask(self, step: Any, *answers: Any) -> Any:
@@ -59,7 +59,7 @@ class Walk:
             while True:
                 asked = walk.throw(answer) if isinstance(answer, Exception) else walk.send(answer)
                 answer = None
-                if isinstance(asked, Pause):
+                if isinstance(asked, PauseStep):
                     self.now += asked.seconds
                     self.pauses.append(asked.seconds)
                 else:
@@ -97,14 +97,14 @@ def test_it_ends(walk: Walk) -> None:
 
 def test_a_wait_with_an_end_of_its_own_ends_there(walk: Walk) -> None:
     with pytest.raises(NoAnswer):
-        walk.ask(Ask("GET", "/", repeatable=True, until=walk.now + 10.0))
+        walk.ask(RequestStep("GET", "/", repeatable=True, until=walk.now + 10.0))
     assert sum(walk.pauses) <= 10.0
 
 
 def test_a_service_that_never_answered_is_given_up_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[str] = []
-    flow = Patience(300.0, told.append).through(flows.job(HERE, "job-1"))
-    assert isinstance(next(flow), Ask)
+    flow = Retries(300.0, told.append).through(flows.job(HERE, "job-1"))
+    assert isinstance(next(flow), RequestStep)
     with pytest.raises(NoAnswer, match="refused"):
         flow.throw(REFUSED)
     assert told == []
@@ -126,16 +126,16 @@ def test_a_refusal_is_no_absence(walk: Walk, status: int) -> None:
 
 
 def test_a_download_begins_again(walk: Walk, tmp_path: Path) -> None:
-    walk.ask(Fetch("/v1/volumes/vol-1/data", {}, tmp_path / "v.h5"), GONE, answered(503), None)
+    walk.ask(DownloadStep("/v1/volumes/vol-1/data", {}, tmp_path / "v.h5"), GONE, answered(503), None)
     assert len(walk.pauses) == 2
 
 
 def test_a_job_has_one_key_however_often_it_is_sent() -> None:
     step = next(flows.submit(HERE, "ds-1"))
-    assert isinstance(step, Ask)
+    assert isinstance(step, RequestStep)
     assert step.repeatable
     other = next(flows.submit(HERE, "ds-1"))
-    assert isinstance(other, Ask)
+    assert isinstance(other, RequestStep)
     assert step.options["headers"]["Idempotency-Key"] != other.options["headers"]["Idempotency-Key"]
 
 

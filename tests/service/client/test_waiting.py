@@ -5,7 +5,7 @@ import json
 import pytest
 
 from bentray_service.client.errors import ClientError, NoAnswer
-from bentray_service.client.steps import Ask, Listen, Pause
+from bentray_service.client.steps import EventStep, PauseStep, RequestStep
 from bentray_service.client.waiting import STREAMS, wait_for
 from bentray_service.routes.models.records import JobRecord
 
@@ -34,7 +34,7 @@ def walk(answers, timeout_s=None):
         while True:
             step = flow.throw(answer) if isinstance(answer, Exception) else flow.send(answer)
             steps.append(type(step))
-            answer = None if isinstance(step, Pause) else next(answers)
+            answer = None if isinstance(step, PauseStep) else next(answers)
     except StopIteration as end:
         return steps, end.value
 
@@ -52,19 +52,34 @@ def test_events_make_it_look():
             Answer(state="succeeded"),
         ]
     )
-    assert steps == [Ask, Listen, Listen, Ask, Listen, Listen, Listen, Ask]
+    assert steps == [
+        RequestStep,
+        EventStep,
+        EventStep,
+        RequestStep,
+        EventStep,
+        EventStep,
+        EventStep,
+        RequestStep,
+    ]
     assert job.state == "succeeded"
 
 
 def test_the_end_of_the_stream_makes_it_look():
     steps, _ = walk([Answer(), None, Answer(state="succeeded")])
-    assert steps == [Ask, Listen, Ask]
+    assert steps == [RequestStep, EventStep, RequestStep]
 
 
 def test_where_no_events_come_it_looks_now_and_then():
     broken = [Answer(), NoAnswer("gone")] * STREAMS
     steps, _ = walk([*broken, Answer(), Answer(), Answer(state="succeeded")])
-    assert steps == [Ask, Listen, Pause] * STREAMS + [Ask, Pause, Ask, Pause, Ask]
+    assert steps == [RequestStep, EventStep, PauseStep] * STREAMS + [
+        RequestStep,
+        PauseStep,
+        RequestStep,
+        PauseStep,
+        RequestStep,
+    ]
 
 
 def test_a_service_that_is_gone_is_told():

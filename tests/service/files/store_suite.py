@@ -38,15 +38,15 @@ class StoreSuite:
     @pytest.mark.parametrize("content", [b"", b"abc", bytes(range(256)) * 999])
     def test_a_file_is_the_same_everywhere(self, files, elsewhere, content):
         path = self.file(files, content)
-        brought = elsewhere.store.bring(self.there(elsewhere, path))
+        brought = elsewhere.store.fetch(self.there(elsewhere, path))
         assert brought.read_bytes() == content
         # The tags of downloads are made of it.
         assert brought.stat().st_mtime_ns == path.stat().st_mtime_ns
-        assert files.store.bring(path) == path
+        assert files.store.fetch(path) == path
 
     def test_so_is_a_folder(self, files, elsewhere):
         path = self.folder(files)
-        brought = elsewhere.store.bring(self.there(elsewhere, path))
+        brought = elsewhere.store.fetch(self.there(elsewhere, path))
         assert {one.name: one.read_bytes() for one in brought.iterdir()} == {
             "outer.npy": b"outer",
             "layout.json": b"{}",
@@ -57,12 +57,12 @@ class StoreSuite:
         path.write_bytes(b"made anew")
         for _ in range(2):
             files.store.publish(path)
-        assert elsewhere.store.bring(self.there(elsewhere, path)).read_bytes() == b"made anew"
+        assert elsewhere.store.fetch(self.there(elsewhere, path)).read_bytes() == b"made anew"
 
     def test_what_is_not_there_is_not_found(self, files):
         files.of(LOCAL).root.mkdir(parents=True, exist_ok=True)
         with pytest.raises(FileNotFoundError):
-            files.store.bring(files.of(LOCAL).dataset(new_id("dataset")))
+            files.store.fetch(files.of(LOCAL).dataset(new_id("dataset")))
 
     def test_what_is_removed_is_nowhere_and_the_rest_stays(self, files, elsewhere):
         gone, folder, kept = self.file(files), self.folder(files), self.file(files)
@@ -71,18 +71,18 @@ class StoreSuite:
         for path in (gone, folder):
             assert not path.exists()
             with pytest.raises(FileNotFoundError):
-                elsewhere.store.bring(self.there(elsewhere, path))
-        assert elsewhere.store.bring(self.there(elsewhere, kept)).read_bytes() == b"abc"
+                elsewhere.store.fetch(self.there(elsewhere, path))
+        assert elsewhere.store.fetch(self.there(elsewhere, kept)).read_bytes() == b"abc"
 
     def test_tenants_have_nothing_in_common(self, files, elsewhere):
         path = self.file(files, b"mine")
         theirs = self.there(files, path, OTHER)
         with pytest.raises(FileNotFoundError):
-            files.store.bring(theirs)
+            files.store.fetch(theirs)
         theirs.write_bytes(b"theirs")
         files.store.publish(theirs)
         files.store.remove([path])
-        assert elsewhere.store.bring(self.there(elsewhere, path, OTHER)).read_bytes() == b"theirs"
+        assert elsewhere.store.fetch(self.there(elsewhere, path, OTHER)).read_bytes() == b"theirs"
 
     def test_all_of_a_tenant_is_counted(self, files):
         kept = self.file(files, bytes(1000))

@@ -4,7 +4,7 @@ import pytest
 
 from bentray_service.files import bucket as module
 from bentray_service.files.bucket import Bucket
-from bentray_service.refusals import StorageAway
+from bentray_service.refusals import StorageUnavailable
 
 
 def test_lists_and_removals_go_beyond_a_page(bucket_url, monkeypatch):
@@ -32,7 +32,7 @@ def test_two_prefixes_of_a_bucket_do_not_meet(bucket_url):
 def test_a_removal_that_is_refused_is_no_removal(bucket_url, monkeypatch):
     bucket = Bucket(bucket_url)
     monkeypatch.setattr(bucket, "_call", lambda *_, **__: {"Errors": [{"Key": "a", "Code": "AccessDenied"}]})
-    with pytest.raises(StorageAway):
+    with pytest.raises(StorageUnavailable):
         bucket.remove(["a"])
 
 
@@ -40,7 +40,7 @@ def test_a_removal_that_is_refused_is_no_removal(bucket_url, monkeypatch):
     "ask", [lambda it: list(it.listed()), lambda it: it.note("a", {}), lambda it: it.remove("a")]
 )
 def test_a_bucket_that_is_not_there_is_no_missing_object(bucket_url, ask):
-    with pytest.raises(StorageAway):
+    with pytest.raises(StorageUnavailable):
         ask(Bucket(f"{bucket_url.removesuffix('/scans')}-missing"))
 
 
@@ -49,7 +49,7 @@ def test_a_bucket_that_says_nothing_is_given_up(bucket_url, s3_server, monkeypat
     bucket = Bucket(bucket_url)
     s3_server.silent.set()
     try:
-        with pytest.raises(StorageAway):
+        with pytest.raises(StorageUnavailable):
             bucket.told("a")
     finally:
         s3_server.silent.clear()

@@ -14,7 +14,7 @@ from bentray_service.files.bucket import Bucket
 from bentray_service.files.bucket_store import FORGOTTEN_S, LEFT_S, MARK, BucketStore
 from bentray_service.files.cache import RECENT_S
 from bentray_service.files.data_folder import Files
-from bentray_service.refusals import StorageAway
+from bentray_service.refusals import StorageUnavailable
 from bentray_service.rows.ids import new_id
 from bentray_service.rows.tenants import LOCAL
 
@@ -73,7 +73,7 @@ class TestBucketStore(StoreSuite):
 
     def test_nothing_but_the_thing_is_left_by_publishing_and_bringing(self, files, elsewhere):
         path = self.folder(files)
-        elsewhere.store.bring(self.there(elsewhere, path))
+        elsewhere.store.fetch(self.there(elsewhere, path))
         for one in (files, elsewhere):
             assert not list(one.scratch.iterdir())
 
@@ -86,7 +86,7 @@ class TestBucketStore(StoreSuite):
 
         def ask(_):
             barrier.wait()
-            return files.store.bring(path).read_bytes()
+            return files.store.fetch(path).read_bytes()
 
         with ThreadPoolExecutor(8) as pool:
             assert set(pool.map(ask, range(8))) == {content}
@@ -101,7 +101,7 @@ class TestBucketStore(StoreSuite):
         # It is begun, then come the parts, then it is put together.
         assert [method for method, _ in s3_server.asked].count("PUT") == 3
         self.forget(path)
-        assert files.store.bring(path).read_bytes() == content
+        assert files.store.fetch(path).read_bytes() == content
 
     def test_while_it_is_away_nothing_is_kept_fetched_or_removed_and_nothing_lost(
         self, files, s3_server, caplog
@@ -113,27 +113,27 @@ class TestBucketStore(StoreSuite):
         s3_server.away.set()
         for ask in (
             lambda: files.store.publish(new),
-            lambda: files.store.bring(gone),
+            lambda: files.store.fetch(gone),
             lambda: files.store.remove([there]),
             lambda: files.of(LOCAL).bytes_used(),
             lambda: files.store.tidy(lambda: False),
         ):
-            with pytest.raises(StorageAway):
+            with pytest.raises(StorageUnavailable):
                 ask()
         assert "bucket" in files.store.fault()
-        assert files.store.bring(there).read_bytes() == b"abc"
+        assert files.store.fetch(there).read_bytes() == b"abc"
         assert s3.SECRET not in caplog.text
         s3_server.away.clear()
         assert files.store.fault() is None
         files.store.publish(new)
-        assert files.store.bring(gone).read_bytes() == b"abc"
+        assert files.store.fetch(gone).read_bytes() == b"abc"
         assert not list(files.scratch.iterdir())
 
     def test_an_upload_that_cannot_be_kept_leaves_nothing(self, files, s3_server):
         mine, name = files.of(LOCAL), new_id("dataset")
         mine.candidate(name).write_bytes(b"checked")
         s3_server.away.set()
-        with pytest.raises(StorageAway):
+        with pytest.raises(StorageUnavailable):
             mine.adopt(name)
         assert not mine.dataset(name).exists()
 
@@ -145,7 +145,7 @@ class TestBucketStore(StoreSuite):
         (files.scratch / "damaged").write_bytes(b"abd")
         bucket.put(files.scratch / "damaged", key, {name: told[name] for name in told if name != "size"})
         with pytest.raises(OSError, match="SHA-256"):
-            files.store.bring(path)
+            files.store.fetch(path)
         assert not path.exists()
 
     def test_what_was_used_longest_ago_makes_room(self, opened, known):
@@ -168,7 +168,7 @@ class TestBucketStore(StoreSuite):
             recent,
         }
         # What went comes back when somebody asks for it, and what is in use may be more than was allowed.
-        assert all(files.store.bring(path).exists() for path in (oldest, older, newer))
+        assert all(files.store.fetch(path).exists() for path in (oldest, older, newer))
 
     def test_what_nobody_knows_goes_and_what_lies_here_only_is_published(
         self, files, elsewhere, known, bucket, monkeypatch
@@ -180,7 +180,7 @@ class TestBucketStore(StoreSuite):
         known.known = {(LOCAL, kept.stem), (LOCAL, alone.stem)}
         # Young as they are, they may be about to have rows.
         files.store.tidy(lambda: False)
-        assert files.store.bring(orphan).exists()
+        assert files.store.fetch(orphan).exists()
         assert forgotten.exists()
         now = time.time()
         monkeypatch.setattr(bucket_store.time, "time", lambda: now + max(FORGOTTEN_S, LEFT_S) + 60.0)
@@ -189,12 +189,12 @@ class TestBucketStore(StoreSuite):
         assert left == {kept.name, alone.name}
         assert not forgotten.exists()
         assert not orphan.exists()
-        assert elsewhere.store.bring(self.there(elsewhere, alone)).read_bytes() == alone.read_bytes()
+        assert elsewhere.store.fetch(self.there(elsewhere, alone)).read_bytes() == alone.read_bytes()
 
     def test_a_bucket_that_lost_its_mark_is_a_fault(self, files, bucket):
         path = self.file(files)
         self.forget(path)
         bucket.remove([MARK, path.relative_to(files.root).as_posix()])
         assert "not the one of this database" in files.store.fault()
-        with pytest.raises(StorageAway):
-            files.store.bring(path)
+        with pytest.raises(StorageUnavailable):
+            files.store.fetch(path)

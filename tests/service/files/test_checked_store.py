@@ -73,7 +73,7 @@ def test_a_flipped_bit_is_found_by_the_next_process(opened, rows, caplog):
     store = opened().store
     for _ in range(2):
         with pytest.raises(Damaged, match=f"{path.stem}, other bytes than were stored"):
-            store.bring(path)
+            store.fetch(path)
     assert rows.get(LOCAL, path.stem)["damaged"] is not None
     assert len(caplog.records) == 1, "said once"
 
@@ -81,10 +81,10 @@ def test_a_flipped_bit_is_found_by_the_next_process(opened, rows, caplog):
 def test_a_file_that_another_program_writes_to_is_found_at_once(opened):
     files = opened()
     path = stored(files)
-    assert files.store.bring(path) == path
+    assert files.store.fetch(path) == path
     flip(path, quietly=False)
     with pytest.raises(Damaged):
-        files.store.bring(path)
+        files.store.fetch(path)
 
 
 @pytest.mark.parametrize("left", [0, 1, len(CONTENT) - 1])
@@ -92,7 +92,7 @@ def test_a_cut_file(opened, left):
     path = stored(opened())
     os.truncate(path, left)
     with pytest.raises(Damaged, match=f"{left} bytes in place of 25600"):
-        opened().store.bring(path)
+        opened().store.fetch(path)
 
 
 def test_a_missing_file_is_damage_and_a_deleted_one_is_not(opened, rows):
@@ -100,9 +100,9 @@ def test_a_missing_file_is_damage_and_a_deleted_one_is_not(opened, rows):
     path = stored(files)
     path.unlink()
     with pytest.raises(Damaged, match="missing"):
-        files.store.bring(path)
+        files.store.fetch(path)
     with pytest.raises(Deleted):
-        files.store.bring(files.of(LOCAL).dataset(new_id("dataset")))
+        files.store.fetch(files.of(LOCAL).dataset(new_id("dataset")))
 
 
 def test_a_folder(opened):
@@ -112,10 +112,10 @@ def test_a_folder(opened):
     for name in ("layout.json", "outer.npy"):
         (folder / name).write_bytes(CONTENT)
     files.store.publish(folder)
-    assert opened().store.bring(folder) == folder
+    assert opened().store.fetch(folder) == folder
     flip(folder / "outer.npy")
     with pytest.raises(Damaged):
-        opened().store.bring(folder)
+        opened().store.fetch(folder)
 
 
 def test_it_is_read_once_a_process(opened, monkeypatch):
@@ -126,7 +126,7 @@ def test_it_is_read_once_a_process(opened, monkeypatch):
     digest = checked_store.digest_of
     monkeypatch.setattr(checked_store, "digest_of", lambda path: read.append(path) or digest(path))
     for _ in range(3):
-        files.store.bring(path)
+        files.store.fetch(path)
     assert read == [path]
 
 
@@ -135,20 +135,20 @@ def test_a_restored_file_is_taken_again(opened, rows):
     path = stored(files)
     flip(path)
     with pytest.raises(Damaged):
-        opened().store.bring(path)
+        opened().store.fetch(path)
     path.write_bytes(CONTENT)
-    assert files.store.bring(path).read_bytes() == CONTENT
+    assert files.store.fetch(path).read_bytes() == CONTENT
     assert rows.get(LOCAL, path.stem)["damaged"] is None
 
 
 def test_what_a_scrub_found_is_not_served_by_a_process_that_has_compared_it(opened, rows):
     files = opened()
     path = stored(files)
-    files.store.bring(path)
+    files.store.fetch(path)
     flip(path)
     rows.damaged(LOCAL, path.stem, 1.0)
     with pytest.raises(Damaged):
-        files.store.bring(path)
+        files.store.fetch(path)
 
 
 def test_a_file_of_an_older_version_is_taken_as_it_is_and_kept_so(opened, rows, tmp_path):
@@ -160,20 +160,20 @@ def test_a_file_of_an_older_version_is_taken_as_it_is_and_kept_so(opened, rows, 
     with database.write() as connection:
         connection.execute(insert(uploaded_volumes).values(**own, **told))
     database.close()
-    assert opened().store.bring(path) == path
+    assert opened().store.fetch(path) == path
     row = rows.get(LOCAL, path.stem)
     assert (row["as_written"], row["bytes"], row["path"]) == (False, len(CONTENT), f"volumes/{path.name}")
     flip(path)
     with pytest.raises(Damaged):
-        opened().store.bring(path)
+        opened().store.fetch(path)
 
 
 def test_the_work_of_a_job_changes_freely(opened, rows):
     files = opened()
     folder = files.of(LOCAL).work(new_id("job"))
-    assert files.store.bring(folder) == folder
+    assert files.store.fetch(folder) == folder
     (folder / "part-0.npz").write_bytes(CONTENT)
-    assert opened().store.bring(folder) == folder
+    assert opened().store.fetch(folder) == folder
     assert rows.all() == []
 
 
@@ -182,7 +182,7 @@ def test_what_is_being_deleted_gets_no_checksum_again(opened, rows):
     path = stored(opened())
     rows.forget(LOCAL, [path.stem])
     with pytest.raises(Deleted):
-        opened().store.bring(path)
+        opened().store.fetch(path)
     assert rows.all() == []
 
 
@@ -194,6 +194,6 @@ def test_a_bucket_has_another_copy(tmp_path, rows, bucket_url):
     files.prepare()
     path = stored(files)
     flip(path)
-    assert store.bring(path).read_bytes() == CONTENT
+    assert store.fetch(path).read_bytes() == CONTENT
     assert rows.get(LOCAL, path.stem)["damaged"] is None
     database.close()

@@ -7,13 +7,13 @@ from sqlalchemy import func, insert, select, update
 
 from bentray_service.access.quota import Quota
 from bentray_service.files.data_folder import Files
-from bentray_service.files.deletion import Deletion, Stored
+from bentray_service.files.deletion import Deletion, StoredItem
 from bentray_service.files.orphans import Orphans
 from bentray_service.housekeeping import DAY_S, Housekeeper
-from bentray_service.ingest.append import Hold
+from bentray_service.ingest.append import UploadLocks
 from bentray_service.refusals import InUse, UnknownId
 from bentray_service.rows import schema
-from bentray_service.rows.ages import Ages
+from bentray_service.rows.ages import ExpiryMarks
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import new_id, volume_of
 from bentray_service.rows.jobs import Jobs
@@ -113,7 +113,7 @@ class Shelf:
         return job
 
     def delete(self, what, name, tenant=LOCAL):
-        self.deletion.delete(Stored(tenant, what, name))
+        self.deletion.delete(StoredItem(tenant, what, name))
 
     def left(self):
         """The files of all tenants."""
@@ -347,9 +347,9 @@ def housekeeper(shelf, clocks, keep_days=30.0, uploads=None):
         uploads or Uploads(shelf.database),
         shelf.files,
         shelf.deletion,
-        Hold(),
+        UploadLocks(),
         Quota(shelf.database, 10**9),
-        Ages(shelf.database),
+        ExpiryMarks(shelf.database),
         observed,
         orphans,
         keep_days,

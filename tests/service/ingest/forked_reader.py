@@ -53,7 +53,7 @@ def main() -> None:
     files = json.loads(Path(sys.argv[3]).read_text())
     # What every fork needs is imported once.
     for what in {what for what, _, _ in files}:
-        child.convert(what, Path("/dev/null"), Path("/dev/null/none"), {"title": ""})
+        child.convert_upload(what, Path("/dev/null"), Path("/dev/null/none"), {"title": ""})
     import_module("bentray_workers.files.reconstruction")
     for what, path, given in files:
         sys.stdout.write(json.dumps(read_one(memory, seconds, what, Path(path), given)) + "\n")
@@ -66,10 +66,10 @@ def read_one(memory: int, seconds: float, what: str, path: Path, given: dict[str
     begun = time.monotonic()
     process_id = os.fork()
     if process_id == 0:
-        child.limit(memory, seconds)
+        child.limit_resources(memory, seconds)
         # Ends it also inside of a library, which the limit of processor time does only while it computes.
         signal.alarm(30 * int(seconds))
-        answer = child.convert(what, path, path.with_suffix(".canonical"), given)
+        answer = child.convert_upload(what, path, path.with_suffix(".canonical"), given)
         os.write(sink, json.dumps(answer).encode())
         os._exit(0)
     os.close(sink)

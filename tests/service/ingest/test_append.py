@@ -11,7 +11,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.ingest import receive as receiving
-from bentray_service.ingest.append import Checksum, Hold, append, discard_unverified, size_of
+from bentray_service.ingest.append import Checksum, UploadLocks, append, discard_unverified, received_bytes
 from bentray_service.refusals import Locked, TooLarge, UnknownChecksum, WrongChecksum
 
 BEGIN = b"begin "
@@ -82,7 +82,7 @@ def test_what_is_no_checksum_is_refused(header, error):
 
 
 def test_one_writer_at_a_time_also_after_a_failure():
-    hold = Hold()
+    hold = UploadLocks()
 
     def fail():
         with hold("a"), hold("b"):
@@ -124,13 +124,13 @@ def test_what_came_before_a_kill_counts_unless_its_checksum_was_not_verified(tmp
     assert ended.returncode == -signal.SIGKILL
     assert path.stat().st_size > 16
     if not checked:
-        assert size_of(path) == path.stat().st_size
+        assert received_bytes(path) == path.stat().st_size
         return
     # Also before anything has been cut off.
-    assert size_of(path) == len(BEGIN)
+    assert received_bytes(path) == len(BEGIN)
     discard_unverified(path)
     assert path.read_bytes() == BEGIN
-    assert size_of(path) == len(BEGIN)
+    assert received_bytes(path) == len(BEGIN)
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -141,7 +141,7 @@ def test_a_piece_may_follow_one_that_was_not_verified(tmp_path):
     (tmp_path / "u.unverified").write_text(str(len(BEGIN)))
     assert run(path, b"middle") == 12
     assert path.read_bytes() == b"begin middle"
-    assert size_of(path) == 12
+    assert received_bytes(path) == 12
 
 
 def test_bytes_of_a_piece_do_not_count_while_it_is_checked(tmp_path, monkeypatch):
@@ -153,8 +153,8 @@ def test_bytes_of_a_piece_do_not_count_while_it_is_checked(tmp_path, monkeypatch
         for chunk in (b"mid", b"dle"):
             yield chunk
             await asyncio.sleep(0)
-            seen.append(size_of(path))
+            seen.append(received_bytes(path))
 
     asyncio.run(append(watched(), path, len(BEGIN), 100, checksum("md5", b"middle")))
     assert seen == [len(BEGIN)] * 2
-    assert size_of(path) == 12
+    assert received_bytes(path) == 12

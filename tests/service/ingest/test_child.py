@@ -15,7 +15,7 @@ from bentray_workers.files.dataset.record import LONGEST_TEXT
 
 
 def test_summary_of_a_good_file(scan, tmp_path):
-    answer = child.convert("dataset", scan(), tmp_path / "out.h5", {})
+    answer = child.convert_upload("dataset", scan(), tmp_path / "out.h5", {})
     counts = answer["ok"].pop("counts")
     assert (counts["emissions"], counts["elements"], counts["width_m"]) == (16, 16, 0.1)
     assert answer["ok"] == {
@@ -36,15 +36,15 @@ def test_summary_of_a_good_file(scan, tmp_path):
 
 
 def test_the_canonical_file_says_the_same(scan, tmp_path):
-    first = child.convert("dataset", scan(), tmp_path / "once.h5", {})
-    assert child.convert("dataset", tmp_path / "once.h5", tmp_path / "twice.h5", {}) == first
+    first = child.convert_upload("dataset", scan(), tmp_path / "once.h5", {})
+    assert child.convert_upload("dataset", tmp_path / "once.h5", tmp_path / "twice.h5", {}) == first
 
 
 def test_a_bad_file_is_named(scan, tmp_path):
     def spoil(file):
         file["geometry/element_position_m"][3] = np.nan
 
-    answer = child.convert("dataset", scan(spoil), tmp_path / "out.h5", {})
+    answer = child.convert_upload("dataset", scan(spoil), tmp_path / "out.h5", {})
     assert answer["error"]["field"] == "geometry/element_position_m"
     assert "element 3" in answer["error"]["found"]
 
@@ -55,7 +55,7 @@ def test_a_reader_that_breaks_is_the_fault_of_the_file(scan, tmp_path, monkeypat
         raise error
 
     monkeypatch.setattr("bentray_workers.foreign_scans.convert_dataset", broken)
-    answer = child.convert("dataset", scan(), tmp_path / "out.h5", {})
+    answer = child.convert_upload("dataset", scan(), tmp_path / "out.h5", {})
     assert answer["error"]["field"] == "file"
 
 
@@ -64,13 +64,13 @@ def test_a_full_disk_is_no_fault_of_the_file(scan, tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device", str(target))
 
     monkeypatch.setattr("bentray_workers.foreign_scans.convert_dataset", full)
-    assert child.convert("dataset", scan(), tmp_path / "out.h5", {}) == {"full": True}
+    assert child.convert_upload("dataset", scan(), tmp_path / "out.h5", {}) == {"full": True}
 
 
 def test_a_volume(tmp_path):
     np.save(tmp_path / "v.npy", np.arange(60.0).reshape(3, 4, 5))
     given = {"title": "A head", "spacing_m": [2e-3], "shape": None, "dtype": None}
-    answer = child.convert("volume", tmp_path / "v.npy", tmp_path / "out.h5", given)
+    answer = child.convert_upload("volume", tmp_path / "v.npy", tmp_path / "out.h5", given)
     assert answer["ok"] == {
         "title": "A head",
         "shape": [3, 4, 5],
@@ -78,13 +78,13 @@ def test_a_volume(tmp_path):
         "origin_m": [0.0] * 3,
         "value_range": [0.0, 59.0],
     }
-    again = child.convert("volume", tmp_path / "out.h5", tmp_path / "again.h5", {})
+    again = child.convert_upload("volume", tmp_path / "out.h5", tmp_path / "again.h5", {})
     assert again == answer
 
 
 def test_a_bad_volume_is_named(tmp_path):
     np.save(tmp_path / "v.npy", np.full((2, 2, 2), np.nan))
-    answer = child.convert("volume", tmp_path / "v.npy", tmp_path / "out.h5", {})
+    answer = child.convert_upload("volume", tmp_path / "v.npy", tmp_path / "out.h5", {})
     assert (answer["error"]["field"], answer["error"]["found"]) == ("values", "nan at node (0, 0, 0)")
     assert not (tmp_path / "out.h5").exists()
 

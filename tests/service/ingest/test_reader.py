@@ -9,9 +9,9 @@ from bentray_kernels.errors import InvalidInput
 from bentray_service.access.quota import Quota
 from bentray_service.files.data_folder import Files
 from bentray_service.ingest import reader as reading
-from bentray_service.ingest.canonical import Limits
+from bentray_service.ingest.canonical import IngestLimits
 from bentray_service.ingest.fair_queue import FairQueue
-from bentray_service.ingest.reader import UploadReader
+from bentray_service.ingest.reader import UploadIngest
 from bentray_service.refusals import StorageFull, UnknownId
 from bentray_service.rows.database import open_database
 from bentray_service.rows.tenants import LOCAL, Tenant
@@ -52,10 +52,10 @@ class Bench:
         self.uploads, self.files, self.store = Uploads(database), Files(folder), Store()
         self.files.prepare()
         self.answers, self.read = [], []
-        limits, self.queue = Limits(2**30, 10.0, folder), FairQueue(1)
+        limits, self.queue = IngestLimits(2**30, 10.0, folder), FairQueue(1)
         self.queue.start()
         stores, quota = {"dataset": self.store}, Quota(database, 10**6)
-        self.reader = UploadReader(self.uploads, self.files, stores, limits, 60.0, self.queue, quota)
+        self.reader = UploadIngest(self.uploads, self.files, stores, limits, 60.0, self.queue, quota)
 
     def meet(self, what, source, result_id, files, limits, given, reserve, started):
         self.read.append(result_id)
@@ -67,7 +67,7 @@ class Bench:
     def whole(self, tenant=LOCAL):
         row = self.uploads.add(tenant, "dataset", 3, {}, "", 60.0, 10**6)
         self.files.of(tenant).upload(row["id"]).write_bytes(b"abc")
-        self.uploads.arrived(row["id"])
+        self.uploads.mark_complete(row["id"])
         return row
 
     def settled(self, row):

@@ -95,15 +95,15 @@ def test_a_full_disk_is_told_and_nothing_stands_in_the_wrong_place(tmp_path, mon
         def close(self):
             os.close(self.handle)
 
-    async def pour():
+    async def write_body():
         file = Full(path)
         try:
-            await receiving.pour(stream([bytes([k]) * 10 for k in range(5)]), file, LIMIT, "", None)
+            await receiving.write_body(stream([bytes([k]) * 10 for k in range(5)]), file, LIMIT, "", None)
         finally:
             file.close()
 
     with pytest.raises(StorageFull, match="no space"):
-        asyncio.run(pour())
+        asyncio.run(write_body())
     assert path.read_bytes() == b"".join(bytes([k]) * 10 for k in range(fails_at))
     assert len(calls) == fails_at + 1
 
@@ -121,6 +121,6 @@ def test_a_write_may_take_a_part_at_a_time(tmp_path):
             return self.file.fileno()
 
     file = Short()
-    asyncio.run(receiving.pour(stream([b"0123456789"]), file, LIMIT, "", None))
+    asyncio.run(receiving.write_body(stream([b"0123456789"]), file, LIMIT, "", None))
     assert file.body == b"0123456789"
     file.file.close()

@@ -10,7 +10,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.ingest import sandbox
-from bentray_service.refusals import QuotaUsedUp, StorageFull
+from bentray_service.refusals import QuotaExceeded, StorageFull
 
 LIMITS = {"memory_bytes": 4 * 1024**3, "seconds": 60.0}
 
@@ -79,9 +79,9 @@ def test_a_size_that_is_refused_ends_the_reader_and_nothing_is_written(scan, tmp
     running = []
 
     def reserve(size):
-        raise QuotaUsedUp("storage", f"{size} bytes", "fewer")
+        raise QuotaExceeded("storage", f"{size} bytes", "fewer")
 
-    with pytest.raises(QuotaUsedUp):
+    with pytest.raises(QuotaExceeded):
         run(scan(), tmp_path, reserve=reserve, started=running.append)
     with pytest.raises(ProcessLookupError):
         os.kill(running[0], 0)
@@ -98,9 +98,9 @@ def test_temporary_files_of_a_reader_lie_beside_the_file_it_makes(program, scan,
     (tmp_path / "own").mkdir()
 
     def kill(size):
-        raise QuotaUsedUp("storage", f"{size} bytes", "fewer")
+        raise QuotaExceeded("storage", f"{size} bytes", "fewer")
 
-    with pytest.raises(QuotaUsedUp):
+    with pytest.raises(QuotaExceeded):
         sandbox.ingest(
             "dataset", scan(), tmp_path / "own" / "out.h5", scratch=tmp_path, reserve=kill, **LIMITS
         )

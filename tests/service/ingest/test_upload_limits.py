@@ -5,7 +5,7 @@ from contextlib import ExitStack
 import pytest
 
 from bentray_service.ingest.upload_limits import UploadLimits
-from bentray_service.refusals import Busy, TooOften
+from bentray_service.refusals import Busy, RateLimited
 from bentray_service.rows.tenants import Tenant
 
 ONE, OTHER, THIRD = Tenant("one"), Tenant("other"), Tenant("third")
@@ -16,7 +16,7 @@ def test_a_tenant_may_have_so_many_and_the_service_takes_so_many():
     with ExitStack() as stack:
         for tenant in (ONE, ONE, OTHER):
             stack.enter_context(limits(tenant))
-        with pytest.raises(TooOften, match="2 on their way; accepted: at most 2 of a tenant"), limits(ONE):
+        with pytest.raises(RateLimited, match="2 on their way; accepted: at most 2 of a tenant"), limits(ONE):
             raise AssertionError
         with pytest.raises(Busy, match="3 on their way"), limits(THIRD):
             raise AssertionError
@@ -35,7 +35,7 @@ def test_so_many_may_be_begun_in_a_minute_by_each_tenant():
     limits = UploadLimits(begun_per_minute=3)
     for _ in range(3):
         limits.check_begin(ONE)
-    with pytest.raises(TooOften, match="more than 3 begun in a minute") as refused:
+    with pytest.raises(RateLimited, match="more than 3 begun in a minute") as refused:
         limits.check_begin(ONE)
     assert 0.0 < refused.value.wait_s <= 20.0
     limits.check_begin(OTHER)

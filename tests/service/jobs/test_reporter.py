@@ -17,11 +17,11 @@ class FakeJobs:
         self.further = 0
         self.sizes = []
 
-    def got_further(self, job_id):
+    def reset_attempts(self, job_id):
         self.check()
         self.further += 1
 
-    def took(self, job_id, size):
+    def record_size(self, job_id, size):
         self.check()
         self.sizes.append(size)
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from bentray_service.app import create_app
 from bentray_service.cli import app as command_line
-from bentray_service.rows.api_key import Token
+from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.settings import ServiceSettings
@@ -207,7 +207,7 @@ def test_another_tenant_finds_neither_job_nor_dataset(serving, until):
     with serving() as http:
         auth = {}
         for name in ("acme", "other"):
-            token = Token.new()
+            token = ApiKey.new()
             Keys(http.app.state.parts.database).add(token, Tenant(name), name, ("read", "write"))
             auth[name] = {"Authorization": f"Bearer {token.shown()}"}
         http.headers.update(auth["acme"])

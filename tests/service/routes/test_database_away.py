@@ -9,7 +9,7 @@ import pytest
 
 from bentray_service.access import sign_in
 from bentray_service.rows import database
-from bentray_service.rows.api_key import Token
+from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.tenants import LOCAL
 
@@ -42,7 +42,7 @@ def test_every_route_while_postgresql_is_dead(start, scan, postgresql_server, ke
     http = start(database_url=address)
     if keyed:
         # The door needs the database, too.
-        token = Token.new()
+        token = ApiKey.new()
         Keys(http.app.state.parts.database).add(token, LOCAL, "", ("read", "write"))
         http.headers["Authorization"] = f"Bearer {token.shown()}"
     content = scan().read_bytes()

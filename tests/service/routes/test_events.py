@@ -81,7 +81,7 @@ def test_a_wrong_place_is_refused(start, uploaded, submitted, work, last):
 def test_all_streams_share_one_look_at_the_database(start, uploaded, submitted, until, work, monkeypatch):
     http = start()
     parts, looks, threads = http.app.state.parts, [], set()
-    news = parts.jobs.__class__.news
+    news = parts.jobs.__class__.updates
 
     def counted(self, known):
         looks.append(set(known))
@@ -89,7 +89,7 @@ def test_all_streams_share_one_look_at_the_database(start, uploaded, submitted, 
         return news(self, known)
 
     monkeypatch.setattr(feed, "INTERVAL_SECONDS", 0.2)
-    monkeypatch.setattr("bentray_service.rows.jobs.Jobs.news", counted)
+    monkeypatch.setattr("bentray_service.rows.jobs.Jobs.updates", counted)
     work.hold.clear()
     dataset = uploaded(http)
     jobs = [submitted(http, dataset)["id"] for _ in range(3)]
@@ -150,7 +150,7 @@ def test_a_database_that_is_away_ends_no_stream(start, uploaded, submitted, unti
     work.hold.clear()
     job = submitted(http, uploaded(http))
     until(http, job["id"], "running")
-    news, failures = http.app.state.parts.jobs.__class__.news, iter(range(5))
+    news, failures = http.app.state.parts.jobs.__class__.updates, iter(range(5))
 
     def fails_at_first(self, known):
         if next(failures, None) is not None:
@@ -158,7 +158,7 @@ def test_a_database_that_is_away_ends_no_stream(start, uploaded, submitted, unti
         work.hold.set()
         return news(self, known)
 
-    monkeypatch.setattr("bentray_service.rows.jobs.Jobs.news", fails_at_first)
+    monkeypatch.setattr("bentray_service.rows.jobs.Jobs.updates", fails_at_first)
     told = parsed(http.get(f"/v1/jobs/{job['id']}/events").text)
     assert json.loads(told[-1]["data"])["state"] == "succeeded"
 

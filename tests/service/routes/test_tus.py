@@ -327,7 +327,7 @@ def test_what_was_whole_at_a_death_is_read_at_the_next_start(start, scan, state)
     files.upload(row["id"]).write_bytes(content)
     files.candidate(row["result_id"]).write_bytes(content[:500])
     if state == "reading":
-        http.app.state.parts.uploads.arrived(row["id"])
+        http.app.state.parts.uploads.mark_complete(row["id"])
     http.__exit__()
     http = start()
     assert settled(http, place)["result"] == row["result_id"]
@@ -344,7 +344,7 @@ def test_what_was_stored_at_a_death_is_not_stored_twice(start, scan):
     upload = place.rpartition("/")[2]
     http.__exit__()
     http = start()
-    http.app.state.parts.uploads.arrived(upload)
+    http.app.state.parts.uploads.mark_complete(upload)
     http.app.state.parts.reader.notify()
     assert settled(http, place)["result"] == done["result"]
     assert len(http.get("/v1/datasets").json()["datasets"]) == 1

@@ -11,7 +11,7 @@ from bentray_service.ingest.fair_queue import FairQueue
 from bentray_service.ingest.upload_limits import MOST_OF_TENANT
 from bentray_service.refusals import Busy
 from bentray_service.routes import uploads
-from bentray_service.routes.uploads import in_turn
+from bentray_service.routes.uploads import run_in_turn
 from bentray_service.rows.tenants import LOCAL, Tenant
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
@@ -68,7 +68,7 @@ def test_who_goes_away_leaves_the_queue(queue):
             return {"type": "http.disconnect"}
 
         waiting = asyncio.create_task(
-            in_turn(Request({"type": "http"}, receive), queue, LOCAL, lambda: done.append("read"))
+            run_in_turn(Request({"type": "http"}, receive), queue, LOCAL, lambda: done.append("read"))
         )
         while not queue.waiting(LOCAL):
             await asyncio.sleep(0)
@@ -87,7 +87,7 @@ def test_who_waits_too_long_is_told_so(queue, monkeypatch):
     async def ask():
         request = Request({"type": "http"}, asyncio.Event().wait)
         with pytest.raises(Busy, match=r"no turn in 0\.01 s"):
-            await in_turn(request, queue, LOCAL, dict)
+            await run_in_turn(request, queue, LOCAL, dict)
 
     asyncio.run(ask())
     assert queue.waiting(LOCAL) == 0

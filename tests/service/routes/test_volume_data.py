@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from bentray_service.files.deletion import Stored
+from bentray_service.files.deletion import StoredItem
 from bentray_service.rows.ids import new_id
 from bentray_service.rows.tenants import LOCAL
 from bentray_workers.files.volume import Volume, write_volume
@@ -120,7 +120,7 @@ def test_an_export_whose_volume_goes_when_it_is_made(http, upload, monkeypatch):
 
     async def delete_then(tenant, volume, *given):
         await export(tenant, volume, *given)
-        parts.deletion.delete(Stored(tenant, "volume", volume["id"]))
+        parts.deletion.delete(StoredItem(tenant, "volume", volume["id"]))
 
     monkeypatch.setattr(parts.pictures, "export", delete_then)
     answer = http.get(f"{upload}?format=npy")

@@ -5,7 +5,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from bentray_service.refusals import DatabaseAway
+from bentray_service.refusals import DatabaseUnavailable
 from bentray_service.rows import admission
 from bentray_service.rows.admission import MOST_AT_ONCE, MOST_WHILE_SLOW, Admission
 
@@ -18,37 +18,37 @@ class Clock:
 
 
 def test_many_at_once_while_it_is_quick():
-    door = Admission(Clock())
+    sign_in = Admission(Clock())
     with ExitStack() as stack:
         for _ in range(MOST_AT_ONCE):
-            stack.enter_context(door())
+            stack.enter_context(sign_in())
 
 
 def test_few_once_the_oldest_has_taken_long():
     clock = Clock()
-    door = Admission(clock)
+    sign_in = Admission(clock)
     with ExitStack() as stack:
         for _ in range(MOST_WHILE_SLOW):
-            stack.enter_context(door())
+            stack.enter_context(sign_in())
         clock.now = 2.5
-        with pytest.raises(DatabaseAway, match="8 requests that wait for a slow database"):
-            stack.enter_context(door())
-    with door():
+        with pytest.raises(DatabaseUnavailable, match="8 requests that wait for a slow database"):
+            stack.enter_context(sign_in())
+    with sign_in():
         pass
 
 
 def test_one_more_waits_a_moment_for_a_place(monkeypatch):
     monkeypatch.setattr(admission, "PLACE_SECONDS", 10.0)
-    door, come, left = Admission(Clock()), threading.Event(), threading.Event()
+    sign_in, come, left = Admission(Clock()), threading.Event(), threading.Event()
 
     def last():
         come.set()
-        with door():
+        with sign_in():
             left.set()
 
     with ExitStack() as stack:
         for _ in range(MOST_AT_ONCE):
-            stack.enter_context(door())
+            stack.enter_context(sign_in())
         thread = threading.Thread(target=last)
         thread.start()
         assert come.wait(10.0)
@@ -59,9 +59,9 @@ def test_one_more_waits_a_moment_for_a_place(monkeypatch):
 
 def test_the_one_after_all_places_is_refused(monkeypatch):
     monkeypatch.setattr(admission, "PLACE_SECONDS", 0.0)
-    door = Admission(Clock())
+    sign_in = Admission(Clock())
     with ExitStack() as stack:
         for _ in range(MOST_AT_ONCE):
-            stack.enter_context(door())
-        with pytest.raises(DatabaseAway, match="32 requests that wait for the database"):
-            stack.enter_context(door())
+            stack.enter_context(sign_in())
+        with pytest.raises(DatabaseUnavailable, match="32 requests that wait for the database"):
+            stack.enter_context(sign_in())

@@ -5,13 +5,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.rows.api_key import Token
+from bentray_service.rows.api_key import ApiKey
 
 
 def test_there_and_back():
-    token = Token.new()
-    assert Token.of(token.shown()) == token
-    assert Token.new().shown() != token.shown()
+    token = ApiKey.new()
+    assert ApiKey.of(token.shown()) == token
+    assert ApiKey.new().shown() != token.shown()
     secret = token.shown().rpartition("_")[2]
     assert len(secret) == 40
     assert secret not in f"{token} {token!r} {token.digest()}"
@@ -19,14 +19,14 @@ def test_there_and_back():
 
 @given(st.text(max_size=80))
 def test_nothing_else_is_a_key(text):
-    assert Token.of(text) is None
-    assert Token.of(Token.new().shown() + text[:1]) is None or not text
+    assert ApiKey.of(text) is None
+    assert ApiKey.of(ApiKey.new().shown() + text[:1]) is None or not text
 
 
 @pytest.mark.parametrize("spoil", [str.upper, lambda t: f"{t}\n", lambda t: t[:-1], lambda t: f" {t}"])
 def test_a_slip_is_refused_and_not_repeated(spoil):
-    spoiled = spoil(Token.new().shown())
-    assert Token.of(spoiled) is None
+    spoiled = spoil(ApiKey.new().shown())
+    assert ApiKey.of(spoiled) is None
     with pytest.raises(InvalidInput) as refusal:
-        Token.given("key", spoiled)
+        ApiKey.given("key", spoiled)
     assert spoiled[-20:-2] not in str(refusal.value)

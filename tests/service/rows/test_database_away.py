@@ -11,7 +11,7 @@ from contextlib import closing, contextmanager
 import pytest
 from sqlalchemy import select
 
-from bentray_service.refusals import DatabaseAway, DatabaseFull
+from bentray_service.refusals import DatabaseFull, DatabaseUnavailable
 from bentray_service.rows import admission, database, postgresql_patience, schema
 from bentray_service.rows.database import open_database
 from bentray_service.rows.jobs import Jobs
@@ -48,7 +48,7 @@ def test_held_by_another_program(tmp_path, monkeypatch, caplog):
         jobs = Jobs(opened)
         with held(tmp_path / "db.sqlite"):
             for _ in range(3):
-                with pytest.raises(DatabaseAway, match="locked by another program"):
+                with pytest.raises(DatabaseUnavailable, match="locked by another program"):
                     jobs.add(LOCAL, "simulation", {})
             assert jobs.newest(LOCAL, 9) == [], "reading goes on"
         assert jobs.add(LOCAL, "simulation", {})["state"] == "queued"
@@ -67,7 +67,7 @@ def test_few_threads_wait_while_it_is_held(tmp_path, monkeypatch):
             # One after the other, as requests come.
             time.sleep(0.02 * number)
             begun = time.monotonic()
-            with pytest.raises(DatabaseAway):
+            with pytest.raises(DatabaseUnavailable):
                 jobs.add(LOCAL, "simulation", {})
             took.append(time.monotonic() - begun)
 
@@ -92,7 +92,7 @@ def test_postgresql_that_is_killed(postgresql_server):
         try:
             begun = time.monotonic()
             for _ in range(3):
-                with pytest.raises(DatabaseAway) as caught:
+                with pytest.raises(DatabaseUnavailable) as caught:
                     ask(opened)
                 assert str(postgresql_server.port) not in str(caught.value), (
                     "its address is nobody's business"
@@ -116,7 +116,7 @@ def test_postgresql_that_stands_still(postgresql_server, monkeypatch):
             asked = [pool.submit(ask, opened) for _ in range(30)]
             ends = [one.exception(timeout=30.0) for one in asked]
             assert time.monotonic() - begun < BOUNDED_S
-        assert {type(end) for end in ends} == {DatabaseAway}
+        assert {type(end) for end in ends} == {DatabaseUnavailable}
         assert ask(opened) == schema.VERSION
         assert threading.active_count() <= threads, "nobody still waits"
     postgresql_server.drop(address)
@@ -128,7 +128,7 @@ def test_a_row_that_another_holds_on_postgresql(postgresql_server, monkeypatch):
     with closing(open_database(address)) as opened, closing(open_database(address)) as other:
         with other.write() as connection:
             connection.execute(schema.about.update().values(probed=1.0))
-            with pytest.raises(DatabaseAway, match="locked by another program"):
+            with pytest.raises(DatabaseUnavailable, match="locked by another program"):
                 opened.probe()
         opened.probe()
     postgresql_server.drop(address)

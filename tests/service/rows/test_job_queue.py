@@ -71,7 +71,7 @@ def test_a_cancelled_job_cannot_succeed(database, jobs, queue, dataset):
     assert not queue.succeed(job["id"], volume(job["id"]))
     with pytest.raises(UnknownId):
         Volumes(database).get(LOCAL, volume_of(job["id"]))
-    queue.cancelled(job["id"])
+    queue.mark_cancelled(job["id"])
     assert queue.state(job["id"]) == "cancelled"
 
 
@@ -108,7 +108,7 @@ def test_a_job_that_gets_further_is_taken_up_again_and_again(database, jobs, que
     for _ in range(8):
         dying = Queue(database)
         assert dying.claim()["id"] == job["id"]
-        dying.got_further(job["id"])
+        dying.reset_attempts(job["id"])
         assert queue.recover(PROBLEM, alone=True) == 1
     assert jobs.get(LOCAL, job["id"])["attempts"] == 1
     assert [event["state"] for event in jobs.events(LOCAL, job["id"])] == [
@@ -131,13 +131,13 @@ def test_a_service_beside_others_takes_only_what_is_given_up(database, jobs, que
     assert queue.recover(PROBLEM, alone=False) == 1
     assert queue.claim()["id"] == job["id"]
     # The first one wakes up and has lost its job.
-    assert other.told(job["id"]) is None
+    assert other.held_state(job["id"]) is None
     other.progress(job["id"], 7, 9, [])
     other.fail(job["id"], PROBLEM)
     other.release(job["id"], "late")
     assert not other.succeed(job["id"], volume(job["id"]))
     row = jobs.get(LOCAL, job["id"])
-    assert (row["state"], row["done"], queue.told(job["id"])) == ("running", 0, "running")
+    assert (row["state"], row["done"], queue.held_state(job["id"])) == ("running", 0, "running")
     assert queue.succeed(job["id"], volume(job["id"]))
 
 

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from bentray_service.refusals import Finished, KeyReused, QueueFull, UnknownId
+from bentray_service.refusals import JobFinished, KeyReused, QueueFull, UnknownId
 from bentray_service.rows.tenants import LOCAL, Tenant
 
 
@@ -34,7 +34,7 @@ def test_a_queued_job_is_cancelled_at_once(jobs, queue, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
     assert jobs.request_cancel(LOCAL, job["id"])["state"] == "cancelled"
     assert queue.claim() is None
-    with pytest.raises(Finished, match="cancelled"):
+    with pytest.raises(JobFinished, match="cancelled"):
         jobs.request_cancel(LOCAL, job["id"])
 
 

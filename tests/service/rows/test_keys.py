@@ -6,7 +6,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.rows import schema
-from bentray_service.rows.api_key import Token
+from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.keys import USED_S, Keys
 from bentray_service.rows.tenants import LOCAL, Tenant
 
@@ -19,7 +19,7 @@ def keys(database):
 
 
 def test_the_secret_is_nowhere(database, keys):
-    token = Token.new()
+    token = ApiKey.new()
     assert not keys.any()
     keys.add(token, ACME, "one", ("read",))
     assert keys.any()
@@ -30,16 +30,16 @@ def test_the_secret_is_nowhere(database, keys):
 
 
 def test_another_secret_under_the_same_id_is_none(keys):
-    token = Token.new()
+    token = ApiKey.new()
     keys.add(token, ACME, "one", ("read",))
-    assert keys.owner(Token(token.id, Token.new().shown()[-40:])) is None
-    assert keys.owner(Token.new()) is None
+    assert keys.owner(ApiKey(token.id, ApiKey.new().shown()[-40:])) is None
+    assert keys.owner(ApiKey.new()) is None
     with pytest.raises(InvalidInput, match="which exists"):
         keys.add(token, ACME, "again", ("read",))
 
 
 def test_it_ends_when_it_expires_or_is_revoked(keys, monkeypatch):
-    soon, never = Token.new(), Token.new()
+    soon, never = ApiKey.new(), ApiKey.new()
     now = time.time()
     keys.add(soon, ACME, "soon", ("read",), now + 100.0)
     keys.add(never, LOCAL, "never", ("read",))
@@ -57,7 +57,7 @@ def test_it_ends_when_it_expires_or_is_revoked(keys, monkeypatch):
 
 
 def test_its_last_use_is_known_to_the_minute(keys, monkeypatch):
-    token, now = Token.new(), time.time()
+    token, now = ApiKey.new(), time.time()
     keys.add(token, ACME, "one", ("read",))
     for later, expected in ((0.0, 0.0), (USED_S - 1.0, 0.0), (USED_S + 1.0, USED_S + 1.0)):
         monkeypatch.setattr("bentray_service.rows.keys.time.time", lambda at=now + later: at)

@@ -8,7 +8,7 @@ import pytest
 
 from bentray_service.files.data_folder import Files
 from bentray_service.files.deletion import Deletion, Stored
-from bentray_service.refusals import Finished, InUse, KeyReused, UnknownId
+from bentray_service.refusals import InUse, JobFinished, KeyReused, UnknownId
 from bentray_service.rows import admission
 from bentray_service.rows.tenants import LOCAL
 
@@ -30,7 +30,7 @@ def at_once(ask):
         begin.wait()
         try:
             return ask(number)
-        except (Finished, InUse, KeyReused, UnknownId) as refusal:
+        except (JobFinished, InUse, KeyReused, UnknownId) as refusal:
             return refusal
 
     with ThreadPoolExecutor(AT_ONCE) as pool:
@@ -79,7 +79,7 @@ def test_a_scan_is_deleted_or_has_jobs(jobs, database, dataset, tmp_path):
 def test_a_queued_job_is_cancelled_once(jobs, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)["id"]
     told = Counter(type(one) for one in at_once(lambda _: jobs.request_cancel(LOCAL, job)))
-    assert told == {dict: 1, Finished: AT_ONCE - 1}
+    assert told == {dict: 1, JobFinished: AT_ONCE - 1}
     assert states(jobs, job) == ["queued", "cancelled"]
 
 

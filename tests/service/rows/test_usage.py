@@ -10,7 +10,7 @@ import pytest
 from bentray_service.access.quota import LEASE_S, Quota
 from bentray_service.files.data_folder import Files
 from bentray_service.files.deletion import Deletion, Stored
-from bentray_service.refusals import DatabaseAway, QuotaUsedUp, TooOften
+from bentray_service.refusals import DatabaseUnavailable, QuotaExceeded, RateLimited
 from bentray_service.rows import uploads as uploading
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import new_id
@@ -34,7 +34,7 @@ def at_once(ask):
         begin.wait()
         try:
             ask(number)
-        except (QuotaUsedUp, TooOften):
+        except (QuotaExceeded, RateLimited):
             return False
         return True
 
@@ -66,7 +66,9 @@ def test_of_many_uploads_begun_at_once_there_are_no_more_than_a_tenant_may_have(
     monkeypatch.setattr(uploading, "MOST_BEGUN", 5)
     uploads = Uploads(database)
     assert at_once(lambda n: uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)).count(True) == 5
-    with pytest.raises(TooOften, match="5 that are begun and not whole; accepted: fewer than 5") as refused:
+    with pytest.raises(
+        RateLimited, match="5 that are begun and not whole; accepted: fewer than 5"
+    ) as refused:
         uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)
     assert refused.value.wait_s > 0.0
     uploads.add(OTHER, "dataset", 1, {}, "", 60.0, 100)
@@ -89,12 +91,12 @@ def test_the_refusal_says_what_is_stored_reserved_and_allowed(database):
     quota.stored(LOCAL, "vol-1.nii", 50)
     quota.resize(LOCAL, "ds-1", 30)
     found = "50 bytes stored, 30 reserved, 21 more asked for; accepted: at most 100 bytes for a tenant"
-    with pytest.raises(QuotaUsedUp, match=found):
+    with pytest.raises(QuotaExceeded, match=found):
         quota.resize(LOCAL, "ds-2", 21)
     quota.resize(LOCAL, "ds-2", 20)
     # What is there already is no reason to refuse its change.
     quota.resize(LOCAL, "ds-1", 29)
-    with pytest.raises(QuotaUsedUp):
+    with pytest.raises(QuotaExceeded):
         quota.resize(LOCAL, "ds-1", 31)
     assert quota.of(LOCAL) == Usage(50, 49)
 
@@ -120,7 +122,7 @@ def test_a_database_that_is_away_keeps_no_room_for_what_has_ended(database, monk
     quota = Quota(database, 100)
 
     def away():
-        raise DatabaseAway("no answer")
+        raise DatabaseUnavailable("no answer")
 
     quota.resize(LOCAL, "ds-1", 60)
     monkeypatch.setattr(database, "write", away)
@@ -152,9 +154,9 @@ def test_a_job_has_its_room_until_its_end(database, jobs, queue, dataset, end):
     before = quota.of(LOCAL).stored
     job = jobs.add(LOCAL, "reconstruction", {}, dataset, reserve=(60, 100))["id"]
     assert queue.claim()["id"] == job
-    queue.took(job, 50)
+    queue.record_size(job, 50)
     assert quota.of(LOCAL) == Usage(before, 60)
-    queue.took(job, 80)
+    queue.record_size(job, 80)
     assert quota.of(LOCAL) == Usage(before, 80)
     queue.release(job, "the workers were away")
     queue.claim()

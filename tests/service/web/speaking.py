@@ -12,7 +12,7 @@ from typing import Any
 import uvicorn
 
 from bentray_service.settings import ServiceSettings
-from bentray_service.web.connections import Limits
+from bentray_service.web.connections import ConnectionLimits
 from bentray_service.web.listening import Listening
 from bentray_service.web.server import Server
 
@@ -20,7 +20,7 @@ PATIENCE_S = 20.0
 
 
 @contextmanager
-def served(app: Any, limits: Limits | None = None, **settings: Any) -> Iterator[Server]:
+def served(app: Any, limits: ConnectionLimits | None = None, **settings: Any) -> Iterator[Server]:
     """A server of ``app``, which knows nothing of a lifespan; its port is ``server.port``."""
     with Listening() as listening:
         listening.bind(("127.0.0.1", 0))

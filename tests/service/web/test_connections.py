@@ -14,7 +14,7 @@ import pytest
 
 from bentray_service.web import descriptors, protocol
 from bentray_service.web.addresses import networks
-from bentray_service.web.connections import KEPT, MOST, SPARE, Connections, Limits
+from bentray_service.web.connections import KEPT, MOST, SPARE, ConnectionLimits, Connections
 
 from .speaking import connected, read_answer, read_to_end, served
 
@@ -40,7 +40,7 @@ def come(connections, address, count):
 
 
 def test_the_longest_silent_of_an_address_makes_room():
-    connections = Connections(Limits(10, 3, 2))
+    connections = Connections(ConnectionLimits(10, 3, 2))
     first, second, third = come(connections, "192.0.2.1", 3)
     connections.busy(first)
     connections.busy(second)
@@ -53,7 +53,7 @@ def test_the_longest_silent_of_an_address_makes_room():
 
 
 def test_in_all_the_address_with_the_most_makes_room():
-    connections = Connections(Limits(6, 4, 2))
+    connections = Connections(ConnectionLimits(6, 4, 2))
     honest = come(connections, "192.0.2.1", 2)
     many = come(connections, "192.0.2.2", 4)
     come(connections, "192.0.2.3", 2)
@@ -63,7 +63,7 @@ def test_in_all_the_address_with_the_most_makes_room():
 
 
 def test_where_all_are_at_work_a_new_one_is_spare():
-    connections = Connections(Limits(3, 3, 2))
+    connections = Connections(ConnectionLimits(3, 3, 2))
     for one in come(connections, "192.0.2.1", 3):
         connections.busy(one)
     spare = [Fake() for _ in range(4)]
@@ -77,7 +77,7 @@ def test_where_all_are_at_work_a_new_one_is_spare():
 
 
 def test_one_customer_has_many_addresses():
-    connections = Connections(Limits(100, 3, 2))
+    connections = Connections(ConnectionLimits(100, 3, 2))
     found = [Fake() for _ in range(6)]
     for n, one in enumerate(found):
         connections.add(one, f"2001:db8::{n:x}")
@@ -89,7 +89,7 @@ def test_one_customer_has_many_addresses():
 
 
 def test_a_trusted_proxy_brings_many():
-    connections = Connections(Limits(20, 3, 2), networks("10.0.0.0/8"))
+    connections = Connections(ConnectionLimits(20, 3, 2), networks("10.0.0.0/8"))
     assert not any(one.dropped for one in come(connections, "10.1.2.3", 20))
 
 
@@ -104,7 +104,7 @@ def test_a_trusted_proxy_brings_many():
     ],
 )
 def test_the_limits_follow_from_the_descriptors(allowed, in_use, of_address, most, each):
-    assert Limits.of(allowed, in_use, of_address) == Limits(most, each, SPARE)
+    assert ConnectionLimits.of(allowed, in_use, of_address) == ConnectionLimits(most, each, SPARE)
 
 
 def test_the_limit_of_descriptors_is_raised(monkeypatch):
@@ -145,7 +145,7 @@ def app():
 
 
 def test_silent_connections_keep_nobody_out(app):
-    with served(app, Limits(1000, 8, 4)) as server:
+    with served(app, ConnectionLimits(1000, 8, 4)) as server:
         silent = [connected(server) for _ in range(40)]
         for one in silent[::2]:
             one.sendall(b"GET / HT")
@@ -161,7 +161,7 @@ def test_silent_connections_keep_nobody_out(app):
 
 
 def test_health_is_answered_where_all_are_at_work(app):
-    with served(app, Limits(1000, 3, 4)) as server:
+    with served(app, ConnectionLimits(1000, 3, 4)) as server:
         working = [connected(server) for _ in range(3)]
         for one in working:
             one.sendall(OTHER)

@@ -17,10 +17,10 @@ from bentray_service.web import errors
 @pytest.fixture
 def http():
     app = FastAPI()
-    errors.install(app)
+    errors.install_handlers(app)
 
     @app.get("/refused")
-    def refused():
+    def problem_response():
         raise InvalidInput("speed", -1, "a speed > 0")
 
     @app.get("/full")
@@ -103,7 +103,7 @@ def test_methods_are_told_of_included_routers_and_static_files_too(tmp_path):
         return name
 
     app = FastAPI()
-    errors.install(app)
+    errors.install_handlers(app)
     app.include_router(router)
     app.mount("/static", StaticFiles(directory=tmp_path))
     http = TestClient(app)

@@ -4,8 +4,8 @@ import asyncio
 
 import pytest
 
-from bentray_service.refusals import TooSlow
-from bentray_service.web.request_rate import LEAST_BYTES, Pace
+from bentray_service.refusals import BodyTimeout
+from bentray_service.web.request_rate import LEAST_BYTES, RequestRate
 
 HTTP = {"type": "http"}
 SECONDS = 0.5
@@ -27,7 +27,7 @@ def run(chunks, *, every, seconds=SECONDS, scope=HTTP):
         body = chunks.pop(0)
         return {"type": "http.request", "body": body, "more_body": bool(chunks)}
 
-    asyncio.run(Pace(app, seconds)(scope, receive, None))
+    asyncio.run(RequestRate(app, seconds)(scope, receive, None))
     return got
 
 
@@ -36,12 +36,12 @@ def test_a_body_that_comes_is_read():
 
 
 def test_a_body_that_drips_is_broken_off():
-    with pytest.raises(TooSlow, match=f"at least {LEAST_BYTES} bytes in 0.5 s"):
+    with pytest.raises(BodyTimeout, match=f"at least {LEAST_BYTES} bytes in 0.5 s"):
         run([b"x"] * 10_000, every=0.005)
 
 
 def test_a_body_that_stops_is_broken_off():
-    with pytest.raises(TooSlow):
+    with pytest.raises(BodyTimeout):
         run([b"x", b"y"], every=60.0)
 
 
@@ -61,7 +61,7 @@ def test_who_waits_after_the_body_is_not_hurried():
         await asyncio.sleep(0.0 if len(messages) == 2 else 0.3)
         return messages.pop(0)
 
-    asyncio.run(Pace(app, 0.1)(HTTP, receive, None))
+    asyncio.run(RequestRate(app, 0.1)(HTTP, receive, None))
     assert not messages
 
 
@@ -69,4 +69,4 @@ def test_other_connections_pass():
     async def app(scope, receive, send):
         assert receive == "receive"
 
-    asyncio.run(Pace(app, 0.1)({"type": "lifespan"}, "receive", "send"))
+    asyncio.run(RequestRate(app, 0.1)({"type": "lifespan"}, "receive", "send"))

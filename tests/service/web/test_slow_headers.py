@@ -8,7 +8,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.web import slow_headers
-from bentray_service.web.errors import refused
+from bentray_service.web.errors import problem_response
 
 from .speaking import connected, read_answer, read_to_end, served
 
@@ -39,7 +39,7 @@ def telling():
             try:
                 message = await receive()
             except InvalidInput as error:
-                await refused(error, scope["path"])(scope, receive, send)
+                await problem_response(error, scope["path"])(scope, receive, send)
                 return
             body, more = body + message["body"], message["more_body"]
         names = [name.decode() for name, _ in scope["headers"]]

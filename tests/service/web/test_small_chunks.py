@@ -9,7 +9,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.web import small_chunks
-from bentray_service.web.errors import refused
+from bentray_service.web.errors import problem_response
 
 from .speaking import connected, read_answer, read_to_end, served
 
@@ -32,7 +32,7 @@ class Counting:
             try:
                 message = await receive()
             except InvalidInput as error:
-                await refused(error, scope["path"])(scope, receive, send)
+                await problem_response(error, scope["path"])(scope, receive, send)
                 return
             if message["type"] == "http.disconnect":
                 self.gone.set()

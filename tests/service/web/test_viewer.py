@@ -15,7 +15,7 @@ from bentray_kernels.meshes.example_surfaces import torus
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.jobs import kinds
-from bentray_service.rows.api_key import Token
+from bentray_service.rows.api_key import ApiKey
 
 CHROMIUM = Path("/usr/bin/chromium")
 # The first picture waits for its compiled functions where none are kept from before.
@@ -276,12 +276,12 @@ def test_by_keyboard_alone(page, serve, scan, work):
 
 
 def test_where_a_key_is_needed_the_page_asks_for_it_and_sends_it(page, serve, scan, work, tmp_path):
-    key = Token.new()
+    key = ApiKey.new()
     (tmp_path / "key").write_text(key.shown())
     address = serve(first_key_file=tmp_path / "key")
     page.goto(address)
     page.locator("#access").get_by_text("A key is needed").wait_for()
-    page.get_by_label("API key").fill(Token.new().shown())
+    page.get_by_label("API key").fill(ApiKey.new().shown())
     page.get_by_role("button", name="Use key").click()
     page.locator("#key-error").get_by_text("unknown, revoked or expired").wait_for()
     page.get_by_label("API key").fill(key.shown())

@@ -47,7 +47,7 @@ OPTIONS = {**SETTINGS, **VIEW}
 
 
 @dataclass(frozen=True)
-class AskedField:
+class FieldOptions:
     """What a command line says of a field: the values of the options that were given, by field."""
 
     given: dict[str, Any]
@@ -74,12 +74,12 @@ class AskedField:
 
 
 def with_field_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with the options in place of its parameter ``asked``, an ``AskedField``."""
+    """The command with the options in place of its parameter ``asked``, an ``FieldOptions``."""
 
     @wraps(command)
     def run(**given: Any) -> None:
         options = {name: value for name in OPTIONS if (value := given.pop(name)) is not None}
-        command(asked=AskedField(options), **given)
+        command(asked=FieldOptions(options), **given)
 
     parameters: list[inspect.Parameter] = []
     for parameter in inspect.signature(command, eval_str=True).parameters.values():

@@ -11,14 +11,14 @@ from typer.core import TyperCommand
 AXES = 3
 
 
-class SpacingInRow(TyperCommand):
+class RepeatedSpacing(TyperCommand):
     """A command whose ``--spacing`` takes one number or a row of them."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        return super().parse_args(ctx, list(spread("--spacing", args)))
+        return super().parse_args(ctx, list(repeat_option("--spacing", args)))
 
 
-def spread(option: str, words: Sequence[str]) -> Iterator[str]:
+def repeat_option(option: str, words: Sequence[str]) -> Iterator[str]:
     """``words`` with ``option`` before each number of the row that follows it."""
     left = 0
     for word in words:

@@ -48,7 +48,7 @@ OPTIONS = {
 
 
 @dataclass(frozen=True)
-class AskedView:
+class ViewOptions:
     """What a command line says of a view: the values of the options that were given, by field."""
 
     given: dict[str, Any]
@@ -69,13 +69,13 @@ class AskedView:
 
 
 def with_view_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with the options in place of its parameter ``asked``, an ``AskedView``."""
+    """The command with the options in place of its parameter ``asked``, an ``ViewOptions``."""
 
     @wraps(command)
     def run(**given: Any) -> None:
         # Typer gives an empty list for an option that may be repeated and was not given.
         options = {name: value for name in OPTIONS if (value := given.pop(name)) not in (None, [])}
-        command(asked=AskedView(options), **given)
+        command(asked=ViewOptions(options), **given)
 
     parameters: list[inspect.Parameter] = []
     for parameter in inspect.signature(command, eval_str=True).parameters.values():

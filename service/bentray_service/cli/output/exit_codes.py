@@ -31,9 +31,9 @@ class Commands(TyperGroup):
         try:
             code = super().main(*args, **options)
         except InvalidInput as error:
-            from ...refusals import DatabaseAway, StorageAway, StorageFull
+            from ...refusals import DatabaseUnavailable, StorageFull, StorageUnavailable
 
-            away = isinstance(error, DatabaseAway | StorageAway | StorageFull)
+            away = isinstance(error, DatabaseUnavailable | StorageUnavailable | StorageFull)
             _end(str(error), WORK_FAILED if away else BAD_INPUT)
         except WorkFailed as error:
             _end(str(error), WORK_FAILED)

@@ -7,7 +7,7 @@ from dataclasses import fields
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.cli.options.field_options import OPTIONS, SETTINGS, VIEW, AskedField
+from bentray_service.cli.options.field_options import OPTIONS, SETTINGS, VIEW, FieldOptions
 from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.field_view import CHOICES, FieldView
 
@@ -27,13 +27,13 @@ def test_the_help_names_every_choice() -> None:
 
 
 def test_each_takes_its_own() -> None:
-    asked = AskedField({"samples": 8, "mode": "refract"})
+    asked = FieldOptions({"samples": 8, "mode": "refract"})
     assert asked.settings() == FieldSettings(samples=8)
     assert asked.view() == FieldView(mode="refract")
 
 
 def test_a_wrong_value_is_named() -> None:
     with pytest.raises(InvalidInput, match="scene"):
-        AskedField({"scene": "moon"}).view()
+        FieldOptions({"scene": "moon"}).view()
     with pytest.raises(InvalidInput, match="samples"):
-        AskedField({"samples": 99}).settings()
+        FieldOptions({"samples": 99}).settings()

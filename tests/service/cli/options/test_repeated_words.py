@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bentray_service.cli.options.repeated_words import spread
+from bentray_service.cli.options.repeated_words import repeat_option
 
 
 @pytest.mark.parametrize(
@@ -23,9 +23,9 @@ from bentray_service.cli.options.repeated_words import spread
     ],
 )
 def test_rows(words: str, meant: str) -> None:
-    assert list(spread("-s", words.split())) == meant.split()
+    assert list(repeat_option("-s", words.split())) == meant.split()
 
 
 @given(st.lists(st.text(max_size=4).filter(lambda word: word != "-s")))
 def test_without_the_option_nothing_changes(words: list[str]) -> None:
-    assert list(spread("-s", words)) == words
+    assert list(repeat_option("-s", words)) == words

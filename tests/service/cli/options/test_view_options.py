@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.cli.options.view_options import OPTIONS, AskedView
+from bentray_service.cli.options.view_options import OPTIONS, ViewOptions
 from bentray_workers.rendering.refraction_view import RefractionView
 
 
@@ -22,17 +22,17 @@ def test_every_field_has_an_option_that_tells_its_default() -> None:
 
 
 def test_what_is_left_out_takes_the_default() -> None:
-    assert AskedView({}).view() == (RefractionView(), None)
-    asked = AskedView({"iso": [0.5, 0.7], "index": [1.2, 1.3], "fresnel": True})
+    assert ViewOptions({}).view() == (RefractionView(), None)
+    asked = ViewOptions({"iso": [0.5, 0.7], "index": [1.2, 1.3], "fresnel": True})
     assert asked.view()[0] == RefractionView(iso=(0.5, 0.7), index=(1.2, 1.3), fresnel=True)
 
 
 def test_a_backdrop_may_be_a_file() -> None:
-    view, file = AskedView({"backdrop": "garden.jpg"}).view()
+    view, file = ViewOptions({"backdrop": "garden.jpg"}).view()
     assert (view.backdrop, file) == ("picture", Path("garden.jpg"))
-    assert AskedView({"backdrop": "picture"}).view()[1] is None
+    assert ViewOptions({"backdrop": "picture"}).view()[1] is None
 
 
 def test_a_wrong_value_is_named() -> None:
     with pytest.raises(InvalidInput, match="camera"):
-        AskedView({"camera": "fisheye"}).view()
+        ViewOptions({"camera": "fisheye"}).view()
