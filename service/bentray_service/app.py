@@ -1,4 +1,4 @@
-"""The application: opens the database, the cluster and the runner, and closes them in the other order."""
+"""The ASGI application: opens the parts of the service in order, and closes them in reverse order."""
 
 from __future__ import annotations
 
@@ -71,25 +71,25 @@ from .web.tus_headers import TusHeaders
 from .wiring import Parts
 
 DESCRIPTION = (
-    "Refraction-corrected ultrasound computed tomography. Upload a scan, start a reconstruction, "
-    "watch it, fetch the image. Every error is a problem+json that names the field, what was found and "
-    "what is accepted."
+    "Refraction-corrected ultrasound computed tomography: upload a scan, start a reconstruction, "
+    "watch it, download the image. Every error is a problem+json with the field, the value found and "
+    "the values accepted."
 )
 
-# What is told of routes that the guard keeps; it looks at every request, whatever is said here. Each of them
-# needs the database.
+# OpenAPI description of protected routes; the guard middleware authenticates every request. Protected routes
+# need the database.
 CLOSED: Any = {
-    "dependencies": [Depends(HTTPBearer(auto_error=False, description="A key, where one is asked for."))],
+    "dependencies": [Depends(HTTPBearer(auto_error=False, description="An API key, if required."))],
     "responses": errors.problems(401, 403, 429, 503),
 }
 
 
 def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> FastAPI:
-    """The service as an ASGI application.
+    """Create the ASGI application.
 
     Args:
-        settings: where it keeps its data and what it allows.
-        cluster: an open cluster to use, which stays open; without it the application opens its own.
+        settings: of the service.
+        cluster: an open cluster, which stays open; None: the application opens its own.
     """
 
     @asynccontextmanager
@@ -112,7 +112,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
         redoc_url=None,
         responses=errors.problems("default"),
     )
-    # Set by whoever stops the server, so that endless answers end before it waits for them.
+    # Set when the server stops, so that event streams end before it waits for them.
     app.state.leaving = threading.Event()
     errors.install_handlers(app, tuple(KINDS))
     app.add_middleware(RequestRate, seconds=settings.upload_patience_s)
@@ -134,7 +134,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
 def _open(
     settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack, leaving: threading.Event
 ) -> Parts:
-    """Open every part; ``stack`` closes what has been opened, also when a later part fails."""
+    """Open all parts; ``stack`` closes them, also when a later part fails."""
     stack.enter_context(private_files())
     files = Files(settings.data_dir)
     files.prepare()
@@ -149,7 +149,7 @@ def _open(
         Checksums(database),
     )
     files = Files(settings.data_dir, store)
-    orphans = Orphans(files, database, keeps=settings.storage_url is None)
+    orphans = Orphans(files, database, is_store=settings.storage_url is None)
     orphans.begin()
     quota = Quota(database, settings.max_tenant_bytes)
     quota.begin(files, alone=settings.database_url is None)
@@ -173,7 +173,7 @@ def _open(
         settings.jobs_at_once,
         settings.tenants_at_once,
         settings.min_free_bytes,
-        # The lock on the folder keeps other services away from the database that lies in it.
+        # The lock on the data folder excludes other services from its SQLite database.
         alone=settings.database_url is None,
     )
     runner.start()

@@ -1,17 +1,17 @@
-"""Few arenas of memory for many threads: each keeps what is free in it, and glibc makes a dozen of them."""
+"""Limits the number of malloc arenas of glibc, to reduce the memory use of many threads."""
 
 from __future__ import annotations
 
 import ctypes
 
-# glibc's number for ``mallopt``, of <malloc.h>.
+# Parameter of ``mallopt`` in <malloc.h>.
 M_ARENA_MAX = -8
-# Beside the first: threads hardly allocate at the same time, for they take turns with the interpreter.
+# In addition to the main arena; threads rarely allocate at the same time because of the GIL.
 MOST = 2
 
 
 def limit_arenas() -> None:
-    """To be called before there are threads; where the C library is another, nothing happens."""
+    """Set the limit; to be called before threads are started. No effect with other C libraries."""
     try:
         mallopt = ctypes.CDLL(None).mallopt
     except (AttributeError, OSError, TypeError):

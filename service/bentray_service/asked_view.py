@@ -1,4 +1,4 @@
-"""Views as people ask for them: one query parameter a field, each known, all of them checked."""
+"""Dependencies that build a view from query parameters, one for each field of a dataclass."""
 
 from __future__ import annotations
 
@@ -17,13 +17,10 @@ View = TypeVar("View")
 
 
 def asked_of(kind: type[View]) -> Callable[..., View]:
-    """A dependency that gives the view of a query.
+    """A dependency that builds a view from the query; it raises InvalidInput for unknown parameters.
 
     Args:
         kind: a dataclass whose fields have a ``description`` in their metadata.
-
-    Returns:
-        Raises InvalidInput for a parameter that does not exist, and from the view itself.
     """
     names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
 
@@ -39,7 +36,7 @@ def asked_of(kind: type[View]) -> Callable[..., View]:
 
 
 def _signature(kind: type[Any]) -> inspect.Signature:
-    """What FastAPI reads the parameters from: those of the view, with their meanings."""
+    """The signature for FastAPI: the fields of the view with their descriptions."""
     types = get_type_hints(kind)
     found = [inspect.Parameter("request", inspect.Parameter.KEYWORD_ONLY, annotation=Request)]
     for field in fields(kind):

@@ -1,4 +1,4 @@
-"""The cluster as the service sees it: how many workers there are, and what jobs would take of them."""
+"""The Dask cluster of the service: workers, and plans of jobs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .rows.records import VolumeRow
 
 
 def check_renderable(volume: VolumeRow) -> None:
-    """Refuse a volume that cannot be shown as glass: not in space, uneven, or too large for any worker.
+    """Reject a volume that cannot be rendered: not 3-D, non-uniform spacing, or too large for any worker.
 
     Raises:
         InvalidInput: naming ``volume``.
@@ -31,7 +31,7 @@ def check_renderable(volume: VolumeRow) -> None:
 
 
 class Cluster(Protocol):
-    """What :func:`bentray_workers.cluster.connection.open_cluster` gives; tests bring a lighter one."""
+    """The interface of :func:`bentray_workers.cluster.connection.open_cluster`."""
 
     @property
     def client(self) -> Any: ...
@@ -40,7 +40,7 @@ class Cluster(Protocol):
 
 
 class Compute:
-    """The worker pool of this service."""
+    """The cluster of this service."""
 
     def __init__(self, cluster: Cluster, fetch: Callable[[Path], Path]) -> None:
         """Args:
@@ -52,38 +52,37 @@ class Compute:
 
     @property
     def client(self) -> Any:
-        """The ``distributed.Client`` that jobs are given."""
+        """The ``distributed.Client`` for jobs."""
         return self._cluster.client
 
     def workers(self) -> int:
-        """How many workers are connected now; 0 when the scheduler is gone."""
+        """Number of connected workers; 0 without scheduler."""
         try:
             return int(self._cluster.describe()["workers"])
         except (OSError, TimeoutError):
             return 0
 
     def plan(self, counts: dict[str, Any] | None, path: Path, settings: Settings) -> dict[str, Any]:
-        """How a dataset would be reconstructed by the workers that are connected now.
+        """Plan the reconstruction of a dataset on the connected workers.
 
         Args:
-            counts: what ``files.dataset.record.record_of`` keeps of it; None for one from before they were
-                kept, whose file is read then.
-            path: of its file.
+            counts: from ``files.dataset.record.record_of``; None: they are read from the file.
+            path: of the file.
             settings: of the reconstruction.
 
         Raises:
-            InvalidInput: for tasks that none of them can hold, or a lane that none offers.
+            InvalidInput: when no worker has enough memory or the required resource.
         """
         try:
             offers = probed_capacities(self.client, settings)
         except (OSError, TimeoutError):
-            # The scheduler is gone; the job waits until it is back, on workers of which nothing is known.
+            # Without scheduler, the job waits; its workers are unknown.
             offers = ()
         known = counts_in(self._fetch(path)) if counts is None else DatasetCounts(**counts)
         return planning.plan(known.summary(settings), settings, offers).to_dict()
 
     def plan_simulation(self, asked: PhantomScan) -> dict[str, Any]:
-        """The same of a simulation."""
+        """Plan a simulation in the same way."""
         try:
             offers = capacities_of(self.client)
         except (OSError, TimeoutError):
@@ -91,7 +90,7 @@ class Compute:
         return simulation_planning.plan_simulation(asked, offers).to_dict()
 
     def check_turntable(self, shape: Sequence[int], view: RefractionView) -> None:
-        """Refuse a turntable of a volume of that shape whose pictures no connected worker can draw.
+        """Reject a turntable whose images no connected worker has enough memory for.
 
         Raises:
             InvalidInput: naming ``volume``, with the bytes found and accepted.

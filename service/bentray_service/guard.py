@@ -1,4 +1,4 @@
-"""The one place that every request passes: who asks, whether it may, and what is written down of it."""
+"""Middleware that authenticates and logs every request."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .wiring import Parts
 
 log = logging.getLogger("bentray.access")
 
-# What anybody may see: the pages, which hold no data, and whether the service works. All else is closed.
+# Public paths: pages without data, and health checks. All other paths need authentication.
 PUBLIC = frozenset({"/", "/docs", "/openapi.json", "/health/live", "/health/ready"})
 PUBLIC_FOLDERS = ("/static/", "/problems/")
 
@@ -27,7 +27,7 @@ UNMATCHED = "unmatched"
 
 
 class Guard:
-    """ASGI middleware: puts the caller into ``request.state.caller``, or refuses before the body is read."""
+    """ASGI middleware: sets ``request.state.caller``, or rejects the request before its body is read."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -71,7 +71,7 @@ def _parts(scope: Scope) -> Parts:
 
 
 class _RequestLog:
-    """What went past of one request."""
+    """Collects the log entry of a request."""
 
     def __init__(self, scope: Scope) -> None:
         self._scope = scope
@@ -100,7 +100,7 @@ class _RequestLog:
         return counted
 
     def log_request(self) -> None:
-        """A line for the log, and an entry for the audit where somebody was let in."""
+        """Write a log line, and an entry of the audit log for an authenticated request."""
         route = str(getattr(self._scope.get("route"), "path", UNMATCHED))
         figures: dict[str, Any] = {
             "method": self._scope["method"],
@@ -126,7 +126,7 @@ class _RequestLog:
         )
 
     def _ids(self) -> list[str]:
-        """What was named in the path, and what was made."""
+        """Ids in the path and in the Location of the response."""
         named = [str(value) for value in self._scope.get("path_params", {}).values()]
         made = self.location.rpartition("/")[2]
         return [one[:80] for one in (*named, made) if one]

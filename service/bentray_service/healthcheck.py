@@ -1,10 +1,11 @@
-"""Whether a part of an installation works: ``python -m bentray_service.healthcheck [ADDRESS [worker]]``.
+"""Health check of a service, scheduler or worker: ``python -m bentray_service.healthcheck [ADDRESS
+[worker]]``.
 
-Without an address it asks the service on port 8000 of this machine whether it is ready. The address of a
-Dask scheduler, as ``tcp://127.0.0.1:8786``, asks whether that answers; with the word ``worker`` whether a
-worker of this machine serves it. Ends with 0, or 1 and the reason, or 2 where the words make no sense.
+Without an address, checks the service on port 8000 of this machine. The address of a Dask scheduler, e.g.
+``tcp://127.0.0.1:8786``, checks the scheduler; with ``worker``, a worker of this machine. The exit code is 0,
+1 with a reason, or 2 for wrong arguments.
 
-A container runs it every few seconds, so it imports the standard library alone.
+Containers run it every few seconds, so it imports the standard library only.
 """
 
 from __future__ import annotations
@@ -22,12 +23,12 @@ from urllib.parse import urlsplit
 from bentray_workers.cluster import heartbeat
 
 SECONDS = 10.0
-# Both sides of Dask's protocol begin with a message that holds this name.
+# Both sides of the Dask protocol start with a message that contains this name.
 GREETING = b"pickle-protocol"
 
 
 def check(url: str) -> str | None:
-    """None when the service at ``url`` is ready; otherwise why not, in words."""
+    """None if the service at ``url`` is ready, else the reason."""
     try:
         parts = urlsplit(url)
         kind = http.client.HTTPSConnection if parts.scheme == "https" else http.client.HTTPConnection
@@ -40,34 +41,34 @@ def check(url: str) -> str | None:
             connection.close()
         return None if answer.status == http.client.OK else str(json.loads(body)["detail"])
     except (OSError, http.client.HTTPException, ValueError, KeyError, TypeError) as error:
-        return f"no service answers at {url}: {error}"
+        return f"no answer from a service at {url}: {error}"
 
 
 def check_scheduler(address: str) -> str | None:
-    """None when a Dask scheduler answers at ``address``; otherwise why not.
+    """None if a Dask scheduler answers at ``address``, else the reason.
 
-    With TLS the certificates are those in the folder that ``BENTRAY_TLS_DIR`` names.
+    With TLS, the certificates are in the folder ``BENTRAY_TLS_DIR``.
     """
     try:
         parts = urlsplit(address)
         with _connected(parts.hostname or "", parts.port or 0, secured=parts.scheme == "tls") as connection:
             greeting = connection.recv(4096)
             if GREETING not in greeting:
-                return f"what answers at {address} is no Dask scheduler"
-            # Its own words are those of a peer of its version; a connection that broke off is logged.
+                return f"the server at {address} is not a Dask scheduler"
+            # The greeting is returned, since the scheduler logs incomplete handshakes.
             connection.sendall(greeting)
     except (OSError, ValueError) as error:
-        return f"no scheduler answers at {address}: {error}"
+        return f"no answer from a scheduler at {address}: {error}"
     return None
 
 
 def check_worker(address: str) -> str | None:
-    """None when a worker of this machine serves the scheduler at ``address``; otherwise why not."""
+    """None if a worker of this machine is connected to the scheduler at ``address``, else the reason."""
     silence = heartbeat.silence_s(address)
     if silence is not None and silence <= heartbeat.STALE_S:
         return None
-    known = "none" if silence is None else f"the last {silence:.0f} s ago"
-    return f"no sign of life of a worker of {address}: {known}"
+    known = "none so far" if silence is None else f"the last one {silence:.0f} s ago"
+    return f"no heartbeat of a worker of {address}: {known}"
 
 
 def _connected(host: str, port: int, *, secured: bool) -> socket.socket:
@@ -77,10 +78,10 @@ def _connected(host: str, port: int, *, secured: bool) -> socket.socket:
     folder = os.environ.get("BENTRAY_TLS_DIR")
     try:
         if not folder:
-            raise ValueError("BENTRAY_TLS_DIR names no folder of certificates")
+            raise ValueError("BENTRAY_TLS_DIR is not set to a folder of certificates")
         context = ssl.create_default_context(cafile=str(Path(folder) / "authority.pem"))
         context.load_cert_chain(Path(folder) / "certificate.pem", Path(folder) / "key.pem")
-        # As Dask does: who holds a certificate of the authority is trusted, whatever its name.
+        # As in Dask, any certificate of the authority is accepted, without a check of the host name.
         context.check_hostname = False
         return context.wrap_socket(plain)
     except (OSError, ValueError):
@@ -99,7 +100,7 @@ CHECKS: dict[tuple[str, ...], Callable[[str], str | None]] = {
 
 
 def main(words: list[str]) -> None:
-    """For a container's health check."""
+    """Run the health check of a container."""
     address, *part = words or ["http://127.0.0.1:8000"]
     chosen = CHECKS.get((address.partition("://")[0], *part))
     if chosen is None:

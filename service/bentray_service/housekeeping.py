@@ -1,4 +1,4 @@
-"""The thread that removes what has been kept long enough: uploads that nobody goes on with, and old data."""
+"""Periodic deletion of expired uploads, old data and orphaned files."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from .rows.uploads import Uploads
 log = logging.getLogger("bentray.housekeeping")
 
 INTERVAL_SECONDS = 60.0
-# The store is looked through less often, for it may hold much.
+# Interval between clean-ups of the store, s.
 TIDY_SECONDS = 3600.0
-# How long a large file may take to come to its end there.
+# Longest wait for a file operation when the service stops, s.
 STOP_SECONDS = 30.0
 DAY_S = 86400.0
-# For how long something must be found too old before it goes.
+# Time for which an item must be found expired before it is deleted, s.
 AGE_SECONDS = DAY_S
-# Beyond what clocks are corrected by while they run.
+# Larger steps of the system clock are treated as corrections, s.
 JUMP_SECONDS = 30.0
 
 UPLOAD = "upload"
 
 
 class Housekeeper:
-    """Sweeps every ``INTERVAL_SECONDS``.
+    """Deletes expired items every ``INTERVAL_SECONDS``.
 
-    What is too old goes only once it has been found so for ``AGE_SECONDS`` of observed time, and an upload
-    once more for as long as it is kept: the clock of the machine may have been set wrong for a while.
+    An item is deleted only after it has been found expired for ``AGE_SECONDS`` of observed time (an upload
+    for its keeping time), since the system clock may have been wrong for a while.
     """
 
     def __init__(
@@ -58,14 +58,13 @@ class Housekeeper:
         clocks: Callable[[], tuple[float, float]] = lambda: (time.time(), time.monotonic()),
     ) -> None:
         """Args:
-        uploads, files, deletion, orphans: what it works on.
-        hold: of an upload, so that none vanishes under whoever writes to it.
-        quota: whose reservations are renewed as long as this process lives.
-        ages, observed: what tells since when something is too old.
-        keep_days: how long datasets, volumes and meshes are kept, and jobs that have none of them; None:
-            until they are deleted.
-        upload_keep_s: how long an upload is kept after something came, s.
-        clocks: s since 1970, and seconds that only grow.
+        uploads, files, deletion, orphans: to clean up.
+        hold: locks of uploads.
+        quota: its reservations are renewed while this process lives.
+        ages, observed: marks of expired items, and the observed time.
+        keep_days: maximum age of datasets, volumes, meshes and jobs without them; None: unlimited.
+        upload_keep_s: keeping time of uploads, s.
+        clocks: s since 1970, and monotonic seconds.
         """
         self._uploads = uploads
         self._files = files
@@ -100,14 +99,14 @@ class Housekeeper:
                     self._orphans.sweep(self._leaving.is_set)
                     tidied = time.monotonic()
             except DatabaseUnavailable as error:
-                log.warning("what is old waits: %s", error)
+                log.warning("deletion of old data pauses: %s", error)
             except (SQLAlchemyError, OSError, StorageUnavailable):
-                log.exception("what is old could not be removed; trying again in %g s", INTERVAL_SECONDS)
+                log.exception("old data could not be deleted; next attempt in %g s", INTERVAL_SECONDS)
             if self._leaving.wait(INTERVAL_SECONDS):
                 return
 
     def sweep(self) -> None:
-        """Mark what is too old now, and remove what has been so for long enough."""
+        """Mark expired items, and delete those that have been expired for long enough."""
         now = self._now()
         uploads = {ExpiredItem(row["tenant"], UPLOAD, row["id"]): row for row in self._uploads.expired(now)}
         stored: dict[ExpiredItem, StoredItem] = {}
@@ -125,13 +124,13 @@ class Housekeeper:
                 self._delete(stored[aged])
 
     def _now(self) -> float:
-        """The time of day, s since 1970; notices when it has been set."""
+        """The system time, s since 1970; detects corrections of the clock."""
         wall, steady = self._clocks()
         if self._last is not None:
             jump = (wall - self._last[0]) - (steady - self._last[1])
             if abs(jump) > JUMP_SECONDS:
                 log.warning(
-                    "the clock of this machine was set by %+.0f s; what is too old now waits from here on",
+                    "the system clock was changed by %+.0f s; waiting times of expired items start again",
                     jump,
                 )
                 self._ages.clear()
@@ -141,18 +140,18 @@ class Housekeeper:
     def _delete(self, stored: StoredItem) -> None:
         try:
             self._deletion.delete(stored)
-            log.info("%s of %s was kept long enough", stored.id, stored.tenant)
+            log.info("deleted %s of %s after its keeping time", stored.id, stored.tenant)
         except (InUse, UnknownId):
-            # A job still needs it, or it went with what it was made of.
+            # Needed by a job, or already deleted.
             pass
 
     def forget(self, row: UploadRow) -> None:
-        """Remove an upload; what it has become stays.
+        """Delete an upload; a stored result is kept.
 
         Raises:
             InUse: while it is being read.
         """
         if row["state"] == "reading":
-            raise InUse("upload", f"{row['id']}, which is being read", "one that is not")
+            raise InUse("upload", f"{row['id']}, which is being read", "an upload that is not being read")
         remove(self._files.of(row["tenant"]).upload(row["id"]))
         self._uploads.remove(row["id"])

@@ -1,4 +1,4 @@
-"""Lines of the log: as words for a person or as JSON, with the request and the job, without any secret."""
+"""Log formatters for text and JSON, with request and job ids and without secrets."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from contextvars import ContextVar
 from datetime import UTC, datetime
 from typing import Literal
 
-# What is being worked on: the id of the request, of the job.
+# Ids of the current request and job.
 _ABOUT: ContextVar[dict[str, str]] = ContextVar("bentray_about")
 
-# Whole keys, and passwords in addresses of databases; what is in the first group stays.
+# API keys and passwords in database addresses; the first group is kept.
 _SECRETS = (
     re.compile(r"(bentray_[0-9a-f]{12}_)[0-9a-f]{40}"),
     re.compile(r"(://[^\s:/@]*:)[^\s/@]+(?=@)"),
 )
 
-# Where Dask shows a traceback for what it still had to say when a connection closed, as at each stop. What is
-# lost with a connection, others tell.
+# Dask logs tracebacks of unsent messages when a connection is closed, also at every shutdown. Lost
+# connections are logged elsewhere.
 CLOSED = "distributed.batched"
 
-# Loggers of what any client can bring about as often as it likes.
+# Loggers whose messages any client can trigger.
 PROVOKED = ("bentray.connections", "uvicorn.error", "asyncio")
 SELDOM_S = 60.0
 
 
 @contextmanager
 def about(**what: str) -> Iterator[None]:
-    """Every line logged in the block, also by threads that it starts tasks in, says what it is about."""
+    """Add ids to all log lines within the block, also in tasks started there."""
     token = _ABOUT.set({**_ABOUT.get({}), **what})
     try:
         yield
@@ -43,14 +43,14 @@ def about(**what: str) -> Iterator[None]:
 
 
 def without_secrets(text: str) -> str:
-    """The same with ``***`` in place of every key and password."""
+    """Replace keys and passwords by ``***``."""
     for secret in _SECRETS:
         text = secret.sub(r"\1***", text)
     return text
 
 
 class TextFormatter(logging.Formatter):
-    """For a terminal; what a client sent cannot begin a line of its own."""
+    """Format for a terminal; control characters from clients are escaped."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - the name of the library
         return "".join(
@@ -68,7 +68,7 @@ class TextFormatter(logging.Formatter):
 
 
 class JsonFormatter(logging.Formatter):
-    """JSON, one object a line."""
+    """One JSON object per line."""
 
     def format(self, record: logging.LogRecord) -> str:
         line = {
@@ -85,7 +85,7 @@ class JsonFormatter(logging.Formatter):
 
 
 class _Stderr(logging.Handler):
-    """Writes to whatever stderr is by then."""
+    """Writes to the current ``sys.stderr``."""
 
     def emit(self, record: logging.LogRecord) -> None:
         try:
@@ -96,13 +96,13 @@ class _Stderr(logging.Handler):
 
 
 class RateLimitFilter(logging.Filter):
-    """Lets each kind of line through once in ``SELDOM_S``, with the number of those that were held back."""
+    """Passes each kind of message once per ``SELDOM_S``, with the number of suppressed ones."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
         self._clock = clock
         self._lock = threading.Lock()
-        # By logger, level and words, oldest first: when it was let through, and how many were not since.
+        # By logger, level and message, oldest first: time of the last output, suppressed messages since.
         self._known: dict[tuple[str, int, str], tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
@@ -119,17 +119,16 @@ class RateLimitFilter(logging.Filter):
                     break
                 del self._known[old]
         if held:
-            record.msg, record.args = f"{record.getMessage()} (and {held} times since it was last said)", ()
+            record.msg, record.args = f"{record.getMessage()} (suppressed {held} times)", ()
         return True
 
 
 @contextmanager
 def configured(form: Literal["text", "json"]) -> Iterator[None]:
-    """In the block every logger of this process writes to stderr, in one form.
+    """Send all loggers of this process to stderr within the block.
 
-    As words, what a person should know of; as JSON also a line for each request. What clients can bring about
-    at will is told once a minute. Enter it once all that has
-    handlers of its own, as Dask does, is imported.
+    Text has warnings; JSON also has one line per request. Messages that clients can trigger are limited to
+    one per minute. To be entered after all imports that add handlers, such as Dask.
     """
     handler = _Stderr()
     handler.setFormatter(TextFormatter() if form == "text" else JsonFormatter())

@@ -1,7 +1,7 @@
-"""What Prometheus is told: how requests go, what the queue holds, and what is left of workers and disk.
+"""Prometheus metrics of requests, jobs, workers and disk.
 
-Names begin with ``bentray_`` and end with their unit in the plural (``_seconds``, ``_bytes``), counters after
-it with ``_total``. No metric has a label whose values a client can choose.
+Names start with ``bentray_`` and end with the unit in the plural (``_seconds``, ``_bytes``), counters with
+``_total``. No label has values that clients can choose.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from .rows.schema import STATES
 if TYPE_CHECKING:
     from .wiring import Parts
 
-# From a status poll to a picture that a worker draws.
+# From a status poll to a rendered image.
 BUCKETS_S = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0)
 
 UNMATCHED = "unmatched"
 
 
 class Metrics:
-    """The metrics of one application.
+    """The metrics of an application.
 
     Attributes:
-        registry: all of them.
+        registry: of all metrics.
     """
 
     def __init__(self) -> None:
@@ -43,20 +43,20 @@ class Metrics:
         )
         self._seconds = Histogram(
             "bentray_http_request_duration_seconds",
-            "From the first byte of a request to the last of its answer.",
+            "Time from the first byte of a request to the last byte of its response.",
             labels,
             buckets=BUCKETS_S,
             registry=self.registry,
         )
         self._received = Counter(
-            "bentray_http_received_bytes_total", "Bytes of bodies received.", labels, registry=self.registry
+            "bentray_http_received_bytes_total", "Bytes of request bodies.", labels, registry=self.registry
         )
         self._in_flight = Gauge(
-            "bentray_http_requests_in_flight", "Requests that are being answered.", registry=self.registry
+            "bentray_http_requests_in_flight", "Requests in progress.", registry=self.registry
         )
 
     def watch(self, parts: Parts) -> None:
-        """Tell of an open service, too; read when it is asked for."""
+        """Add metrics of an open service, collected on request."""
         self.registry.register(_ServiceCollector(parts))
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
@@ -99,12 +99,12 @@ def _method(scope: Scope) -> str:
 
 
 def _route(scope: Scope) -> str:
-    """The path as the route writes it, as ``/v1/jobs/{job_id}``."""
+    """The path template of the route, e.g. ``/v1/jobs/{job_id}``."""
     return str(getattr(scope.get("route"), "path", UNMATCHED))
 
 
 class _ServiceCollector(Collector):
-    """Reads the parts of a service when Prometheus asks; what cannot be read is left out."""
+    """Collects the metrics of the parts of a service; unavailable ones are omitted."""
 
     def __init__(self, parts: Parts) -> None:
         self._parts = parts
@@ -124,10 +124,10 @@ class _ServiceCollector(Collector):
                 waiting.add_metric([state], counts.get(state, 0))
             yield waiting
             age = 0.0 if oldest is None else max(0.0, time.time() - oldest)
-            yield _gauge("bentray_jobs_oldest_queued_seconds", "Age of the job that waits longest.", age)
-        yield _gauge("bentray_workers", "Dask workers connected.", parts.compute.workers())
+            yield _gauge("bentray_jobs_oldest_queued_seconds", "Age of the oldest queued job.", age)
+        yield _gauge("bentray_workers", "Connected Dask workers.", parts.compute.workers())
         up = float(parts.files.store.fault() is None)
-        yield _gauge("bentray_storage_up", "Whether what keeps the files answers.", up)
+        yield _gauge("bentray_storage_up", "Whether the store is available.", up)
         free = shutil.disk_usage(parts.files.root).free
         yield _gauge("bentray_disk_free_bytes", "Free space in the data folder.", free)
 

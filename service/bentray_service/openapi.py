@@ -10,7 +10,7 @@ from .settings import ServiceSettings
 
 
 def description() -> str:
-    """The OpenAPI document as text; the same on every machine."""
+    """The OpenAPI document as text; it is the same on every machine."""
     document = create_app(ServiceSettings.model_construct()).openapi()
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 

@@ -1,4 +1,4 @@
-"""The render lane shared out: a task a worker at a time, tenants in turn, no more than can be done soon."""
+"""The queue of rendering tasks: one task per worker at a time, tenants take turns, limited waiting time."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from bentray_workers.cluster.capacities import WorkerCapacity
 from .refusals import RateLimited
 from .rows.tenants import Tenant
 
-# A picture that would be done later than this, by what is known of those before it, is refused, s.
+# Maximum estimated waiting time of a new image, s.
 LATEST_S = 60.0
-# Pictures of a tenant, and of all of them, that are drawn or wait.
+# Maximum number of images in progress, per tenant and in total.
 MOST_OF_TENANT, MOST_IN_ALL = 64, 256
-# A task that may take longer than this leaves one worker free for shorter ones, s.
+# One worker is kept free of tasks that may take longer than this, s.
 LONG_S = 3.0
-# How old the list of workers may be, s; it is read anew while something waits for one.
+# Maximum age of the list of workers, s.
 FRESH_S = 1.0
 
 
 @dataclass
 class _Waiter:
-    """A task that waits for a worker."""
+    """A task waiting for a worker."""
 
     fits: Callable[[WorkerCapacity], bool]
     long: bool
@@ -36,23 +36,22 @@ class _Waiter:
 
 
 class PictureQueue:
-    """Which tenant's task is next, and on which worker.
+    """Assigns rendering tasks to workers.
 
-    Every worker takes one task of a picture at a time, so nothing waits where it cannot be overtaken. A
-    worker that becomes free goes to the tenant whose last turn is longest ago. All of it is used from one
-    event loop.
+    Every worker has at most one rendering task. A free worker is assigned to the tenant served least
+    recently. To be used from one event loop only.
     """
 
     def __init__(self, workers: Callable[[], Awaitable[Mapping[str, WorkerCapacity]]]) -> None:
         """Args:
-        workers: gives the connected ones by address; none while the scheduler is away.
+        workers: returns the connected workers by address; none without scheduler.
         """
         self._ask_workers = workers
         self._workers: Mapping[str, WorkerCapacity] = {}
         self._asked = -math.inf
         self._busy: dict[str, bool] = {}
         self._waiting: dict[Tenant, list[_Waiter]] = {}
-        # Of tenants with a picture in hand: seconds of a core, pictures, and which turn was the last.
+        # By tenant with images in progress: CPU time, number of images, last turn.
         self._seconds: dict[Tenant, float] = {}
         self._pictures: Counter[Tenant] = Counter()
         self._served: dict[Tenant, int] = {}
@@ -60,21 +59,21 @@ class PictureQueue:
         self._refreshing: asyncio.Task[None] | None = None
 
     async def workers(self) -> Mapping[str, WorkerCapacity]:
-        """Those that are connected now, or were a moment ago, by address."""
+        """The connected workers by address, at most ``FRESH_S`` old."""
         if time.monotonic() - self._asked > FRESH_S:
             await self._refresh()
         return self._workers
 
     def offer(self, address: str) -> WorkerCapacity:
-        """Of a worker that was given out; of one that has left meanwhile, that of no limits."""
+        """The capacity of a worker; unlimited for a worker that has left."""
         return self._workers.get(address, WorkerCapacity(0, ()))
 
     @asynccontextmanager
     async def admitted(self, tenant: Tenant, seconds: float) -> AsyncIterator[None]:
-        """One picture in hand, of so many seconds of a core.
+        """Admit an image with an estimated CPU time, for the duration of the block.
 
         Raises:
-            TooOften: where too many are in hand, or it would be done too late.
+            RateLimited: when there are too many images in progress, or it would take too long.
         """
         self._check(tenant, seconds)
         self._pictures[tenant] += 1
@@ -92,12 +91,12 @@ class PictureQueue:
     async def place(
         self, tenant: Tenant, fits: Callable[[WorkerCapacity], bool], *, long: bool
     ) -> AsyncIterator[str]:
-        """A worker's render lane, by the worker's address; waits until it is this task's turn.
+        """Wait for a worker and yield its address.
 
         Args:
-            tenant: whose task it is.
-            fits: whether a worker can hold it.
-            long: whether it may take longer than ``LONG_S``.
+            tenant: owner of the task.
+            fits: whether a worker has enough capacity.
+            long: whether the task may take longer than ``LONG_S``.
         """
         waiter = _Waiter(fits, long, asyncio.get_running_loop().create_future())
         self._waiting.setdefault(tenant, []).append(waiter)
@@ -118,11 +117,11 @@ class PictureQueue:
             self._leave(address)
 
     def waiting(self) -> dict[Tenant, int]:
-        """Tasks that wait for a worker, by tenant."""
+        """Number of waiting tasks by tenant."""
         return {tenant: len(waiters) for tenant, waiters in self._waiting.items()}
 
     async def close(self) -> None:
-        """Ask for no workers any more."""
+        """Stop polling for workers."""
         if self._refreshing is not None:
             self._refreshing.cancel()
             with suppress(asyncio.CancelledError):
@@ -130,21 +129,21 @@ class PictureQueue:
 
     def _check(self, tenant: Tenant, seconds: float) -> None:
         own = self._seconds.get(tenant, 0.0) + seconds
-        # Those who take turns with it cannot get more than it does meanwhile.
+        # Tenants take turns, so each of them delays this one by at most its own time.
         others = sum(min(each, own) for other, each in self._seconds.items() if other != tenant)
         late = (own + others) / max(1, len(self._workers)) - LATEST_S
         held, all_of_them = self._pictures[tenant], self._pictures.total()
         if all_of_them and late > 0.0:
-            found = f"{held} pictures of this tenant in hand, {all_of_them} in all"
-            accepted = f"pictures that can be drawn in about {LATEST_S:g} s; see Retry-After"
+            found = f"{held} images of this tenant in progress, {all_of_them} in total"
+            accepted = f"images that can be rendered in about {LATEST_S:g} s; see Retry-After"
             raise RateLimited("pictures", found, accepted, min(LATEST_S, max(1.0, late)))
         if held >= MOST_OF_TENANT or all_of_them >= MOST_IN_ALL:
-            found = f"{held} in hand of this tenant, {all_of_them} in all"
-            accepted = f"fewer than {MOST_OF_TENANT} of a tenant and {MOST_IN_ALL} in all; see Retry-After"
+            found = f"{held} images of this tenant in progress, {all_of_them} in total"
+            accepted = f"fewer than {MOST_OF_TENANT} per tenant and {MOST_IN_ALL} in total; see Retry-After"
             raise RateLimited("pictures", found, accepted, 1.0)
 
     def _assign(self) -> None:
-        """Give free workers to those who wait, first to the tenant whose last turn is longest ago."""
+        """Assign free workers to waiting tasks, first of the tenant served least recently."""
         given = True
         while given:
             in_turn = sorted(self._waiting, key=lambda tenant: self._served.get(tenant, 0))
@@ -152,7 +151,7 @@ class PictureQueue:
 
     def _give(self, tenant: Tenant) -> bool:
         for waiter in self._waiting[tenant]:
-            # Cancelled ones are gone in a moment.
+            # Cancelled tasks are about to be removed.
             address = None if waiter.place.done() else self._free_for(waiter)
             if address is not None:
                 self._busy[address] = waiter.long

@@ -1,4 +1,4 @@
-"""Pictures and files that workers make while somebody waits: in turn, bounded, ended with the request."""
+"""Rendering of images and export of files on workers, with time limits and cancellation."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ from .refusals import Busy, StorageFull
 from .rows.records import DatasetRow, FieldRow, VolumeRow
 from .rows.tenants import Tenant
 
-# From the admission of a picture to its end.
+# Time limit of an image, s.
 RENDER_SECONDS = 120.0
-# Above the tasks of reconstructions, so that a picture is next when a lane is shared.
+# Higher than the priority of reconstruction tasks.
 RENDER_PRIORITY = 10
-# Threads that hand tasks out and fetch results; none of them waits for a task.
+# Threads that submit tasks and fetch results, without waiting for tasks.
 THREADS = 8
-# The scheduler is asked for its workers, and a task that is not done is looked after, s.
+# Time limit for the list of workers, and interval between checks of a running task, s.
 ASK_S, LOOK_S = 5.0, 5.0
 FULL = (errno.ENOSPC, errno.EDQUOT)
-# How often a task may see its worker leave.
+# Maximum number of attempts when workers leave.
 MOST_TRIES = 2
 
 Found = TypeVar("Found")
 
 
 class Pictures:
-    """What the render lane of the workers does for this service.
+    """Rendering on the workers of this service.
 
-    Every method waits without holding a thread, and may be cancelled, which ends the work on the cluster.
-    They raise InvalidInput for what takes too long or more memory than any worker has, and from the task
-    itself; TooOften where too much waits already; Busy where it was not done in time.
+    Methods wait without a thread; cancellation ends the work on the cluster. They raise InvalidInput for too
+    large or too slow requests and from the task itself, RateLimited when too many images are in progress,
+    and Busy after the time limit.
     """
 
     def __init__(self, cluster: Cluster, fetch: Callable[[Path], Path]) -> None:
@@ -68,13 +68,13 @@ class Pictures:
         self._queue = PictureQueue(self._workers)
 
     async def slice_png(self, tenant: Tenant, volume: VolumeRow, path: Path, how: dict[str, Any]) -> bytes:
-        """One slice of a volume as PNG.
+        """Render one slice of a volume as PNG.
 
         Args:
-            tenant: whose turn it takes.
+            tenant: owner.
             volume: its row.
             path: of its file.
-            how: as in ``bentray_workers.images.slice``, or ``volume_slice`` of an upload.
+            how: arguments of ``bentray_workers.images.slice``, or ``volume_slice`` for an upload.
         """
         cost = picture_cost.slice_cost(VolumeFile.of(volume), how.get("size"))
         draw = drawing_tasks.slice_png if "job_id" in volume else drawing_tasks.volume_slice_png
@@ -83,55 +83,55 @@ class Pictures:
     async def refraction_png(
         self, tenant: Tenant, volume: VolumeRow, path: Path, view: RefractionView
     ) -> bytes:
-        """A volume as glass."""
+        """Render a volume with refraction."""
         cost = picture_cost.refraction_cost(VolumeFile.of(volume), view)
         what = "volume", f"shape {tuple(volume['shape'])}", cost
         return bytes(await self._made(tenant, what, path, lambda here: refraction.tasks_of(here, view)))
 
     async def field_png(self, tenant: Tenant, field: FieldRow, folder: Path, view: FieldView) -> bytes:
-        """A scene with a geometry field."""
+        """Render a scene with a geometry field."""
         what = "field", str(field["id"]), picture_cost.field_cost(field["figures"], view)
         return bytes(await self._made(tenant, what, folder, lambda here: field_picture.tasks_of(here, view)))
 
     async def field_map_png(self, tenant: Tenant, field: FieldRow, folder: Path, which: str) -> bytes:
-        """The geometry image of a field, as ``bentray_workers.rendering.field_picture.map_png``."""
+        """Render the geometry image of a field, see ``bentray_workers.rendering.field_picture.map_png``."""
         what = "field", str(field["id"]), picture_cost.map_cost(field["figures"])
         return bytes(await self._one(tenant, what, folder, field_picture.map_png, {"what": which}))
 
     async def quality(self, tenant: Tenant, dataset: DatasetRow, path: Path, picker: str) -> dict[str, Any]:
-        """The examination of a dataset file, see ``bentray_workers.reconstruction.quality_report``."""
+        """Create the quality report of a dataset, see ``bentray_workers.reconstruction.quality_report``."""
         what = "dataset", str(dataset["id"]), picture_cost.quality_cost(dataset)
         return dict(await self._one(tenant, what, path, quality_report, {"picker": picker}))
 
     async def quality_png(self, tenant: Tenant, dataset: DatasetRow, path: Path, picker: str) -> bytes:
-        """The page about it."""
+        """Render the quality report of a dataset."""
         what = "dataset", str(dataset["id"]), picture_cost.quality_cost(dataset)
         return bytes(await self._one(tenant, what, path, quality_page, {"picker": picker}))
 
     async def mesh_volume(
         self, tenant: Tenant, volume: VolumeRow, path: Path, iso: float | None, step: int, target: Path
     ) -> dict[str, Any]:
-        """The iso-surface of a volume as a mesh file; as ``isosurface_mesh.mesh_volume``."""
+        """Extract the iso-surface of a volume to a mesh file, see ``isosurface_mesh.mesh_volume``."""
         what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.mesh_cost(VolumeFile.of(volume))
         how = {"iso": iso, "step": step, "target": target}
         return dict(await self._one(tenant, what, path, mesh_volume, how))
 
     async def export(self, tenant: Tenant, volume: VolumeRow, path: Path, target: Path, name: str) -> None:
-        """A volume in another format, a key of ``volume_export.FORMATS``."""
+        """Export a volume to another format, a key of ``volume_export.FORMATS``."""
         what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.export_cost(VolumeFile.of(volume))
         how = {"target": target, "name": name}
         await self._one(tenant, what, path, volume_export.export_volume, how)
 
     def waiting(self) -> dict[Tenant, int]:
-        """PictureTasks that wait for a worker, by tenant."""
+        """Number of waiting tasks by tenant."""
         return self._queue.waiting()
 
     async def close(self) -> None:
-        """Ask for no workers any more, in the loop that asked."""
+        """Stop polling for workers, in the event loop that uses this object."""
         await self._queue.close()
 
     def stop(self) -> None:
-        """Begin nothing more."""
+        """Start no further tasks."""
         for pool in (self._threads, self._asker):
             pool.shutdown(wait=False, cancel_futures=True)
 
@@ -153,14 +153,14 @@ class Pictures:
         tasks_of: Callable[[Path], PictureTasks],
         how: Mapping[str, Any] | None = None,
     ) -> Any:
-        """The result of some tasks.
+        """Run tasks and return the result of the last one.
 
         Args:
-            tenant: whose turn it takes.
-            what: the field that a refusal names, what it found, and the cost.
-            path: of what is read, to be brought first.
-            tasks_of: gives the tasks for where it lies.
-            how: more arguments of each task.
+            tenant: owner.
+            what: field and value for a refusal, and the cost.
+            path: input, fetched from the store first.
+            tasks_of: creates the tasks for the path.
+            how: further arguments of each task.
         """
         field, found, cost = what
         workers = await self._queue.workers()
@@ -171,19 +171,19 @@ class Pictures:
                 try:
                     return await _Run(self, tenant, cost, dict(how or {})).all(tasks)
                 except (InvalidInput, FileNotFoundError):
-                    # What is deleted or damaged meanwhile is told as that, not as a worker sees it.
+                    # Report an input that was deleted or damaged in the meantime.
                     await self._in_thread(lambda: self._fetch(path))
                     raise
         except TimeoutError:
             raise Busy(
-                "workers", f"no answer in {RENDER_SECONDS:g} s", "another try, or more workers"
+                "workers", f"no answer in {RENDER_SECONDS:g} s", "a later request, or more workers"
             ) from None
 
     async def _in_thread(self, work: Callable[[], Found]) -> Found:
         return await asyncio.get_running_loop().run_in_executor(self._threads, work)
 
     async def _workers(self) -> dict[str, WorkerCapacity]:
-        """The connected workers; none while the scheduler is away."""
+        """The connected workers; none without scheduler."""
         if self._asking is None or self._asking.done():
             self._asking = asyncio.get_running_loop().run_in_executor(
                 self._asker, lambda: capacities_by_address(self._cluster.client)
@@ -195,7 +195,7 @@ class Pictures:
 
 
 class _Run:
-    """The tasks of one picture."""
+    """The tasks of one image."""
 
     def __init__(self, pictures: Pictures, tenant: Tenant, cost: Cost, how: dict[str, Any]) -> None:
         self._pictures, self._tenant, self._cost, self._how = pictures, tenant, cost, how
@@ -203,10 +203,10 @@ class _Run:
         self._begun: list[Any] = []
 
     async def all(self, tasks: PictureTasks) -> Any:
-        """Run them and fetch the result of the last; all of them are released at the end."""
+        """Run the tasks and return the result of the last one; all are released at the end."""
         running: list[asyncio.Task[Any]] = []
         try:
-            # The first one tells how long the others will take.
+            # The first task shows how long the others will take.
             first = await self._ended(tasks.tiles[0])
             running = [asyncio.create_task(self._ended(part)) for part in tasks.tiles[1:]]
             last = first
@@ -221,7 +221,7 @@ class _Run:
                 future.release()
 
     async def _ended(self, task: tuple[Any, ...]) -> Any:
-        """The future of a task that has been done; raises what the task did."""
+        """Run a task; returns its future, or raises its error."""
         for _ in range(MOST_TRIES):
             async with self._pictures._queue.place(self._tenant, self._fits, long=self._long) as address:
                 begun = time.monotonic()
@@ -233,17 +233,17 @@ class _Run:
                         await self._result(future)
                     return future
                 future.release()
-        raise Busy("workers", f"{MOST_TRIES} that left while they drew this", "another try, or more workers")
+        raise Busy("workers", f"{MOST_TRIES} that left during this task", "a later request, or more workers")
 
     async def _result(self, future: Any) -> Any:
-        """What a task gave, or raised."""
+        """The result of a task; its error is raised."""
 
         def fetched() -> Any:
             try:
                 return future.result(timeout=RENDER_SECONDS)
             except (KilledWorker, CancelledError) as error:
-                found = f"one that was lost while it drew this ({type(error).__name__})"
-                raise Busy("workers", found, "another try, or more workers") from error
+                found = f"one lost during this task ({type(error).__name__})"
+                raise Busy("workers", found, "a later request, or more workers") from error
             except OSError as error:
                 if error.errno not in FULL:
                     raise
@@ -261,12 +261,12 @@ class _Run:
         )
 
     async def _leaves(self, future: Any, address: str) -> bool:
-        """Wait until a task has been done; whether its worker leaves before."""
+        """Wait for the end of a task; returns True if its worker leaves before."""
         loop = asyncio.get_running_loop()
         done = asyncio.Event()
 
         def tell(_: Any) -> None:
-            # Nobody listens once the service has stopped.
+            # The event loop is closed after the service has stopped.
             with suppress(RuntimeError):
                 loop.call_soon_threadsafe(done.set)
 

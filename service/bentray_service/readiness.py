@@ -1,4 +1,4 @@
-"""Whether the service can do its work: looked at by a thread of its own, so that nothing else delays it."""
+"""The readiness check, in a thread of its own with a time limit."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from .jobs.runner import Runner
 from .refusals import NotReady
 from .rows.database import Database
 
-# Who asks is answered within this time, s; a part that takes longer is a fault.
+# Time limit of the check, s.
 WITHIN_S = 3.0
 
 
 @dataclass(frozen=True)
 class ReadinessReport:
-    """What a look gave.
+    """The result of a check.
 
     Attributes:
         faults: (part, found, needed) of each part that does not work.
-        workers: connected.
-        free_bytes: in the data folder.
+        workers: number of connected workers.
+        free_bytes: free space in the data folder.
     """
 
     faults: tuple[tuple[str, str, str], ...]
@@ -39,7 +39,7 @@ class ReadinessReport:
 
 
 class Readiness:
-    """Looks at every part when somebody asks, one look at a time however many ask."""
+    """Checks all parts on request; concurrent requests share one check."""
 
     def __init__(
         self,
@@ -50,19 +50,19 @@ class Readiness:
         min_free_bytes: int,
     ) -> None:
         """Args:
-        database, files, compute: that are looked at.
-        threads: what has threads that must be alive, by name.
-        min_free_bytes: free space below which the disk is a fault.
+        database, files, compute: to check.
+        threads: parts with threads, by name.
+        min_free_bytes: minimum free disk space.
         """
         self._database, self._files, self._compute = database, files, compute
         self._threads, self._min_free_bytes = threads, min_free_bytes
         self._pool = ThreadPoolExecutor(1, "readiness")
         self._inspecting: asyncio.Future[ReadinessReport] | None = None
-        # What the thread looks at now.
+        # The part that is being checked.
         self._part = "service"
 
     async def report(self) -> ReadinessReport:
-        """What a look gives that is under way, or a new one.
+        """The result of the current check, or of a new one.
 
         Raises:
             NotReady: naming the part that does not answer in time.
@@ -73,10 +73,12 @@ class Readiness:
             async with asyncio.timeout(WITHIN_S):
                 return await asyncio.shield(self._inspecting)
         except TimeoutError:
-            raise NotReady([(self._part, f"no answer in {WITHIN_S:g} s", "an answer in that time")]) from None
+            raise NotReady(
+                [(self._part, f"no answer in {WITHIN_S:g} s", "an answer within this time")]
+            ) from None
 
     def stop(self) -> None:
-        """Look no more; a look that still waits for a part is left behind."""
+        """Start no further checks."""
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def _inspect(self) -> ReadinessReport:
@@ -86,7 +88,7 @@ class Readiness:
             self._database.probe()
         except SQLAlchemyError as error:
             found = error.value if isinstance(error, InvalidInput) else type(error).__name__
-            faults.append(("database", found, "a database that can be written"))
+            faults.append(("database", found, "a writable database"))
         self._part = "disk"
         free = shutil.disk_usage(self._files.root).free
         if free < self._min_free_bytes:
@@ -94,12 +96,12 @@ class Readiness:
             faults.append(("disk", f"{free} bytes free", needed))
         self._part = "storage"
         if fault := self._files.store.fault():
-            faults.append(("storage", fault, "a bucket that can be read (BENTRAY_STORAGE_URL)"))
+            faults.append(("storage", fault, "a readable bucket (BENTRAY_STORAGE_URL)"))
         self._part = "workers"
         workers = self._compute.workers()
         if workers == 0:
             faults.append(("workers", "0 connected", "at least one Dask worker"))
         for part, owner in self._threads.items():
             if not owner.alive():
-                faults.append((part, "a thread has ended", "every thread alive; start the service anew"))
+                faults.append((part, "a thread has ended", "all threads alive; restart the service"))
         return ReadinessReport(tuple(faults), workers, free)

@@ -1,4 +1,4 @@
-"""What the service refuses beside plain bad input; each names the field, what was found and what is taken."""
+"""Errors of the service with the field, the value found and the values accepted."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.errors import InvalidInput
 
-# Where things are listed that are not called as their ids are.
+# Resources with irregular plurals.
 LISTED = {"mesh": "meshes", "field": "geometry-fields"}
 
 
 class Refusal(InvalidInput):
-    """A refusal whose constructor takes other arguments than the three parts; it is pickled by these."""
+    """A refusal whose constructor has other arguments; it is pickled as plain InvalidInput."""
 
     def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
         return InvalidInput, (self.field, self.value, self.accepted)
 
 
 class UnknownId(Refusal):
-    """Nothing of this kind has this id."""
+    """No item has this id."""
 
     def __init__(self, field: str, value: str) -> None:
         listed = LISTED.get(field, f"{field}s")
@@ -28,22 +28,24 @@ class UnknownId(Refusal):
 
 
 class Deleted(Refusal, FileNotFoundError):  # noqa: N818 - a refusal, like the others
-    """It was deleted while the request was on its way."""
+    """The item was deleted during the request."""
 
     def __init__(self, name: str) -> None:
-        InvalidInput.__init__(self, "id", f"{name}, which has been deleted", "an id of what is there")
+        InvalidInput.__init__(self, "id", f"{name}, which has been deleted", "the id of an existing item")
 
 
 class Damaged(Refusal):
-    """What lies on the disk is not what was stored."""
+    """The content of a stored file has changed."""
 
     def __init__(self, name: str, found: str) -> None:
-        accepted = "the bytes that were stored: restore its file from a backup, or delete it and make it anew"
+        accepted = (
+            "the original content: restore the file from a backup, or delete the item and create it again"
+        )
         super().__init__("stored data", f"{name}, {found}", accepted)
 
 
 class WrongMediaType(Refusal):
-    """The Content-Type of the request is not one that the route takes."""
+    """The Content-Type is not accepted."""
 
     def __init__(self, found: str | None, accepted: Sequence[str]) -> None:
         super().__init__("Content-Type", repr(found) if found else "nothing", " or ".join(accepted))
@@ -54,82 +56,82 @@ class EmptyBody(InvalidInput):
 
 
 class TooLarge(InvalidInput):
-    """The body is larger than the service takes."""
+    """The body is too large."""
 
 
 class BodyTimeout(InvalidInput):
-    """The body hardly comes."""
+    """The body is received too slowly."""
 
 
 class TinyChunks(InvalidInput):
-    """The body comes in chunks so small that most of the work is with them."""
+    """The body is sent in too many small chunks."""
 
 
 class MalformedRequest(InvalidInput):
-    """What came is no HTTP."""
+    """The request is not valid HTTP."""
 
 
 class UnknownMethod(InvalidInput):
-    """The method is one that nothing here knows."""
+    """The HTTP method is unknown."""
 
 
 class HeadersTooLarge(InvalidInput):
-    """The head of the request is too long."""
+    """The request headers are too long."""
 
 
 class TooManyConnections(InvalidInput):
-    """So many connections are open that this one cannot be served."""
+    """Too many connections are open."""
 
 
 class WrongProtocol(InvalidInput):
-    """The request does not speak the version of the upload protocol that the service does."""
+    """The request has another version of the upload protocol."""
 
 
 class WrongOffset(InvalidInput):
-    """What was sent does not begin where the upload stands."""
+    """The offset of the data differs from that of the upload."""
 
 
 class Locked(InvalidInput):
-    """Another request is at work on it."""
+    """Another request uses the upload."""
 
 
 class WrongChecksum(InvalidInput):
-    """What came is not what was sent."""
+    """The received data does not match its checksum."""
 
 
 class UnknownChecksum(InvalidInput):
-    """The checksum is of a kind that the service does not know."""
+    """The checksum algorithm is unknown."""
 
 
 class InUse(InvalidInput):
-    """A job that is not at its end needs it."""
+    """An unfinished job needs the item."""
 
 
 class JobFinished(InvalidInput):
-    """The job has ended, so nothing can be asked of it any more."""
+    """The job has ended and cannot be changed."""
 
 
 class KeyReused(InvalidInput):
-    """The idempotency key came with another request before."""
+    """The idempotency key was used with another request."""
 
 
 class QueueFull(InvalidInput):
-    """So many jobs wait already that no more are taken for now."""
+    """Too many jobs are queued."""
 
 
 class NotAuthenticated(InvalidInput):
-    """The caller is not known."""
+    """The caller is not authenticated."""
 
 
 class Forbidden(InvalidInput):
-    """The caller is known, and may not do this."""
+    """The caller does not have the required permission."""
 
 
 class RateLimited(Refusal):
-    """The tenant asks more often than it may.
+    """The tenant exceeds a rate limit.
 
     Attributes:
-        wait_s: after which it may again.
+        wait_s: time until the next request is accepted, s.
     """
 
     def __init__(self, field: str, value: str, accepted: str, wait_s: float) -> None:
@@ -138,30 +140,30 @@ class RateLimited(Refusal):
 
 
 class TooManyStreams(InvalidInput):
-    """So many event streams are open that no more are taken for now."""
+    """Too many event streams are open."""
 
 
 class QuotaExceeded(InvalidInput):
-    """The tenant stores as much as it may."""
+    """The storage quota of the tenant is exceeded."""
 
 
 class RangeNotSatisfiable(Refusal):
-    """A part of a file was asked for that begins beyond its end.
+    """The requested range starts beyond the end of the file.
 
     Attributes:
         size: of the file, bytes.
     """
 
     def __init__(self, found: str, size: int) -> None:
-        super().__init__("Range", repr(found), f"a part that begins within the {size} bytes")
+        super().__init__("Range", repr(found), f"a range that starts within the {size} bytes")
         self.size = size
 
 
 class NoAnimation(Refusal):
-    """The job is none of kind refraction, or has no result."""
+    """The job has no animation: it has another kind, or has not succeeded."""
 
     def __init__(self, job_id: str, kind: str, state: str) -> None:
-        super().__init__("job", f"{job_id}, {kind}, {state}", "a job of kind refraction that has succeeded")
+        super().__init__("job", f"{job_id}, {kind}, {state}", "a successful job of kind refraction")
 
 
 class StorageFull(InvalidInput):
@@ -169,34 +171,32 @@ class StorageFull(InvalidInput):
 
 
 class StorageUnavailable(Refusal):
-    """The bucket that keeps the files does not answer, or refuses."""
+    """The bucket with the files is unavailable."""
 
     def __init__(self, found: str) -> None:
-        super().__init__("storage", found, "another try, once it answers again")
+        super().__init__("storage", found, "a later request, when the storage is available")
 
 
 class DatabaseUnavailable(Refusal, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
-    """The database does not answer, is held by another program, or has too many waiting for it already."""
+    """The database is unavailable, locked by another program, or overloaded."""
 
     def __init__(self, found: str) -> None:
-        InvalidInput.__init__(self, "database", found, "another try, once it answers again")
+        InvalidInput.__init__(self, "database", found, "a later request, when the database is available")
 
 
 class DatabaseFull(Refusal, StorageFull, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
     """The disk of the database is full."""
 
     def __init__(self) -> None:
-        InvalidInput.__init__(
-            self, "database", "no space to write a row", "a larger disk, or other files gone"
-        )
+        InvalidInput.__init__(self, "database", "no space to write a row", "more free disk space")
 
 
 class Busy(InvalidInput):
-    """No worker took the task in time."""
+    """No worker was available in time."""
 
 
 class NotReady(Exception):  # noqa: N818 - names a state, like the other refusals
-    """Some part that the service needs does not work; each fault is (part, found, needed)."""
+    """Parts of the service do not work; each fault is (part, found, needed)."""
 
     def __init__(self, faults: Sequence[tuple[str, str, str]]) -> None:
         self.faults = tuple(faults)

@@ -1,4 +1,4 @@
-"""The settings of the service: environment variables with the prefix BENTRAY_, each with its meaning."""
+"""The settings of the service: environment variables with the prefix BENTRAY_."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ GIB = 1024**3
 
 
 class ServiceSettings(BaseSettings):
-    """Everything that may differ between two installations.
+    """The settings of an installation.
 
-    A field ``port`` is read from ``BENTRAY_PORT``; the one exception is ``DASK_SCHEDULER_ADDRESS``,
-    which keeps the name that Dask users know.
+    A field ``port`` is read from ``BENTRAY_PORT``; the only exception is ``DASK_SCHEDULER_ADDRESS``, the
+    usual name in Dask.
     """
 
     model_config = SettingsConfigDict(env_prefix="BENTRAY_", frozen=True)
@@ -33,101 +33,104 @@ class ServiceSettings(BaseSettings):
     dask_scheduler_address: str | None = Field(
         None,
         validation_alias=AliasChoices("dask_scheduler_address", "DASK_SCHEDULER_ADDRESS"),
-        description="Scheduler of an existing Dask cluster; without it the service starts its own workers.",
+        description="Scheduler of an existing Dask cluster; default: the service starts its own workers.",
     )
     cluster: Literal["embedded", "slurm", "kubernetes"] = Field(
-        "embedded", description="What starts the workers where no scheduler is given."
+        "embedded", description="How workers are started without a scheduler address."
     )
     cluster_template: Path | None = Field(
-        None, description="YAML file that tells slurm or kubernetes about this site."
+        None, description="YAML file with the site configuration for slurm or kubernetes."
     )
     tls_dir: Path | None = Field(
-        None, description="Folder of the certificates for the scheduler and the workers; no TLS without it."
+        None, description="Folder with certificates for scheduler and workers; default: no TLS."
     )
-    workers: int | None = Field(None, gt=0, description="Worker processes to start; one a core without it.")
+    workers: int | None = Field(None, gt=0, description="Worker processes to start; default: one per core.")
     database_url: str | None = Field(
-        None, description="SQLAlchemy address of the database; an SQLite file in data_dir without it."
+        None, description="SQLAlchemy address of the database; default: an SQLite file in data_dir."
     )
     database_password_file: Path | None = Field(
-        None, description="File whose first line is the password of database_url, which then holds none."
+        None, description="File with the password of database_url in its first line."
     )
     storage_url: str | None = Field(
         None,
         pattern=r"^s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9!_.*'()-]+)*/?$",
-        description="s3://bucket/prefix to keep the files in; without it they stay in data_dir.",
+        description="s3://bucket/prefix to store the files; default: data_dir.",
     )
     cache_bytes: int = Field(
-        50 * GIB, ge=0, description="Bytes that data_dir may hold of what is kept in storage_url."
+        50 * GIB, ge=0, description="Size of the cache of storage_url in data_dir, in bytes."
     )
-    jobs_at_once: int = Field(2, ge=1, le=64, description="Jobs that run at the same time; the others wait.")
+    jobs_at_once: int = Field(
+        2, ge=1, le=64, description="Maximum number of running jobs; others are queued."
+    )
     tenants_at_once: int = Field(
         16,
         ge=1,
         le=256,
-        description="Tenants of whom one job runs in any case, beyond jobs_at_once; the workers are shared.",
+        description="Maximum number of running jobs including one of each tenant, beyond jobs_at_once.",
     )
     max_queued_jobs: int = Field(
-        1000, ge=1, description="Jobs that may wait, of each tenant; a further one is refused with 429."
+        1000,
+        ge=1,
+        description="Maximum number of queued jobs per tenant; further ones are rejected with 429.",
     )
     ingest_memory_bytes: int = Field(
         4 * GIB,
         ge=GIB // 2,
-        description="Address space of the process that opens an uploaded file, in bytes.",
+        description="Address space of the ingest process for uploaded files, in bytes.",
     )
-    ingest_seconds: float = Field(120.0, gt=0, description="Time that process may take, in seconds.")
+    ingest_seconds: float = Field(120.0, gt=0, description="Time limit of this process, in seconds.")
     upload_patience_s: float = Field(
-        60.0, gt=0, description="Time in which 64 KiB of a body must come, in seconds; else it is broken off."
+        60.0, gt=0, description="Time in which 64 KiB of a request body must arrive, in seconds."
     )
     upload_keep_s: float = Field(
         86400.0,
         gt=0,
-        description="How long an unfinished upload is kept after something came, in seconds.",
+        description="Keeping time of an incomplete upload without further data, in seconds.",
     )
     keep_days: float | None = Field(
         None,
         gt=0,
-        description="Age at which datasets, volumes, meshes and jobs without any are deleted; "
-        "never without it.",
+        description="Maximum age of datasets, volumes, meshes and jobs without them; default: unlimited.",
     )
     min_free_bytes: int = Field(
         GIB // 2,
         ge=0,
-        description="Free disk space below which the service is not ready and begins no job, in bytes.",
+        description="Minimum free disk space for readiness and for starting jobs, in bytes.",
     )
 
     first_key_file: Path | None = Field(
         None,
-        description="File with the first key, of tenant local with every scope; read while there is none.",
+        description="File with the first key, for the tenant local with all scopes; read if there is no key.",
     )
     trusted_proxies: str | None = Field(
-        None, description="Addresses or networks, parted by commas, of proxies that are believed who calls."
+        None, description="Addresses or networks of trusted authenticating proxies, separated by commas."
     )
     proxy_user_header: str = Field(
         "X-Forwarded-User",
         pattern=r"^[A-Za-z0-9-]+$",
-        description="Header in which such a proxy names the user, who is a tenant.",
+        description="Header with the user name from such a proxy; the user is the tenant.",
     )
     connections_per_address: int | None = Field(
         None,
         ge=1,
-        description="Connections that one client address may have open, trusted proxies apart; without it a "
-        "quarter of all that there are descriptors for, which are 4096 at most.",
+        description="Maximum number of connections per client address, except for trusted proxies; "
+        "default: a quarter of all connections, which are limited by file descriptors and to 4096.",
     )
     requests_per_minute: int = Field(
-        1200, ge=0, description="Requests of a tenant, where keys or a proxy are used; 0: any number."
+        1200, ge=0, description="Rate limit per tenant with keys or a proxy; 0: unlimited."
     )
-    renders_per_minute: int = Field(240, ge=0, description="The same of pictures that are drawn.")
-    max_tenant_bytes: int = Field(100 * GIB, gt=0, description="Bytes that a tenant may store.")
+    renders_per_minute: int = Field(240, ge=0, description="Rate limit for rendered images; 0: unlimited.")
+    max_tenant_bytes: int = Field(100 * GIB, gt=0, description="Storage quota per tenant, in bytes.")
     log_format: Literal["text", "json"] = Field(
-        "text", description="Form of the log: warnings as words, or every request as a line of JSON."
+        "text", description="Log format: warnings as text, or all requests as lines of JSON."
     )
 
     @classmethod
     def load(cls, **given: Any) -> Self:
-        """Read the environment; what is ``given`` wins.
+        """Read the environment; ``given`` values take precedence.
 
         Raises:
-            InvalidInput: naming the first setting that is wrong, as its environment variable.
+            InvalidInput: naming the first invalid setting as an environment variable.
         """
         try:
             return cls(**given)
@@ -141,10 +144,10 @@ class ServiceSettings(BaseSettings):
 
     @property
     def database(self) -> str:
-        """The address of the database that is really used, with its password.
+        """The address of the database, including the password.
 
         Raises:
-            InvalidInput: when the password cannot be read, or there is nothing that it belongs to.
+            InvalidInput: when the password cannot be read, or is given without ``database_url``.
         """
         if self.database_password_file is None:
             return self.database_url or f"sqlite:///{self.data_dir.resolve() / 'bentray.sqlite'}"
@@ -157,7 +160,7 @@ class ServiceSettings(BaseSettings):
             address = make_url(self.database_url).set(password=password)
         except OSError as error:
             found = f"{self.database_password_file} ({error.strerror})"
-            raise InvalidInput("BENTRAY_DATABASE_PASSWORD_FILE", found, "a file that can be read") from error
+            raise InvalidInput("BENTRAY_DATABASE_PASSWORD_FILE", found, "a readable file") from error
         except ArgumentError as error:
             raise InvalidInput("BENTRAY_DATABASE_URL", self.database_url, "a SQLAlchemy address") from error
         return address.render_as_string(hide_password=False)

@@ -1,4 +1,4 @@
-"""The parts of one running service, and how a route gets at them."""
+"""The parts of a running service, and the dependencies that give routes access to them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from .settings import ServiceSettings
 
 @dataclass(frozen=True)
 class Parts:
-    """What the lifespan of the application made."""
+    """All parts of a running service."""
 
     settings: ServiceSettings
     database: Database
@@ -65,16 +65,16 @@ class Parts:
 
 
 def parts_of(request: Request) -> Parts:
-    """Those of the service that answers."""
+    """The parts of the service of a request."""
     return cast(Parts, request.app.state.parts)
 
 
 def caller_of(request: Request) -> Caller:
-    """Who asks; there is nobody where nobody was let in, and then this fails."""
+    """The authenticated caller of a request."""
     return cast(Caller, request.state.caller)
 
 
-# Coroutines, for FastAPI gives every plain function a thread of the pool that all requests share.
+# Coroutines, since FastAPI runs plain functions in the thread pool.
 async def _service(request: Request) -> Parts:
     return parts_of(request)
 
@@ -89,5 +89,5 @@ async def _tenant(request: Request) -> Tenant:
 
 Service = Annotated[Parts, Depends(_service)]
 CurrentCaller = Annotated[Caller, Depends(_caller)]
-# Whose request it is; every query takes it.
+# The tenant of the caller, for queries.
 CallerTenant = Annotated[Tenant, Depends(_tenant)]

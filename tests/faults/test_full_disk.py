@@ -27,7 +27,7 @@ def test_a_job_waits_for_room(tmp_path, small_disk, scan, scan_file):
         filler = fill(small_disk)
         # SQLite may have no room to say so before there is some.
         wait_until(lambda: not machine.http.get("/health/ready").is_success)
-        wait_until(lambda: "waits for room" in (tmp_path / "service.log").read_text())
+        wait_until(lambda: "the disk is full" in (tmp_path / "service.log").read_text())
         filler.unlink()
         assert machine.ended(job)["state"] == "succeeded"
         found = read_reconstruction(

@@ -38,7 +38,7 @@ def test_it_outlives_its_service(machine: Machine, scan: Dataset, scan_file: Pat
         machine.restart("service")
         stdout, stderr = submit.communicate(timeout=PATIENCE_S)
     assert submit.returncode == 0, stderr
-    assert "trying again for up to 300 s." in stderr
+    assert "retrying for up to 300 s." in stderr
     assert "The service answers again." in stderr
     jobs = machine.http.get("/v1/jobs").json()["jobs"]
     assert [job["id"] for job in jobs if job["id"] not in before] == [json.loads(stdout)["job"]]

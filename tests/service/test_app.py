@@ -111,7 +111,7 @@ def test_two_services_cannot_share_a_folder(start):
     files = start("one").app.state.parts.files.of(LOCAL)
     arriving = files.incoming(new_id("dataset"))
     arriving.write_bytes(b"half an upload")
-    with pytest.raises(InvalidInput, match="another service is using"):
+    with pytest.raises(InvalidInput, match="in use by another service"):
         start("one")
     assert arriving.exists()
 

@@ -33,7 +33,7 @@ def test_the_reason_is_told(serve, cluster):
 
 
 def test_nobody_there():
-    assert "no service answers at http://127.0.0.1:9" in check("http://127.0.0.1:9")
+    assert "no answer from a service at http://127.0.0.1:9" in check("http://127.0.0.1:9")
 
 
 @pytest.fixture
@@ -70,17 +70,19 @@ def test_a_scheduler_answers_and_logs_no_broken_connection(greeting):
 
 def test_what_is_no_scheduler(greeting):
     address, _ = greeting(b"HTTP/1.1 400 Bad Request\r\n\r\n")
-    assert check_scheduler(address) == f"what answers at {address} is no Dask scheduler"
+    assert check_scheduler(address) == f"the server at {address} is not a Dask scheduler"
 
 
 def test_no_scheduler():
-    assert check_scheduler("tcp://127.0.0.1:9").startswith("no scheduler answers at tcp://127.0.0.1:9: ")
+    assert check_scheduler("tcp://127.0.0.1:9").startswith(
+        "no answer from a scheduler at tcp://127.0.0.1:9: "
+    )
 
 
 def test_a_worker_lives_while_it_gives_signs(monkeypatch, tmp_path):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     address = "tcp://scheduler:8786"
-    assert check_worker(address) == f"no sign of life of a worker of {address}: none"
+    assert check_worker(address) == f"no heartbeat of a worker of {address}: none"
     with heartbeat.file_for(address).open("ab") as file:
         fcntl.flock(file, fcntl.LOCK_SH)
         assert check_worker(address) is None
@@ -102,7 +104,11 @@ def test_it_loads_the_standard_library_alone():
 
 @pytest.mark.parametrize(
     ("words", "code"),
-    [(["http://127.0.0.1:9"], "no service answers"), (["ftp://x"], 2), (["tcp://127.0.0.1:9", "service"], 2)],
+    [
+        (["http://127.0.0.1:9"], "no answer from a service"),
+        (["ftp://x"], 2),
+        (["tcp://127.0.0.1:9", "service"], 2),
+    ],
 )
 def test_how_it_ends(words, code):
     with pytest.raises(SystemExit) as end:

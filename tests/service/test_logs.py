@@ -123,9 +123,7 @@ def test_what_clients_bring_about_is_told_once_a_minute(capsys):
     assert [passes("connection %d was lost", k) for k in range(1000)] == 1000 * [None]
     assert passes("something else") == "something else"
     now[0] = 61.0
-    assert (
-        passes("connection %d was lost", 2) == "connection 2 was lost (and 1000 times since it was last said)"
-    )
+    assert passes("connection %d was lost", 2) == "connection 2 was lost (suppressed 1000 times)"
     assert passes("connection %d was lost", 3) is None
     # What is not said any more is not kept either.
     now[0] = 500.0

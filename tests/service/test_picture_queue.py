@@ -154,7 +154,7 @@ def test_what_would_be_late_is_refused_and_told_when_to_come_again():
         await run.queue.workers()
         async with run.queue.admitted(A, 100.0), run.queue.admitted(A, 15.0):
             with pytest.raises(
-                RateLimited, match=r"pictures: found 2 pictures of this tenant in hand"
+                RateLimited, match=r"pictures: found 2 images of this tenant in progress"
             ) as refused:
                 async with run.queue.admitted(A, 25.0):
                     raise AssertionError
@@ -174,7 +174,7 @@ def test_the_number_of_pictures_is_bounded():
         held = [run.queue.admitted(A, 0.0) for _ in range(MOST_OF_TENANT)]
         for one in held:
             await one.__aenter__()
-        with pytest.raises(RateLimited, match=f"fewer than {MOST_OF_TENANT} of a tenant"):
+        with pytest.raises(RateLimited, match=f"fewer than {MOST_OF_TENANT} per tenant"):
             await run.queue.admitted(A, 0.0).__aenter__()
         others = [run.queue.admitted(Tenant(f"t{k}"), 0.0) for k in range(MOST_IN_ALL - MOST_OF_TENANT)]
         for one in others:

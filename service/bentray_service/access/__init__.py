@@ -1,1 +1,1 @@
-"""Who may do what: keys, proxies, scopes, rates, and the record of who did."""
+"""Access control: authentication, scopes, quotas, rate limits and the audit log."""

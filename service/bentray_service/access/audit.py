@@ -1,4 +1,4 @@
-"""The record of who read and changed what: a line of JSON for each request, in a file for each day."""
+"""The audit log: one line of JSON per request, one file per day."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ log = logging.getLogger("bentray.audit")
 
 Entry = dict[str, Any]
 
-# How jobs stand is asked for again and again, and tells nothing of anybody's measurements.
+# Frequent polls, which show no measurement data.
 LEFT_OUT = frozenset(
     {
         ("GET", "/v1/jobs"),
@@ -28,10 +28,10 @@ _NAME = re.compile(r"(\d{4}-\d{2}-\d{2})\.jsonl")
 
 
 class Audit:
-    """Appends entries to files in a folder; nothing there is ever changed.
+    """Appends entries to the files of the audit log.
 
     An entry has ``time``, ``request``, ``tenant``, ``how``, ``who``, ``method``, ``route``, ``ids``,
-    ``status``, ``received`` and ``sent`` (bytes): no query, no header, no content.
+    ``status``, ``received`` and ``sent`` (bytes), but no query, header or content.
     """
 
     def __init__(self, folder: Path, now: Callable[[], datetime] = lambda: datetime.now(UTC)) -> None:
@@ -39,25 +39,25 @@ class Audit:
         self._now = now
 
     def append(self, entry: Entry) -> None:
-        """Append one entry; what cannot be stored is in the log at least."""
+        """Append one entry; an entry that cannot be stored is written to the log."""
         if (entry["method"], entry["route"]) in LEFT_OUT:
             return
         now = self._now()
         line = json.dumps({"time": now.isoformat(timespec="milliseconds"), **entry})
         path = self._folder / f"{now:%Y-%m-%d}.jsonl"
         try:
-            # One write to the end, so that no two lines mix; only who runs the service may read it.
+            # A single write keeps lines intact; only the user of the service can read the file.
             handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
             try:
                 os.write(handle, f"{line}\n".encode())
             finally:
                 os.close(handle)
         except OSError as error:
-            log.error("the audit could not store (%s): %s", error.strerror, line)
+            log.error("the audit log could not be written (%s): %s", error.strerror, line)
 
 
 def entries(folder: Path) -> Iterator[Entry]:
-    """All entries, oldest first; a line that was torn is passed over, and said."""
+    """All entries, oldest first; incomplete lines are skipped with a warning."""
     for path in sorted(folder.glob("*.jsonl")):
         if not _NAME.fullmatch(path.name):
             continue
@@ -66,7 +66,7 @@ def entries(folder: Path) -> Iterator[Entry]:
                 try:
                     entry = json.loads(line)
                 except ValueError:
-                    log.warning("%s:%d is torn and passed over", path.name, number)
+                    log.warning("%s:%d is incomplete and skipped", path.name, number)
                     continue
                 if isinstance(entry, dict):
                     yield entry

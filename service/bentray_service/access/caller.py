@@ -1,4 +1,4 @@
-"""The caller of a request: which tenant it acts for, and what it may do."""
+"""The authenticated caller of a request: tenant and scopes."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from bentray_kernels.errors import InvalidInput
 
 from ..rows.tenants import LOCAL, Tenant
 
-# What each scope allows; few, so that one can say what a key can do.
+# Permissions of each scope.
 SCOPES: Mapping[str, str] = MappingProxyType(
     {
-        "read": "look at everything of the tenant, pictures and files too",
+        "read": "read all data of the tenant, including images and files",
         "write": "upload, start, cancel and delete",
-        "metrics": "read /metrics, which tells of all tenants together",
+        "metrics": "read /metrics, which covers all tenants",
     }
 )
 USUAL = ("read", "write")
@@ -25,13 +25,13 @@ METRICS = "/metrics"
 
 @dataclass(frozen=True)
 class Caller:
-    """Who asks.
+    """The authenticated caller.
 
     Attributes:
-        tenant: for whom.
-        how: by what it is known: ``open`` where nobody is asked for a key, ``key`` or ``proxy``.
-        who: the id of the key, or the user that the proxy named.
-        scopes: what it may do.
+        tenant: whose data it accesses.
+        how: method of authentication: ``open`` (not required), ``key`` or ``proxy``.
+        who: id of the key, or user name from the proxy.
+        scopes: permissions.
     """
 
     tenant: Tenant
@@ -44,17 +44,17 @@ ANYONE = Caller(LOCAL, "open", "", frozenset(SCOPES))
 
 
 def scope_of(method: str, path: str) -> str:
-    """The scope that a request needs."""
+    """The scope required by a request."""
     if path == METRICS:
         return "metrics"
     return "read" if method in ("GET", "HEAD", "OPTIONS") else "write"
 
 
 def checked_scopes(words: str) -> tuple[str, ...]:
-    """The scopes in a list with commas.
+    """Parse scopes separated by commas.
 
     Raises:
-        InvalidInput: naming the one that there is not.
+        InvalidInput: naming an unknown scope.
     """
     found = tuple(dict.fromkeys(word.strip() for word in words.split(",")))
     for scope in found:

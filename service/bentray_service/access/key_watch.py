@@ -1,4 +1,4 @@
-"""What is under way for a key ends when the key does: one look at the database a second, for all requests."""
+"""Ends requests in progress when their key is revoked or expires, polling the database once a second."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ EVENTS = b"text/event-stream"
 
 
 class KeyWatch:
-    """Knows which requests each key has under way, and ends them once it is revoked or has expired.
+    """The requests in progress of each key.
 
-    A revocation is a row of the database, for another process makes it. Most requests are answered before
-    it is looked at for the first time.
+    Keys are revoked by another process, therefore the database is polled. Most requests end before the first
+    poll.
     """
 
     def __init__(self, keys: Keys) -> None:
@@ -36,7 +36,7 @@ class KeyWatch:
 
     @contextmanager
     def during(self, key_id: str, end: Callable[[], None]) -> Iterator[None]:
-        """In the block ``end`` is called, at most once, if the key ends."""
+        """Within the block, call ``end`` once if the key is revoked or expires."""
         self._under_way.setdefault(key_id, set()).add(end)
         if self._polling is None:
             self._polling = asyncio.create_task(self._poll())
@@ -49,7 +49,7 @@ class KeyWatch:
                 self._under_way.pop(key_id, None)
 
     async def _poll(self) -> None:
-        # A thread of its own, which nothing else can hold.
+        # A thread of its own, so that polling does not wait for other work.
         limiter = anyio.CapacityLimiter(1)
         try:
             while True:
@@ -61,7 +61,7 @@ class KeyWatch:
                         self._keys.ended, list(self._under_way), limiter=limiter
                     )
                 except (SQLAlchemyError, DatabaseUnavailable) as error:
-                    log.warning("whether keys were revoked could not be read: %s", error)
+                    log.warning("revoked keys could not be read: %s", error)
                     continue
                 for key_id in ended:
                     for end in self._under_way.pop(key_id, set()):
@@ -73,14 +73,14 @@ class KeyWatch:
 async def answer_while_valid(
     app: ASGIApp, scope: Scope, receive: Receive, send: Send, watch: KeyWatch, key_id: str
 ) -> None:
-    """Answer a request of a key until the answer, or the key, comes to its end.
+    """Answer a request until its key is revoked or expires.
 
-    Before the answer has begun, it is 401 then. A stream of events ends; of any other answer the connection
-    is broken off, so that a part of a file is not taken for the whole.
+    Before the response has started, it becomes 401. An event stream ends; the connection of any other
+    response is aborted, so that the client does not take a part of a file for the whole.
     """
     cancelling = anyio.CancelScope()
     ended = begun = events = replaced = complete = False
-    refusal = NotAuthenticated("Authorization", "a key that was revoked or expired meanwhile", "a valid key")
+    refusal = NotAuthenticated("Authorization", "a key revoked or expired during the request", "a valid key")
 
     def end() -> None:
         nonlocal ended

@@ -1,4 +1,4 @@
-"""How much a tenant may store: reserved before the work begins, so that nothing comes together beyond it."""
+"""Storage quotas: space is reserved before work begins."""
 
 from __future__ import annotations
 
@@ -22,43 +22,43 @@ from ..rows.usage import Lease, Usage
 
 log = logging.getLogger("bentray.access")
 
-# How long a process that says nothing is believed to be at work on what it has reserved room for, s.
+# Time after which a process that does not renew its reservations is considered dead, s.
 LEASE_S = 900.0
 
 
 class Quota:
-    """Reserves room for what tenants are about to store, in the database: services that share it agree."""
+    """Reserves storage for tenants in the database, shared by all services."""
 
     def __init__(self, database: Database, most_bytes: int, clock: Callable[[], float] = time.time) -> None:
         """Args:
-        database: which holds the rows.
-        most_bytes: that a tenant may store.
+        database: stores the reservations.
+        most_bytes: quota of each tenant.
         clock: seconds since 1970.
         """
         self.most_bytes = most_bytes
         self._database = database
         self._clock = clock
         self._lock = threading.Lock()
-        # What is to be released.
+        # Reservations to release.
         self._ended: set[tuple[Tenant, str]] = set()
         self._owner = f"{socket.gethostname()[:40]}-{os.getpid()}-{secrets.token_hex(4)}"
 
     def of(self, tenant: Tenant) -> Usage:
-        """What a tenant stores and has reserved."""
+        """Usage of a tenant."""
         with self._database.read() as connection:
             return usage.usage_of(connection, tenant)
 
     @asynccontextmanager
     async def reserved(self, tenant: Tenant, name: str, size: int) -> AsyncIterator[None]:
-        """Reserve room while the block runs; what has been stored by its end stays, without anything else.
+        """Reserve storage within the block; stored items are kept at its end, the rest is released.
 
         Args:
-            tenant: whose it is.
-            name: of the thing that is to come.
-            size: bytes that it will have at most; ``resize`` changes it.
+            tenant: owner.
+            name: id of the item.
+            size: its maximum size, bytes; ``resize`` changes it.
 
         Raises:
-            QuotaUsedUp: when there is less room.
+            QuotaExceeded: when less is available.
         """
         await run_in_threadpool(self.resize, tenant, name, size)
         try:
@@ -67,39 +67,39 @@ class Quota:
             await run_in_threadpool(self.release, tenant, name)
 
     def resize(self, tenant: Tenant, name: str, size: int) -> None:
-        """Change how much is reserved for a thing; it is reserved for this process if nothing was.
+        """Change or create a reservation of this process.
 
         Raises:
-            QuotaUsedUp: when there is less room; what was reserved stays so.
+            QuotaExceeded: when less is available; the reservation is unchanged.
         """
         with self._database.write() as connection:
             usage.reserve(connection, tenant, name, size, self.most_bytes, self._lease())
 
     def stored(self, tenant: Tenant, name: str, size: int) -> None:
-        """Say that a thing without a row of its own is stored now, and how large it is."""
+        """Record the size of a stored item without a row."""
         with self._database.write() as connection:
             usage.store(connection, tenant, name, size)
 
     def gone(self, tenant: Tenant, name: str) -> None:
-        """Say that a thing without a row of its own is stored no more."""
+        """Record the deletion of an item without a row."""
         with self._database.write() as connection:
             usage.forget(connection, tenant, [name])
 
     def release(self, tenant: Tenant, name: str) -> None:
-        """Give up a reservation, later if the database is away now; what is stored by then stays."""
+        """Release a reservation; repeated later if the database is unavailable."""
         with self._lock:
             self._ended.add((tenant, name))
         try:
             self._release_ended()
         except SQLAlchemyError:
-            log.warning("the reservation of %s is given up later", name, exc_info=True)
+            log.warning("the reservation of %s will be released later", name, exc_info=True)
 
     def begin(self, files: Files, *, alone: bool) -> None:
-        """Drop what processes that died had reserved, and take the sizes of the files that lie here.
+        """Drop reservations of dead processes, and correct the sizes of stored items.
 
         Args:
             files: the data folder.
-            alone: no other service uses the database, so that none of the reservations is of a living one.
+            alone: whether no other service uses the database; then all reservations are dropped.
         """
         with self._database.write() as connection:
             usage.drop_leased(connection) if alone else usage.drop_expired(connection)
@@ -108,7 +108,7 @@ class Quota:
                 usage.correct(connection, tenant, sizes)
 
     def renew(self) -> None:
-        """Say that this process is still at work, and drop what those that died had reserved."""
+        """Renew the reservations of this process, and drop those of dead processes."""
         self._release_ended()
         with self._database.write() as connection:
             usage.renew(connection, self._lease())

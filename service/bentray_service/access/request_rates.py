@@ -1,4 +1,4 @@
-"""How often a tenant may ask: a bucket each, that fills evenly and holds a minute's worth."""
+"""Rate limits of tenants: a token bucket for each, with the capacity of one minute."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-# Buckets that are full again are as good as none; looked for when there are so many.
+# Full buckets are removed when there are this many.
 MANY = 10_000
 
 
@@ -18,10 +18,10 @@ class _TokenBucket:
 
 
 class RequestRates:
-    """Counts requests of each tenant.
+    """Token buckets of tenants.
 
     Args:
-        per_minute: how many may come in a minute, evenly or at once; 0: as many as do.
+        per_minute: rate limit and capacity; 0: unlimited.
         clock: seconds.
     """
 
@@ -32,7 +32,7 @@ class RequestRates:
         self._buckets: dict[str, _TokenBucket] = {}
 
     def take(self, tenant: str) -> float:
-        """0 where a request may go on; else the seconds until one may."""
+        """0 if a request is allowed, else the seconds until the next one is."""
         if not self.per_minute:
             return 0.0
         with self._lock:

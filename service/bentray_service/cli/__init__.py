@@ -1,4 +1,4 @@
-"""The `bentray` command: one file a command, each loading what it needs only when it runs."""
+"""The `bentray` command: one file per subcommand, with lazy imports."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from . import (
 )
 from .options.repeated_words import RepeatedSpacing
 from .output.exit_codes import Commands
-from .output.terminal import show_our_warnings_in_a_line
+from .output.terminal import show_warnings_on_one_line
 
 __all__ = ["app", "main"]
 
@@ -37,7 +37,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     help="Refraction-corrected ultrasound computed tomography: sound-speed and attenuation images.",
-    epilog="Begin with: bentray demo. Exit codes: 0 done, 1 the work failed, 2 the input was bad.",
+    epilog="Start with: bentray demo. Exit codes: 0 success, 1 failure, 2 invalid input.",
 )
 
 for command in (
@@ -77,7 +77,7 @@ def _start(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
     ] = False,
 ) -> None:
-    show_our_warnings_in_a_line()
+    show_warnings_on_one_line()
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
 

@@ -2,6 +2,6 @@
 
 from . import main
 
-# Dask's workers import this module anew under another name, and must not start the command again.
+# Dask workers import this module under another name.
 if __name__ == "__main__":
     main()

@@ -1,4 +1,4 @@
-"""`bentray audit`: who read and changed what, from the record that the service keeps."""
+"""`bentray audit`: show the audit log of a service."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def audit(
 ) -> None:
     """Show the audit log: who read and changed what, oldest first.
 
-    Each request of a caller who was let in is there, but for asking how jobs stand. The files, one a day in
-    DATA/audit, are only ever appended to; move old ones away as you like.
+    It has every authenticated request, except for polling jobs. The files in DATA/audit, one per day, are
+    append-only; old ones can be moved away.
 
     Example:  bentray audit --id ds-0123456789abcdef0123 --since 2026-11-01
     """
@@ -47,12 +47,14 @@ def audit(
     settings = ServiceSettings.load(**({} if data is None else {"data_dir": data}))
     folder, first = Files(settings.data_dir).audit, _day(since)
     if not folder.is_dir():
-        raise InvalidInput("data_dir", f"{settings.data_dir}, without an audit", "a service's data folder")
+        raise InvalidInput(
+            "data_dir", f"{settings.data_dir}, without audit log", "the data folder of a service"
+        )
 
     def wanted() -> Iterator[dict[str, Any]]:
         for entry in entries(folder):
-            told = {"tenant": tenant, "who": who}
-            if any(value is not None and entry.get(name) != value for name, value in told.items()):
+            filters = {"tenant": tenant, "who": who}
+            if any(value is not None and entry.get(name) != value for name, value in filters.items()):
                 continue
             if touched is not None and touched not in entry.get("ids", []):
                 continue
@@ -72,7 +74,7 @@ def _day(text: str | None) -> str:
     try:
         return datetime.strptime(text, "%Y-%m-%d").replace(tzinfo=UTC).strftime("%Y-%m-%d")
     except ValueError:
-        raise InvalidInput("since", repr(text[:40]), "a day, as 2026-11-22") from None
+        raise InvalidInput("since", repr(text[:40]), "a date, e.g. 2026-11-22") from None
 
 
 def _cell(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""A folder of scans on a cluster: what `bentray submit --batch` does."""
+"""`bentray submit --batch`: reconstruct a folder of scans on a cluster."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ def submit_batch(
     *,
     as_json: bool,
 ) -> None:
-    """Reconstruct every ``*.h5`` of a folder into OUTPUT/NAME/, and leave out what has its result.
+    """Reconstruct every ``*.h5`` of a folder into OUTPUT/NAME/; existing results are skipped.
 
     Args:
-        folder: of the datasets; every worker must see it under the same path, and ``output`` too.
+        folder: of the datasets; it and ``output`` must have the same path on every worker.
         scheduler: of the cluster.
         settings: of every reconstruction.
         output: None: ``results`` in the folder.
-        at_once: datasets under way; None: one more than the cluster has workers.
+        at_once: number of concurrent datasets; None: one more than the number of workers.
         tls: folder of the certificates.
         as_json: print one JSON object at the end.
 
     Raises:
-        InvalidInput: for the folder, the scheduler or the settings.
-        WorkFailed: when a dataset failed; the others have been done.
+        InvalidInput: for an invalid folder, scheduler or setting.
+        WorkFailed: when a dataset failed; the others are completed.
     """
     entries = entries_of(folder)
     results = output_folder((output or folder / "results").resolve())
@@ -72,7 +72,7 @@ def entries_of(folder: Path) -> list[Entry]:
     """An entry for each dataset of a folder, by name.
 
     Raises:
-        InvalidInput: where there are none.
+        InvalidInput: when there are none.
     """
     from bentray_workers.reconstruction.batch import Entry
 
@@ -87,7 +87,7 @@ def entries_of(folder: Path) -> list[Entry]:
 def reconstruct_one(
     client: Any, entry: Entry, results: Path, settings: Settings, stop: Callable[[], bool]
 ) -> None:
-    """Reconstruct one dataset into its folder of results; the picture is drawn by the cluster too."""
+    """Reconstruct one dataset into its folder of results; the image is rendered on the cluster, too."""
     from bentray_kernels.task_graph import Cancelled
     from bentray_workers.cluster.resources import RENDER
     from bentray_workers.files.dataset import read_dataset
@@ -102,7 +102,7 @@ def reconstruct_one(
         )
         return bytes(drawn.result())
 
-    # Checkpoints are gone on from by whoever asks for the same again, and by nobody else.
+    # Checkpoints are only valid for the same request.
     mark = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:12]
     work_dir = output_folder(folder / f"work-{mark}")
     try:
@@ -118,7 +118,7 @@ def reconstruct_one(
 
 
 def _asked(source: Path, settings: Settings) -> dict[str, Any]:
-    """What a result is of: it is valid for the same file and the same settings only."""
+    """The request that a result belongs to: file size, modification time and settings."""
     there = source.stat()
     asked = {"bytes": there.st_size, "mtime_ns": there.st_mtime_ns, "settings": settings.to_dict()}
     found: dict[str, Any] = json.loads(json.dumps(without_nan(asked)))
@@ -126,7 +126,7 @@ def _asked(source: Path, settings: Settings) -> dict[str, Any]:
 
 
 def finished(folder: Path, source: Path, settings: Settings) -> dict[str, Any] | None:
-    """The figures of a whole and sound result of this file with these settings; None without one."""
+    """The figures of a complete result of this file with these settings, else None."""
     from bentray_workers.files.reconstruction import read_reconstruction
 
     try:

@@ -47,7 +47,7 @@ def bench(
 
 
 def benchmark_folder() -> Path:
-    """The folder of the benchmarks: beside the packages in a source checkout, which no wheel contains.
+    """The folder of the benchmarks in a source checkout; it is not part of the wheel.
 
     Raises:
         InvalidInput: when Bentray does not run from a checkout.
@@ -62,17 +62,17 @@ def load(name: str, folder: Path) -> Rows:
     """The function ``rows(quick, progress)`` of one benchmark.
 
     Raises:
-        InvalidInput: for a name that is no benchmark; lists those that are.
+        InvalidInput: for an unknown name, with the list of all benchmarks.
         WorkFailed: when the file does not define ``rows``.
     """
-    # What only other benchmarks import has a name that begins with an underscore.
+    # Modules imported by several benchmarks start with an underscore.
     files = (path for path in folder.glob("*/*.py") if not path.stem.startswith("_"))
     known = {path.stem: path.parent.name for path in sorted(files, key=lambda path: path.stem)}
-    # A hyphen is what a command line has between words, an underscore what a module has.
+    # Hyphens are accepted in place of underscores.
     stem = name.replace("-", "_")
     if stem not in known:
         raise InvalidInput("name", repr(name), "one of " + ", ".join(known))
-    # A namespace package of the checkout.
+    # The benchmarks are a namespace package of the checkout.
     if str(folder.parent) not in sys.path:
         sys.path.insert(0, str(folder.parent))
     module = importlib.import_module(f"{folder.name}.{known[stem]}.{stem}")

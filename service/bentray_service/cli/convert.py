@@ -1,4 +1,4 @@
-"""`bentray convert`: a scan in the format of another program into a dataset file."""
+"""`bentray convert`: convert a scan of another program to a dataset file."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def convert(
 ) -> None:
     """Convert a scan from another format (MATLAB, k-Wave, NumPy) into a dataset file.
 
-    Taken are MATLAB files with delta_tof and element_positions, or with time, transducerPositionsXY and
-    full_dataset; .npz of plain arrays under the names of the dataset format; and zips of k-Wave outputs with
-    geometry.npz beside object/*.h5 and water/*.h5. The service takes the same as they are.
+    Supported are MATLAB files with delta_tof and element_positions, or with time, transducerPositionsXY and
+    full_dataset; .npz files with the array names of the dataset format; and zip files of k-Wave outputs with
+    geometry.npz, object/*.h5 and water/*.h5. The service accepts these formats directly.
 
     Example:  bentray convert scan.mat -o scan.h5
     """
@@ -33,7 +33,7 @@ def convert(
     from bentray_workers.foreign_scans import convert_dataset
 
     dataset = convert_dataset(source, target)
-    told: dict[str, Any] = {
+    summary: dict[str, Any] = {
         "file": str(source),
         "output": str(target),
         "source": dataset.source,
@@ -46,7 +46,7 @@ def convert(
         "water_speed_mps": dataset.water_speed_mps,
     }
     if as_json:
-        print_json(told)
+        print_json(summary)
         return
-    print_lines([f"{name}: {value}" for name, value in told.items() if value not in (str(target), "")])
+    print_lines([f"{name}: {value}" for name, value in summary.items() if value not in (str(target), "")])
     print_lines([str(target)])

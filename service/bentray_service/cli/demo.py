@@ -1,4 +1,4 @@
-"""`bentray demo`: the whole path once, a phantom scan through a real service, straight against bent rays."""
+"""`bentray demo`: compare straight and bent rays on a simulated scan with a local service."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import typer
 from bentray_workers.files.atomic import write_bytes
 
 from .options.paths import output_folder
-from .output.exit_codes import WorkFailed, service_answers
+from .output.exit_codes import WorkFailed, client_errors
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar, remark
 from .service_process import running_service
 from .submit import show_job
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from ..client import Client
 
-# The two jobs by the names of the closing table; what is not named here is the service's default.
+# Settings of the two jobs; all others have their defaults.
 JOBS: dict[str, dict[str, Any]] = {"straight": {"rays": "straight"}, "bent": {"rays": "curved"}}
 
 
@@ -37,7 +37,8 @@ def demo(
 ) -> None:
     """Start a service, simulate a scan, reconstruct it and compare straight with bent rays.
 
-    Needs no data and leaves nothing running. Fails if bent rays do not beat straight ones.
+    Needs no data, and stops the service at the end. Fails if bent rays are not more accurate than straight
+    ones.
 
     Example:  bentray demo --coupling 1375 -o demo-output
     """
@@ -56,10 +57,10 @@ def demo(
     with (
         tempfile.TemporaryDirectory(prefix="bentray-demo-") as data,
         running_service(Path(data), folder / "service.log") as url,
-        service_answers(),
+        client_errors(),
         Client(url) as client,
     ):
-        remark(f"A service is at {url}. Simulating a scan: {elements} transducers, {nodes}² nodes.")
+        remark(f"The service runs at {url}. Simulating a scan: {elements} transducers, {nodes}² nodes.")
         with progress_bar("Simulating") as step:
             dataset = simulate(settings, lambda progress: step(progress.done, progress.total, "emitters"))
         scan = folder / "phantom.h5"
@@ -78,7 +79,9 @@ def demo(
     _show(found, picture, time.perf_counter() - started, as_json)
     straight, bent = (found[name]["truth"]["mean_absolute_error_of_range"] for name in JOBS)
     if not bent < straight:
-        raise WorkFailed(f"bent rays ({100 * bent:.1f} %) do not beat straight ones ({100 * straight:.1f} %)")
+        raise WorkFailed(
+            f"bent rays ({100 * bent:.1f} %) are not better than straight rays ({100 * straight:.1f} %)"
+        )
 
 
 def _reconstruct(
@@ -107,5 +110,5 @@ def _show(found: dict[str, dict[str, Any]], picture: Path, seconds: float, as_js
         for name, figures in found.items()
     ]
     columns = ("rays", "mean abs. error of range", "rms error", "residual", "time")
-    print_table("Table 6 phantom, inside the breast", columns, rows, columns[1:])
-    print_lines([f"The whole took {seconds:.0f} s. The picture:", str(picture)])
+    print_table("2-D breast phantom (Li 2008, Table 6), inside the breast", columns, rows, columns[1:])
+    print_lines([f"Total time {seconds:.0f} s. Comparison image:", str(picture)])

@@ -1,4 +1,4 @@
-"""`bentray devices`: which OpenCL devices there are, and whether they compute right."""
+"""`bentray devices`: list and test the OpenCL devices."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 def devices(as_json: AsJson = False) -> None:
     """List and test the OpenCL devices, and show which one the method fim-opencl uses.
 
-    A device that computes wrongly, aborts or hangs is refused with the reason; where none is left, the
-    same is computed without OpenCL. GPUs are tried before processors. The variable BENTRAY_OPENCL_DEVICE
-    chooses one by index or name; "none" hides all.
+    A device that computes wrong results, aborts or hangs is rejected with the reason. Without a usable
+    device, the computation runs without OpenCL. GPUs are preferred over CPUs. The variable
+    BENTRAY_OPENCL_DEVICE selects a device by index or name; "none" hides all.
 
     Example:  bentray devices --json
     """
@@ -25,7 +25,7 @@ def devices(as_json: AsJson = False) -> None:
 
     found = find_devices()
     verdicts: list[Verdict] = []
-    with progress_bar("Trying OpenCL devices") as step:
+    with progress_bar("Testing OpenCL devices") as step:
         for device in found:
             step(len(verdicts), len(found), device.name)
             verdicts.append(verdict_on(device))
@@ -52,11 +52,11 @@ def _figures(device: Device, verdict: Verdict) -> dict[str, object]:
 
 def _remarks(verdict: Verdict) -> str:
     unneeded = "; ".join(f"{stage}: {fault}" for stage, fault in verdict.faults.items())
-    return verdict.reason or (f"not needed and not used: {unneeded}" if unneeded else "")
+    return verdict.reason or (f"failed optional tests: {unneeded}" if unneeded else "")
 
 
 def _source(device: Device) -> str:
-    library = device.library or "a library that cannot be told"
+    library = device.library or "an unknown library"
     return f"{device.package}: {library}" if device.package else library
 
 
@@ -65,4 +65,4 @@ def _summary(choice: Choice, found: bool) -> list[str]:
     if device is not None:
         return [f"fim-opencl uses device {device.index}, {device.label}"]
     reason = "no device passed" if found else choice.reason
-    return [f"{reason}; fim-opencl computes without OpenCL, as fim", f"what helps: {help_of(choice)}"]
+    return [f"{reason}; fim-opencl computes without OpenCL, as fim", f"suggestion: {help_of(choice)}"]

@@ -1,4 +1,4 @@
-"""`bentray download`: a scan or an image that a running service keeps, as a file."""
+"""`bentray download`: download a scan or a volume from a service."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 from bentray_kernels.errors import InvalidInput
 
 from .options.paths import output_file
-from .output.exit_codes import service_answers
+from .output.exit_codes import client_errors
 from .output.terminal import AsJson, print_json, print_lines, progress_bar, remark
 
 if TYPE_CHECKING:
@@ -40,18 +40,18 @@ def download(
     if stored.startswith("vol-"):
         formats |= {".nii": "nifti", ".mha": "metaimage", ".mat": "mat", ".npy": "npy"}
     elif not stored.startswith("ds-"):
-        raise InvalidInput("id", repr(stored), "the id of a scan (ds-…) or of a volume (vol-…)")
+        raise InvalidInput("id", repr(stored), "the id of a scan (ds-…) or a volume (vol-…)")
     names: dict[str, Format] = {**{one: one for one in formats.values()}, "h5": "hdf5"}
     if form is not None and form not in names:
         raise InvalidInput("format", repr(form), "one of " + ", ".join(names))
     chosen = formats.get(output.suffix.lower()) if form is None else names[form]
     if chosen is None:
-        raise InvalidInput("output", output, "a name that ends in " + ", ".join(formats) + ", or --format")
+        raise InvalidInput("output", output, "a name ending in " + ", ".join(formats) + ", or --format")
     target = output_file(output, force=force)
 
     from ..client import Client
 
-    with service_answers(), Client(url, on_wait=remark) as client, progress_bar("Downloading") as step:
+    with client_errors(), Client(url, on_wait=remark) as client, progress_bar("Downloading") as step:
         if stored.startswith("vol-"):
             client.download(stored, chosen, target)
         else:

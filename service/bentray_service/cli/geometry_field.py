@@ -1,4 +1,4 @@
-"""`bentray geometry-field`: from a mesh file to its geometry field and pictures, without a server."""
+"""`bentray geometry-field`: build and render the geometry field of a mesh without a server."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def geometry_field(
 ) -> None:
     """Build the geometry field of a mesh and render it into OUTPUT.
 
-    Writes image.png, geometry-image.png, normal-map.png, geometry-field.json and the field itself. A field
-    that is there already is used again; one that was broken off is gone on from.
+    Writes image.png, geometry-image.png, normal-map.png, geometry-field.json and the field. An existing field
+    is reused; an interrupted one is continued.
 
     Example:  bentray geometry-field bunny.ply -o bunny --mode refract --up y
     """
@@ -54,10 +54,10 @@ def geometry_field(
     work.mkdir(exist_ok=True)
     write_mesh(work / "mesh.h5", stored)
     started = time.perf_counter()
-    with progress_bar("Making the field") as step:
+    with progress_bar("Building the field") as step:
 
         def show(progress: Progress) -> None:
-            step(progress.done, progress.total, "" if progress.total else "laying the mesh out")
+            step(progress.done, progress.total, "" if progress.total else "parameterising the mesh")
 
         figures = build_field(None, work / "mesh.h5", settings, target, work, show)
     shutil.rmtree(work)
@@ -72,7 +72,7 @@ def geometry_field(
 
 
 def _draw(field: Path, view: FieldView, folder: Path, step: Step) -> dict[str, str]:
-    """The three pictures; their paths by name."""
+    """Render the three images; returns their paths by name."""
     from concurrent.futures import ThreadPoolExecutor
 
     from bentray_workers.files.atomic import write_bytes
@@ -118,7 +118,7 @@ def _show(source: Path, found: dict[str, Any], *, as_json: bool) -> None:
         ("tables", f"{found['samples']} samples along an edge, {tables:.0f} MB"),
         ("wrong hits and misses", f"{100.0 * figures['lookup_wrong']:.2f} % of random rays"),
         ("error of the others", f"{figures['lookup_median']:.1e} of the cube, median"),
-        ("time", f"{found['make_seconds']:.1f} s to make, {found['draw_seconds']:.1f} s to draw"),
+        ("time", f"{found['make_seconds']:.1f} s to build, {found['draw_seconds']:.1f} s to render"),
     ]
     print_table(f"Geometry field of {source.name}", ("figure", "value"), rows)
     print_lines(found["outputs"].values())

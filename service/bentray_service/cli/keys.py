@@ -1,4 +1,4 @@
-"""`bentray keys`: make, list and revoke the keys that let callers in."""
+"""`bentray keys`: create, list and revoke API keys."""
 
 from __future__ import annotations
 
@@ -22,26 +22,28 @@ if TYPE_CHECKING:
 
 Data = Annotated[
     Path | None,
-    typer.Option("--data", help="Data folder of the service.", show_default="as bentray serve has it"),
+    typer.Option("--data", help="Data folder of the service.", show_default="as for bentray serve"),
 ]
-ACCEPTED_AGES = "a number and h, d or w, as 12h, 90d, 52w; never without it"
+ACCEPTED_AGES = "a number with h, d or w, e.g. 12h, 90d, 52w; never by default"
 SECONDS = {"h": 3600.0, "d": 86400.0, "w": 604800.0}
 LONGEST_NAME = 100
 
 keys = typer.Typer(
-    help="Keys of the REST interface: who holds one acts for its tenant. They are in the database of the "
-    "service, which may be running; from the first key on it asks everybody for one.",
+    help="API keys: a key gives access to the data of its tenant. Keys are stored in the database of the "
+    "service, which may be running; once a key exists, authentication is required.",
     no_args_is_help=True,
 )
 
 
 @keys.command()
 def create(
-    name: Annotated[str, typer.Option(help="What it is for, to recognise it by.")],
-    tenant: Annotated[str, typer.Option(help="Whose data it opens.")] = "local",
-    scopes: Annotated[str, typer.Option(help="Of read, write and metrics, parted by commas.")] = "read,write",
+    name: Annotated[str, typer.Option(help="Name of the key.")],
+    tenant: Annotated[str, typer.Option(help="Tenant whose data it can access.")] = "local",
+    scopes: Annotated[
+        str, typer.Option(help="Scopes, separated by commas: read, write, metrics.")
+    ] = "read,write",
     expires: Annotated[
-        str | None, typer.Option(help="After how long it ends: 12h, 90d, 52w.", show_default="never")
+        str | None, typer.Option(help="Lifetime, e.g. 12h, 90d, 52w.", show_default="never")
     ] = None,
     data: Data = None,
     as_json: AsJson = False,
@@ -64,7 +66,9 @@ def create(
     if as_json:
         print_json({**_shown(row), "key": token.shown()})
     else:
-        remark(f"A key of the tenant {whose}; it is not shown again. Set BENTRAY_KEY to it, or send it as")
+        remark(
+            f"A key of the tenant {whose}; it is not shown again. Set BENTRAY_KEY to it, or send the header"
+        )
         remark("Authorization: Bearer …")
         print_lines([token.shown()])
 
@@ -107,7 +111,7 @@ def revoke(
     if as_json:
         print_json(found)
     else:
-        print_lines([f"{found['id']} of {found['tenant']} is revoked"])
+        print_lines([f"{found['id']} of {found['tenant']} revoked"])
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""The one command that gives a machine without a usable OpenCL device one."""
+"""The command that installs a usable OpenCL device."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def help_of(choice: Choice) -> str:
-    """The command, and after ``#`` what it brings; empty where a device is chosen."""
+    """The command, with a comment after ``#``; empty if a device is chosen."""
     from bentray_kernels.opencl.devices import WISH, hidden
 
     if choice.device is not None:

@@ -1,4 +1,4 @@
-"""`bentray quality`: what is wrong with a scan, before it is reconstructed."""
+"""`bentray quality`: check the data quality of a scan."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .output.terminal import AsJson, print_json, print_lines, print_table, progr
 
 
 class Water(StrEnum):
-    """What a calibration does with the speed of the water."""
+    """The water speed in a calibration."""
 
     stated = "stated"
     fitted = "fitted"
@@ -37,9 +37,9 @@ def quality(
 ) -> None:
     """Check the data quality of a scan: report in OUTPUT/quality.json and .png, corrected scan in picked.h5.
 
-    Dead elements, swapped and inverted channels, wrong time zeros, cycle jumps, outliers and the like are
-    named, and left out or corrected in picked.h5. A scan that must not be used ends with exit code 1.
-    With --calibrate there is calibration.json as well, and picked.h5 has the fitted positions and water.
+    Finds dead elements, swapped and inverted channels, wrong time zeros, cycle skips, outliers and more;
+    they are left out or corrected in picked.h5. The exit code is 1 for an unusable scan.
+    With --calibrate, also writes calibration.json; picked.h5 has the fitted positions and water speed.
 
     Example:  bentray quality scan.h5 -o report
     """
@@ -63,21 +63,21 @@ def quality(
         paths["calibration"] = folder / "calibration.json"
         fitted = json.dumps(calibration.to_dict(), indent=2, allow_nan=False) + "\n"
         write_bytes(paths["calibration"], fitted.encode())
-    told: dict[str, Any] = {
+    summary: dict[str, Any] = {
         "file": str(source),
         **found.report,
         "outputs": {kind: str(path) for kind, path in paths.items()},
     }
     write_bytes(paths["png"], found.page)
-    write_bytes(paths["json"], (json.dumps(told, indent=2, allow_nan=False) + "\n").encode())
+    write_bytes(paths["json"], (json.dumps(summary, indent=2, allow_nan=False) + "\n").encode())
     if as_json:
-        print_json(told)
+        print_json(summary)
     else:
         lines = [(f["check"], f["found"], _elements(f), f["action"]) for f in found.report["findings"]]
         title = f"{source.name}: {found.report['verdict']}"
         print_table(title, ("check", "found", "elements", "done"), lines)
         usable = f"{found.report['usable_pairs']} of {found.report['pairs']} pairs usable"
-        print_lines([usable, *told["outputs"].values()])
+        print_lines([usable, *summary["outputs"].values()])
     if found.picked is None:
         refused = next(f for f in found.report["findings"] if f["action"] == "refused")
         raise WorkFailed(f"{refused['check']}: {refused['found']}; accepted: {refused['accepted']}")

@@ -1,4 +1,4 @@
-"""`bentray reconstruct`: from a dataset file to images and figures, without a server."""
+"""`bentray reconstruct`: reconstruct a dataset file without a server."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def reconstruct(
         int | None,
         typer.Option(
             min=1,
-            show_default="what works side by side, at most one a core",
+            show_default="number of parallel tasks, at most one per core",
             help="Worker processes; 1 runs in this process.",
         ),
     ] = None,
@@ -60,7 +60,7 @@ def reconstruct(
 def run(
     file: Path, dataset: Dataset, settings: Settings, workers: int | None, show: Callable[[Progress], None]
 ) -> Reconstruction:
-    """The reconstruction of a file, by so many processes of its own; None: by as many as are of use."""
+    """Reconstruct a file with worker processes of this command; None: with as many as are useful."""
     from bentray_workers.reconstruction.reconstruction_run import reconstruct as reconstruct_slices
 
     count = workers or useful_workers(dataset, settings)
@@ -73,13 +73,13 @@ def run(
 
 
 def useful_workers(dataset: Dataset, settings: Settings) -> int:
-    """Worker processes that have enough to do at the same time to be worth their start, at most one a core.
+    """The useful number of worker processes, at most one per core.
 
-    Slices run side by side; so do the emitters of a volume with Gauss-Newton, and what ``auto`` tries. SART
-    uses its emitters one after the other, and one slice with Gauss-Newton is done before workers have begun.
+    Parallel are slices, the emitters of a volume with Gauss-Newton, and candidate models of ``auto``. SART
+    processes emitters one after another, and Gauss-Newton of one slice is faster than the start of workers.
 
     Raises:
-        InvalidInput: for a volume of a scan that has one height only.
+        InvalidInput: for a volume of a scan with one height only.
     """
     from bentray_kernels.tomography.pairs import count
 

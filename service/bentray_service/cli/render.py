@@ -1,4 +1,4 @@
-"""`bentray render`: a volume as glass before a backdrop, without a server."""
+"""`bentray render`: refractive rendering of a volume without a server."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from bentray_workers.rendering.refraction_view import RefractionView
 
 ACCEPTED = "a volume: NumPy, NRRD, NIfTI, HDF5 of Bentray, or raw with --shape and --dtype"
-# What a thread draws at a time: rows, fewer of those with many rays, since Ctrl-C waits for what is begun.
+# Size of the tile of a thread: rows, fewer with many rays, since Ctrl-C waits for tiles in progress.
 ROWS, RAYS = 16, 2**15
-# Of the cube that a phantom fills.
+# Side of the cube of a phantom.
 PHANTOM_SIDE_M = 0.1
 
 
 class SampledPhantom(StrEnum):
-    """Volumes that need no file."""
+    """Synthetic volumes."""
 
     SPHERE = "sphere"
     ONE_HOLE = "one-hole"
@@ -88,7 +88,7 @@ def render(
     png = output_file(output, force=force, suffix=".png")
     placed = None if position_map is None else output_file(position_map, force=force, suffix=".npy")
     if placed is not None and view.mode == "shaded":
-        raise InvalidInput("--map", placed, "nothing with --mode shaded: it does not look at the backdrop")
+        raise InvalidInput("--map", placed, "no --map with --mode shaded, which has no backdrop")
 
     from bentray_workers.files.atomic import write_bytes
     from bentray_workers.files.volume_formats import Given, import_volume
@@ -121,7 +121,7 @@ def render(
 def _refuse(given: dict[str, object]) -> None:
     for option, value in given.items():
         if value:
-            raise InvalidInput(option, value, "nothing with --phantom: it tells its own")
+            raise InvalidInput(option, value, "no such option with --phantom")
 
 
 def _sampled(phantom: SampledPhantom, nodes: int) -> Volume:
@@ -161,13 +161,13 @@ def _drawn(
             found.append(future.result())
             step(len(found), len(drawn))
     finally:
-        # After Ctrl-C nothing more is begun.
+        # After Ctrl-C no further tiles are started.
         pool.shutdown(cancel_futures=True)
     return found
 
 
 def _joined(strips: list[Tile]) -> tuple[Colours, Any]:
-    """The picture, and where each pixel looks; of a shaded one nothing."""
+    """The image, and the backdrop position of each pixel; None for a shaded image."""
     import numpy as np
 
     positions = [one.position_m for one in strips if one.position_m is not None]

@@ -1,4 +1,4 @@
-"""`bentray reproduce`: a result made again from its own record, and compared bit for bit."""
+"""`bentray reproduce`: repeat a reconstruction and compare the result bit by bit."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ def reproduce(
         int | None,
         typer.Option(
             min=1,
-            show_default="what works side by side, at most one a core",
+            show_default="number of parallel tasks, at most one per core",
             help="Worker processes; 1 runs in this process. The result does not depend on it.",
         ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Repeat a reconstruction from its own settings and seed, and compare every array.
+    """Repeat a reconstruction with its own settings and seed, and compare every array.
 
-    It ends with 0 where all are the same to the bit, and with 1 where they are not; other versions of
-    Python, NumPy or Numba, or another processor, may round differently.
+    The exit code is 0 if all arrays are identical, else 1. Other versions of Python, NumPy or Numba, or
+    another processor, may round differently.
 
     Example:  bentray reproduce result/reconstruction.h5 scan.h5
     """
@@ -70,7 +70,7 @@ def reproduce(
 
 
 def compared(before: Reconstruction, after: Reconstruction) -> dict[str, Any]:
-    """For each array, None where both are the same to the bit, else the largest difference, or words."""
+    """The difference of each array: None if identical, the maximum difference, or a description."""
     import numpy as np
 
     from bentray_workers.files.reconstruction import IMAGES
@@ -87,22 +87,22 @@ def compared(before: Reconstruction, after: Reconstruction) -> dict[str, Any]:
         elif np.array_equal(old, new, equal_nan=True):
             found[place] = None
         else:
-            found[place] = float(np.nanmax(np.abs(old - new), initial=0.0)) or "values that are no numbers"
+            found[place] = float(np.nanmax(np.abs(old - new), initial=0.0)) or "NaN at other nodes"
     old_rms, new_rms = ([sweep.residual_rms_s for sweep in one.history] for one in (before, after))
-    found["history"] = None if old_rms == new_rms else "residuals of other sizes"
+    found["history"] = None if old_rms == new_rms else "different residuals"
     return found
 
 
 def difference_text(difference: float | str | None) -> str:
-    """In words."""
+    """Description of a difference."""
     if difference is None:
-        return "the same, bit for bit"
+        return "identical"
     return difference if isinstance(difference, str) else f"at most {difference:.3g}"
 
 
 def _reason(found: dict[str, Any], other_versions: bool) -> str:
     if other_versions:
-        return ": other versions made it"
+        return ": it was created with other versions"
     if found["speed_mps"] and found["history"]:
-        return ": is it of this scan?"
+        return ": the scan may be another one"
     return ""

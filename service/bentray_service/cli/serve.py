@@ -1,4 +1,4 @@
-"""`bentray serve`: the service on this machine, with its own workers or those of a given scheduler."""
+"""`bentray serve`: run the service with its own workers or an existing cluster."""
 
 from __future__ import annotations
 
@@ -41,18 +41,18 @@ def serve(
     ] = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(help="Dask scheduler to use instead of own workers, as tcp://head:8786."),
+        typer.Option(help="Dask scheduler to use instead of own workers, e.g. tcp://head:8786."),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Worker processes to start.", show_default="one a core")
+        int | None, typer.Option(help="Worker processes to start.", show_default="one per core")
     ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print {url, pid, data} as one JSON object.")
     ] = False,
 ) -> None:
-    """Start the service and keep it running until Ctrl-C.
+    """Start the service and run it until Ctrl-C.
 
-    An option that is not given is read from its environment variable (BENTRAY_PORT and so on).
+    Default values of the options are read from environment variables (BENTRAY_PORT and so on).
 
     Example:  bentray serve --port 8000 --data /srv/bentray
     """
@@ -69,7 +69,7 @@ def serve(
     try:
         settings = ServiceSettings.load(**given)
     except InvalidInput as error:
-        # The settings speak of environment variables; the user may have typed an option.
+        # Name the option instead of the environment variable if the option was given.
         name = error.field.removeprefix("BENTRAY_").lower()
         field = OPTIONS[name] if name in given else error.field
         raise InvalidInput(field, error.value, error.accepted) from error
@@ -83,12 +83,12 @@ def serve(
 def _listen(host: str, port: int) -> socket.socket:
     from ..web.listening import Listening
 
-    # The socket is bound here and handed on, so that a busy port is found before any worker starts
-    # and port 0 is known by its real number.
+    # The socket is bound before any worker starts, so that a busy port is reported early
+    # and port 0 is replaced by the actual number.
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     except (socket.gaierror, UnicodeError) as error:
-        raise InvalidInput("host", repr(host), "an address of this machine, as 127.0.0.1") from error
+        raise InvalidInput("host", repr(host), "an address of this machine, e.g. 127.0.0.1") from error
     listening = Listening(family, kind, protocol)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -96,7 +96,7 @@ def _listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         listening.close()
         if error.errno == errno.EADDRNOTAVAIL:
-            raise InvalidInput("host", repr(host), "an address of this machine, as 127.0.0.1") from error
+            raise InvalidInput("host", repr(host), "an address of this machine, e.g. 127.0.0.1") from error
         raise InvalidInput(
             "port", f"{port} on {host} ({error.strerror})", "a free port of this machine; 0 picks one"
         ) from error
@@ -119,8 +119,8 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
                 here = {"url": url, "pid": os.getpid(), "data": str(settings.data_dir.resolve())}
                 print_lines([json.dumps(here)])
             if self.started:
-                _say(settings, f"Bentray is at {url} (data in {settings.data_dir}); Ctrl-C stops it.")
-                _say(settings, _reach(asks=not made.state.parts.sign_in.open()))
+                _say(settings, f"Bentray runs at {url} (data in {settings.data_dir}); stop it with Ctrl-C.")
+                _say(settings, _access_note(required=not made.state.parts.sign_in.open()))
 
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
             made.state.leaving.set()
@@ -130,7 +130,7 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
     made = create_app(settings)
     app = _Starting(made)
     server = Announcing(app, settings)
-    # Uvicorn ends the process when the application cannot start; here the reason has the last word.
+    # Uvicorn exits when the application cannot start; the reason is raised below.
     with suppress(SystemExit), logs.configured(settings.log_format):
         server.run(sockets=[listening])
     if app.failure is not None:
@@ -140,7 +140,7 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
 
 
 class _Starting:
-    """Keeps what stopped the application from starting, for one clear line instead of a logged traceback."""
+    """Remembers the error of a failed start, for a one-line message instead of a traceback."""
 
     def __init__(self, app: Any) -> None:
         self._app = app
@@ -167,10 +167,10 @@ def _say(settings: ServiceSettings, words: str) -> None:
         remark(words)
 
 
-def _reach(*, asks: bool) -> str:
-    if asks:
-        return "Every caller is asked for a key, or comes through a trusted proxy."
+def _access_note(*, required: bool) -> str:
+    if required:
+        return "Authentication by API key or trusted proxy is required."
     return (
-        "It is open on loopback only: nothing but this machine can reach it, and nobody here is asked for a "
-        "key. The first one, of `bentray keys create`, changes that."
+        "Only this machine can reach the service, and no authentication is required; to require it, "
+        "create a key with `bentray keys create`."
     )

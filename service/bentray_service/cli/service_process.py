@@ -1,4 +1,4 @@
-"""A service of one's own: `bentray serve` in a child process that ends with the block it was started for."""
+"""A temporary service: `bentray serve` in a child process."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from pathlib import Path
 
 from .output.exit_codes import WorkFailed
 
-# The first start on a machine compiles the kernels: a minute, and several where much else runs.
+# Time limit for the start, s; the first start compiles the kernels, which takes a minute or more.
 START_S = 600.0
 STOP_S = 20.0
 
 
 @contextmanager
 def running_service(data: Path, log: Path) -> Iterator[str]:
-    """Start a service on a free port and yield its URL; it is stopped however the block is left.
+    """Start a service on a free port and yield its URL; it is stopped at the end of the block.
 
     Args:
-        data: folder for its data.
-        log: file for what it prints, to look at when it fails.
+        data: its data folder.
+        log: file for its output.
 
     Raises:
-        WorkFailed: when it ends or stays silent instead of starting.
+        WorkFailed: when it does not start.
     """
     command = [sys.executable, "-m", "bentray_service.cli", "serve", "--host", "127.0.0.1", "--port", "0"]
     command += ["--json", "--data", str(data)]
-    # Its own process group, so that its workers can be ended with it, and Ctrl-C reaches it through us only.
+    # A separate process group, to stop its workers as well; Ctrl-C is handled by this process only.
     with log.open("wb") as errors:
         process = subprocess.Popen(  # noqa: S603 - our own command, no shell
             command, stdout=subprocess.PIPE, stderr=errors, start_new_session=True
@@ -54,7 +54,7 @@ def _url(process: subprocess.Popen[bytes], log: Path) -> str:
     line = process.stdout.readline()
     if not line:
         said = log.read_text(errors="replace").strip().splitlines()
-        raise WorkFailed(f"the service ended at once: {said[-1] if said else 'it said nothing'} (log: {log})")
+        raise WorkFailed(f"the service exited at once: {said[-1] if said else 'no output'} (log: {log})")
     return str(json.loads(line)["url"])
 
 
@@ -64,7 +64,7 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
         with suppress(subprocess.TimeoutExpired):
             process.wait(STOP_S)
     finally:
-        # What is left of its group; usually nothing.
+        # Kill remaining processes of the group.
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
@@ -74,7 +74,7 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
 
 @contextmanager
 def _terminable() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP leave the block like Ctrl-C does, so that what it started is stopped."""
+    """Handle SIGTERM and SIGHUP like Ctrl-C, so that the service is stopped."""
 
     def leave(number: int, frame: object) -> None:
         raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""`bentray simulate`: the scan of a known phantom as a dataset file."""
+"""`bentray simulate`: simulate the scan of a breast phantom."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 
 class BreastPhantom(StrEnum):
-    """The phantoms by the tables of the dissertation."""
+    """The breast phantoms (Li 2008)."""
 
     TABLE6 = "table6"
     TABLE7 = "table7"
 
 
 class Array(StrEnum):
-    """How the rings of a scan in space lie."""
+    """Arrangement of the rings of a 3-D scan."""
 
     MOVED = "moved"
     RINGS = "rings"
@@ -40,7 +40,7 @@ def simulate(
         typer.Option(help="2-D breast phantom (Li 2008, Table 6) or 3-D breast phantom (Table 7)."),
     ] = BreastPhantom.TABLE6,
     nodes: Annotated[int, typer.Option(help="Nodes per side of the image that the scan is made for.")] = 128,
-    elements: Annotated[int, typer.Option(help="Transducers of a ring; each sends and receives.")] = 256,
+    elements: Annotated[int, typer.Option(help="Transducers of a ring; each emits and receives.")] = 256,
     coupling: Annotated[float, typer.Option(help="Speed of the water, m/s.")] = 1500.0,
     refinement: Annotated[
         int | None,
@@ -89,14 +89,14 @@ def simulate(
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate the travel times of a breast phantom, or its traces, and keep its truth beside them.
+    """Simulate travel times or traces of a breast phantom; the dataset includes the ground truth.
 
     Example:  bentray simulate -o phantom.h5 --coupling 1375 --noise-ns 20
     """
     path = output_file(output, force=force)
 
     from bentray_workers.files.dataset import read_dataset
-    from bentray_workers.simulation.request import AskedSimulation
+    from bentray_workers.simulation.request import PhantomScan
     from bentray_workers.simulation.simulation_run import simulate_to_file
     from bentray_workers.simulation.waves import WaveSimulationSettings
 
@@ -116,7 +116,7 @@ def simulate(
         "emissions": emissions,
         "side_m": side,
     }
-    settings = AskedSimulation(phantom=phantom.value, waveform=waveform, **request).chosen()
+    settings = PhantomScan(phantom=phantom.value, waveform=waveform, **request).chosen()
     started = time.perf_counter()
     with progress_bar("Simulating") as step:
         simulate_to_file(None, settings, path, on_progress=lambda now: step(now.done, now.total, "tasks"))
@@ -157,7 +157,7 @@ def _wave_rows(settings: WaveSimulationSettings, dataset: Dataset) -> list[tuple
         ("elements", f"{settings.elements}, {settings.emissions} of them emit"),
         ("pulse", f"{1e-3 * settings.frequency_hz:g} kHz"),
         ("traces", f"{settings.samples} samples at {1e-6 * (dataset.sampling_rate_hz or 0.0):.3g} MHz"),
-        ("grid", f"{settings.told_grid} nodes of {1e3 * settings.spacing_m:.3g} mm"),
+        ("grid", f"{settings.grid_text} nodes of {1e3 * settings.spacing_m:.3g} mm"),
         ("time step", f"{1e9 * settings.step_s:.3g} ns"),
         ("dispersion", f"phase speed error {centre:.1e} at the centre, {highest:.1e} at the upper end"),
         ("noise", "none" if settings.snr is None else f"1/{settings.snr:g} of the pulse in water"),

@@ -1,4 +1,4 @@
-"""`bentray submit`: send a scan to a running service and fetch its image; or a folder to a cluster."""
+"""`bentray submit`: reconstruct a scan on a service, or a folder of scans on a cluster."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bentray_kernels.errors import InvalidInput
 
 from .options.paths import input_file, output_folder
 from .options.settings_options import Asked, settings_from, with_settings_options
-from .output.exit_codes import service_answers
+from .output.exit_codes import client_errors
 from .output.results import show_results, write_results
 from .output.terminal import AsJson, Step, print_json, print_lines, progress_bar, remark, residual_note
 from .worker import Tls
@@ -40,7 +40,7 @@ def submit(
             "--out",
             "-o",
             help="Folder for the results.",
-            show_default="do not fetch them; of a batch, DIR/results",
+            show_default="no download; with --batch, DIR/results",
         ),
     ] = None,
     wait: Annotated[
@@ -72,12 +72,12 @@ def submit(
 ) -> None:
     """Upload a scan, reconstruct it on a service and download the result.
 
-    When the service or its database is started again meanwhile, it says so, waits up to five minutes, and
-    goes on; the job is started once.
+    If the service or its database restarts in the meantime, requests are retried for up to five minutes; the
+    job is started only once.
 
-    With --batch, reconstruct a folder of scans on a Dask cluster without the service. What has a sound result
-    of the same file and settings is left out, so that a batch that was stopped can be given again; one that
-    fails leaves the others alone and makes the exit code 1. As in:
+    With --batch, reconstruct a folder of scans on a Dask cluster without the service. Scans with a valid
+    result for the same file and settings are skipped, so an interrupted batch can be repeated. Other scans
+    continue after a failure; then the exit code is 1. Example:
     bentray submit --batch scans --scheduler tcp://head:8786 --out results
 
     Example:  bentray submit scan.h5 --url http://127.0.0.1:8000 -o result
@@ -88,14 +88,16 @@ def submit(
         )
     if batch is None and scheduler is not None:
         raise InvalidInput(
-            "scheduler", f"{scheduler} without --batch", "--url of a service, which has its own"
+            "scheduler", f"{scheduler} without --batch", "--url of a service, which has its own scheduler"
         )
     if batch is not None and (scheduler is None or not wait):
         found = "none" if scheduler is None else f"{scheduler} with --no-wait"
-        raise InvalidInput("scheduler", found, "the address of a Dask scheduler, and to wait, for --batch")
+        raise InvalidInput(
+            "scheduler", found, "the address of a Dask scheduler without --no-wait, for --batch"
+        )
     if output is not None and not wait:
         raise InvalidInput(
-            "output", f"{output} with --no-wait", "one of the two: there is no result to fetch yet"
+            "output", f"{output} with --no-wait", "one of the two: there is no result to download yet"
         )
     settings = settings_from(asked)
     if file is not None:
@@ -114,7 +116,7 @@ def _submit(
 
     from ..client import Client
 
-    with service_answers(), Client(url, on_wait=remark) as client:
+    with client_errors(), Client(url, on_wait=remark) as client:
         with progress_bar("Uploading") as step:
             dataset = client.upload(source, step)
         job = client.submit(dataset.id, settings.to_dict())
@@ -134,7 +136,7 @@ def _submit(
 
 
 def show_job(record: JobRecord, step: Step) -> None:
-    """One record of a job on a progress bar."""
+    """Show the progress of a job on a progress bar."""
     progress, history = record.progress, record.history
     note = residual_note(history[-1].residual_rms_s if history else None)
     step(progress.done, progress.total, note or progress.phase or record.state)
@@ -144,7 +146,7 @@ def _report(source: Path, folder: Path, volume: Path, job: JobRecord, as_json: b
     from bentray_workers.files.dataset import read_dataset
     from bentray_workers.files.reconstruction import read_reconstruction
 
-    # The truth, where there is one, is in the file that was sent; the service keeps only the scan.
+    # The ground truth is in the local file only.
     dataset = read_dataset(source, traces=False)
     result = read_reconstruction(volume)
     found = write_results(folder, result, dataset, job.seconds or 0.0, file=str(source), job=job.id)

@@ -1,4 +1,4 @@
-"""`bentray verify`: read everything that is stored and compare it with the checksums in the database."""
+"""`bentray verify`: verify the checksums of all stored files."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from .keys import Data
 from .output.exit_codes import WorkFailed
 from .output.terminal import AsJson, print_json, print_lines, remark
 
-# What is named one by one.
-TOLD = ("damaged", "orphan")
+# States that are listed individually.
+LISTED = ("damaged", "orphan")
 
 
 def verify(
@@ -26,8 +26,8 @@ def verify(
 ) -> None:
     """Verify the checksum of every stored file; the service may be running.
 
-    What is damaged is named, and not served until it is restored; the exit code is 1 then. Files from before
-    there were checksums get one. With a bucket, what lies there is fetched and compared.
+    Damaged files are listed, and not served until they are restored; then the exit code is 1. Files without
+    checksum, from earlier versions, get one. Files in a bucket are downloaded.
 
     Example:  bentray verify --data /srv/bentray --json
     """
@@ -47,7 +47,7 @@ def verify(
         checksums = Checksums(database)
         inner = open_store(settings.storage_url, root.root, database, settings.cache_bytes)
         files = Files(settings.data_dir, CheckedStore(inner, root.root, checksums))
-        orphans = Orphans(files, database, keeps=settings.storage_url is None)
+        orphans = Orphans(files, database, is_store=settings.storage_url is None)
         if remove_orphans:
             with closing(lock(files.root)):
                 orphans.accept()
@@ -56,9 +56,9 @@ def verify(
     if as_json:
         print_json({"counts": counts, "things": [one._asdict() for one in found]})
     else:
-        told = [one for one in found if one.state in TOLD]
-        print_lines([f"{one.state}: {one.tenant} {one.path} {one.found}".rstrip() for one in told])
+        listed = [one for one in found if one.state in LISTED]
+        print_lines([f"{one.state}: {one.tenant} {one.path} {one.found}".rstrip() for one in listed])
         words = ", ".join(f"{count} {state}" for state, count in sorted(counts.items()))
-        remark(words or "nothing is stored")
+        remark(words or "no stored files")
     if counts["damaged"]:
-        raise WorkFailed(f"{counts['damaged']} of {len(found)} stored things are damaged")
+        raise WorkFailed(f"{counts['damaged']} of {len(found)} stored items are damaged")

@@ -1,4 +1,4 @@
-"""`bentray worker`: let this machine work for a scheduler, here or elsewhere."""
+"""`bentray worker`: run workers for a Dask scheduler."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def worker(
         ),
     ],
     workers: Annotated[
-        int | None, typer.Option(min=1, show_default="one a core", help="Worker processes.")
+        int | None, typer.Option(min=1, show_default="one per core", help="Worker processes.")
     ] = None,
     memory_limit: Annotated[
         str | None,
         typer.Option(
             envvar="BENTRAY_WORKER_MEMORY",
-            show_default="its share of this machine's",
+            show_default="equal share of the memory of this machine",
             help="Memory limit per process, e.g. 4GiB; above it a process is restarted; tasks run elsewhere.",
         ),
     ] = None,
@@ -48,7 +48,7 @@ def worker(
     host: Annotated[
         str | None,
         typer.Option(
-            show_default="the one that leads to the scheduler",
+            show_default="address of the interface to the scheduler",
             help="Address under which scheduler and workers reach this machine.",
         ),
     ] = None,
@@ -66,10 +66,10 @@ def worker(
 ) -> None:
     """Join a Dask scheduler as worker until Ctrl-C or SIGTERM; running tasks then move to other workers.
 
-    Each process runs one reconstruction and one rendering task at a time. It must see the data folder of the
-    service under the same path. Kernels are compiled before the first task comes. When the scheduler goes,
-    the workers wait for it to come back. Whoever reaches the scheduler or a worker can run code there: keep
-    both on a network of your own, or use TLS.
+    Each process runs one reconstruction task and one rendering task at a time. The data folder of the service
+    must have the same path on this machine. Kernels are compiled before the first task. If the scheduler
+    stops, the workers wait for its restart. Anyone who can connect to the scheduler or a worker can run code
+    there: use a private network or TLS.
 
     Example:  bentray worker --scheduler tcp://head:8786 --workers 4 --memory-limit 4GiB
     """
@@ -84,7 +84,7 @@ def worker(
             parse_bytes(memory_limit)
         except ValueError as error:
             raise InvalidInput(
-                "memory_limit", repr(memory_limit), "a size, as 4GiB; 0 for no limit"
+                "memory_limit", repr(memory_limit), "a size, e.g. 4GiB; 0: unlimited"
             ) from error
     count = workers if workers is not None else len(os.sched_getaffinity(0))
     asked = JoinRequest(
@@ -107,5 +107,5 @@ def _has_device() -> bool:
     from bentray_kernels.opencl import choose
 
     device = choose().device
-    remark("No OpenCL device passed its trial." if device is None else f"OpenCL device: {device.label}.")
+    remark("No OpenCL device passed the tests." if device is None else f"OpenCL device: {device.label}.")
     return device is not None

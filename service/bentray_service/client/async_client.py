@@ -1,4 +1,4 @@
-"""The client for programs with an event loop: the same calls as ``Client``, awaited."""
+"""The asynchronous client, with the same methods as ``Client``."""
 
 from __future__ import annotations
 
@@ -123,6 +123,6 @@ class AsyncClient(Connection):
 
 
 async def _awaited(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:
-    """The chunks of a file, read in a thread."""
+    """Read the chunks of a file in a thread."""
     while (chunk := await anyio.to_thread.run_sync(next, chunks, None)) is not None:
         yield chunk

@@ -1,4 +1,4 @@
-"""The client for programs that wait: upload a scan, run a job, fetch the result."""
+"""The synchronous client: upload a scan, run a job, download the result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What both clients have in common: address, key, patience, and how a flow becomes a method."""
+"""Common options of both clients, and the documentation of their methods."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ CONNECT_S = 10.0
 
 
 class Connection:
-    """A connection to one service; use it as a context manager.
+    """A connection to one service, to be used as a context manager.
 
-    Every method raises :class:`ClientError` when the service refuses or does not answer.
+    Every method raises :class:`ClientError` when the service rejects the request or does not answer.
 
     Args:
         url: of the service.
-        key: an API key, where the service asks for one; ``BENTRAY_KEY`` without it.
-        timeout_s: how long an answer may take.
-        poll_s: how often a job is polled where its events do not come through.
-        patience_s: how long to repeat requests to a service that has answered before and is away now, as when
-            it or its database is restarted. Only what is safe to repeat is repeated: reading, downloading,
-            uploading, and starting a job, which has a key of its own. 0 gives up at once.
-        on_wait: called with a line when such waiting begins and when it is over.
+        key: API key, if required; default: the variable ``BENTRAY_KEY``.
+        timeout_s: time limit for a response.
+        poll_s: interval between polls of a job without event stream.
+        patience_s: time for which requests are retried while the service is unavailable, e.g. during a
+            restart. Only
+            idempotent requests are retried: reading, downloading, uploading, and starting a job with a key.
+            0: no retries.
+        on_wait: called with a message when retries begin and when they end.
 
     Raises:
-        InvalidInput: for a ``url`` that is no web address.
+        InvalidInput: for an invalid ``url``.
     """
 
     def __init__(
@@ -59,13 +60,13 @@ class Connection:
         self._options: dict[str, Any] = {
             "base_url": self.url,
             "headers": {"Authorization": f"Bearer {key}"} if key else {},
-            # The answer to an upload comes after the service has read the whole file.
+            # An upload is answered after the service has read the file.
             "timeout": httpx.Timeout(timeout_s, connect=CONNECT_S),
         }
 
 
 def document(method: Callable[..., Any], flow: Callable[..., Any]) -> None:
-    """Give a method the name, docstring and signature of its flow, with the result in place of the flow."""
+    """Copy name, docstring and signature from a flow to a method, with its result as return type."""
     update_wrapper(method, flow)
     signature = inspect.signature(flow)
     first, *others = signature.parameters.values()

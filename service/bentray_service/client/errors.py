@@ -1,4 +1,4 @@
-"""What the client raises: the problem of the service, readable and with its fields."""
+"""Errors of the client, with the problem returned by the service."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from ..web.problem import Problem
 
 
 class ClientError(Exception):
-    """The service refused, the job failed, or nothing answered.
+    """The service rejected a request, a job failed, or there was no answer.
 
     Attributes:
-        status: the HTTP status, or None when there was no answer.
+        status: HTTP status, or None without an answer.
         field, found, accepted: from the problem, or None.
-        problem: the whole problem, or None.
-        upload: the id of the upload that was broken off; ``upload(…, resume=…)`` goes on with it.
-        retry_after_s: how long the service asks to wait before the next attempt, s, or None.
+        problem: the problem, or None.
+        upload: id of an interrupted upload, to continue with ``upload(…, resume=…)``.
+        retry_after_s: suggested time before the next attempt, s, or None.
     """
 
     def __init__(self, message: str, status: int | None = None, problem: Problem | None = None) -> None:
@@ -30,10 +30,10 @@ class ClientError(Exception):
 
 
 class NoAnswer(ClientError):  # noqa: N818 - names what happened, to whoever tries again
-    """The connection could not be made, or broke.
+    """The connection failed.
 
     Attributes:
-        sent: whether the service may have got the request.
+        sent: whether the service may have received the request.
     """
 
     def __init__(self, message: str, *, sent: bool = True) -> None:
@@ -42,13 +42,13 @@ class NoAnswer(ClientError):  # noqa: N818 - names what happened, to whoever tri
 
 
 def no_answer(url: str, error: httpx.TransportError) -> NoAnswer:
-    """The error of a connection that failed."""
+    """The error for a failed connection."""
     refused = isinstance(error, httpx.ConnectError | httpx.ConnectTimeout)
     return NoAnswer(f"no answer from {url}: {error}", sent=not refused)
 
 
 def from_problem(problem: Problem | None) -> ClientError:
-    """The error that a problem+json describes."""
+    """The error for a problem+json."""
     if problem is None:
         return ClientError("The service refused without a reason")
     detail = f": {problem.detail}" if problem.detail else ""
@@ -56,11 +56,11 @@ def from_problem(problem: Problem | None) -> ClientError:
 
 
 def from_response(response: httpx.Response) -> ClientError:
-    """The error of an answer that is not a success."""
+    """The error for an unsuccessful response."""
     if response.headers.get("content-type", "").startswith("application/problem+json"):
         error = from_problem(Problem.model_validate_json(response.content))
     else:
-        words = f"{response.url} answered {response.status_code}, and not as Bentray does"
+        words = f"{response.url} answered {response.status_code}, but not as a Bentray service"
         error = ClientError(words, response.status_code)
     wait = response.headers.get("retry-after", "")
     if wait.isdecimal():

@@ -1,4 +1,4 @@
-"""What the clients can do, each a flow: requests in order, and the result."""
+"""The operations of the clients, written as flows of requests."""
 
 from __future__ import annotations
 
@@ -38,17 +38,17 @@ def upload(
     resume: str | None = None,
     **metadata: str,
 ) -> Flow[Uploaded]:
-    """Upload a file, a large one in pieces, which go on after the connection broke.
+    """Upload a file in chunks; interrupted uploads are continued.
 
     Args:
         path: of the file.
         on_progress: called with ``(sent, total)``, bytes.
-        kind: what it is.
-        resume: the id of an upload to go on with: ``ClientError.upload`` of the one that was broken off.
-        metadata: of a volume or a mesh its ``title``, of a volume ``spacing_m``, ``shape`` and ``dtype`` too.
+        kind: type of the file.
+        resume: id of an interrupted upload, from ``ClientError.upload``.
+        metadata: ``title`` of a volume or mesh; ``spacing_m``, ``shape`` and ``dtype`` of a volume.
 
     Returns:
-        The record of the dataset, the volume or the mesh.
+        the record of the dataset, volume or mesh.
     """
     answer = yield from send_file(Path(path), on_progress, kind, resume, metadata)
     return RECORDS[kind].model_validate_json(answer.content)
@@ -57,19 +57,19 @@ def upload(
 def submit(
     connection: Connection, dataset_id: str, settings: Mapping[str, Any] | None = None
 ) -> Flow[JobRecord]:
-    """Start a reconstruction; settings left out take their defaults."""
+    """Start a reconstruction; omitted settings take their defaults."""
     return (
         yield from _start({"kind": "reconstruction", "dataset": dataset_id, "settings": dict(settings or {})})
     )
 
 
 def simulate(connection: Connection, settings: Mapping[str, Any] | None = None) -> Flow[JobRecord]:
-    """Start the simulation of a scan; the job's ``dataset`` is its id once the job has succeeded."""
+    """Start the simulation of a scan; ``dataset`` of the successful job is its id."""
     return (yield from _start({"kind": "simulation", "settings": dict(settings or {})}))
 
 
 def job(connection: Connection, job_id: str) -> Flow[JobRecord]:
-    """The job record as it is now."""
+    """Get the current record of a job."""
     return (yield from _record(JobRecord, "GET", f"/v1/jobs/{job_id}"))
 
 
@@ -84,27 +84,27 @@ def wait(
     on_progress: Callable[[JobRecord], None] | None = None,
     timeout_s: float | None = None,
 ) -> Flow[JobRecord]:
-    """Wait until a job has succeeded and return its record; ``on_progress`` gets every record before.
+    """Wait until a job has succeeded and return its record; ``on_progress`` is called with every record.
 
     Raises:
-        ClientError: when the job failed (with its problem), was cancelled, or exceeds ``timeout_s``.
+        ClientError: when the job failed or was cancelled, or after ``timeout_s``.
     """
     return (yield from wait_for(job_id, on_progress, timeout_s, connection.poll_s))
 
 
 def volume(connection: Connection, volume_id: str) -> Flow[VolumeRecord]:
-    """The metadata of a result."""
+    """Get the record of a volume."""
     return (yield from _record(VolumeRecord, "GET", f"/v1/volumes/{volume_id}"))
 
 
 def slice_png(connection: Connection, /, volume_id: str, **how: str | float) -> Flow[bytes]:
-    """One slice as PNG; ``how``: index, quantity, low, high, colormap."""
+    """Get a slice as PNG; ``how``: index, quantity, low, high, colormap."""
     path = f"/v1/volumes/{volume_id}/slice.png"
     return bytes((yield RequestStep("GET", path, {"params": how}, repeatable=True)).content)
 
 
 def download(connection: Connection, volume_id: str, format: Format, path: Path | str) -> Flow[Path]:  # noqa: A002
-    """Fetch a result into ``path``; the file is there whole or not at all."""
+    """Download a volume to ``path``, atomically."""
     yield DownloadStep(f"/v1/volumes/{volume_id}/data", {"params": {"format": format}}, Path(path))
     return Path(path)
 
@@ -112,13 +112,13 @@ def download(connection: Connection, volume_id: str, format: Format, path: Path 
 def download_dataset(
     connection: Connection, dataset_id: str, path: Path | str, on_progress: OnBytes | None = None
 ) -> Flow[Path]:
-    """Fetch a scan, uploaded or simulated, into ``path``; ``on_progress`` as of ``upload``."""
+    """Download a scan to ``path``; ``on_progress`` as in ``upload``."""
     yield DownloadStep(f"/v1/datasets/{dataset_id}/file", {}, Path(path), on_progress)
     return Path(path)
 
 
 def result(connection: Connection, volume_id: str) -> Flow[Result]:
-    """A volume as arrays with coordinates; ``.to_xarray()`` makes a dataset of xarray of it."""
+    """Get a volume as arrays with coordinates; ``.to_xarray()`` converts it to a dataset of xarray."""
     about = yield from volume(connection, volume_id)
     with tempfile.TemporaryDirectory() as folder:
         path = yield from download(connection, volume_id, "hdf5", Path(folder) / "volume.h5")
@@ -126,7 +126,7 @@ def result(connection: Connection, volume_id: str) -> Flow[Result]:
 
 
 def delete(connection: Connection, stored_id: str) -> Flow[None]:
-    """Delete a dataset, a volume or a mesh with all that was made of it."""
+    """Delete a dataset, volume or mesh with everything derived from it."""
     kind = PREFIXES.get(stored_id.partition("-")[0])
     if kind is None:
         raise ClientError(f"{stored_id!r} is not the id of a dataset, a volume or a mesh")
@@ -139,7 +139,7 @@ def _record(model: type[Record], method: str, path: str) -> Flow[Record]:
 
 
 def _start(request: dict[str, Any]) -> Flow[JobRecord]:
-    """Start a job; its key makes sure that it is one, however often the request has to be sent."""
+    """Start a job with an idempotency key, so that retries start no second job."""
     options = {"json": request, "headers": {"Idempotency-Key": str(uuid.uuid4())}}
     answer = yield RequestStep("POST", "/v1/jobs", options, repeatable=True)
     return JobRecord.model_validate_json(answer.content)

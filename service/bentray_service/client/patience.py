@@ -1,4 +1,4 @@
-"""While a service is away, what is safe to repeat is repeated, with pauses between."""
+"""Retries of idempotent requests while the service is unavailable."""
 
 from __future__ import annotations
 
@@ -11,39 +11,39 @@ from .steps import DownloadStep, Flow, PauseStep, RequestStep, Step
 
 T = TypeVar("T")
 
-# How long a service may be away before the client gives up, s.
+# Time for which requests are retried, s.
 PATIENCE_S = 300.0
-# Between two attempts, s; each pause is twice the one before.
+# Pauses between attempts, s; each is twice the previous one.
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 15.0
 
-# What a proxy answers while its service is away, and a service while its database is.
-AWAY = (502, 503, 504)
-# An error of the service may be a database that ends under it, or may never pass: it is tried so often.
+# Status codes of a proxy without its service, and of a service without its database.
+UNAVAILABLE = (502, 503, 504)
+# An internal error may be temporary, so it is retried a few times.
 ERROR, MOST_ERRORS = 500, 5
 
 
-def away(error: ClientError) -> bool:
+def unavailable(error: ClientError) -> bool:
     """Whether the same request may succeed later."""
-    return isinstance(error, NoAnswer) or error.status in (*AWAY, ERROR)
+    return isinstance(error, NoAnswer) or error.status in (*UNAVAILABLE, ERROR)
 
 
 class Retries:
-    """How long one client goes on asking.
+    """Retries the requests of one client.
 
-    A service that has never answered is given up at once: its address may be wrong.
+    Requests to a service that has never answered are not retried, since the address may be wrong.
 
     Args:
-        seconds: from the first attempt of a request to its last.
-        told: called with a line when waiting begins and when it is over.
+        seconds: time limit from the first attempt of a request.
+        told: called with a message when retries begin and when they end.
     """
 
-    def __init__(self, seconds: float, told: Callable[[str], None] | None) -> None:
+    def __init__(self, seconds: float, on_message: Callable[[str], None] | None) -> None:
         self._seconds = seconds
-        self._told = told
+        self._on_message = on_message
         self._answered = False
 
     def through(self, flow: Flow[T]) -> Flow[T]:
-        """The same flow, each of its steps repeated where that is safe and worth while."""
+        """The same flow with retries of its steps."""
         answer: Any = None
         error: ClientError | None = None
         while True:
@@ -74,7 +74,7 @@ class Retries:
                 if time.monotonic() + pause > last:
                     raise
                 if not waits:
-                    self._say(f"{error}; trying again for up to {last - begun:.0f} s.")
+                    self._say(f"{error}; retrying for up to {last - begun:.0f} s.")
                 waits = True
                 yield PauseStep(pause)
                 pause = min(2.0 * pause, LONGEST_PAUSE_S)
@@ -85,13 +85,13 @@ class Retries:
                 return answer
 
     def _say(self, line: str) -> None:
-        if self._told is not None:
-            self._told(line)
+        if self._on_message is not None:
+            self._on_message(line)
 
 
 def repeatable(step: Step, error: ClientError) -> bool:
-    """Whether a step that failed may be done again without doing anything twice."""
-    if not isinstance(step, RequestStep | DownloadStep) or not away(error):
+    """Whether a failed step can be repeated without side effects."""
+    if not isinstance(step, RequestStep | DownloadStep) or not unavailable(error):
         return False
     never_sent = isinstance(error, NoAnswer) and not error.sent
     return never_sent or isinstance(step, DownloadStep) or step.repeatable

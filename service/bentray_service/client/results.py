@@ -1,4 +1,4 @@
-"""A volume as arrays with coordinates and units, from the file that the service gives."""
+"""A volume as arrays with coordinates and units, read from the downloaded file."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Result:
-    """What is in a volume.
+    """The content of a volume.
 
     Attributes:
-        axes: names of the axes in order, ``x``, ``y`` and, in space, ``z``.
-        values: arrays over these by name: of a reconstruction ``speed``, ``coverage`` and, where it has them,
-            ``attenuation`` and ``recovery``; of an upload ``value``.
-        coordinates: place of each node along each axis, m; of slices at uneven heights the z are missing.
-        units: of each array.
-        attributes: where it comes from: ids, title, settings, versions.
+        axes: names of the axes in order: ``x``, ``y`` and, in 3-D, ``z``.
+        values: arrays by name: for a reconstruction ``speed``, ``coverage`` and, if present, ``attenuation``
+            and ``recovery``; for an upload ``value``.
+        coordinates: node positions along each axis, m; ``z`` is missing for slices with non-uniform heights.
+        units: unit of each array.
+        attributes: provenance: ids, title, settings, versions.
     """
 
     axes: tuple[str, ...]
@@ -37,10 +37,10 @@ class Result:
     attributes: Mapping[str, str] = field(default_factory=dict)
 
     def to_xarray(self) -> xarray.Dataset:
-        """The same as a dataset of xarray, with the units in ``attrs``.
+        """Convert to a dataset of xarray, with the units in ``attrs``.
 
         Raises:
-            ClientError: where xarray is not installed.
+            ClientError: when xarray is not installed.
         """
         try:
             import xarray
@@ -57,22 +57,17 @@ class Result:
         return xarray.Dataset(arrays, coords=places, attrs=dict(self.attributes))
 
 
-# Unit of each array of a reconstruction.
+# Units of the arrays of a reconstruction.
 UNITS = {"speed": "m/s", "coverage": "m", "attenuation": "Np/m", "recovery": "1"}
 
 
 def read_result(path: Path, record: VolumeRecord) -> Result:
-    """Read a volume's HDF5 file.
-
-    Args:
-        path: of the file.
-        record: of the volume, as the service tells it.
-    """
+    """Read the HDF5 file of a volume with the given record."""
     from bentray_workers.files.reconstruction import read_reconstruction
     from bentray_workers.files.volume import read_volume
 
     named = ("id", "title", "job", "dataset", "sha256")
-    told = {name: str(value) for name in named if (value := getattr(record, name))}
+    attributes = {name: str(value) for name in named if (value := getattr(record, name))}
     spacing: tuple[float, ...]
     origin: tuple[float, ...]
     if record.source == "upload":
@@ -84,7 +79,7 @@ def read_result(path: Path, record: VolumeRecord) -> Result:
         values = {name: getattr(found, name) for name in UNITS if getattr(found, name) is not None}
         units = {name: UNITS[name] for name in values}
         spacing, origin = found.spacing_m, found.origin_m
-        told |= {**found.provenance, "settings": str(found.settings.to_dict())}
+        attributes |= {**found.provenance, "settings": str(found.settings.to_dict())}
     shape = next(iter(values.values())).shape
     axes = tuple(record.axes.split(","))
     coordinates = {
@@ -92,4 +87,4 @@ def read_result(path: Path, record: VolumeRecord) -> Result:
         for axis, n, start, step in zip(axes, shape, origin, spacing, strict=True)
         if np.isfinite(start) and np.isfinite(step)
     }
-    return Result(axes, values, coordinates, units, told)
+    return Result(axes, values, coordinates, units, attributes)

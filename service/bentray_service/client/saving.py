@@ -1,4 +1,4 @@
-"""A download on its way into a file, which is there whole or not at all."""
+"""Atomic download to a file."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .steps import DownloadStep
 
 @contextmanager
 def saving(step: DownloadStep, response: httpx.Response) -> Iterator[Callable[[bytes], None]]:
-    """What the chunks are given to; on leaving, the file takes the target's place.
+    """Yield a function that writes chunks; at the end, the file replaces the target.
 
     Args:
-        step: says where it goes, and who is told how much has come.
+        step: target and progress callback.
         response: to be read in chunks.
 
     Raises:
-        ClientError: where it cannot be written.
+        ClientError: when the file cannot be written.
     """
     target = step.target
     partial = target.with_name(f"{target.name}.partial")
@@ -31,8 +31,8 @@ def saving(step: DownloadStep, response: httpx.Response) -> Iterator[Callable[[b
 
             def save(chunk: bytes) -> None:
                 file.write(chunk)
-                if step.told is not None:
-                    step.told(file.tell(), total)
+                if step.on_progress is not None:
+                    step.on_progress(file.tell(), total)
 
             yield save
             file.flush()

@@ -1,7 +1,7 @@
-"""What a client does one after the other, told apart from how: each call is a generator of steps.
+"""Steps of the flows of both clients: requests, downloads, event streams and pauses.
 
-A flow yields steps and is sent their answers; a step that fails is thrown into it as :class:`ClientError`.
-``Client`` and ``AsyncClient`` walk through the same flows.
+A flow is a generator that yields steps and receives their results; errors are raised in it as
+:class:`ClientError`. ``Client`` and ``AsyncClient`` execute the same flows.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ CHUNK_BYTES = 1024 * 1024
 
 @dataclass(frozen=True)
 class RequestStep:
-    """A request; its answer is the response, read, once it is a success.
+    """A request; its result is the complete response.
 
     Attributes:
         method, path: of the service.
-        options: as ``httpx`` takes them: ``params``, ``json``, ``headers``.
-        body: makes the chunks of the body.
-        repeatable: whether the service does nothing twice when the request comes again.
-        until: when to stop repeating it, by ``time.monotonic``; None for no such time.
+        options: for ``httpx``: ``params``, ``json``, ``headers``.
+        body: generates the chunks of the body.
+        repeatable: whether the request is idempotent.
+        until: end of retries, by ``time.monotonic``; None: unlimited.
     """
 
     method: str
@@ -38,29 +38,29 @@ class RequestStep:
 
 @dataclass(frozen=True)
 class DownloadStep:
-    """Download into a file, which is there whole or not at all; no answer.
+    """An atomic download to a file, without a result.
 
     Attributes:
         path, options: of the request.
         target: the file.
-        told: called with (bytes that came, bytes in all).
+        told: called with (received bytes, total bytes).
     """
 
     path: str
     options: Mapping[str, Any]
     target: Path
-    told: Callable[[int, int], None] | None = None
+    on_progress: Callable[[int, int], None] | None = None
 
 
 @dataclass(frozen=True)
 class EventStep:
-    """Wait for the next line of a stream of events, which is opened at the first time.
+    """Read the next line of an event stream, which is opened on first use.
 
-    The answer is the line, or None when the stream has ended.
+    The result is the line, or None at the end of the stream.
 
     Attributes:
         path: of the stream.
-        seconds: of silence after which the connection counts as broken.
+        seconds: time limit for a line.
     """
 
     path: str
@@ -69,7 +69,7 @@ class EventStep:
 
 @dataclass(frozen=True)
 class PauseStep:
-    """Wait so long; no answer."""
+    """A pause, without a result."""
 
     seconds: float
 

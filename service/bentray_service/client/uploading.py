@@ -1,4 +1,4 @@
-"""The flow of an upload: by tus, over broken connections, and stored once however often it is sent."""
+"""The flow of an upload with tus, continued after broken connections."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .steps import CHUNK_BYTES, Flow, PauseStep, RequestStep
 UploadKind = Literal["dataset", "volume", "mesh"]
 OnBytes = Callable[[int, int], None]
 
-# Where each kind is found.
+# Path of each kind.
 PLACES: Mapping[str, str] = {"dataset": "/v1/datasets", "volume": "/v1/volumes", "mesh": "/v1/meshes"}
 
-# How often in a row a connection may break without a byte getting through, and the pauses between, s.
+# Attempts in a row without progress, and the pauses between them, s.
 TRIES = 6
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 15.0
-# Between two looks at an upload that is being read, s.
+# Interval between polls of an upload during ingestion, s.
 FIRST_LOOK_S, LONGEST_LOOK_S = 0.05, 1.0
 
 TUS = {"Tus-Resumable": "1.0.0"}
@@ -34,7 +34,7 @@ PIECE = {"Content-Type": "application/offset+octet-stream"}
 def send_file(
     path: Path, on_progress: OnBytes | None, kind: UploadKind, resume: str | None, said: Mapping[str, str]
 ) -> Flow[httpx.Response]:
-    """Upload a file; the result is the answer with the record of what it became."""
+    """Upload a file; the result is the response with the record of the stored item."""
     if kind not in PLACES:
         raise InvalidInput("kind", repr(kind), " or ".join(PLACES))
     try:
@@ -56,20 +56,20 @@ def send_file(
 def _begin(total: int, said: Mapping[str, str]) -> Flow[str]:
     metadata = ",".join(f"{name} {base64.b64encode(text.encode()).decode()}" for name, text in said.items())
     headers = {**TUS, "Upload-Length": str(total), "Upload-Metadata": metadata}
-    # One that is begun twice is forgotten, and ends by itself.
+    # An unused upload expires.
     answer = yield RequestStep("POST", "/v1/uploads", {"headers": headers}, repeatable=True)
     return httpx.URL(answer.headers["Location"]).path
 
 
 def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Flow[None]:
-    """Send what is missing, as often as it takes."""
+    """Send the missing data, with retries."""
     failures, reached, pause = 0, -1, FIRST_PAUSE_S
     while True:
         try:
             there = yield RequestStep("HEAD", place, {"headers": TUS}, repeatable=True)
             offset, length = int(there.headers["Upload-Offset"]), int(there.headers["Upload-Length"])
             if length != total:
-                raise ClientError(f"{path} has {total} bytes; the upload at {place} is one of {length}")
+                raise ClientError(f"{path} has {total} bytes, but the upload at {place} has {length}")
             if offset > reached:
                 failures, reached, pause = 0, offset, FIRST_PAUSE_S
             if offset == total:
@@ -78,7 +78,7 @@ def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Fl
             yield RequestStep("PATCH", place, {"headers": headers}, _chunks(path, offset, total, on_progress))
             return
         except ClientError as error:
-            # Locked: the service has not noticed yet that the connection before is gone.
+            # Locked: the service has not yet noticed that the previous connection is broken.
             if not isinstance(error, NoAnswer) and error.status not in (408, 409, 423, 500, 502, 503, 504):
                 raise
             failures += 1
@@ -89,7 +89,7 @@ def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Fl
 
 
 def _read(place: str) -> Flow[httpx.Response]:
-    """Wait until the service has read the upload."""
+    """Wait until the service has ingested the upload."""
     pause = FIRST_LOOK_S
     while True:
         record = UploadRecord.model_validate_json((yield RequestStep("GET", place, repeatable=True)).content)

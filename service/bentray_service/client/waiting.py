@@ -1,4 +1,4 @@
-"""The flow of waiting for a job: by its events where they come through, else by looking now and then."""
+"""The flow that waits for a job, by its event stream or by polling."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from ..routes.models.records import JobRecord
 from .errors import ClientError, from_problem
 from .steps import EventStep, Flow, PauseStep, RequestStep
 
-# The service says something at least every 15 s; a proxy that keeps events back never does.
+# Time limit for a line of the event stream, s; the service sends one at least every 15 s.
 SILENCE_S = 40.0
-# A stream that breaks so often is not tried again.
+# Number of broken event streams before polling.
 STREAMS = 3
 
 
 def wait_for(
     job_id: str, on_progress: Callable[[JobRecord], None] | None, timeout_s: float | None, poll_s: float
 ) -> Flow[JobRecord]:
-    """Wait until a job has succeeded; its value is the record of the job."""
+    """Wait until a job has succeeded; the result is its record."""
     deadline = None if timeout_s is None else time.monotonic() + timeout_s
     place, broken = f"/v1/jobs/{job_id}", 0
     while True:
@@ -48,7 +48,7 @@ def wait_for(
 
 
 def _news(place: str, seconds: float, deadline: float | None) -> Flow[bool]:
-    """Wait for an event or for the deadline; false when the stream has ended, as it does with the job."""
+    """Wait for an event or the deadline; False at the end of the stream."""
     while deadline is None or time.monotonic() <= deadline:
         line = yield EventStep(place, seconds)
         if line is None:

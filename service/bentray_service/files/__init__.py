@@ -1,1 +1,1 @@
-"""The stored files of tenants: in the data folder or in a bucket, checked, cleaned up."""
+"""Stored files of tenants in the data folder or a bucket, with checksums and clean-up."""

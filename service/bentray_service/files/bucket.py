@@ -1,4 +1,4 @@
-"""Objects under one prefix of an S3 bucket, through s3fs; what goes wrong there is ``StorageUnavailable``."""
+"""Access to objects under one prefix of an S3 bucket with s3fs; errors become ``StorageUnavailable``."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from ..refusals import StorageUnavailable
 
 log = logging.getLogger("bentray.storage")
 
-# A few of them are in memory at a time; a larger file has larger ones, for there are at most MOST_PARTS.
+# Size of the parts of an upload, larger for files with more than MOST_PARTS parts.
 PART_BYTES = 16 * 2**20
 PARTS_AT_ONCE = 4
 MOST_PARTS = 10_000
-# What one call to S3 removes.
+# Maximum number of objects per S3 delete request.
 MOST_REMOVED = 1000
-# Retries come on top, so that a bucket which cannot be reached is given up after some ten seconds; so is one
-# that says nothing, but where it takes in a file, which it may put together for minutes.
+# With retries, an unreachable bucket is given up after about ten seconds. The timeout of a file upload is
+# longer, since the bucket may take minutes to assemble the parts.
 CONNECT_S = 3.0
 READ_S = 120.0
 ANSWER_S = 10.0
 TRIES = {"total_max_attempts": 2, "mode": "standard"}
 
-# Of the local disk: they are no fault of the bucket.
+# Errors of the local disk.
 OWN = (errno.ENOSPC, errno.EDQUOT)
 
 
 @dataclass(frozen=True)
 class BucketObject:
-    """An object: its key below the prefix, its size and when it was last written, s since 1970."""
+    """An object: key below the prefix, size, and time of last modification, s since 1970."""
 
     key: str
     size: int
@@ -46,7 +46,7 @@ class BucketObject:
 
 
 class Bucket:
-    """Keys are relative to the prefix. Credentials and endpoint come from the variables that AWS names."""
+    """A bucket; keys are relative to the prefix. Credentials come from the usual AWS variables."""
 
     def __init__(self, url: str) -> None:
         """Args:
@@ -63,28 +63,28 @@ class Bucket:
         )
         self._s3.retries = 2
 
-    def put(self, path: Path, key: str, told: Mapping[str, str]) -> None:
-        """Write a file as an object, with ``told`` beside it; it is there whole or not at all."""
+    def put(self, path: Path, key: str, metadata: Mapping[str, str]) -> None:
+        """Upload a file with metadata; the object is complete or absent."""
         part = max(PART_BYTES, math.ceil(path.stat().st_size / MOST_PARTS))
         with self._watched():
-            self._s3.put_file(str(path), self._place(key), chunksize=part, Metadata=dict(told))
+            self._s3.put_file(str(path), self._place(key), chunksize=part, Metadata=dict(metadata))
 
     def get(self, key: str, path: Path) -> None:
-        """Read an object into a file, of which something may be there after an error.
+        """Download an object; after an error the file may be incomplete.
 
         Raises:
-            FileNotFoundError: when there is none.
+            FileNotFoundError: when the object does not exist.
         """
         with self._watched(may_miss=True):
             self._s3.get_file(self._place(key), str(path))
 
-    def put_metadata(self, key: str, told: Mapping[str, str]) -> None:
-        """Write an object that is nothing but what is ``told`` beside it."""
+    def put_metadata(self, key: str, metadata: Mapping[str, str]) -> None:
+        """Write an empty object with metadata."""
         with self._watched():
-            self._call("put_object", Key=self._prefix + key, Body=b"", Metadata=dict(told))
+            self._call("put_object", Key=self._prefix + key, Body=b"", Metadata=dict(metadata))
 
     def metadata(self, key: str) -> dict[str, str] | None:
-        """What was told beside an object, and its size as ``size``; None when there is none."""
+        """Metadata of an object, with its ``size``; None if it does not exist."""
         try:
             with self._watched(may_miss=True):
                 found = self._call("head_object", Key=self._prefix + key)
@@ -93,7 +93,7 @@ class Bucket:
         return {**found["Metadata"], "size": str(found["ContentLength"])}
 
     def listed(self, under: str = "") -> Iterator[BucketObject]:
-        """All objects whose keys begin so."""
+        """All objects whose keys start with ``under``."""
         more: dict[str, str] = {}
         while True:
             with self._watched():
@@ -106,7 +106,7 @@ class Bucket:
             more = {"ContinuationToken": page["NextContinuationToken"]}
 
     def remove(self, keys: Collection[str]) -> None:
-        """Remove objects; those that are not there are passed over."""
+        """Delete objects; missing ones are ignored."""
         left = [{"Key": self._prefix + key} for key in keys]
         while left:
             batch, left = left[:MOST_REMOVED], left[MOST_REMOVED:]
@@ -124,11 +124,9 @@ class Bucket:
             own = isinstance(error, OSError) and error.errno in OWN
             if own or (may_miss and isinstance(error, FileNotFoundError)):
                 raise
-            # Callers are told neither address nor key.
+            # Callers must not see the address and the key.
             log.warning("%s: %s: %s", self.url, type(error).__name__, error)
-            raise StorageUnavailable(
-                f"the bucket does not do what it is asked ({type(error).__name__})"
-            ) from error
+            raise StorageUnavailable(f"error of the bucket ({type(error).__name__})") from error
 
     def _call(self, method: str, **how: Any) -> Any:
         return self._s3.call_s3(method, Bucket=self._name, **how, timeout=ANSWER_S)

@@ -1,4 +1,4 @@
-"""The store that keeps files in a bucket; the data folder is a cache of it."""
+"""A store that keeps files in a bucket, with the data folder as a cache."""
 
 from __future__ import annotations
 
@@ -21,31 +21,30 @@ from .tenant_files import KEPT
 
 log = logging.getLogger("bentray.storage")
 
-# The object that tells which database a bucket belongs to.
+# The object with the id of the database that uses the bucket.
 MARK = "bentray-database"
-# How long what was found out of the bucket is believed, s: whether it answers, and how much a tenant has.
+# Caching times of the availability of the bucket and of the usage of tenants, s.
 FRESH_S = 5.0
 SUM_S = 60.0
-# After which what no row knows of was forgotten, and is not about to have one, s. Clocks of buckets differ.
+# Minimum age of orphaned objects and cached files before deletion, s; the clocks of buckets differ.
 FORGOTTEN_S = 86400.0
 LEFT_S = 3600.0
 
 
 class BucketStore:
-    """Keeps things in a bucket, each as one object whose key is its path in the data folder; see
-    :class:`Store`.
+    """Keeps each item as one object whose key is its path in the data folder; see :class:`Store`.
 
-    What lies in the data folder is believed: no name is ever used for another content. What is fetched is
-    checked against the SHA-256 that was written beside it.
+    A cached file is always valid, since names are never reused for other content. Downloads are verified
+    against the SHA-256 in the metadata of the object.
     """
 
     def __init__(self, root: Path, bucket: Bucket, mark: str, known: LiveIds, cache_bytes: int) -> None:
         """Args:
         root: the data folder.
-        bucket: which holds ``mark`` under ``MARK``.
-        mark: of the database.
-        known: what it knows of.
-        cache_bytes: what things may take in the data folder; those in use may take more.
+        bucket: with ``mark`` under ``MARK``.
+        mark: id of the database.
+        known: ids in use.
+        cache_bytes: maximum size of the cache; files in use may exceed it.
         """
         self._root = root
         self._bucket = bucket
@@ -62,10 +61,10 @@ class BucketStore:
     def publish(self, path: Path) -> None:
         key = self._key(path)
         with packed(path, self._root / "scratch") as whole:
-            told = metadata_of(path, whole)
+            metadata = metadata_of(path, whole)
             held = self._bucket.metadata(key)
-            if held is None or held.get("sha256") != told["sha256"]:
-                self._bucket.put(whole, key, told)
+            if held is None or held.get("sha256") != metadata["sha256"]:
+                self._bucket.put(whole, key, metadata)
                 self._count(path, whole.stat().st_size)
         self._cache.use(path)
         self._make_room(0)
@@ -78,7 +77,7 @@ class BucketStore:
             if mine := coming is None:
                 coming = self._coming[path] = Future()
         if not mine:
-            # Somebody fetches it already.
+            # Another thread is downloading it.
             coming.result()
             return path
         try:
@@ -102,7 +101,7 @@ class BucketStore:
     def remove(self, paths: Collection[Path]) -> None:
         if fault := self.fault():
             raise StorageUnavailable(fault)
-        # In this order, so that who publishes what lies there by itself can see that it is gone.
+        # Cache first, so that a concurrent publication notices the deletion.
         self._cache.clear(paths)
         self._bucket.remove([self._key(path) for path in paths])
         with self._lock:
@@ -126,16 +125,15 @@ class BucketStore:
             return self._fault
 
     def tidy(self, stop: Callable[[], bool]) -> None:
-        """Remove what was forgotten, and publish what lies in the data folder only, as from before there was
-        a bucket."""
+        """Delete orphaned objects and cached files, and publish files that are in the data folder only."""
         held = {one.key: one.changed for one in self._bucket.listed("tenants/")}
         lying = list(self._cache.stored_paths())
-        # Asked for last: what came meanwhile has a row, or is young.
+        # Queried last, so that files created meanwhile have a row or are new.
         names, now = self._known.names(), time.time()
         unknown = (key for key in held if _name(key) not in names)
         old = [key for key in unknown if now - held[key] > FORGOTTEN_S]
         if old:
-            log.warning("%d objects of which the database knows nothing are removed", len(old))
+            log.warning("deleting %d objects without a row in the database", len(old))
             self._bucket.remove(old)
         for path in lying:
             if stop():
@@ -154,16 +152,16 @@ class BucketStore:
 
     def _fetch(self, path: Path) -> None:
         key = self._key(path)
-        told = self._bucket.metadata(key)
-        if told is None:
+        metadata = self._bucket.metadata(key)
+        if metadata is None:
             if fault := self._probe():
                 raise StorageUnavailable(fault)
-            raise FileNotFoundError(errno.ENOENT, "it is not in the bucket", key)
-        self._make_room(int(told["size"]))
+            raise FileNotFoundError(errno.ENOENT, "not in the bucket", key)
+        self._make_room(int(metadata["size"]))
         whole = self._root / "scratch" / f"{secrets.token_hex(8)}.coming"
         try:
             self._bucket.get(key, whole)
-            unpack(whole, told, path)
+            unpack(whole, metadata, path)
         except ValueError as error:
             raise OSError(errno.EIO, str(error), key) from error
         finally:
@@ -182,11 +180,11 @@ class BucketStore:
 
     def _probe(self) -> str | None:
         try:
-            told = self._bucket.metadata(MARK)
+            metadata = self._bucket.metadata(MARK)
         except StorageUnavailable as error:
             return error.value
-        if told is None or told.get("database") != self._mark:
-            return "the bucket is not there, or not the one of this database any more"
+        if metadata is None or metadata.get("database") != self._mark:
+            return "the bucket does not exist, or belongs to another database"
         return None
 
     def _key(self, path: Path) -> str:
@@ -194,6 +192,6 @@ class BucketStore:
 
 
 def _name(key: str) -> Name:
-    """The tenant and the id of ``tenants/TENANT/KIND/ID.…``."""
+    """Tenant and id from the key ``tenants/TENANT/KIND/ID.…``."""
     _, tenant, _, name = key.split("/", 3)
     return tenant, name.partition(".")[0]

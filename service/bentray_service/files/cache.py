@@ -1,4 +1,4 @@
-"""The data folder as a cache: what was used last, and how what was used longest ago makes room."""
+"""The data folder as a cache with eviction of the least recently used items."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from pathlib import Path
 from .disk import bytes_in
 from .tenant_files import KEPT
 
-# What can be made of the things that are kept goes with them.
+# Exports are evicted together with their volume.
 MADE_OF_THEM = ("exports",)
-# How long nothing goes that was asked for: longer than any picture takes, and than a download needs to begin.
+# Items used within this time are not evicted, s; longer than rendering or the start of a download takes.
 RECENT_S = 300.0
 
 
 @dataclass
 class CachedItem:
-    """A thing with all that was made of it; ``used`` is when it was last asked for, s since 1970."""
+    """An item with its exports; ``used`` is the time of last use, s since 1970."""
 
     paths: list[Path] = field(default_factory=list)
     size: int = 0
@@ -30,9 +30,9 @@ class CachedItem:
 
 
 class Cache:
-    """What lies in the folders ``KEPT`` and ``MADE_OF_THEM`` of every tenant below ``root``.
+    """The folders ``KEPT`` and ``MADE_OF_THEM`` of all tenants below ``root``.
 
-    When a thing was last used is the access time of its file or folder, which outlives the service.
+    The time of last use of an item is the access time of its file or folder.
     """
 
     def __init__(self, root: Path, most_bytes: int) -> None:
@@ -41,7 +41,7 @@ class Cache:
         self._lock = threading.Lock()
 
     def use(self, path: Path) -> bool:
-        """Whether a thing lies there; it stays for the next ``RECENT_S`` then."""
+        """Whether an item is cached; if so, its time of last use is set to now."""
         with self._lock:
             try:
                 written = path.stat().st_mtime_ns
@@ -53,12 +53,12 @@ class Cache:
     def make_room(
         self, wanted: int, needed: Callable[[], Collection[str]], kept: Callable[[Path], bool]
     ) -> None:
-        """Remove things, those used longest ago first, until ``wanted`` bytes fit.
+        """Evict the least recently used items until ``wanted`` bytes fit.
 
         Args:
-            wanted: bytes that are to come.
-            needed: the ids of all that unfinished jobs need; asked for only when something has to go.
-            kept: whether a thing can be had again.
+            wanted: size of a new item, bytes.
+            needed: returns the ids that unfinished jobs need; called only if something must be evicted.
+            kept: whether an item can be downloaded again.
         """
         things = self._things()
         total = sum(thing.size for thing in things.values()) + wanted
@@ -74,7 +74,7 @@ class Cache:
                 total -= thing.size
 
     def clear(self, paths: Collection[Path]) -> None:
-        """Remove what lies there, each thing at once."""
+        """Delete cached items, each atomically."""
         for path in paths:
             gone = self._root / "scratch" / f"{secrets.token_hex(8)}.gone"
             try:
@@ -87,13 +87,13 @@ class Cache:
                 gone.unlink()
 
     def stored_paths(self) -> Iterator[Path]:
-        """Every file or folder that is whole."""
+        """All complete files and folders."""
         for folder in self._root.glob("tenants/*/*"):
             if folder.name in (*KEPT, *MADE_OF_THEM):
                 yield from (path for path in folder.iterdir() if path.suffix != ".partial")
 
     def _drop(self, thing: CachedItem) -> bool:
-        """Remove a thing, unless somebody asked for it meanwhile."""
+        """Evict an item, unless it was used in the meantime."""
         with self._lock:
             for path in thing.paths:
                 if path.exists() and path.stat().st_atime > thing.used:
@@ -102,7 +102,7 @@ class Cache:
         return True
 
     def _things(self) -> dict[tuple[str, str], CachedItem]:
-        """By tenant and id."""
+        """Cached items by tenant and id."""
         found: dict[tuple[str, str], CachedItem] = {}
         for path in self.stored_paths():
             try:

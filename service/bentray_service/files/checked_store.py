@@ -1,4 +1,4 @@
-"""A store whose things are checked: what changed on the disk is never read as if it were what was stored."""
+"""A store that verifies checksums, so that damaged files are never served."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ log = logging.getLogger("bentray.storage")
 
 
 class CheckedStore:
-    """Notes the checksum of what is published, and compares it the first time that this process reads it.
+    """Stores a checksum with each publication, and verifies it at the first use in this process.
 
-    What another program writes to later is compared again, for its age or its size tells. What only a scrub
-    can find (``bentray verify``) is marked in the database, which is asked each time.
+    A file with another size or modification time is verified again. Damage found by ``bentray verify`` is
+    marked in the database, which is queried at each use.
     """
 
     def __init__(self, inner: Store, root: Path, checksums: Checksums) -> None:
         """Args:
-        inner: keeps the things.
+        inner: the store.
         root: the data folder.
-        checksums: their rows.
+        checksums: the table of checksums.
         """
         self._inner = inner
         self._root = root
@@ -44,7 +44,7 @@ class CheckedStore:
 
     def publish(self, path: Path) -> None:
         tenant, name, place = self._named(path)
-        # Before it is kept: from then on somebody may read it.
+        # Before publication, since it may be read immediately afterwards.
         self._checksums.record(tenant, name, place, digest_of(path), as_written=True)
         self._inner.publish(path)
 
@@ -52,11 +52,11 @@ class CheckedStore:
         """See :class:`Store`.
 
         Raises:
-            Damaged: when it is not what was stored, or not there any more.
-            Deleted: when there is none, nor a row of its checksum.
+            Damaged: when the content differs from the checksum or the file is missing.
+            Deleted: when neither the file nor its checksum exists.
         """
         if path.parent.name not in KEPT:
-            # On its way, as the work folder of a job that reads nothing else: it has no checksum.
+            # Not a stored item, e.g. the work folder of a job.
             return self._inner.fetch(path)
         tenant, name, place = self._named(path)
         row = self._checksums.get(tenant, name)
@@ -67,7 +67,7 @@ class CheckedStore:
             elif row["damaged"] is not None or not self._is_sound(path, row):
                 self._mend(path, row)
         except FileNotFoundError as error:
-            # Whoever deletes it forgets the checksum first.
+            # A deletion removes the checksum before the file.
             if row is None or self._checksums.get(tenant, name) is None:
                 raise Deleted(name) from error
             raise self._damaged(row, "missing") from error
@@ -79,7 +79,7 @@ class CheckedStore:
         return path
 
     def remove(self, paths: Collection[Path]) -> None:
-        # First, so that whoever misses a file sees that it was to go.
+        # Checksums first, so that readers recognise a missing file as deleted.
         for tenant, named in groupby(sorted(map(self._named, paths)), key=itemgetter(0)):
             self._checksums.delete(tenant, [name for _, name, _ in named])
         self._inner.remove(paths)
@@ -99,7 +99,7 @@ class CheckedStore:
         self._inner.tidy(stop)
 
     def _is_sound(self, path: Path, row: ChecksumRow) -> bool:
-        """Whether a thing holds what its row says; read once, unless it was written anew."""
+        """Whether the content matches the checksum; read again only after a modification."""
         with self._alone(path):
             known = row["sha256"], stamp_of(path)
             if self._compared.get(path) == known:
@@ -110,10 +110,10 @@ class CheckedStore:
             return True
 
     def _first_seen(self, tenant: Tenant, name: str, place: str, path: Path) -> None:
-        """Take a thing from before there were checksums as it is.
+        """Store the current checksum of an item from before version 4.
 
         Raises:
-            Deleted: when it is being deleted, and only its file is still there.
+            Deleted: when it is being deleted.
         """
         with self._alone(path):
             stamp, found = stamp_of(path), digest_of(path)
@@ -121,20 +121,20 @@ class CheckedStore:
         if not self._checksums.record_first_seen(tenant, name, place, found):
             self._compared.pop(path, None)
             raise Deleted(name)
-        log.info("%s of %s had no checksum yet; it is taken as it is", name, tenant)
+        log.info("stored the first checksum of %s of %s", name, tenant)
 
     def _mend(self, path: Path, row: ChecksumRow) -> None:
-        """Take another copy in place of a damaged one, if there is one.
+        """Replace a damaged item by another copy, if there is one.
 
         Raises:
-            Damaged: where there is none.
+            Damaged: otherwise.
         """
         self._compared.pop(path, None)
         whole = self._is_sound(path, row) or (self._inner.refetch(path) and self._is_sound(path, row))
         if not whole:
             found = digest_of(path)
-            other = f"{found.bytes} bytes in place of {row['bytes']}"
-            raise self._damaged(row, other if found.bytes != row["bytes"] else "other bytes than were stored")
+            other = f"{found.bytes} bytes instead of {row['bytes']}"
+            raise self._damaged(row, other if found.bytes != row["bytes"] else "different content")
         if row["damaged"] is not None:
             self._checksums.damaged(row["tenant"], row["id"], None)
 
@@ -147,7 +147,7 @@ class CheckedStore:
 
     @contextmanager
     def _alone(self, path: Path) -> Iterator[None]:
-        """One thread compares a thing while others that want it wait."""
+        """Only one thread verifies an item."""
         lock = self._comparing.setdefault(path, threading.Lock())
         try:
             with lock:
@@ -156,7 +156,7 @@ class CheckedStore:
             self._comparing.pop(path, None)
 
     def _named(self, path: Path) -> tuple[Tenant, str, str]:
-        """The tenant, the id and the place of ``tenants/TENANT/KIND/ID.…``."""
+        """Tenant, id and relative path from ``tenants/TENANT/KIND/ID.…``."""
         _, tenant, kind, name = path.relative_to(self._root).parts
         return Tenant(tenant), name.partition(".")[0], f"{kind}/{name}"
 

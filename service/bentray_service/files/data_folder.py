@@ -1,4 +1,4 @@
-"""The data folder: what belongs to no tenant, the folder of each, and who may use it."""
+"""The data folder: folders of tenants, scratch space, audit log and lock."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ log = logging.getLogger("bentray.storage")
 
 
 class Files:
-    """Folders of one service under ``data_dir``.
+    """The data folder of a service.
 
-    ``tenants/`` holds a folder for each tenant (see :class:`TenantFiles`), ``scratch/`` what workers need
-    while they work, ``audit/`` who read and changed what.
+    ``tenants/`` has a folder for each tenant (see :class:`TenantFiles`), ``scratch/`` temporary files of
+    workers, ``audit/`` the audit log.
 
     Attributes:
-        store: what keeps the files of tenants for good; the data folder itself, if nothing else is given.
+        store: keeps the files permanently; default: the data folder itself.
     """
 
     def __init__(self, data_dir: Path, store: Store | None = None) -> None:
@@ -39,10 +39,10 @@ class Files:
         self.audit = self.root / "audit"
 
     def prepare(self) -> None:
-        """Make the folders, and close them to other users of this machine.
+        """Create the folders, accessible for this user only.
 
         Raises:
-            InvalidInput: when the folder cannot be made or written, or others would still reach it.
+            InvalidInput: when a folder cannot be created or remains accessible for others.
         """
         try:
             self.root.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -50,28 +50,25 @@ class Files:
             for folder in (self._tenants, self.scratch, self.audit):
                 folder.mkdir(mode=0o700, exist_ok=True)
         except OSError as error:
-            raise InvalidInput(
-                "data_dir", f"{self.root} ({error.strerror})", "a folder that can be written"
-            ) from error
+            raise InvalidInput("data_dir", f"{self.root} ({error.strerror})", "a writable folder") from error
 
     def of(self, tenant: Tenant) -> TenantFiles:
-        """The folders of a tenant, made if needed.
+        """The folders of a tenant; created if needed.
 
         Raises:
-            InvalidInput: for a name that no tenant can have.
+            InvalidInput: for an invalid tenant name.
         """
         found = TenantFiles(self._tenants / checked_tenant(tenant), self.store)
         found.prepare()
         return found
 
     def give_to_local(self) -> None:
-        """Move what an older version left, before there were tenants; call it once the folder is locked."""
+        """Move data of versions without tenants to the tenant ``local``; the folder must be locked."""
         old = [self.root / name for name in KINDS if (self.root / name).is_dir()]
         if not old:
             return
-        log.warning("the data in %s goes to the tenant %s", self.root, LOCAL)
-        # An empty folder may be replaced by a full one, and each is by itself: a start that was cut off goes
-        # on here.
+        log.warning("moving the data in %s to the tenant %s", self.root, LOCAL)
+        # Each move is independent and replaces an empty folder, so an interrupted move can be repeated.
         local = self.of(LOCAL).root
         for folder in old:
             folder.replace(local / folder.name)
@@ -79,7 +76,7 @@ class Files:
         sync(self.root)
 
     def drop_leftovers(self) -> None:
-        """Remove what a dead process left half done; call it once the folder is locked."""
+        """Delete incomplete files of a dead process; the folder must be locked."""
         for files in self._all():
             files.drop_leftovers()
         for left in self.scratch.iterdir():
@@ -89,12 +86,12 @@ class Files:
                 left.unlink()
 
     def keep_work(self, job_ids: Collection[str]) -> None:
-        """Remove the work folders of all jobs but these."""
+        """Delete the work folders of all other jobs."""
         for files in self._all():
             files.keep_work(job_ids)
 
     def sizes(self) -> Iterator[tuple[Tenant, dict[str, int]]]:
-        """Of each tenant what lies here of its stored things, bytes by id; see ``TenantFiles.sizes``."""
+        """Sizes of stored items of each tenant in this folder, bytes by id; see ``TenantFiles.sizes``."""
         for files in self._all():
             yield Tenant(files.root.name), files.sizes()
 
@@ -104,10 +101,10 @@ class Files:
 
 
 def lock(root: Path) -> IO[bytes]:
-    """Take the data folder for this process; closing the returned file, or dying, gives it back.
+    """Lock the data folder for this process; closing the returned file releases the lock.
 
     Raises:
-        InvalidInput: when another service has it. Two would run each other's jobs.
+        InvalidInput: when another service uses the folder.
     """
     handle = (root / "service.lock").open("ab")
     try:
@@ -115,6 +112,6 @@ def lock(root: Path) -> IO[bytes]:
     except BlockingIOError as error:
         handle.close()
         raise InvalidInput(
-            "data_dir", f"{root}, which another service is using", "a folder of its own for every service"
+            "data_dir", f"{root}, in use by another service", "a separate folder for every service"
         ) from error
     return handle

@@ -1,4 +1,4 @@
-"""Deleting what is stored, with all that was made of it: the rows first, then the files."""
+"""Deletion of stored items with everything derived from them: rows first, then files."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ log = logging.getLogger("bentray.storage")
 
 
 class StoredItem(NamedTuple):
-    """One thing that can be deleted; ``what`` is ``dataset``, ``volume``, ``mesh`` or ``job``."""
+    """An item to delete; ``what`` is ``dataset``, ``volume``, ``mesh`` or ``job``."""
 
     tenant: Tenant
     what: str
@@ -42,13 +42,11 @@ class StoredItem(NamedTuple):
 class Deletion:
     """Deletes datasets, volumes, meshes and jobs of a tenant.
 
-    A dataset goes with the simulation that made it, its jobs and their volumes, a volume with the job that
-    made it, its turntables and its exports, a mesh with its jobs and their fields. A mesh made of a volume
-    stays. A job by itself is one that none of them takes along: it read nothing that is stored, and made
-    nothing, as a simulation that was cancelled or failed.
+    A dataset is deleted with the simulation that created it, its jobs and their volumes; a volume with its
+    job, turntables and exports; a mesh with its jobs and their fields. Meshes of iso-surfaces are kept. Other
+    jobs, e.g. failed simulations, are deleted separately.
 
-    Whoever reads a file meanwhile has it open, or finds neither file nor row. A death on the way leaves
-    files that no row knows; see ``Orphans``.
+    Open files can still be read. If the service dies in between, files without rows remain; see ``Orphans``.
     """
 
     def __init__(self, database: Database, files: Files) -> None:
@@ -56,16 +54,16 @@ class Deletion:
         self._files = files
 
     def delete(self, stored: StoredItem) -> None:
-        """Delete one thing and all that was made of it.
+        """Delete an item and everything derived from it.
 
         Raises:
-            UnknownId: when the tenant has no such one.
-            InUse: when a job that needs it is not at its end; nothing is deleted then.
-            StorageAway: when files cannot be removed now; nothing is deleted then.
+            UnknownId: when the tenant has no such item.
+            InUse: when an unfinished job needs it; nothing is deleted.
+            StorageUnavailable: when files cannot be deleted now; nothing is deleted.
         """
         name = checked(stored.what, stored.id)
         if fault := self._files.store.fault():
-            # Said before the database is held.
+            # Before the write transaction, which must be short.
             raise StorageUnavailable(fault)
         with self._database.write() as connection:
             if not any(_has(connection, table, stored.tenant, name) for table in _TABLES[stored.what]):
@@ -82,10 +80,10 @@ class Deletion:
         try:
             self._files.of(stored.tenant).remove([name, *results, *fields, *gone])
         except (StorageUnavailable, DatabaseUnavailable, OSError):
-            log.warning("files of %s stay until they are found as orphans", stored.id, exc_info=True)
+            log.warning("files of %s remain until they are removed as orphans", stored.id, exc_info=True)
 
     def older_than(self, time: float) -> Iterator[StoredItem]:
-        """What every tenant has from before a time, in seconds since 1970."""
+        """The items of all tenants created before a time, s since 1970."""
         for what, tables in _TABLES.items():
             for table in tables:
                 old = _ended_with_nothing(time) if table is jobs else table.c.created < time
@@ -98,18 +96,18 @@ class Deletion:
         needing = jobs.c.id.in_(gone), jobs.c.state.not_in(ENDED)
         busy = connection.execute(select(jobs.c.id, jobs.c.state).where(*needing)).first()
         if busy is not None:
-            found = f"{stored.id}, which {busy.id} needs ({busy.state})"
-            raise InUse(stored.what, found, "one that no unfinished job needs; cancel the job first")
+            found = f"{stored.id}, needed by {busy.id} ({busy.state})"
+            raise InUse(stored.what, found, "an item that no unfinished job needs; cancel the job first")
 
 
 def _has(connection: Connection, table: Table, tenant: Tenant, name: str) -> bool:
     mine = select(table.c.id).where(table.c.tenant == tenant, table.c.id == name)
-    # Jobs that are submitted now wait, and find it gone; SQLite lets one write at a time anyway.
+    # Locked, so that a concurrent submission of a job waits and finds the row deleted.
     return connection.execute(mine.with_for_update()).first() is not None
 
 
 def _of(connection: Connection, tenant: Tenant, condition: ColumnElement[bool]) -> set[str]:
-    """The ids of the jobs of a tenant for which a condition holds."""
+    """The ids of the jobs of a tenant that fulfil a condition."""
     return set(connection.execute(select(jobs.c.id).where(jobs.c.tenant == tenant, condition)).scalars())
 
 
@@ -124,14 +122,14 @@ def _of_volume(connection: Connection, tenant: Tenant, name: str) -> set[str]:
 
 
 def _ended_with_nothing(time: float) -> ColumnElement[bool]:
-    """Jobs that ended before a time and that nothing stored takes along when it is deleted."""
+    """Jobs that ended before a time and are not deleted together with a stored item."""
     read = jobs.c.dataset_id, jobs.c.volume_id, jobs.c.mesh_id
     made = select(datasets.c.id).where(datasets.c.job_id == jobs.c.id).exists()
     return and_(jobs.c.finished < time, *(one.is_(None) for one in read), ~made)
 
 
 def _fields(connection: Connection, tenant: Tenant, mesh: str, gone: Collection[str]) -> set[str]:
-    """The geometry fields that go with a mesh; one that a job on another mesh shares is given to that."""
+    """The geometry fields to delete with a mesh; a field used by another mesh is assigned to that one."""
     mine = geometry_fields.c.tenant == tenant
     found = connection.execute(
         select(geometry_fields.c.id).where(
@@ -159,7 +157,7 @@ def _forget(
     fields: Collection[str],
     gone: Collection[str],
 ) -> None:
-    """Delete the rows, those that point at others first."""
+    """Delete the rows, those with references first."""
     mine = geometry_fields.c.tenant == tenant, geometry_fields.c.id.in_(fields)
     connection.execute(delete(geometry_fields).where(*mine))
     delete_checksums(connection, tenant, {*names, *fields, *gone})

@@ -1,4 +1,4 @@
-"""How much lies in a folder."""
+"""Disk usage of a folder."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def bytes_in(folder: Path) -> int:
-    """The size of all files in a folder, bytes; what vanishes meanwhile is not counted."""
+    """Total size of the files in a folder, bytes; files deleted meanwhile are ignored."""
     total = 0
     try:
         with os.scandir(folder) as entries:

@@ -1,4 +1,4 @@
-"""The default store: the data folder itself, without a second copy of anything."""
+"""The default store: the data folder itself."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from .disk import bytes_in
 
 
 class LocalStore:
-    """Keeps things where they lie; see :class:`Store`."""
+    """Keeps files in place; see :class:`Store`."""
 
     def publish(self, path: Path) -> None:
-        """What writes a file makes its content durable; this does so for its name."""
+        """Make the name durable; the content is made durable by the writer."""
         sync(path.parent)
 
     def fetch(self, path: Path) -> Path:
@@ -42,4 +42,4 @@ class LocalStore:
         return None
 
     def tidy(self, stop: Callable[[], bool]) -> None:
-        """There is one place only, so nothing can be out of line."""
+        """Nothing to do: there are no copies."""

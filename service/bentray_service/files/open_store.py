@@ -1,4 +1,4 @@
-"""Which store the settings ask for, opened; a bucket is told which database it belongs to."""
+"""Opens the store selected by the settings; a bucket is bound to one database."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ def open_store(url: str | None, root: Path, database: Database, cache_bytes: int
     """Open the store of a service.
 
     Args:
-        url: ``s3://bucket/prefix``; None for the data folder itself.
+        url: ``s3://bucket/prefix``; None for the data folder.
         root: the data folder.
-        database: whose rows tell what is in the store.
-        cache_bytes: as ``BucketStore`` takes it.
+        database: with the rows of the stored items.
+        cache_bytes: see ``BucketStore``.
 
     Raises:
-        InvalidInput: when the bucket cannot be read and written, is another database's, or what it takes to
-            speak with it is not installed.
+        InvalidInput: when the bucket is not readable and writable, belongs to another database, or the
+            packages for S3 are not installed.
     """
     if url is None:
         return LocalStore()
@@ -36,18 +36,18 @@ def open_store(url: str | None, root: Path, database: Database, cache_bytes: int
         from .bucket_store import MARK, BucketStore
     except ImportError as error:
         found = f"{url}, without the module {error.name}"
-        raise InvalidInput(FIELD, found, "an address once bentray[s3] is installed") from error
+        raise InvalidInput(FIELD, found, "an address, with bentray[s3] installed") from error
     bucket, mark = Bucket(url), mark_of(database)
     try:
-        told = bucket.metadata(MARK)
-        if told is None and next(bucket.listed(), None) is not None:
-            raise InvalidInput(FIELD, f"{url}, where other things lie", "a prefix that nothing else uses")
-        if told is not None and told.get("database") != mark:
-            found = f"{url}, which belongs to another database than BENTRAY_DATABASE_URL"
-            raise InvalidInput(FIELD, found, "a prefix of its own for every database")
-        # Also where it is there: that shows that the bucket can be written.
+        metadata = bucket.metadata(MARK)
+        if metadata is None and next(bucket.listed(), None) is not None:
+            raise InvalidInput(FIELD, f"{url}, which contains other objects", "an unused prefix")
+        if metadata is not None and metadata.get("database") != mark:
+            found = f"{url}, used by another database than BENTRAY_DATABASE_URL"
+            raise InvalidInput(FIELD, found, "a separate prefix for every database")
+        # Written even if present, to verify write access.
         bucket.put_metadata(MARK, {"database": mark})
     except StorageUnavailable as error:
         found = f"{url} ({error.value})"
-        raise InvalidInput(FIELD, found, "a bucket that can be read and written") from error
+        raise InvalidInput(FIELD, found, "a readable and writable bucket") from error
     return BucketStore(root, bucket, mark, LiveIds(database), cache_bytes)

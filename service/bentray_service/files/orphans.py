@@ -1,4 +1,4 @@
-"""Files that no row knows: left by a death between the file and its row, found and removed."""
+"""Orphaned files, i.e. files without a row in the database: detection and removal."""
 
 from __future__ import annotations
 
@@ -22,52 +22,53 @@ from .tenant_files import KEPT
 
 log = logging.getLogger("bentray.storage")
 
-# What is made of things that are kept, and what comes in pieces.
+# Exports and resumable uploads.
 BESIDE = ("exports", "uploads")
-# The file that tells with which database the data folder was used last, and after how many starts.
+# The file with the id of the database that used the data folder last, and its number of starts.
 STAMP = "database.json"
-# For how long a file must be known to nobody while the service runs, s: it may wait for its row.
+# Minimum time for which a file must be orphaned while the service runs, s: new files wait for their row.
 SAFE_S = 3600.0
 
 
 class Orphans:
-    """Finds and removes them in the data folder; what lies in a bucket only, its store tidies.
+    """Finds and removes orphans in the data folder; those in a bucket are removed by its store.
 
-    Where the folder was used with another database, or a later state of this one, as after a dump was
-    restored, nothing is removed: what this database does not know may be wanted.
+    If the folder was used with another database, or with a later state of this one, as after the restore of a
+    backup, nothing is removed.
     """
 
     def __init__(
-        self, files: Files, database: Database, *, keeps: bool, clock: Callable[[], float] = time.monotonic
+        self, files: Files, database: Database, *, is_store: bool, clock: Callable[[], float] = time.monotonic
     ) -> None:
         """Args:
         files: the data folder.
-        database: whose rows count.
-        keeps: whether the folder keeps what is stored, and is no cache.
-        clock: seconds that only grow.
+        database: with the rows.
+        keeps: whether the folder is the store, not a cache.
+        clock: monotonic seconds.
         """
         self._files = files
         self._database = database
         self._known = LiveIds(database)
-        self._kinds = (*KEPT, *BESIDE) if keeps else BESIDE
+        self._kinds = (*KEPT, *BESIDE) if is_store else BESIDE
         self._clock = clock
         self._seen: dict[Path, float] = {}
         self._agreed = False
 
     def found(self) -> list[Path]:
-        """All that no row knows now, some of which may be about to have one."""
+        """All files without a row; some may be new."""
         lying = list(self._lying())
-        # Asked for last: what came meanwhile has a row.
+        # Queried last, so that new files have a row.
         names = self._known.names()
         return [path for path in lying if (path.parts[-3], path.name.partition(".")[0]) not in names]
 
     def begin(self) -> None:
-        """Remove what a dead service left; call it once the folder is locked, before anything is written."""
+        """Remove orphans of a dead service; the folder must be locked, before anything is written."""
         found = self.found()
         if found and not self._used_together():
             log.warning(
-                "%d files in %s have no row in this database, and stay, for the folder was last used with "
-                "another database or a later state of it; `bentray verify --remove-orphans` removes them",
+                "%d files in %s have no row in this database and are kept, since the folder was last "
+                "used with another database or a later state of it; remove them with "
+                "`bentray verify --remove-orphans`",
                 len(found),
                 self._files.root,
             )
@@ -76,12 +77,12 @@ class Orphans:
         self._stamp()
 
     def accept(self) -> None:
-        """Remove all of them, whatever the folder was used with before: somebody asked for it."""
+        """Remove all orphans at the request of the operator."""
         self.remove(self.found())
         self._stamp()
 
     def sweep(self, stop: Callable[[], bool]) -> None:
-        """Remove what has been without a row for ``SAFE_S``; call it now and then."""
+        """Remove files that have been orphaned for ``SAFE_S``; to be called periodically."""
         if not self._agreed:
             return
         found, now = self.found(), self._clock()
@@ -89,13 +90,13 @@ class Orphans:
         self.remove([path for path, since in self._seen.items() if now - since >= SAFE_S and not stop()])
 
     def remove(self, paths: list[Path]) -> None:
-        """Remove them."""
+        """Remove files."""
         for path in paths:
-            log.warning("%s has no row and is removed", path.relative_to(self._files.root))
+            log.warning("removing %s, which has no row", path.relative_to(self._files.root))
             self._files.of(Tenant(path.parts[-3])).drop(path)
 
     def _stamp(self) -> None:
-        """Say that the folder and the database belong together from now on."""
+        """Record that the folder and the database are used together."""
         with self._database.write() as connection:
             begun = int(connection.execute(select(about.c.begun).with_for_update()).scalar_one()) + 1
             connection.execute(update(about).values(begun=begun))

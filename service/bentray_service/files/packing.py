@@ -1,4 +1,4 @@
-"""A thing as one file: a file as it is, a folder packed, and back."""
+"""Packing of a folder into one file, and unpacking."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from bentray_workers.files.atomic import sync
 
 @contextmanager
 def packed(path: Path, scratch: Path) -> Iterator[Path]:
-    """One file that holds what lies at ``path``: itself, or for a folder a tar file, which goes again.
+    """The file at ``path``, or a temporary tar file of the folder.
 
     Args:
-        path: of a file, or of a folder with nothing but files.
-        scratch: where the tar file lies meanwhile.
+        path: a file, or a folder with files only.
+        scratch: folder of the temporary file.
     """
     if not path.is_dir():
         yield path
@@ -36,24 +36,24 @@ def packed(path: Path, scratch: Path) -> Iterator[Path]:
 
 
 def metadata_of(path: Path, whole: Path) -> dict[str, str]:
-    """What to tell beside ``whole``, so that ``unpack`` can check it and make ``path`` again."""
+    """Metadata for ``unpack``: SHA-256, form and modification time."""
     with whole.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     form = "folder" if path.is_dir() else "file"
     return {"sha256": digest, "form": form, "mtime-ns": str(path.stat().st_mtime_ns)}
 
 
-def unpack(whole: Path, told: Mapping[str, str], path: Path) -> None:
-    """Let the thing in ``whole`` lie at ``path``, with the age it had, at once and safe from a power cut.
+def unpack(whole: Path, metadata: Mapping[str, str], path: Path) -> None:
+    """Unpack ``whole`` to ``path``, atomically and durably, with the original modification time.
 
     Raises:
-        ValueError: when it is not what was told of it.
+        ValueError: when the SHA-256 differs from the metadata.
     """
-    if metadata_of(whole, whole)["sha256"] != told.get("sha256"):
-        raise ValueError(f"{path.name} has another SHA-256 than when it was written")
+    if metadata_of(whole, whole)["sha256"] != metadata.get("sha256"):
+        raise ValueError(f"the SHA-256 of {path.name} has changed")
     ready = whole
     try:
-        if told["form"] == "folder":
+        if metadata["form"] == "folder":
             ready = whole.with_suffix(".unpacked")
             with tarfile.open(whole) as archive:
                 archive.extractall(ready, filter="data")
@@ -62,8 +62,8 @@ def unpack(whole: Path, told: Mapping[str, str], path: Path) -> None:
             sync(ready)
         else:
             sync(whole)
-        os.utime(ready, ns=(ready.stat().st_atime_ns, int(told["mtime-ns"])))
-        # A folder that lies there by now is the same: no name is ever used for anything else.
+        os.utime(ready, ns=(ready.stat().st_atime_ns, int(metadata["mtime-ns"])))
+        # An existing folder has the same content, since names are never reused.
         if not path.is_dir():
             ready.replace(path)
         sync(path.parent)

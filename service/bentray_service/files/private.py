@@ -1,4 +1,4 @@
-"""What lies in the data folder is for the user of the service alone: made so, checked and tightened."""
+"""File permissions: the data folder is accessible for the user of the service only."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from bentray_kernels.errors import InvalidInput
 
 log = logging.getLogger("bentray.storage")
 
-# Reading, writing and entering by the group and by everybody else.
+# Permissions of the group and of others.
 OTHERS = stat.S_IRWXG | stat.S_IRWXO
 
 
 @contextmanager
 def private_files() -> Iterator[None]:
-    """What this process, and each that it starts, makes meanwhile is for its user alone: 0700 and 0600."""
+    """Create files with mode 0600 and folders with 0700 within the block."""
     before = os.umask(OTHERS)
     try:
         yield
@@ -28,10 +28,10 @@ def private_files() -> Iterator[None]:
 
 
 def close_to_others(root: Path) -> None:
-    """Take a folder, and what an older version left in it, from all users but its owner.
+    """Remove the permissions of other users from a folder and its content.
 
     Raises:
-        InvalidInput: where others would still reach it.
+        InvalidInput: when they cannot be removed.
     """
     found = stat.S_IMODE(root.stat().st_mode)
     if not found & OTHERS:
@@ -41,10 +41,10 @@ def close_to_others(root: Path) -> None:
     if stat.S_IMODE(root.stat().st_mode) & OTHERS:
         raise InvalidInput(
             "data_dir",
-            f"{root}, which other users of this machine can reach (mode {found:04o})",
-            "a folder that this user can close to others, as a new one in there",
+            f"{root}, accessible for other users of this machine (mode {found:04o})",
+            "a folder whose permissions this user can change, e.g. a new folder inside",
         )
-    # Behind a closed folder nothing is reached; this is for what is moved or copied out of it.
+    # Files in a private folder are not reachable; this covers files that are moved or copied later.
     changed = 0
     for folder, folders, files in os.walk(root):
         for path in (Path(folder, name) for name in (*folders, *files)):
@@ -53,4 +53,6 @@ def close_to_others(root: Path) -> None:
                 if mode & OTHERS and not path.is_symlink():
                     path.chmod(mode & ~OTHERS)
                     changed += 1
-    log.warning("%s had mode %04o; it and %d files in it are now for its owner alone", root, found, changed)
+    log.warning(
+        "%s had mode %04o; removed the permissions of others from it and %d files", root, found, changed
+    )

@@ -1,4 +1,4 @@
-"""Read everything that is stored and compare it with its checksum; what has none yet is given one."""
+"""Verification of all stored files against their checksums; missing checksums are added."""
 
 from __future__ import annotations
 
@@ -16,13 +16,12 @@ from .tenant_files import KEPT
 
 
 class Finding(NamedTuple):
-    """What was found of one stored thing.
+    """The result for one stored item.
 
     Attributes:
-        tenant, path: whose it is, and where it lies in the tenant's folder.
-        state: ``sound``, ``damaged``, ``first seen`` of one that had no checksum, or ``orphan`` of one that
-            no row knows.
-        found: of a damaged one, in words.
+        tenant, path: owner, and path below the folder of the tenant.
+        state: ``sound``, ``damaged``, ``first seen`` (checksum added) or ``orphan`` (no row).
+        found: description of the damage.
     """
 
     tenant: Tenant
@@ -32,12 +31,12 @@ class Finding(NamedTuple):
 
 
 def scrub(files: Files, checksums: Checksums, orphans: Orphans) -> Iterator[Finding]:
-    """Compare one thing after another; what is damaged is marked, and not served from then on.
+    """Verify all stored items; damaged ones are marked and no longer served.
 
     Args:
-        files: the data folder, with a store that has compared nothing yet.
-        checksums: the rows.
-        orphans: what tells files without a row.
+        files: the data folder, with a store that has verified nothing yet.
+        checksums: the table of checksums.
+        orphans: finds files without a row.
     """
     assert isinstance(files.store, CheckedStore)
     rows = {(row["tenant"], row["path"]) for row in checksums.all()}
@@ -52,7 +51,7 @@ def scrub(files: Files, checksums: Checksums, orphans: Orphans) -> Iterator[Find
         except Damaged as error:
             yield Finding(tenant, place, "damaged", error.value.partition(", ")[2])
         except Deleted:
-            # By the service, which may be running.
+            # Deleted by a running service.
             continue
         else:
             yield Finding(tenant, place, "sound" if (tenant, place) in rows else "first seen")

@@ -1,4 +1,4 @@
-"""What keeps the files of tenants for good: one interface, whether they stay in the data folder or not."""
+"""The interface of stores, which keep the files of tenants permanently."""
 
 from __future__ import annotations
 
@@ -8,54 +8,53 @@ from typing import Protocol
 
 
 class Store(Protocol):
-    """Keeps things: datasets, volumes, animations, meshes and geometry fields, each a file or a folder.
+    """Keeps items: datasets, volumes, animations, meshes and geometry fields, each a file or a folder.
 
-    A thing is named by its path in the data folder, which :class:`TenantFiles` makes of a tenant and checked
-    ids; what is kept of it is whole or not there.
+    An item is identified by its path in the data folder, see :class:`TenantFiles`; it is complete or absent.
     """
 
     def publish(self, path: Path) -> None:
-        """Keep what lies at ``path`` for good, before a row says that it is there.
+        """Keep the item at ``path`` permanently; to be called before its row is inserted.
 
         Raises:
-            StorageAway: when it cannot be kept now; what lies there stays.
+            StorageUnavailable: when it cannot be kept now; the file at ``path`` remains.
         """
 
     def fetch(self, path: Path) -> Path:
-        """Let a thing lie at ``path``, to be read in the minutes that follow, and return the path.
+        """Make an item available at ``path`` for the next minutes, and return the path.
 
         Raises:
-            FileNotFoundError: when there is none.
-            StorageAway: when it cannot be fetched now.
+            FileNotFoundError: when it does not exist.
+            StorageUnavailable: when it cannot be fetched now.
         """
 
     def refetch(self, path: Path) -> bool:
-        """Let another copy lie at ``path`` in place of one that is damaged; whether there is one.
+        """Replace a damaged file at ``path`` by another copy; returns whether there is one.
 
         Raises:
-            FileNotFoundError, StorageAway: as ``fetch``.
+            FileNotFoundError, StorageUnavailable: as ``fetch``.
         """
 
     def remove(self, paths: Collection[Path]) -> None:
-        """Remove things everywhere; those that are not there are passed over.
+        """Delete items; missing ones are ignored.
 
         Raises:
-            StorageAway: when they cannot be removed now.
+            StorageUnavailable: when they cannot be deleted now.
         """
 
     def bytes_used(self, folder: Path) -> int:
-        """What the folder of a tenant takes, wherever it is kept; about a minute old at most.
+        """Storage used by a tenant, at most about a minute old.
 
         Raises:
-            StorageAway: when that cannot be told now.
+            StorageUnavailable: when it cannot be determined now.
         """
 
     def fault(self) -> str | None:
-        """Why nothing can be kept or fetched now, in words, or None; may be asked at any time."""
+        """Why the store is unavailable, or None."""
 
     def tidy(self, stop: Callable[[], bool]) -> None:
-        """Bring what is kept into line with the database, a little at a time until ``stop`` says so.
+        """Remove inconsistencies with the database, until ``stop`` returns True.
 
         Raises:
-            StorageAway: when that cannot be done now.
+            StorageUnavailable: when that is not possible now.
         """

@@ -1,4 +1,4 @@
-"""The files of one tenant: the path of each, made from checked ids only."""
+"""Paths of the files of one tenant, built from validated ids only."""
 
 from __future__ import annotations
 
@@ -11,25 +11,22 @@ from ..rows.ids import PREFIXES, checked
 from .disk import bytes_in
 from .store import Store
 
-# What a data folder of before there were tenants has at its top.
+# The folders of a tenant.
 KINDS = ("incoming", "uploads", "datasets", "volumes", "exports", "animations", "meshes", "fields", "work")
-# Those that a store keeps; the others can be made again, or are on their way.
+# Folders kept by a store; the others are temporary or can be regenerated.
 KEPT = ("datasets", "volumes", "animations", "meshes", "fields")
-# How the names of turntables end; those of bentray_workers.rendering.turntable, which takes long to import.
+# File extensions of turntables, as in bentray_workers.rendering.turntable, whose import is slow.
 ANIMATIONS = ("zip", "apng")
 
 
 class TenantFiles:
     """Folders of one tenant.
 
-    ``incoming/`` holds uploads that no one has checked, ``uploads/`` those that come in pieces,
-    ``datasets/`` the canonical files of scans,
-    ``volumes/`` results and the canonical files of uploaded volumes, ``exports/`` volumes in other formats,
-    ``animations/`` turntables, ``meshes/`` the canonical files of meshes, ``fields/`` a folder for each
-    geometry field, ``work/`` one for each job that is not at its end, with its checkpoints. An upload is a
-    dataset, a volume or a mesh, as its id tells.
+    ``incoming/`` has unchecked uploads, ``uploads/`` resumable uploads, ``datasets/``, ``volumes/`` and
+    ``meshes/`` canonical files, ``exports/`` volumes in other formats, ``animations/`` turntables,
+    ``fields/`` geometry fields, ``work/`` the checkpoints of unfinished jobs.
 
-    What is in ``KEPT`` may lie in a store only: ``Store.fetch`` lets it lie at its path again.
+    Items in ``KEPT`` may exist in the store only; ``Store.fetch`` makes them available at their path.
     """
 
     def __init__(self, root: Path, store: Store) -> None:
@@ -41,14 +38,14 @@ class TenantFiles:
         self._meshes, self._fields, self._work = root / "meshes", root / "fields", root / "work"
 
     def prepare(self) -> None:
-        """Make the folders."""
-        # In this order, so that where the last one is the others are too.
+        """Create the folders."""
+        # The last folder exists only if all others do.
         if not (self.root / KINDS[-1]).is_dir():
             for name in KINDS:
                 (self.root / name).mkdir(parents=True, exist_ok=True)
 
     def drop_leftovers(self) -> None:
-        """Remove what a dead process left half done."""
+        """Delete incomplete files of a dead process."""
         for left in self._incoming.iterdir():
             if left.is_dir():
                 shutil.rmtree(left)
@@ -60,17 +57,17 @@ class TenantFiles:
                 left.unlink()
 
     def incoming(self, upload_id: str) -> Path:
-        """Where an upload lands, before anything has looked at it."""
+        """Path of a one-shot upload before ingestion."""
         return self._incoming / f"{self._canonical(upload_id).stem}.upload"
 
     def candidate(self, upload_id: str) -> Path:
-        """Where the ingest process writes the canonical file: in a folder of its own, made if needed."""
+        """Path of a new canonical file, in its own folder, which is created."""
         folder = self._reading(upload_id)
         folder.mkdir(exist_ok=True)
         return folder / self._canonical(upload_id).name
 
     def upload(self, upload_id: str) -> Path:
-        """What has come of an upload that comes in pieces; it outlives the service."""
+        """Path of the data of a resumable upload."""
         return self._uploads / checked("upload", upload_id)
 
     def dataset(self, dataset_id: str) -> Path:
@@ -78,15 +75,15 @@ class TenantFiles:
         return self._datasets / f"{checked('dataset', dataset_id)}.h5"
 
     def volume(self, volume_id: str) -> Path:
-        """The file of a volume: a reconstruction, or what was uploaded."""
+        """The canonical file of a volume, reconstructed or uploaded."""
         return self._volumes / f"{checked('volume', volume_id)}.h5"
 
     def export(self, volume_id: str, extension: str) -> Path:
-        """A volume in another format; made on demand."""
+        """Path of a volume in another format."""
         return self._exports / f"{checked('volume', volume_id)}.{extension}"
 
     def animation(self, job_id: str, extension: str) -> Path:
-        """The result of a turntable."""
+        """Path of a turntable animation."""
         return self._animations / f"{checked('job', job_id)}.{extension}"
 
     def mesh(self, mesh_id: str) -> Path:
@@ -94,38 +91,38 @@ class TenantFiles:
         return self._meshes / f"{checked('mesh', mesh_id)}.h5"
 
     def field(self, field_id: str) -> Path:
-        """The folder of a geometry field; it is there as a whole or not at all."""
+        """The folder of a geometry field; it is complete or absent."""
         return self._fields / checked("field", field_id)
 
     def work(self, job_id: str) -> Path:
-        """A folder for what a job makes on its way, which outlives the service; made if needed."""
+        """The work folder of a job; created if needed."""
         folder = self._work / checked("job", job_id)
         folder.mkdir(exist_ok=True)
         return folder
 
     def drop_work(self, job_id: str) -> None:
-        """Remove the folder of a job at its end, under the hands of tasks that still run."""
+        """Delete the work folder of a job, even if its tasks are still running."""
         ended = self._work / f"{checked('job', job_id)}.ended"
         with suppress(FileNotFoundError):
-            # What they still want to write under the old name finds no folder.
+            # Running tasks can no longer write to the old path.
             (self._work / job_id).rename(ended)
         shutil.rmtree(ended, ignore_errors=True)
 
     def keep_work(self, job_ids: Collection[str]) -> None:
-        """Remove the folders of all jobs but these."""
+        """Delete the work folders of all other jobs."""
         for folder in self._work.iterdir():
             if folder.name not in job_ids:
                 shutil.rmtree(folder, ignore_errors=True)
 
     def discard_candidate(self, upload_id: str) -> None:
-        """Remove a canonical file that was not adopted, with all that a killed process left beside it."""
+        """Delete a canonical file that was not adopted, and temporary files next to it."""
         shutil.rmtree(self._reading(upload_id), ignore_errors=True)
 
     def adopt(self, upload_id: str) -> Path:
-        """Move the checked canonical file to its place, and keep it for good.
+        """Move a canonical file to its final path, and publish it in the store.
 
         Raises:
-            StorageAway: when it cannot be kept now; nothing is left then.
+            StorageUnavailable: when that is not possible now; no file is left.
         """
         target = self._canonical(upload_id)
         self.candidate(upload_id).replace(target)
@@ -137,10 +134,10 @@ class TenantFiles:
         return target
 
     def remove(self, stored_ids: Collection[str]) -> None:
-        """Remove all files of datasets, volumes, meshes, fields and jobs, in every format.
+        """Delete all files of items and jobs, in every format.
 
         Raises:
-            StorageAway: when they cannot be removed now.
+            StorageUnavailable: when that is not possible now.
         """
         self._store.remove([path for one in stored_ids for path in self._kept(one)])
         for one in stored_ids:
@@ -152,10 +149,10 @@ class TenantFiles:
                         path.unlink(missing_ok=True)
 
     def drop(self, path: Path) -> None:
-        """Remove one file or folder below this one.
+        """Delete one file or folder of the tenant.
 
         Raises:
-            StorageAway: when it cannot be removed now.
+            StorageUnavailable: when that is not possible now.
         """
         if path.parent.name in KEPT:
             self._store.remove([path])
@@ -163,8 +160,7 @@ class TenantFiles:
             path.unlink(missing_ok=True)
 
     def sizes(self) -> dict[str, int]:
-        """Bytes of each stored thing that lies here, by its id; of a volume in another format by the name of
-        the file."""
+        """Sizes of the stored items in this folder, bytes by id, or by file name for exports."""
         found = {}
         for name in (*KEPT, "exports"):
             for path in (self.root / name).iterdir():
@@ -173,11 +169,11 @@ class TenantFiles:
         return found
 
     def bytes_used(self) -> int:
-        """The size of all of it, bytes, wherever it is kept; raises StorageAway where that cannot be told."""
+        """Storage used by the tenant, bytes; raises StorageUnavailable."""
         return self._store.bytes_used(self.root)
 
     def _kept(self, stored_id: str) -> list[Path]:
-        """Where a store may have something of this id."""
+        """Paths where a store may have files of an id."""
         place = {"vol": self.volume, "mesh": self.mesh, "field": self.field}
         prefix = stored_id.partition("-")[0]
         if prefix == PREFIXES["job"]:

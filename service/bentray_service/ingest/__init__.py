@@ -1,1 +1,1 @@
-"""From the bytes of a stranger to a canonical file of a scan, a volume or a mesh."""
+"""Ingestion of untrusted uploads into canonical files of scans, volumes and meshes."""

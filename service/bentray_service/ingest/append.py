@@ -1,4 +1,4 @@
-"""Append to an upload that comes in pieces; one request at a time, and what came stays, however it ends."""
+"""Appending to a resumable upload: one request at a time, durable, with optional checksum."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from bentray_workers.files.atomic import sync, write_bytes
 from ..refusals import Locked, UnknownChecksum, WrongChecksum
 from .receive import write_body
 
-# Each with the form of its digest in base 64.
+# Algorithms, with the format of the digest in base 64.
 ALGORITHMS = {
     "sha256": "[A-Za-z0-9+/]{43}=",
     "sha1": "[A-Za-z0-9+/]{27}=",
@@ -34,18 +34,18 @@ CHECKSUM = "^(" + "|".join(f"{name} {digest}" for name, digest in ALGORITHMS.ite
 
 @dataclass(frozen=True)
 class Checksum:
-    """What a piece should have as its digest."""
+    """Expected digest of a request body."""
 
     algorithm: str
     digest: bytes
 
     @classmethod
     def of(cls, header: str) -> Self:
-        """From a header as ``sha1 Kq5sNclPz7QV2+lfQIuc6R7oRu0=``.
+        """Parse a header such as ``sha1 Kq5sNclPz7QV2+lfQIuc6R7oRu0=``.
 
         Raises:
             UnknownChecksum: for an algorithm that is not in ``ALGORITHMS``.
-            InvalidInput: for anything that is no digest of it.
+            InvalidInput: for an invalid digest.
         """
         algorithm, _, text = header.partition(" ")
         if algorithm not in ALGORITHMS:
@@ -56,7 +56,7 @@ class Checksum:
 
 
 class UploadLocks:
-    """Who is at work on which upload: one at a time."""
+    """Locks of uploads: one request per upload at a time."""
 
     def __init__(self) -> None:
         self._held: set[str] = set()
@@ -64,14 +64,14 @@ class UploadLocks:
 
     @contextmanager
     def __call__(self, upload_id: str) -> Iterator[None]:
-        """Hold an upload.
+        """Lock an upload within the block.
 
         Raises:
-            Locked: when it is held.
+            Locked: when another request has locked it.
         """
         with self._lock:
             if upload_id in self._held:
-                raise Locked("upload", f"{upload_id}, to which another request writes", "one at a time")
+                raise Locked("upload", f"{upload_id}, used by another request", "one request at a time")
             self._held.add(upload_id)
         try:
             yield
@@ -85,21 +85,22 @@ async def append(
 ) -> int:
     """Append a body to ``path``, durably, without blocking the event loop.
 
-    What came before the client went away stays, also when this process dies. With a checksum all of it
-    counts, or nothing: until it is verified a file beside ``path`` says where it begins.
+    Data received before the client disconnects is kept, even if this process dies. With a checksum, all or
+    none
+    of the body is kept: until verification, a file next to ``path`` stores the offset of the body.
 
     Args:
         stream: the chunks of the body.
-        path: the file, of ``offset`` bytes; made if it is not there.
-        offset: where the body begins.
-        length: of the whole upload, bytes.
+        path: a file of ``offset`` bytes; created if needed.
+        offset: of the body.
+        length: total size of the upload, bytes.
         checksum: of the body.
 
     Returns:
-        the size of the file now.
+        the new size of the file.
 
     Raises:
-        TooLarge: when the body goes beyond ``length``.
+        TooLarge: when the body exceeds ``length``.
         WrongChecksum, StorageFull: as their names say.
     """
     digest = _hasher(checksum.algorithm) if checksum is not None else None
@@ -112,7 +113,7 @@ async def append(
         if checksum is not None and digest is not None:
             if not hmac.compare_digest(digest.digest(), checksum.digest):
                 found = base64.b64encode(digest.digest()).decode()
-                raise WrongChecksum("body", f"{checksum.algorithm} {found}", "what Upload-Checksum says")
+                raise WrongChecksum("body", f"{checksum.algorithm} {found}", "the value of Upload-Checksum")
             await run_in_threadpool(_verified, path)
     finally:
         await run_in_threadpool(file.close)
@@ -121,8 +122,8 @@ async def append(
 
 
 def received_bytes(path: Path) -> int:
-    """Bytes that are there and count, of a file that is not made before the first of them."""
-    # Asked before and after, for a piece may begin or end meanwhile.
+    """Number of verified bytes; 0 if the file does not exist."""
+    # Read before and after, since a request may start or end in between.
     before = _unverified_from(path)
     try:
         size = path.stat().st_size
@@ -132,7 +133,7 @@ def received_bytes(path: Path) -> int:
 
 
 def discard_unverified(path: Path) -> None:
-    """Cut off what came of a piece whose checksum was not verified, also by a process that died."""
+    """Remove data with an unverified checksum, also after a crash."""
     begin = _unverified_from(path)
     if begin != math.inf:
         with path.open("r+b") as file:
@@ -142,13 +143,13 @@ def discard_unverified(path: Path) -> None:
 
 
 def remove(path: Path) -> None:
-    """Remove what came of an upload."""
+    """Delete the data of an upload."""
     path.unlink(missing_ok=True)
     _mark(path).unlink(missing_ok=True)
 
 
 def _begin(path: Path, unverified_from: int | None) -> None:
-    """Make the file if it is not there; before any byte of a piece to verify comes, say so durably."""
+    """Create the file if needed; store the offset of unverified data durably."""
     path.touch()
     discard_unverified(path)
     if unverified_from is not None:
@@ -161,7 +162,7 @@ def _verified(path: Path) -> None:
 
 
 def _unverified_from(path: Path) -> float:
-    """The offset from which on nothing counts; infinity where all of it does."""
+    """The offset of unverified data; infinity if there is none."""
     try:
         return int(_mark(path).read_text())
     except FileNotFoundError:
@@ -173,5 +174,5 @@ def _mark(path: Path) -> Path:
 
 
 def _hasher(algorithm: str) -> hashlib._Hash:
-    # SHA-1 and MD5 find what went wrong on the way; nothing rests on them.
+    # SHA-1 and MD5 detect transmission errors; they have no security purpose.
     return hashlib.new(algorithm, usedforsecurity=False)

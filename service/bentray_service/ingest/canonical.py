@@ -1,4 +1,4 @@
-"""From an uploaded file to the canonical one in its place."""
+"""Conversion of an uploaded file to a canonical file in its final place."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .sandbox import ingest
 
 @dataclass(frozen=True)
 class IngestLimits:
-    """Of an ingest process.
+    """Limits of an ingest process.
 
     Attributes:
-        memory_bytes, seconds: as ``sandbox.ingest`` takes them.
-        scratch: the folder it runs in.
+        memory_bytes, seconds: see ``sandbox.ingest``.
+        scratch: its working folder.
     """
 
     memory_bytes: int
@@ -35,25 +35,25 @@ def make_canonical(
     reserve: Callable[[int], None],
     started: Callable[[int], None] = lambda process_id: None,
 ) -> dict[str, Any]:
-    """Check ``source`` in a process of its own and put the canonical file where its id says.
+    """Validate ``source`` in a separate process and store the canonical file; after an error no file is left.
 
     Args:
         what: a key of ``ACCEPTED``.
         source: the uploaded file.
-        result_id: of what it becomes.
+        result_id: id of the result.
         files: of the tenant.
         limits: of the process.
-        given: what the user says of it.
-        reserve: reserves so many bytes for it, in place of what was reserved before; it may refuse.
-        started: told the id of the process.
+        given: metadata.
+        reserve: reserves storage, bytes, replacing an earlier reservation.
+        started: called with the process id.
 
     Returns:
-        The summary of what it holds.
+        summary of the content.
 
     Raises:
-        QuotaUsedUp: from ``reserve``; nothing is left then.
-        InvalidInput, StorageFull: as ``sandbox.ingest`` does; nothing is left then.
-        StorageAway: when the canonical file cannot be kept now; the same.
+        QuotaExceeded: from ``reserve``.
+        InvalidInput, StorageFull: see ``sandbox.ingest``.
+        StorageUnavailable: when the canonical file cannot be published.
     """
     received = source.stat().st_size
     try:
@@ -69,7 +69,7 @@ def make_canonical(
             started=started,
             reserve=lambda size: reserve(max(size, received)),
         )
-        # What was received goes now.
+        # The uploaded file will be deleted.
         reserve(candidate.stat().st_size)
         files.adopt(result_id)
     finally:

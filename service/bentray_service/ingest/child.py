@@ -1,8 +1,8 @@
-"""The process that opens an uploaded file: limits itself, reads, rewrites, and prints one line of JSON.
+"""The ingest process: limits its resources, reads an untrusted file, writes the canonical file, prints JSON.
 
 ``python -m bentray_service.ingest.child WHAT IN OUT --memory BYTES --seconds SECONDS --given JSON``
 
-Before it writes, it prints a line ``{"reserve": bytes}`` and waits for a line ``go`` on its input.
+Before writing, it prints ``{"reserve": bytes}`` and waits for the line ``go`` on its input.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 OnSize = Callable[[int], None]
 
 OPEN_FILES = 64
-# How much larger the canonical file of a large upload may be: it is packed quickly, not well.
+# Maximum ratio of the size of the canonical file to that of a large upload, due to fast compression.
 PACKING = 2
 
-# What may be ingested, and how the user is told of it.
+# Accepted types, with a description of the formats.
 ACCEPTED = {
     "dataset": "a scan as uct-transmission (HDF5), MATLAB 5 or 7.3, .npz of arrays, or zip of k-Wave outputs",
     "volume": "a volume as NumPy (.npy), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype",
@@ -45,7 +45,7 @@ def main() -> None:
     parser.add_argument("target", type=Path)
     parser.add_argument("--memory", type=int, required=True)
     parser.add_argument("--seconds", type=float, required=True)
-    parser.add_argument("--given", type=json.loads, required=True, help="what the user says of the file")
+    parser.add_argument("--given", type=json.loads, required=True, help="metadata of the file")
     asked = parser.parse_args()
     limit_resources(asked.memory, asked.seconds, PACKING * asked.source.stat().st_size)
     answer = convert_upload(asked.what, asked.source, asked.target, asked.given, request_space)
@@ -53,7 +53,7 @@ def main() -> None:
 
 
 def limit_resources(memory_bytes: int, seconds: float, file_bytes: int = 0) -> None:
-    """Bound this process, before it imports or opens anything; files may have ``file_bytes``, if more."""
+    """Limit the resources of this process; the file size limit is at least ``file_bytes``."""
     cpu = math.ceil(seconds)
     for what, amount in (
         (resource.RLIMIT_AS, memory_bytes),
@@ -68,11 +68,11 @@ def limit_resources(memory_bytes: int, seconds: float, file_bytes: int = 0) -> N
 
 
 def request_space(size: int) -> None:
-    """Tell the service how large the canonical file will be at most, and wait for its word."""
+    """Send the maximum size of the canonical file to the service, and wait for its permission."""
     sys.stdout.write(json.dumps({"reserve": size}) + "\n")
     sys.stdout.flush()
     if not sys.stdin.readline():
-        # The service is gone, or refuses it and ends this process.
+        # The service has died or has refused the request.
         raise SystemExit(1)
 
 
@@ -83,27 +83,29 @@ def convert_upload(
     given: dict[str, Any],
     on_size: OnSize = lambda size: None,
 ) -> dict[str, Any]:
-    """Read ``source``, write the canonical ``target``, and say what it holds or what is wrong with it.
+    """Convert ``source`` to the canonical file ``target``; returns a summary of the content, or an error.
 
-    ``on_size`` is told before it is written how many bytes it will have at most, but for a header.
+    ``on_size`` is called before writing with the maximum size without the header, bytes.
     """
     try:
         from bentray_kernels.errors import InvalidInput
 
         import_module(READERS[what])
     except (ImportError, MemoryError):
-        # Where memory ends, NumPy says that it cannot be imported.
-        return _error("file", "no memory left to start the reader", "a larger BENTRAY_INGEST_MEMORY_BYTES")
+        # Without memory, the import of NumPy fails.
+        return _error(
+            "file", "out of memory at the start of the reader", "a larger BENTRAY_INGEST_MEMORY_BYTES"
+        )
     try:
         return {"ok": CONVERTED[what](source, target, given, on_size)}
     except InvalidInput as error:
         return _error(error.field, error.value, error.accepted)
     except MemoryError:
-        return _error("file", "data that does not fit into the memory of the reader", "a smaller one")
+        return _error("file", "data larger than the memory of the reader", "a smaller file")
     except Exception as error:
         if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
             return {"full": True}
-        # A reader must never take the service down: whatever breaks it is a fault of the file.
+        # Any other exception is caused by the file.
         return _error("file", f"{type(error).__name__}: {error}", ACCEPTED[what])
 
 
@@ -135,7 +137,7 @@ def _mesh(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) ->
 
 
 CONVERTED = {"dataset": _dataset, "volume": _volume, "mesh": _mesh}
-# Each needs its own reader alone: what starts for every upload should start fast.
+# Imported by type, for a fast start.
 READERS = {
     "dataset": "bentray_workers.foreign_scans",
     "volume": "bentray_workers.files.volume_formats",
@@ -144,7 +146,7 @@ READERS = {
 
 
 def volume_summary(volume: Volume) -> dict[str, Any]:
-    """What the service remembers of a volume, in plain values."""
+    """The columns of a volume, as plain values."""
     return {
         "title": text(volume.title),
         "shape": list(volume.values.shape),

@@ -1,4 +1,4 @@
-"""Whose upload is read next: tenants take turns, and uploads of one tenant go in the order they came."""
+"""The ingest queue: tenants take turns; uploads of one tenant are processed in order."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from distributed.system import MEMORY_LIMIT
 
 from ..rows.tenants import Tenant
 
-# One that no tenant can hold beside the two that each may.
+# Minimum number of threads, so that one tenant cannot occupy all of them.
 LEAST_AT_ONCE = 3
 STOP_SECONDS = 30.0
 
 
 def readers_at_once(memory_bytes: int) -> int:
-    """How many readers this machine can have at a time, each of which may take ``memory_bytes``.
+    """Number of concurrent ingest processes with ``memory_bytes`` each on this machine.
 
-    They take half of the memory at most, but for the least number of them.
+    They use at most half of the memory, unless that allows less than the minimum number.
     """
     return max(LEAST_AT_ONCE, min(int(CPU_COUNT), int(MEMORY_LIMIT) // (2 * memory_bytes)))
 
@@ -34,19 +34,19 @@ class _QueuedRead:
 
 
 class FairQueue:
-    """Does work in threads of its own, of up to ``at_once`` uploads at the same time.
+    """Runs up to ``at_once`` functions in threads.
 
-    Next is the tenant with the fewest at work, of these the one that was served longest ago. One thread is
-    left to the others: whoever comes while a single tenant keeps the service busy begins at once.
+    The next tenant is the one with the fewest running functions, then the one served least recently. One
+    thread is reserved for other tenants, so that a single tenant cannot block the queue.
 
     Attributes:
-        share: how many of one tenant are at work at a time.
+        share: maximum number of running functions per tenant.
     """
 
     def __init__(self, at_once: int) -> None:
         self.share = max(1, at_once - 1)
         self._waiting: dict[Tenant, deque[_QueuedRead]] = {}
-        # When each tenant was served last, as a number that grows.
+        # Turn in which each tenant was served last.
         self._served: Counter[Tenant] = Counter()
         self._turn = 0
         self._working: Counter[Tenant] = Counter()
@@ -61,11 +61,11 @@ class FairQueue:
             thread.start()
 
     def alive(self) -> bool:
-        """Whether every thread is there."""
+        """Whether all threads are alive."""
         return all(thread.is_alive() for thread in self._threads)
 
     def stop(self) -> None:
-        """Cancel what waits, and end the threads after what they are at."""
+        """Cancel queued functions, and end the threads after the running ones."""
         with self._changed:
             self._leaving = True
             waiting = [task.future for tasks in self._waiting.values() for task in tasks]
@@ -76,7 +76,7 @@ class FairQueue:
             thread.join(STOP_SECONDS)
 
     def submit(self, tenant: Tenant, work: Callable[[], Any]) -> Future[Any]:
-        """Let ``work`` be done in the tenant's turn; cancelling the future before that leaves the queue."""
+        """Queue a function for a tenant; cancelling the future removes it from the queue."""
         task = _QueuedRead(work, Future())
         with self._changed:
             self._waiting.setdefault(tenant, deque()).append(task)
@@ -87,7 +87,7 @@ class FairQueue:
         return task.future
 
     def waiting(self, tenant: Tenant) -> int:
-        """How many of a tenant wait."""
+        """Number of queued functions of a tenant."""
         with self._changed:
             return len(self._waiting.get(tenant, ()))
 
@@ -116,11 +116,11 @@ class FairQueue:
                     task.future.set_result(result)
             with self._changed:
                 self._working[tenant] -= 1
-                # Another thread may have passed this tenant by, with nobody else there.
+                # Another thread may have skipped this tenant.
                 self._changed.notify_all()
 
     def _take(self) -> tuple[Tenant, _QueuedRead] | None:
-        """The next, which counts as at work from now on."""
+        """Take the next function from the queue."""
         able = [tenant for tenant in self._waiting if self._working[tenant] < self.share]
         if self._leaving or not able:
             return None

@@ -1,4 +1,4 @@
-"""The thread that has uploads read which came in pieces, once they are whole."""
+"""Ingestion of complete resumable uploads in the background."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ from .fair_queue import FairQueue
 
 log = logging.getLogger("bentray.ingest")
 
-# How long it waits before it looks by itself, s; a whole upload wakes it at once.
+# Interval between polls, s; a complete upload wakes the thread at once.
 IDLE_SECONDS = 5.0
-# How long it waits when the disk is full or the database or the storage away, s.
+# Delay after a full disk or an unavailable database or store, s.
 PATIENCE_SECONDS = 30.0
 STOP_SECONDS = 30.0
 
 
 class UploadIngest:
-    """Puts uploads into the queue of the readers, the oldest first, a few of each tenant at a time.
+    """Submits complete uploads to the ingest queue, oldest first, with a limit for each tenant.
 
-    What a service that died was reading is read again.
+    Uploads that a dead service was reading are read again.
     """
 
     def __init__(
@@ -59,13 +59,13 @@ class UploadIngest:
         quota: Quota,
     ) -> None:
         """Args:
-        uploads: their rows.
-        files: where they lie.
-        stores: the rows of what they become, by the word for it.
-        limits: of a process.
-        keep_s: how long the row of a read upload is kept, s.
-        queue: what reads them in turn.
-        quota: of what tenants may store.
+        uploads: the table of uploads.
+        files: the data folder.
+        stores: tables of the results by type.
+        limits: of an ingest process.
+        keep_s: how long the row of a completed upload is kept, s.
+        queue: the ingest queue.
+        quota: of the tenants.
         """
         self._uploads = uploads
         self._files = files
@@ -75,7 +75,7 @@ class UploadIngest:
         self._queue = queue
         self._quota = quota
         self._lock = threading.Lock()
-        # Uploads that are in the queue, and the processes of those that are read.
+        # Queued uploads, and the process ids of those being read.
         self._queued: dict[str, Tenant] = {}
         self._children: dict[str, int] = {}
         self._put_off = False
@@ -84,25 +84,25 @@ class UploadIngest:
         self._thread = threading.Thread(target=self._loop, name="uploads", daemon=True)
 
     def start(self) -> None:
-        """Take up what a dead process left, then begin."""
+        """Continue the uploads of a dead service, then start the thread."""
         for row in self._uploads.receiving():
             path = self._files.of(row["tenant"]).upload(row["id"])
             discard_unverified(path)
-            # It died between the last byte and saying so.
+            # The service died before it marked the upload as complete.
             if received_bytes(path) == row["length"]:
                 self._uploads.mark_complete(row["id"])
         self._thread.start()
 
     def notify(self) -> None:
-        """Say that an upload is whole."""
+        """Wake the thread after an upload was completed."""
         self._wake.set()
 
     def alive(self) -> bool:
-        """Whether the thread is there."""
+        """Whether the thread is alive."""
         return self._thread.is_alive()
 
     def stop(self) -> None:
-        """End the thread, and the processes at work; their uploads are read at the next start."""
+        """End the thread and the ingest processes; their uploads are read again at the next start."""
         self._leaving.set()
         self._wake.set()
         with self._lock:
@@ -125,7 +125,7 @@ class UploadIngest:
                 self._wake.wait(IDLE_SECONDS)
 
     def _submit(self) -> None:
-        """Put what is whole into the queue, no more of a tenant than can be read at a time."""
+        """Queue complete uploads, at most ``FairQueue.share`` of each tenant."""
         with self._lock:
             queued = set(self._queued)
             room = Counter({tenant: -count for tenant, count in Counter(self._queued.values()).items()})
@@ -148,12 +148,12 @@ class UploadIngest:
         self._wake.set()
 
     def _wait(self, error: BaseException) -> None:
-        """Try again after a while."""
-        log.warning("uploads wait: %s", error)
+        """Log an error and pause."""
+        log.warning("ingestion of uploads pauses: %s", error)
         self._put_off = True
 
     def _is_here(self, row: UploadRow) -> bool:
-        """Whether it lies in this data folder, and not with another service that uses this database."""
+        """Whether the data is in this data folder, not in that of another service."""
         tenant = row["tenant"]
         path = self._files.of(tenant).upload(row["id"])
         return path.exists() or self._known(self._stores[row["what"]], tenant, row["result_id"])
@@ -176,7 +176,7 @@ class UploadIngest:
     def _refusal(
         self, row: UploadRow, tenant: Tenant, store: UploadedTable[Any], path: Path
     ) -> Problem | None:
-        """Read and store an upload; why it cannot be, or None."""
+        """Ingest an upload; returns the problem of a refused one, else None."""
         instance, files = f"/v1/uploads/{row['id']}", self._files.of(tenant)
         try:
             summary = make_canonical(
@@ -197,10 +197,10 @@ class UploadIngest:
         except InvalidInput as error:
             return problem_of(error, instance)
         except Exception:
-            # The thread must outlive what nobody foresaw, and the next upload may be a better one.
+            # An unexpected error must not stop the thread.
             number = secrets.token_hex(8)
-            log.exception("%s could not be read [%s]", row["id"], number)
-            words = f"an error of the service, not of the file; it is in the log under {number}"
+            log.exception("%s could not be ingested [%s]", row["id"], number)
+            words = f"internal error of the service; see the log entry {number}"
             return make_problem(INTERNAL, words, instance=instance, correlation_id=number)
         finally:
             with self._lock:
@@ -208,7 +208,7 @@ class UploadIngest:
         return None
 
     def _known(self, store: UploadedTable[Any], tenant: Tenant, name: str) -> bool:
-        """Whether a service died after it had stored the result."""
+        """Whether the result exists already, from a service that died."""
         try:
             store.get(tenant, name)
         except UnknownId:

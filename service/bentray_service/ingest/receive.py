@@ -1,4 +1,4 @@
-"""Stream the body of an upload to disk, counted while it is read."""
+"""Streaming of a request body to disk."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from starlette.concurrency import run_in_threadpool
 
 from ..refusals import EmptyBody, QuotaExceeded, StorageFull, TooLarge
 
-# Chunks wait as they came, which saves copying them together; a client may send tiny ones.
+# Size of a batch; chunks are written without copying them together.
 BATCH_BYTES, BATCH_CHUNKS = 4 * 1024 * 1024, 1024
-# What a power cut may cost of a body, and how much of it waits for the disk at most.
+# Interval between syncs to disk, bytes.
 SYNC_BYTES = 64 * 1024 * 1024
 
 
 @dataclass(frozen=True)
 class Received:
-    """How many bytes came, and their SHA-256 in hexadecimal."""
+    """Size of a body, and its SHA-256 in hexadecimal."""
 
     size: int
     sha256: str
@@ -41,12 +41,11 @@ async def receive(
 
     Args:
         stream: the chunks of the body.
-        announced: the Content-Length, if there was one; too large a one is refused before a byte is read.
-        path: the file to make; the caller removes it.
-        limit: largest size, bytes.
-        expected: what the body should hold, for the refusal of an empty one.
-        reserve: called in a thread before more is written than was announced, with the size that there may be
-            then; it may refuse.
+        announced: Content-Length, if given.
+        path: a new file; the caller deletes it.
+        limit: maximum size, bytes.
+        expected: description of the expected content.
+        reserve: called in a thread to reserve more than ``announced`` bytes; may raise a refusal.
 
     Raises:
         TooLarge, EmptyBody, StorageFull: as their names say.
@@ -76,20 +75,18 @@ async def write_body(
     digest: hashlib._Hash | None,
     make_room: Callable[[int], None] = lambda size: None,
 ) -> int:
-    """Write what comes to the end of an open file, one batch while the next one comes, and sync it.
-
-    Whatever ends it, all that came before is in the file.
+    """Write a body to the end of an open file and sync it; data received before an error is kept.
 
     Args:
         stream: the chunks.
-        file: where they go, unbuffered: what a full disk refused must not come later.
-        limit: at most so many bytes; those that go beyond are not written.
-        accepted: the limit in words.
-        digest: fed with all that is written.
-        make_room: called in a thread before the file grows, with its size then.
+        file: unbuffered, so that nothing is written after an error.
+        limit: maximum number of bytes.
+        accepted: description of the limit.
+        digest: updated with all data.
+        make_room: called in a thread with the new size before the file grows.
 
     Returns:
-        how many bytes came.
+        the number of bytes.
 
     Raises:
         TooLarge, StorageFull: as their names say.
@@ -107,21 +104,21 @@ async def write_body(
                     await behind.write(batch)
                     batch, held = [], 0
         finally:
-            # After a write that failed, what follows would stand in the wrong place.
+            # After a failed write, further data would have the wrong offset.
             if not behind.failed:
                 await behind.write(batch)
                 await behind.end()
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             raise StorageFull(
-                "body", f"no space after {size} bytes", "a smaller file, or a larger disk"
+                "body", f"no space after {size} bytes", "a smaller file, or more disk space"
             ) from error
         raise
     return size
 
 
 class _GrowingReservation:
-    """What is reserved for a body; one without a length has twice as much each time, so that few calls do."""
+    """The reservation of a body; without Content-Length it is doubled each time."""
 
     def __init__(self, reserved: int, limit: int, reserve: Callable[[int], None]) -> None:
         self._reserved = reserved
@@ -129,7 +126,7 @@ class _GrowingReservation:
         self._reserve = reserve
 
     def make_room(self, size: int) -> None:
-        """Reserve room for ``size`` bytes, if there is none yet."""
+        """Reserve at least ``size`` bytes."""
         if size <= self._reserved:
             return
         for wanted in (min(2 * size, self._limit), size):
@@ -144,10 +141,10 @@ class _GrowingReservation:
 
 
 class _BatchWriter:
-    """Writes a batch in a thread while the next one comes.
+    """Writes batches in a thread while the next one is received.
 
     Attributes:
-        failed: whether a write has; nothing more may be written then.
+        failed: whether a write has failed; nothing more may be written then.
     """
 
     def __init__(self, file: FileIO, digest: hashlib._Hash | None, make_room: Callable[[int], None]) -> None:
@@ -160,12 +157,12 @@ class _BatchWriter:
         self.failed = False
 
     async def write(self, batch: list[bytes]) -> None:
-        """Begin to write, once the batch before is written."""
+        """Write a batch after the previous one."""
         await self._settle()
         self._running = asyncio.create_task(run_in_threadpool(self._write, batch))
 
     async def end(self) -> None:
-        """See all of it on the disk."""
+        """Wait until all data is on disk."""
         await self._settle()
         await run_in_threadpool(os.fdatasync, self._file.fileno())
 

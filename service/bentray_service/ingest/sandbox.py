@@ -1,4 +1,4 @@
-"""Run the ingest process: started apart, timed, killed with its group, believed only when it ends well."""
+"""Runs the ingest process in a sandbox: separate process group, time limit, validated output."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from .child import ACCEPTED
 
 log = logging.getLogger("bentray.ingest")
 
-# Slow for reading and packing traces: a busy machine must be able to.
+# Minimum ingestion rate of a slow machine, bytes/s.
 BYTES_PER_S = 8 * 2**20
 
-# Of what a process that fails says on its error output, which goes to the log.
+# Maximum length of the error output in the log.
 LONGEST_COMPLAINT = 2000
 
-# One thread each: every further one reserves address space, which is limited. No filter plug-in is loaded.
+# One thread, since each further one uses address space; no plug-ins of HDF5.
 ENVIRONMENT = {
     "PATH": os.defpath,
     "OPENBLAS_NUM_THREADS": "1",
@@ -52,27 +52,26 @@ def ingest(
     started: Callable[[int], None] = lambda process_id: None,
     reserve: Callable[[int], None] = lambda size: None,
 ) -> dict[str, Any]:
-    """Check ``source`` in a process of its own and write the canonical ``target``.
+    """Validate ``source`` in a separate process and write the canonical ``target``.
 
-    What it leaves beside ``target`` when it is killed is for the caller to remove: its temporary files lie
-    there too.
+    The caller deletes temporary files next to ``target`` that a killed process has left.
 
     Args:
         what: a key of ``ACCEPTED``.
-        source, target: paths of this machine.
-        memory_bytes: what the process may use of address space.
-        seconds: of processor and of wall time, and one more for each ``BYTES_PER_S`` of the source.
-        scratch: the folder it runs in.
-        given: what the user says of it: of a volume as ``volume_formats.Given``, of a mesh its title.
-        started: told the id of the process.
-        reserve: told the bytes that ``target`` will have at most, before the process writes it; what it
-            raises ends the process.
+        source, target: paths.
+        memory_bytes: address space of the process.
+        seconds: CPU and wall time, plus one second per ``BYTES_PER_S`` bytes of the source.
+        scratch: working folder.
+        given: metadata: see ``volume_formats.Given``; for a mesh its title.
+        started: called with the process id.
+        reserve: called with the maximum size of ``target`` before it is written; an exception ends the
+            process.
 
     Returns:
-        The summary of what it holds.
+        summary of the content.
 
     Raises:
-        InvalidInput: when the file is refused, and also when reading it crashed, hung or ate the memory.
+        InvalidInput: for an invalid file, also if the reader crashed, timed out or ran out of memory.
         StorageFull: when there is no space for the canonical file.
     """
     seconds += source.stat().st_size // BYTES_PER_S
@@ -94,14 +93,14 @@ def ingest(
         finally:
             _kill(process)
         if answer is None:
-            raise InvalidInput("file", f"a file that takes more than {seconds:g} s to read", ACCEPTED[what])
+            raise InvalidInput("file", f"a file that takes longer than {seconds:g} s to read", ACCEPTED[what])
         if process.returncode != 0:
             complaint.seek(0)
             said = complaint.read(LONGEST_COMPLAINT).decode(errors="replace")
             log.warning("the ingest process ended with %s: %s", process.returncode, said)
             raise InvalidInput("file", _death(process.returncode, memory_bytes), ACCEPTED[what])
     if "full" in answer:
-        raise StorageFull("body", "no space for the checked copy", "a smaller file, or a larger disk")
+        raise StorageFull("body", "no space for the canonical file", "a smaller file, or more disk space")
     if "error" in answer:
         raise InvalidInput(answer["error"]["field"], answer["error"]["found"], answer["error"]["accepted"])
     return dict(answer["ok"])
@@ -110,7 +109,7 @@ def ingest(
 def _answer(
     process: subprocess.Popen[bytes], seconds: float, reserve: Callable[[int], None]
 ) -> dict[str, Any] | None:
-    """The last line that the process says, once it has ended; None when it took longer than allowed."""
+    """The last output line of the process; None after a time-out."""
     assert process.stdin is not None
     assert process.stdout is not None
     late = threading.Event()
@@ -125,12 +124,12 @@ def _answer(
     try:
         for line in process.stdout:
             if not line.endswith(b"\n"):
-                # It died while it wrote.
+                # The process died while it wrote.
                 break
             answer = json.loads(line)
             if "reserve" in answer:
                 reserve(int(answer["reserve"]))
-                # A process that is dead by now is told of by its exit code.
+                # The exit code of a dead process is evaluated later.
                 with contextlib.suppress(BrokenPipeError):
                     process.stdin.write(b"go\n")
                     process.stdin.flush()
@@ -147,7 +146,7 @@ def _kill_group(process: subprocess.Popen[bytes]) -> None:
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
-    """End the process and whatever it started, then collect it."""
+    """Kill the process group, then wait for the process."""
     if process.returncode is None:
         _kill_group(process)
         process.wait()
@@ -159,7 +158,7 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
 
 def _death(code: int, memory_bytes: int) -> str:
     if code == -signal.SIGXCPU:
-        return "a file that takes too much processor time to read"
+        return "a file that takes too much CPU time to read"
     if code < 0:
         name = signal.Signals(-code).name
         return f"a file that crashed its reader ({name}, within {memory_bytes} bytes of memory)"

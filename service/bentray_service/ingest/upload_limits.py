@@ -1,4 +1,4 @@
-"""How many uploads may be on their way, and be begun in a minute: refused before a byte is read."""
+"""Limits of concurrent uploads and of the rate of new ones, checked before the body is read."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from ..access.request_rates import RequestRates
 from ..refusals import Busy, RateLimited
 from ..rows.tenants import Tenant
 
-# Each has a connection, and a file of which it reserved the bytes; few of them are read at a time.
+# Each upload has a connection and a reservation; only few are ingested at a time.
 MOST_OF_TENANT = 32
 MOST_IN_ALL = 256
-# Uploads in pieces that a tenant may begin.
+# New resumable uploads of a tenant per minute.
 BEGUN_PER_MINUTE = 120
-# After which it is worth another try, s.
+# Suggested time before the next attempt, s.
 AGAIN_S = 10.0
 
 
 class UploadLimits:
-    """Counts the uploads that are received, wait, or are read, and those in pieces that are begun."""
+    """Counts one-shot uploads in progress and new resumable uploads."""
 
     def __init__(
         self,
@@ -36,32 +36,32 @@ class UploadLimits:
         self._begun = RequestRates(begun_per_minute)
 
     def check_begin(self, tenant: Tenant) -> None:
-        """Refuse an upload in pieces that is begun too soon after others.
+        """Check the rate limit of new resumable uploads.
 
         Raises:
-            TooOften: as it says.
+            RateLimited: when it is exceeded.
         """
         wait_s = self._begun.take(tenant)
         if wait_s > 0.0:
-            found = f"more than {self._begun.per_minute} begun in a minute"
-            raise RateLimited("uploads", found, "fewer; see Retry-After", wait_s)
+            found = f"more than {self._begun.per_minute} new uploads per minute"
+            raise RateLimited("uploads", found, "a lower rate; see Retry-After", wait_s)
 
     @contextmanager
     def __call__(self, tenant: Tenant) -> Iterator[None]:
-        """One more while the block runs.
+        """Count an upload within the block.
 
         Raises:
-            TooOften: when the tenant has as many as it may.
-            Busy: when there are as many as the service takes.
+            RateLimited: when the tenant has too many uploads in progress.
+            Busy: when the service has too many uploads in progress.
         """
         with self._lock:
             own, all_of_them = self._there[tenant], self._there.total()
             if own >= self._of_tenant:
-                accepted = f"at most {self._of_tenant} of a tenant at a time; try again later"
-                raise RateLimited("uploads", f"{own} on their way", accepted, AGAIN_S)
+                accepted = f"at most {self._of_tenant} per tenant at a time; try again later"
+                raise RateLimited("uploads", f"{own} in progress", accepted, AGAIN_S)
             if all_of_them >= self._in_all:
                 accepted = f"at most {self._in_all} at a time; try again later"
-                raise Busy("uploads", f"{all_of_them} on their way", accepted)
+                raise Busy("uploads", f"{all_of_them} in progress", accepted)
             self._there[tenant] += 1
         try:
             yield

@@ -1,1 +1,1 @@
-"""Jobs: what kinds there are, how one is run, and how its failure is told."""
+"""Jobs: their kinds, the runner, progress, and problems of failed jobs."""

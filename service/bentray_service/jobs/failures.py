@@ -1,4 +1,4 @@
-"""Why a job failed, in plain words."""
+"""The problem stored with a failed job."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from ..web.problem import Problem
 log = logging.getLogger("bentray.jobs")
 
 CRASHED = make_problem(
-    FAILED, "the service died while it ran this job, several times; the job is not tried again"
+    FAILED, "the service crashed several times while it ran this job; the job is not repeated"
 )
 
 
 def explain(job_id: str, error: BaseException) -> Problem:
-    """The problem to store with a failed job; what nobody foresaw goes to the log under a number."""
+    """Convert an error to a problem; unexpected errors are logged with a correlation id."""
     instance = f"/v1/jobs/{job_id}"
     if isinstance(error, InvalidInput):
         return problem_of(error, instance)
     if isinstance(error, MemoryError):
-        return make_problem(FAILED, "the memory ran out: use fewer nodes or fewer slices", instance=instance)
+        return make_problem(FAILED, "out of memory: use fewer nodes or fewer slices", instance=instance)
     if isinstance(error, KilledWorker):
-        words = "the workers that ran this job died one after the other, most often for lack of memory"
+        words = "the workers that ran this job died one after another, usually for lack of memory"
         return make_problem(FAILED, words, instance=instance)
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         return make_problem(FAILED, "the disk of the service is full", instance=instance)
     number = secrets.token_hex(8)
     log.error("job %s failed [%s]", job_id, number, exc_info=error)
-    words = f"an error of the service, not of the data; it is in the log under {number}"
+    words = f"internal error of the service; see the log entry {number}"
     return make_problem(INTERNAL, words, instance=instance, correlation_id=number)

@@ -1,4 +1,4 @@
-"""What happens to jobs, for all who watch: one look at the database for every stream of events there is."""
+"""Job events for all event streams, polled by one database query."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from ..rows.tenants import Tenant
 
 log = logging.getLogger("bentray.jobs")
 
-# How often the database is asked, and how soon again for those who have just come.
+# Interval between database queries, and the shorter one after a new stream was opened.
 INTERVAL_SECONDS = 0.5
 SOONEST_SECONDS = 0.05
-# Streams that may be open. Each holds a connection, no thread and no query of its own.
+# Maximum number of open streams. Each holds a connection, but no thread and no query.
 OF_TENANT = 64
 IN_ALL = 256
 
 
 class WatchedJob:
-    """One job that is watched.
+    """A job with at least one event stream.
 
     Attributes:
-        row: how it is: ``state``, ``done``, ``total`` and ``phase``; None before it was looked at.
-        gone: whether there is no such job any more.
-        events: all of it, oldest first.
-        watchers: how many watch it.
+        row: its state and progress; None before the first query.
+        gone: whether it has been deleted.
+        events: all its events, oldest first.
+        watchers: number of streams.
     """
 
     def __init__(self) -> None:
@@ -44,18 +44,18 @@ class WatchedJob:
         self._news = asyncio.Event()
 
     async def wait_for_change(self, seconds: float) -> None:
-        """Wait until something has changed, at most so long."""
+        """Wait until the state, the progress or the events change, at most ``seconds``."""
         with suppress(TimeoutError):
             async with asyncio.timeout(seconds):
                 await self._news.wait()
 
     def notify(self) -> None:
-        """Wake all who wait."""
+        """Wake all waiting streams."""
         self._news.set()
         self._news = asyncio.Event()
 
     def update(self, row: JobProgress | None, events: list[EventRow]) -> None:
-        """Take in what was found."""
+        """Store the result of a query."""
         changed = row != self.row or bool(events) or (row is None) != self.gone
         self.row, self.gone = row, row is None
         self.events += events
@@ -64,12 +64,12 @@ class WatchedJob:
 
 
 class EventFeed:
-    """Watches jobs while anybody wants to know of them; everything here is done by the event loop."""
+    """Polls the watched jobs while there are any; it must be used from the event loop only."""
 
     def __init__(self, jobs: Jobs, leaving: Callable[[], bool]) -> None:
         """Args:
-        jobs: where they are.
-        leaving: whether the service stops, so that every watcher is woken.
+        jobs: the table of jobs.
+        leaving: whether the service stops; then every stream is woken.
         """
         self._jobs = jobs
         self.leaving = leaving
@@ -80,16 +80,16 @@ class EventFeed:
 
     @contextmanager
     def watch(self, tenant: Tenant, job_id: str) -> Iterator[WatchedJob]:
-        """Watch a job of this tenant in the block; that it is the tenant's is checked before.
+        """Watch a job in a ``with`` block; the caller has checked the owner.
 
         Raises:
-            TooManyStreams: when the tenant, or all together, watch as much as they may.
+            TooManyStreams: when too many streams are open, of the tenant or in total.
         """
-        accepted = f"at most {OF_TENANT} of a tenant and {IN_ALL} in all; ask GET /v1/jobs/{job_id} instead"
+        accepted = f"at most {OF_TENANT} per tenant and {IN_ALL} in total; poll GET /v1/jobs/{job_id} instead"
         if self._streams[tenant] >= OF_TENANT:
-            raise TooManyStreams("event streams", f"{OF_TENANT} of this tenant are open", accepted)
+            raise TooManyStreams("event streams", f"{OF_TENANT} streams of this tenant are open", accepted)
         if self._streams.total() >= IN_ALL:
-            raise TooManyStreams("event streams", f"{IN_ALL} are open", accepted)
+            raise TooManyStreams("event streams", f"{IN_ALL} streams are open", accepted)
         self._streams[tenant] += 1
         watched = self._watched.setdefault(job_id, WatchedJob())
         watched.watchers += 1
@@ -108,7 +108,7 @@ class EventFeed:
                 del self._streams[tenant]
 
     async def _poll(self) -> None:
-        # A thread of its own, which nothing else can hold.
+        # A thread of its own, so that polling does not wait for other work.
         limiter = anyio.CapacityLimiter(1)
         try:
             while self._watched:
@@ -120,7 +120,7 @@ class EventFeed:
                 try:
                     found, events = await anyio.to_thread.run_sync(self._jobs.updates, known, limiter=limiter)
                 except (SQLAlchemyError, DatabaseUnavailable) as error:
-                    log.warning("jobs that are watched could not be read: %s", error)
+                    log.warning("watched jobs could not be read: %s", error)
                 else:
                     for job_id, one in watched.items():
                         one.update(found.get(job_id), events.get(job_id, []))

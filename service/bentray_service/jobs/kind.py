@@ -1,4 +1,4 @@
-"""What a kind of job declares: its request, what it reads, its plan, how it runs and what it makes."""
+"""The base class of job kinds: request model, inputs, plan, execution and results."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ..rows.tenants import Tenant
 
 
 class JobRequest(BaseModel):
-    """The body of a request for a job; each kind has one, with its name as ``kind``."""
+    """The body of a request for a job; each kind has its own subclass."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -34,7 +34,7 @@ R = TypeVar("R", bound=JobRequest)
 
 
 class Sources(Protocol):
-    """What plans are made of: the stored things and the workers."""
+    """Stored items and workers, as used for planning."""
 
     @property
     def datasets(self) -> Datasets: ...
@@ -54,13 +54,13 @@ class Sources(Protocol):
 
 @dataclass(frozen=True)
 class Order:
-    """A checked request.
+    """A validated request.
 
     Attributes:
-        settings: as they are stored with the job.
-        largest_bytes: the most that it stores while it runs.
-        references: the ids of what it reads, by column of the table of jobs.
-        plan: how it is cut into tasks, if that is planned before.
+        settings: to store with the job.
+        largest_bytes: maximum storage while it runs.
+        references: ids of inputs, by column of the table of jobs.
+        plan: decomposition into tasks, if planned in advance.
     """
 
     settings: Plain
@@ -71,19 +71,18 @@ class Order:
 
 @dataclass(frozen=True)
 class Task:
-    """One job that runs.
+    """A job to run.
 
     Attributes:
-        client: the ``distributed.Client`` of the worker pool.
-        source: what it reads, as ``Kind.source`` says.
+        client: of the Dask cluster.
+        source: input file, see ``Kind.source``.
         settings: as stored with the job.
-        target: the file to write, atomically, as ``Kind.target`` says.
-        work_dir: a folder of its own, which every worker can read and write; it keeps the checkpoints of an
-            unfinished run.
+        target: output file, see ``Kind.target``; written atomically.
+        work_dir: folder of the job, shared with all workers; it keeps checkpoints.
         on_progress: called with the progress, often.
         on_saved: called after each checkpoint.
-        stop: whether to give up, by raising ``Cancelled``.
-        share: of the workers; how many tasks the job may have in flight.
+        stop: returns True after a cancellation; then ``run`` raises ``Cancelled``.
+        share: of the workers; limits the number of tasks in flight.
     """
 
     client: Any
@@ -101,11 +100,11 @@ class Kind(ABC, Generic[R]):
     """A kind of job.
 
     Attributes:
-        request: the model of its request.
-        example: of a request, for the OpenAPI description.
-        settings: reads the settings that are stored with a job.
-        table: the name of the table that its results are in.
-        lane: the resource of a worker that its tasks need, a key of ``cluster.resources.OFFERED``.
+        request: model of the request.
+        example: request for the OpenAPI description.
+        settings: parses the settings stored with a job.
+        table: name of the table of results.
+        lane: worker resource of its tasks, a key of ``cluster.resources.OFFERED``.
     """
 
     request: ClassVar[type[JobRequest]]
@@ -116,29 +115,29 @@ class Kind(ABC, Generic[R]):
 
     @abstractmethod
     def plan(self, request: R, tenant: Tenant, sources: Sources) -> Order:
-        """Check a request against what is stored and what the workers can do.
+        """Validate a request against the stored inputs and the connected workers.
 
         Raises:
-            UnknownId: for a thing that the tenant does not have.
+            UnknownId: for an input that the tenant does not have.
             InvalidInput: for a job that no connected worker can run.
         """
 
     @abstractmethod
     def source(self, files: TenantFiles, job: JobRow) -> Path:
-        """The file that the job reads; its work folder where it reads nothing."""
+        """The input file; the work folder for a job without input."""
 
     @abstractmethod
     def target(self, files: TenantFiles, job: JobRow) -> Path:
-        """The file that it writes; fixed, so that a job which is run again writes the same one."""
+        """The output file; it is fixed, so that a repeated job writes the same file."""
 
     @abstractmethod
     def run(self, task: Task) -> Plain | None:
-        """Do the work, write ``task.target``, and return the row of the result, if it has one."""
+        """Run the job, write ``task.target`` and return the row of the result, if any."""
 
     @abstractmethod
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
-        """What a job that has succeeded made: fields of its record, and links."""
+        """Ids of the results of a successful job by field of its record, and links."""
 
     def discard(self, files: TenantFiles, target: Path) -> None:
-        """Remove the result of a job that was cancelled at its very end."""
+        """Remove the result of a job that was cancelled after it finished."""
         files.drop(target)

@@ -1,4 +1,4 @@
-"""The kinds of job, each declared once: reconstruction, simulation, refraction, geometry field."""
+"""The kinds of job: reconstruction, simulation, refraction and geometry field, each declared once."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from ..rows.records import JobRow, Plain
 from ..rows.tenants import Tenant
 from .kind import JobRequest, Kind, Order, Sources, Task
 
-DEFAULTS = "What is left out takes its default."
+DEFAULTS = "Omitted settings take their defaults."
 
 
 class ReconstructionRequest(JobRequest):
@@ -49,7 +49,7 @@ class ReconstructionRequest(JobRequest):
 
 
 class ReconstructionKind(Kind[ReconstructionRequest]):
-    """Speed of sound from one dataset."""
+    """Sound speed from one dataset."""
 
     request, settings = ReconstructionRequest, TypeAdapter(Settings)
     table, lane = schema.volumes.name, "recon"
@@ -83,7 +83,7 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
         )
         if not np.isfinite(result.speed).all():
             found = f"no finite speed at {np.count_nonzero(~np.isfinite(result.speed))} nodes"
-            accepted = "settings by which it converges: a smaller relaxation or a larger penalty_strength"
+            accepted = "settings with which it converges: smaller relaxation or larger penalty_strength"
             raise InvalidInput("settings", found, accepted)
         write_reconstruction(task.target, result)
         return {"id": task.target.stem, **_describe(result), "bytes": task.target.stat().st_size}
@@ -95,7 +95,7 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
 
 
 class SimulationRequest(JobRequest):
-    """Simulate the scan of a phantom; it becomes a dataset, with the truth in it."""
+    """Simulate a scan of a phantom; the result is a dataset with the ground truth."""
 
     kind: Literal["simulation"]
     settings: Annotated[PhantomScan, BeforeValidator(partial(known_only, of=PhantomScan))] = Field(
@@ -104,7 +104,7 @@ class SimulationRequest(JobRequest):
 
 
 class SimulationKind(Kind[SimulationRequest]):
-    """The scan of a phantom, as a dataset."""
+    """A simulated scan as a dataset."""
 
     request, settings = SimulationRequest, TypeAdapter(PhantomScan)
     table, lane = schema.datasets.name, "recon"
@@ -115,7 +115,7 @@ class SimulationKind(Kind[SimulationRequest]):
 
     def plan(self, request: SimulationRequest, tenant: Tenant, sources: Sources) -> Order:
         plan = sources.compute.plan_simulation(request.settings)
-        # Its parts, and the file that is made of them.
+        # The parts, and the file assembled from them.
         return Order(request.settings.plain(), 2 * plan["result_bytes"], plan=plan)
 
     def source(self, files: TenantFiles, job: JobRow) -> Path:
@@ -136,22 +136,22 @@ class SimulationKind(Kind[SimulationRequest]):
 
 
 class RefractionRequest(JobRequest):
-    """Show a volume as glass from all sides."""
+    """Render a turntable animation of a volume with refraction."""
 
     kind: Literal["refraction"]
-    volume: str = Field(description="Id of a volume in space with even spacing.")
+    volume: str = Field(description="Id of a 3-D volume with uniform spacing.")
     settings: Annotated[Turntable, BeforeValidator(partial(known_only, of=Turntable))] = Field(
         default_factory=Turntable, description=DEFAULTS
     )
 
 
 class RefractionKind(Kind[RefractionRequest]):
-    """A turntable of one volume; it has no row but the job's."""
+    """A turntable animation of one volume; it has no row of its own."""
 
     request, settings = RefractionRequest, TypeAdapter(Turntable)
     table, lane = schema.volumes.name, "render"
     example: ClassVar[Example] = {
-        "summary": "A volume as glass from all sides",
+        "summary": "A turntable animation of a volume",
         "value": {"kind": "refraction", "volume": "vol-0123456789abcdef0123", "settings": {"format": "zip"}},
     }
 
@@ -179,7 +179,7 @@ class RefractionKind(Kind[RefractionRequest]):
 
 
 class GeometryFieldRequest(JobRequest):
-    """Make the geometry field of a mesh; the same mesh and settings have it at once the second time."""
+    """Build the geometry field of a mesh; a field with the same mesh and settings is reused."""
 
     kind: Literal["geometry-field"]
     mesh: str = Field(description="Id of a mesh.")
@@ -224,7 +224,7 @@ class GeometryFieldKind(Kind[GeometryFieldRequest]):
         return {"field": field}, field_links(field)
 
     def discard(self, files: TenantFiles, target: Path) -> None:
-        """Keep it: it is named by its content, and may be another job's too."""
+        """Keep it: it is identified by its content and may belong to another job, too."""
 
 
 KINDS: Mapping[str, Kind[Any]] = MappingProxyType(
@@ -236,7 +236,7 @@ KINDS: Mapping[str, Kind[Any]] = MappingProxyType(
 
 
 def field_links(field_id: str) -> dict[str, str]:
-    """The addresses of a geometry field and its pictures."""
+    """Links to a geometry field and its images."""
     here = f"/v1/geometry-fields/{field_id}"
     return {
         "field": here,
@@ -259,5 +259,5 @@ def _describe(result: Reconstruction) -> Plain:
 
 
 def finite(value: float) -> float | None:
-    """A number that JSON can hold: None for NaN and infinity."""
+    """A number for JSON: None for NaN and infinity."""
     return float(value) if math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""Between a job that reports often and a database that is written a few times a second."""
+"""Progress of a running job: stored at a limited rate; polls for cancellation."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from .kinds import finite
 log = logging.getLogger("bentray.jobs")
 
 INTERVAL_SECONDS = 0.3
-# Of how many sweeps the record of a job tells at most; the file of the result has all of them.
+# Maximum number of iterations in a job record; the result file has all of them.
 MOST_SWEEPS = 500
-# How often a job that has kept something is asked how much that takes on the disk.
+# Interval between measurements of the disk usage of a job, s.
 MEASURE_SECONDS = 30.0
 
 
 class Reporter:
-    """Stores the progress of one job and asks whether to stop, both at most every ``INTERVAL_SECONDS``.
+    """Stores the progress of one job and polls its state, both at most every ``INTERVAL_SECONDS``.
 
     Attributes:
-        lost: whether another service runs the job by now.
+        lost: whether another service has taken over the job.
     """
 
     def __init__(
@@ -41,10 +41,10 @@ class Reporter:
         taken: Callable[[], int] = lambda: 0,
     ) -> None:
         """Args:
-        queue, job_id: which job.
-        leaving: whether the service leaves.
+        queue, job_id: the job.
+        leaving: whether the service stops.
         clock: seconds.
-        taken: measures how many bytes the job takes on the disk.
+        taken: measures the disk usage of the job, bytes.
         """
         self._queue = queue
         self._job_id = job_id
@@ -58,22 +58,22 @@ class Reporter:
         self.lost = False
 
     def report(self, progress: Progress) -> None:
-        """Keep the newest progress; write it when the last write is long enough ago."""
+        """Remember the progress, and store it if the last write is long enough ago."""
         self._pending = progress
-        # A long history is a long record to write.
+        # Long histories are stored less often.
         wait = INTERVAL_SECONDS * (1.0 + min(len(progress.history), MOST_SWEEPS) / 100.0)
         if self._clock() - self._written < wait:
             return
         try:
             self.flush()
         except DatabaseUnavailable:
-            # A database that is away for a while must not cost a job; the next report says the same.
+            # The job continues while the database is unavailable; the next report is complete.
             pass
         except SQLAlchemyError:
             log.warning("the progress of %s could not be stored", self._job_id, exc_info=True)
 
     def flush(self) -> None:
-        """Write what is kept; called at the end too, so that the last report always arrives."""
+        """Store the last progress; called at the end, too."""
         if self._pending is None:
             return
         kept = self._pending
@@ -86,7 +86,7 @@ class Reporter:
         self._pending = None
 
     def saved(self) -> None:
-        """The job has kept something to go on from: say so once, and now and then how much that takes."""
+        """Reset the attempts after the first checkpoint, and measure the disk usage now and then."""
         try:
             if not self._further:
                 self._queue.reset_attempts(self._job_id)
@@ -97,27 +97,27 @@ class Reporter:
         except DatabaseUnavailable:
             pass
         except SQLAlchemyError:
-            log.warning("that %s got further could not be stored", self._job_id, exc_info=True)
+            log.warning("a checkpoint of %s could not be recorded", self._job_id, exc_info=True)
 
     def stop(self) -> bool:
-        """Whether the job should give up: it was cancelled or lost to another service, or this one leaves."""
+        """Whether to stop: after a cancellation or takeover, or when this service stops."""
         if self._leaving() or self._stopped:
             return True
         if self._clock() - self._asked >= INTERVAL_SECONDS:
             self._asked = self._clock()
             try:
-                told = self._queue.held_state(self._job_id)
-                self.lost = told is None
-                self._stopped = told != "running"
+                state = self._queue.held_state(self._job_id)
+                self.lost = state is None
+                self._stopped = state != "running"
             except DatabaseUnavailable:
                 pass
             except SQLAlchemyError:
-                log.warning("whether %s is cancelled could not be read", self._job_id, exc_info=True)
+                log.warning("the state of %s could not be read", self._job_id, exc_info=True)
         return self._stopped
 
 
 def thin_history(history: Sequence[Sweep]) -> Sequence[Sweep]:
-    """At most ``MOST_SWEEPS`` of a history, evenly, with the first and the last."""
+    """At most ``MOST_SWEEPS`` entries of a history, evenly spaced, including the first and the last."""
     if len(history) <= MOST_SWEEPS:
         return history
     last = len(history) - 1

@@ -1,4 +1,4 @@
-"""The threads that take queued jobs in order and see each to its end."""
+"""The job runner: claims queued jobs, runs each in a thread, and stores the outcome."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ from .reporter import Reporter
 
 log = logging.getLogger("bentray.jobs")
 
-# How long an idle thread waits before it looks by itself; a new job wakes it at once.
+# Interval between polls of an idle runner, s; a new job wakes it at once.
 IDLE_SECONDS = 1.0
-# How long a job may take to notice that the service leaves.
+# Time for running jobs to stop when the service stops, s.
 STOP_SECONDS = 30.0
-# How often the database may refuse the end of a job.
+# Attempts to store the outcome of a job against errors of the database.
 REFUSALS = 3
-# How long a result waits for a store that is away, before it is tried again.
+# Interval between attempts to store a result, s.
 STORE_SECONDS = 5.0
-# How often leases are renewed, and those of dead services looked for.
+# Interval between renewals of leases and searches for dead services, s.
 LEASE_CHECK_SECONDS = LEASE_S / 6.0
 
-# What a client raises when its scheduler dies under it, or has no workers left.
-AWAY = (
+# Errors of a client whose scheduler has died or has no workers.
+UNAVAILABLE = (
     CommClosedError,
     FutureCancelledError,
     CancelledError,
@@ -60,10 +60,10 @@ FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class Runner:
-    """Runs up to ``at_once`` jobs at the same time, and one of each tenant that has none, up to ``tenants``.
+    """Runs up to ``at_once`` jobs at the same time, and one job of every further tenant up to ``tenants``.
 
-    A thread only drives its job: the work is done by the cluster, which the jobs share. While the disk has
-    less than ``min_free_bytes`` free, or the store is away, jobs wait.
+    A thread only controls its job; the cluster, shared by all jobs, does the computation. Jobs wait while
+    less than ``min_free_bytes`` of disk space is free, or the store is unavailable.
     """
 
     def __init__(
@@ -78,9 +78,9 @@ class Runner:
         alone: bool,
     ) -> None:
         """Args:
-        at_once: jobs that run whoever's they are.
-        tenants: jobs that run at most, those beyond ``at_once`` of tenants without another one.
-        alone: whether no other service uses the database; see ``Jobs.recover``.
+        at_once: maximum number of running jobs.
+        tenants: the same including one job of each tenant without another.
+        alone: whether no other service uses the database; see ``Queue.recover``.
         """
         self._queue = queue
         self._files = files
@@ -91,15 +91,15 @@ class Runner:
         self._most = max(at_once, tenants)
         self._shares = Shares()
         self._wake, self._leaving = threading.Event(), threading.Event()
-        # The job of each thread. One that was released may be taken again before its thread has ended.
-        self._in_hand: dict[threading.Thread, str] = {}
+        # The job of each thread. A released job may be claimed again before its thread has ended.
+        self._running: dict[threading.Thread, str] = {}
         self._threads = [
             threading.Thread(target=self._take, name="jobs", daemon=True),
             threading.Thread(target=self._keep_leases, name="leases", daemon=True),
         ]
 
     def start(self) -> None:
-        """Take up what a dead process left, then begin."""
+        """Take over jobs of a dead service, then start the threads."""
         self._recover()
         self._files.keep_work(self._queue.unfinished())
         for thread in self._threads:
@@ -109,12 +109,12 @@ class Runner:
         crashed = CRASHED.model_dump(exclude_none=True)
         again = self._queue.recover(crashed, alone=self._alone, held=self._held())
         if again:
-            log.warning("%d jobs of a service that died wait again", again)
+            log.warning("%d jobs of a dead service are queued again", again)
             self.notify()
 
     def _held(self) -> tuple[str, ...]:
-        """The jobs that are at work here."""
-        return tuple(self._in_hand.copy().values())
+        """The jobs that run in this service."""
+        return tuple(self._running.copy().values())
 
     def _keep_leases(self) -> None:
         while not self._leaving.wait(LEASE_CHECK_SECONDS):
@@ -127,65 +127,67 @@ class Runner:
                 log.exception("the leases could not be renewed")
 
     def notify(self) -> None:
-        """Say that a job has been queued."""
+        """Wake the runner after a job was queued."""
         self._wake.set()
 
     def alive(self) -> bool:
-        """Whether the threads that take jobs and keep leases are there."""
+        """Whether the threads of the runner are alive."""
         return all(thread.is_alive() for thread in self._threads)
 
     def stop(self) -> None:
-        """Stop the running jobs, put them back in the queue and end the threads."""
+        """Stop the running jobs, queue them again and end the threads."""
         self._leaving.set()
         self._wake.set()
-        for thread in [*self._threads, *tuple(self._in_hand)]:
+        for thread in [*self._threads, *tuple(self._running)]:
             thread.join(STOP_SECONDS)
             if thread.is_alive():
                 log.warning(
-                    "%s did not stop in %g s; its job runs again at the next start", thread.name, STOP_SECONDS
+                    "%s did not stop in %g s; its job will be repeated after the next start",
+                    thread.name,
+                    STOP_SECONDS,
                 )
 
     def _take(self) -> None:
-        """Take jobs as long as there is room for one more, and begin each in a thread of its own."""
+        """Claim jobs and start each in its own thread."""
         while not self._leaving.is_set():
-            # Before looking: what is queued from here on wakes this thread again.
+            # Before the query: a job queued later wakes this thread again.
             self._wake.clear()
             try:
                 if self._begin():
                     continue
             except DatabaseUnavailable:
-                # The thread must outlive it; that it is away is in the log already, once.
+                # Already logged; the thread continues.
                 pass
             except Exception:
-                # Whatever it is: no job would ever begin again.
-                log.exception("a job could not be taken; trying again in %g s", IDLE_SECONDS)
+                # An unexpected error must not stop the runner.
+                log.exception("no job could be claimed; next attempt in %g s", IDLE_SECONDS)
             self._wake.wait(IDLE_SECONDS)
 
     def _begin(self) -> bool:
-        """Begin a job, if there is one that may."""
-        running = len(self._in_hand)
+        """Start the next job, if any; returns whether one was started."""
+        running = len(self._running)
         if running >= self._most or not self._has_room() or self._files.store.fault() is not None:
             return False
         job = self._queue.claim(idle_only=running >= self._at_once)
         if job is None:
             return False
-        thread = threading.Thread(target=self._see_to_its_end, args=(job,), name=job["id"], daemon=True)
-        self._in_hand[thread] = job["id"]
+        thread = threading.Thread(target=self._run_to_end, args=(job,), name=job["id"], daemon=True)
+        self._running[thread] = job["id"]
         try:
             thread.start()
         except BaseException:
-            del self._in_hand[thread]
+            del self._running[thread]
             raise
         return True
 
-    def _see_to_its_end(self, job: JobRow) -> None:
+    def _run_to_end(self, job: JobRow) -> None:
         try:
             self._run(job)
         except Exception:
-            # Whatever it is, as a full disk: the job is taken up again, since nobody is at work on it.
-            log.exception("%s could not be ended", job["id"])
+            # The lease expires, and the job is claimed again.
+            log.exception("the outcome of %s could not be stored", job["id"])
         finally:
-            del self._in_hand[threading.current_thread()]
+            del self._running[threading.current_thread()]
             self._wake.set()
 
     def _has_room(self) -> bool:
@@ -193,9 +195,9 @@ class Runner:
 
     def _run(self, job: JobRow) -> None:
         with about(job=job["id"]):
-            self._run_known(job)
+            self._run_logged(job)
 
-    def _run_known(self, job: JobRow) -> None:
+    def _run_logged(self, job: JobRow) -> None:
         job_id, files = job["id"], self._files.of(job["tenant"])
         reporter = Reporter(
             self._queue, job_id, self._leaving.is_set, taken=lambda: bytes_in(files.work(job_id))
@@ -205,12 +207,12 @@ class Runner:
         try:
             source = self._files.store.fetch(kind.source(files, job))
             try:
-                # Another job may have made the same, and a kind may then take it as it is.
+                # An existing result of an identical job may be reused.
                 self._files.store.fetch(target)
             except FileNotFoundError:
                 pass
             except Damaged:
-                # It is made again.
+                # The damaged file is replaced.
                 self._files.store.remove([target])
             client = self._compute.client
             with self._shares.of(job["tenant"], kind.lane, client) as share:
@@ -231,7 +233,7 @@ class Runner:
         except Cancelled:
             if not reporter.lost:
                 self._settle(job_id, lambda: self._stopped(job_id, files, reporter))
-        except (*AWAY, DatabaseUnavailable, StorageUnavailable) as error:
+        except (*UNAVAILABLE, DatabaseUnavailable, StorageUnavailable) as error:
             kinds = (
                 (DatabaseUnavailable, "database"),
                 (StorageUnavailable, "storage"),
@@ -251,15 +253,15 @@ class Runner:
             self._settle(job_id, lambda: self._succeeded(job_id, files, reporter, kind, result, target))
 
     def _put_back(self, job_id: str, reason: str, error: BaseException) -> None:
-        """Queue a job again for a reason that is no fault of the job."""
+        """Queue a job again for a reason outside of the job."""
         log.warning("%s waits: %s (%s)", job_id, reason, error)
         self._settle(job_id, lambda: self._queue.release(job_id, reason))
 
     def _keep(self, target: Path, reporter: Reporter) -> None:
-        """Keep a result for good before a row tells of it, however long the store is away.
+        """Publish a result in the store; repeated while the store is unavailable.
 
         Raises:
-            Cancelled: when the job was to stop meanwhile.
+            Cancelled: when the job was cancelled in the meantime.
         """
         while True:
             try:
@@ -293,23 +295,22 @@ class Runner:
         target: Path,
     ) -> None:
         reporter.flush()
-        # One that has no row is one file.
+        # A result without a row is one file.
         size = target.stat().st_size if result is None else 0
         if not self._queue.succeed(job_id, result, kind.table, size):
             if self._queue.held_state(job_id) is None:
-                # Another service runs it by now, and writes the same file.
+                # Another service runs it now and writes the same file.
                 return
             with suppress(StorageUnavailable):
-                # What stays is found as an orphan.
+                # A remaining file is removed as an orphan.
                 kind.discard(files, target)
             self._queue.mark_cancelled(job_id)
         files.drop_work(job_id)
 
     def _settle(self, job_id: str, write_the_end: Callable[[], None]) -> None:
-        """Write the end of a job, for as long as the database is away: it would count as running otherwise.
+        """Store the outcome of a job; repeated while the database is unavailable.
 
-        An end that the database does not take although it is there will not be taken later either; the job
-        fails by it.
+        After ``REFUSALS`` other errors of the database the job fails.
         """
         refused = 0
         while True:
@@ -320,7 +321,7 @@ class Runner:
                     raise
             except SQLAlchemyError as error:
                 refused += 1
-                log.exception("the end of %s is refused by the database", job_id)
+                log.exception("the outcome of %s could not be stored", job_id)
                 if refused >= REFUSALS:
                     problem = explain(job_id, error).model_dump(exclude_none=True)
                     self._queue.fail(job_id, problem)

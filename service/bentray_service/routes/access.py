@@ -1,4 +1,4 @@
-"""/v1/access: who asks, and what it may do and store."""
+"""/v1/access: identity, permissions and storage usage of the caller."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ router = APIRouter(prefix="/v1/access", tags=["access"])
 
 
 class AccessRecord(BaseModel):
-    """The caller as the service sees it."""
+    """The caller: identity, scopes, storage and rate limits."""
 
-    tenant: str = Field(description="Whose data it works on.")
+    tenant: str = Field(description="Owner of the data.")
     how: Literal["open", "key", "proxy"] = Field(
-        description="How it is known; open: nobody on this machine is asked for a key."
+        description="Authentication method; open: not required on this machine."
     )
-    who: str = Field(description="The id of the key, or the user of the proxy.")
+    who: str = Field(description="Id of the key, or user name from the proxy.")
     scopes: list[str]
-    bytes_stored: int = Field(description="By the tenant, over all.")
-    bytes_reserved: int = Field(description="For its uploads and jobs that are not at their end.")
-    bytes_most: int = Field(description="That the tenant may store.")
-    requests_per_minute: int = Field(description="That the tenant may send; 0: any number.")
-    renders_per_minute: int = Field(description="Pictures among them that may be drawn; 0: any number.")
+    bytes_stored: int = Field(description="Bytes stored by the tenant.")
+    bytes_reserved: int = Field(description="Bytes reserved for uploads and unfinished jobs.")
+    bytes_most: int = Field(description="Storage quota of the tenant, bytes.")
+    requests_per_minute: int = Field(description="Rate limit of the tenant; 0: unlimited.")
+    renders_per_minute: int = Field(description="Rate limit for rendered images; 0: unlimited.")
 
 
 @router.get("", responses=problems(503))
 def show_access(service: Service, caller: CurrentCaller) -> AccessRecord:
-    """Who the caller is, and what it may do and store."""
+    """Show the identity, permissions and storage usage of the caller."""
     settings, limited = service.settings, caller.how != "open"
     used = service.quota.of(caller.tenant)
     return AccessRecord(

@@ -1,4 +1,4 @@
-"""What a request may bring: the check of its media type, and a limit for bodies that are kept in memory."""
+"""Request parameters and bodies: list limits, accepted media types, and a size limit for JSON."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from starlette.types import Message
 
 from ..refusals import TooLarge, WrongMediaType
 
-# How many records a list holds.
-Limit = Annotated[int, Query(ge=1, le=1000, description="At most so many.")]
-# Settings are a few hundred bytes.
+# Parameter of all lists.
+Limit = Annotated[int, Query(ge=1, le=1000, description="Maximum number of records.")]
+# Jobs are a few hundred bytes.
 LONGEST_JSON = 64 * 1024
 
 
 def accept_media_types(*accepted: str) -> Callable[[Request], None]:
-    """A dependency that refuses every Content-Type but these.
+    """A dependency that rejects all other values of Content-Type.
 
     Raises:
-        WrongMediaType: when called, naming what is accepted.
+        WrongMediaType: naming the accepted media types.
     """
 
     def check(request: Request) -> None:
@@ -33,7 +33,7 @@ def accept_media_types(*accepted: str) -> Callable[[Request], None]:
 
 
 class SmallBody(APIRoute):
-    """A route whose body is read up to ``LONGEST_JSON`` bytes and no further."""
+    """A route that reads at most ``LONGEST_JSON`` bytes of the body."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         answer = super().get_route_handler()

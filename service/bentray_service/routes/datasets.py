@@ -1,4 +1,4 @@
-"""/v1/datasets: upload, list and look at scans."""
+"""/v1/datasets: upload, list, download and delete scans."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ router.include_router(quality.router)
 async def upload_dataset(
     request: Request, response: Response, service: Service, tenant: CallerTenant
 ) -> DatasetRecord:
-    """Upload a scan. A process of its own reads it and stores it in canonical form, or says why not."""
+    """Upload a scan. A separate process validates it and stores it in the canonical format."""
     row = await receive_upload(request, service, tenant, service.datasets, {})
     record = dataset_record(row)
     response.headers["Location"] = record.links["self"]
@@ -44,13 +44,13 @@ def list_datasets(
     tenant: CallerTenant,
     limit: Limit = 100,
 ) -> DatasetList:
-    """Datasets, newest first."""
+    """List datasets, newest first."""
     return DatasetList(datasets=[dataset_record(row) for row in service.datasets.newest(tenant, limit)])
 
 
 @router.get("/{dataset_id}", responses=problems(404))
 def show_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> DatasetRecord:
-    """One dataset."""
+    """Show one dataset."""
     return dataset_record(service.datasets.get(tenant, dataset_id))
 
 
@@ -61,9 +61,9 @@ def show_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> Dat
     responses={**download_of(HDF5), **problems(404, 503)},
 )
 def dataset_file(dataset_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
-    """The scan as an HDF5 file in the upload format: what a simulation made, or what was read of an upload.
+    """Download a scan as HDF5 in the upload format.
 
-    A download that broke off goes on with Range, and If-Range with the ETag of the first answer.
+    Interrupted downloads can be resumed with Range and If-Range.
     """
     row = service.datasets.get(tenant, dataset_id)
     path = service.files.store.fetch(service.files.of(tenant).dataset(row["id"]))
@@ -72,5 +72,5 @@ def dataset_file(dataset_id: str, request: Request, service: Service, tenant: Ca
 
 @router.delete("/{dataset_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
 def delete_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> None:
-    """Delete a scan, its jobs, and the volumes that they made; not while a job needs it."""
+    """Delete a scan with its jobs and their volumes; rejected while an unfinished job needs it."""
     service.deletion.delete(StoredItem(tenant, "dataset", dataset_id))

@@ -1,4 +1,4 @@
-"""Files sent so that a broken download goes on: a tag for the content, parts of it, and a name."""
+"""Resumable file downloads: ETag, Range and file name."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from starlette.types import Receive, Scope, Send
 from ..refusals import Deleted, RangeNotSatisfiable
 from ..web.errors import problems
 
-# One part; of several at once, or of a form that nobody knows, the whole file is sent, as RFC 9110 allows.
+# A single range; for several ranges or other forms the whole file is sent, as RFC 9110 allows.
 ONE_PART = re.compile(r"bytes=(\d*)-(\d*)")
 
 
 def download_of(*media_types: str) -> dict[int | str, dict[str, Any]]:
-    """What a route that sends a file may answer, for its OpenAPI description."""
+    """The responses of a download, for the OpenAPI description."""
     content = {media: {"schema": {"type": "string", "format": "binary"}} for media in media_types}
     return {
         200: {"content": content, "description": "The file."},
-        206: {"content": content, "description": "The part that Range asked for."},
-        304: {"description": "The file that the client has is still right."},
+        206: {"content": content, "description": "The requested range."},
+        304: {"description": "Not modified."},
         **problems(416),
     }
 
@@ -33,22 +33,22 @@ def download_of(*media_types: str) -> dict[int | str, dict[str, Any]]:
 def download(
     request: Request, path: Path, seed: str, media_type: str, name: str | None = None, tag: str | None = None
 ) -> Response:
-    """A file, the part of it that was asked for, or 304 where the client has it.
+    """The response with a file, the requested range, or 304.
 
     Args:
-        request: its ``Range``, ``If-Range`` and ``If-None-Match`` count.
-        path: of a file that is replaced whole or not at all.
-        seed: what tells the content from all others; the tag follows from it and from the file's own age.
+        request: with ``Range``, ``If-Range`` and ``If-None-Match``.
+        path: of a file that is only replaced as a whole.
+        seed: identifies the content; the ETag is computed from it and the modification time.
         media_type: of the file.
-        name: that the client is to give it; None: its own.
-        tag: of the content where it is known already.
+        name: file name for the client; None: that of ``path``.
+        tag: the ETag, if known.
 
     Raises:
-        NoSuchPart: for a part beyond the end.
-        Deleted: when there is none any more.
+        RangeNotSatisfiable: for a range beyond the end.
+        Deleted: when the file no longer exists.
     """
     try:
-        # From now on it is open: one that is deleted meanwhile is sent to its end.
+        # An open file is sent completely, even if it is deleted in the meantime.
         file = path.open("rb")
     except FileNotFoundError as error:
         raise Deleted(path.name.partition(".")[0]) from error
@@ -68,7 +68,7 @@ def download(
 
 
 def tag_of(path: Path, seed: str) -> str:
-    """The tag of a file, or of what is made of it alone; ``seed`` and errors as of ``download``."""
+    """The ETag of a file, or of a file generated from it; arguments and errors as of ``download``."""
     try:
         return _tag_of(path.stat(), path, seed)
     except FileNotFoundError as error:
@@ -76,7 +76,7 @@ def tag_of(path: Path, seed: str) -> str:
 
 
 def file_bytes(path: Path) -> int:
-    """Bytes of a file; raises Deleted when there is none any more."""
+    """Size of a file; raises Deleted when it no longer exists."""
     try:
         return path.stat().st_size
     except FileNotFoundError as error:
@@ -84,7 +84,7 @@ def file_bytes(path: Path) -> int:
 
 
 def unchanged(request: Request, tag: str) -> Response | None:
-    """The answer to a client that has it, or None."""
+    """A 304 response if the client has the current version, else None."""
     known = request.headers.get("if-none-match")
     if known is not None and (tag in known or known.strip() == "*"):
         return Response(status_code=304, headers=headers_of(tag))
@@ -92,27 +92,27 @@ def unchanged(request: Request, tag: str) -> Response | None:
 
 
 def headers_of(tag: str) -> dict[str, str]:
-    """What each answer says of the file."""
+    """Cache headers of a file."""
     return {"ETag": tag, "Cache-Control": "private, no-cache"}
 
 
 def _tag_of(state: os.stat_result, path: Path, seed: str) -> str:
-    told = f"{seed}/{path.name}/{state.st_mtime_ns}/{state.st_size}"
-    return f'"{hashlib.sha256(told.encode()).hexdigest()[:32]}"'
+    identity = f"{seed}/{path.name}/{state.st_mtime_ns}/{state.st_size}"
+    return f'"{hashlib.sha256(identity.encode()).hexdigest()[:32]}"'
 
 
 class OpenFile(FileResponse):
-    """A file that is open, also one without a name any more; closed once it is sent."""
+    """A response with an open file, which may have been deleted; it is closed after sending."""
 
     def __init__(
         self, file: BinaryIO, whole: bool, headers: dict[str, str], media_type: str, name: str
     ) -> None:
         """Args:
         file: to send.
-        whole: whether all of it is sent, whatever part the request names.
-        headers, media_type, name: of the answer.
+        whole: ignore the requested range.
+        headers, media_type, name: of the response.
         """
-        # Opened by this name, each answer has a place of its own in it.
+        # Every open of this path has its own file position.
         path, state = f"/proc/self/fd/{file.fileno()}", os.fstat(file.fileno())
         super().__init__(path, headers=headers, media_type=media_type, filename=name, stat_result=state)
         self._file = file
@@ -125,11 +125,11 @@ class OpenFile(FileResponse):
 
 
 def _part_asked_for(request: Request, tag: str, size: int) -> bool:
-    """Whether a part is to be sent; raises NoSuchPart for one that is not there."""
+    """Whether to send a range; raises RangeNotSatisfiable."""
     found = ONE_PART.fullmatch(request.headers.get("range", ""))
     if found is None or found.groups() == ("", ""):
         return False
-    # Only the tag tells for sure that it is the same file: another one is sent whole.
+    # Without a matching ETag the whole file is sent.
     if request.headers.get("if-range", tag) != tag:
         return False
     first, last = found.groups()

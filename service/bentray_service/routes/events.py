@@ -1,4 +1,4 @@
-"""/v1/jobs/{id}/events: what happens to a job, as server-sent events."""
+"""/v1/jobs/{id}/events: state and progress of a job as server-sent events."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..wiring import CallerTenant, Service
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
-# A comment after so much silence keeps proxies from closing the connection.
+# Interval between comments that keep proxies from closing an idle connection, s.
 SILENCE_SECONDS = 15.0
 
 MEDIA_TYPE = "text/event-stream"
@@ -39,21 +39,20 @@ def job_events(
     service: Service,
     tenant: CallerTenant,
     last_event_id: Annotated[
-        int, Header(ge=0, le=2**63 - 1, description="Only later events; a browser sends it by itself.")
+        int, Header(ge=0, le=2**63 - 1, description="Only later events; set by browsers automatically.")
     ] = 0,
 ) -> Response:
-    """What happens to a job, as it happens; it ends with the job.
+    """Stream the events of a job until it ends.
 
-    Events `state` are the changes of its state, each with an id that only grows; between them events
-    `progress`, without an id, tell how far it is. A tenant may have 64 such streams open; a further one is
-    refused with 429.
+    `state` events are changes of state with increasing ids; `progress` events have no id. A tenant may have
+    64 open streams; further ones are rejected with 429.
     """
     service.jobs.get(tenant, job_id)
     return _Stream(service.feed, tenant, job_id, last_event_id)
 
 
 class _Stream(Response):
-    """The answer; its place among the streams is taken when it begins and given back however it ends."""
+    """The response; it holds its place among the open streams while it is sent."""
 
     def __init__(self, feed: EventFeed, tenant: Tenant, job_id: str, last: int) -> None:
         super().__init__(media_type=MEDIA_TYPE)
@@ -63,13 +62,13 @@ class _Stream(Response):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         with self._feed.watch(*self._of) as job:
-            told = _told(self._feed, job, self._last)
-            stream = StreamingResponse(told, media_type=MEDIA_TYPE, headers={"Cache-Control": "no-store"})
+            sent = _generate(self._feed, job, self._last)
+            stream = StreamingResponse(sent, media_type=MEDIA_TYPE, headers={"Cache-Control": "no-store"})
             await stream(scope, receive, send)
 
 
-async def _told(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterator[str]:
-    told: dict[str, Any] = {}
+async def _generate(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterator[str]:
+    sent: dict[str, Any] = {}
     spoken = time.monotonic()
     while not feed.leaving() and not job.gone:
         said = []
@@ -82,11 +81,11 @@ async def _told(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterator[st
                 )
         row = job.row or {"state": "", "done": 0, "total": 0, "phase": ""}
         progress = {"done": row["done"], "total": row["total"], "phase": row["phase"] or ""}
-        if row["state"] == "running" and row["total"] and progress != told:
+        if row["state"] == "running" and row["total"] and progress != sent:
             said.append(_event("progress", progress))
-            told = progress
+            sent = progress
         if not said and time.monotonic() - spoken > SILENCE_SECONDS:
-            said.append(": nothing new\n\n")
+            said.append(": keep-alive\n\n")
         if said:
             spoken = time.monotonic()
             yield "".join(said)
@@ -97,6 +96,6 @@ async def _told(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterator[st
 
 
 def _event(name: str, data: dict[str, Any], number: int | None = None) -> str:
-    """One event in the form of the standard; JSON has no line breaks of its own."""
+    """One server-sent event with a JSON object as data."""
     numbered = "" if number is None else f"id: {number}\n"
     return f"{numbered}event: {name}\ndata: {json.dumps(data)}\n\n"

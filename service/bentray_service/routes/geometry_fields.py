@@ -1,4 +1,4 @@
-"""/v1/geometry-fields: what jobs made of meshes, as figures and pictures."""
+"""/v1/geometry-fields: list geometry fields, show their metrics and images."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def list_fields(
     tenant: CallerTenant,
     limit: Limit = 100,
 ) -> FieldList:
-    """Geometry fields, newest first."""
+    """List geometry fields, newest first."""
     rows = service.geometry_fields.newest(tenant, limit)
     return FieldList(geometry_fields=[field_record(row) for row in rows])
 
 
 @router.get("/{field_id}", responses=problems(404))
 def show_field(field_id: str, service: Service, tenant: CallerTenant) -> FieldRecord:
-    """One geometry field: its sizes, its errors and how long it took."""
+    """Show one geometry field: sizes, errors and computing times."""
     return field_record(service.geometry_fields.get(tenant, field_id))
 
 
@@ -39,9 +39,9 @@ def show_field(field_id: str, service: Service, tenant: CallerTenant) -> FieldRe
 async def image_png(
     field_id: str, request: Request, service: Service, tenant: CallerTenant, view: FieldViewParameters
 ) -> Response:
-    """A scene with the mesh as mirror, glass or clay, its rays answered by the field, traced by a worker.
+    """Render a scene with the mesh as mirror, glass or clay, using the geometry field for secondary rays.
 
-    HEAD gives the tag at once, without drawing, so Content-Length is absent.
+    HEAD returns the ETag without rendering, so Content-Length is absent.
     """
     field = await run_in_threadpool(service.geometry_fields.get, tenant, field_id)
     folder = service.files.of(tenant).field(field["id"])
@@ -55,14 +55,14 @@ async def image_png(
 async def geometry_image_png(
     field_id: str, request: Request, service: Service, tenant: CallerTenant
 ) -> Response:
-    """The geometry image: places of the surface as colours, over its layout on the unit square."""
+    """The geometry image: surface positions as colours over the unit square."""
     return await _map(field_id, request, service, tenant, "positions")
 
 
 @router.head("/{field_id}/normal-map.png", include_in_schema=False)
 @router.get("/{field_id}/normal-map.png", response_class=Response, responses=PICTURE)
 async def normal_map_png(field_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
-    """The normal map: the same with the directions of the normals."""
+    """The normal map: surface normals as colours over the unit square."""
     return await _map(field_id, request, service, tenant, "normals")
 
 

@@ -1,4 +1,4 @@
-"""/health: whether the process lives, and whether it can do its work."""
+"""/health: liveness and readiness of the service."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ metrics_router = APIRouter(tags=["health"])
 
 
 class Alive(BaseModel):
-    """The process answers."""
+    """The process is alive."""
 
     status: str = "alive"
 
 
 class Ready(BaseModel):
-    """The service can do its work."""
+    """The service is ready."""
 
     status: str = "ready"
     workers: int = Field(description="Workers connected now.")
     free_bytes: int = Field(description="Free space in the data folder.")
 
 
-# Both are coroutines without dependencies: neither waits for a thread of the pool that requests share.
+# Both are coroutines without dependencies, so they do not wait for the thread pool of the requests.
 @router.get("/live")
 async def live() -> Alive:
-    """Whether the process answers; a failure here means: start it anew."""
-    # No thread is asked for, so that it answers while all of them wait for something.
+    """Liveness: whether the process answers; restart it if it does not."""
+    # Uses no thread, so that it answers while all of them are busy.
     return Alive()
 
 
 @router.get("/ready", responses=problems(503))
 async def ready(request: Request) -> Ready:
-    """Whether uploads and jobs can be served now; each fault is named."""
+    """Readiness: whether uploads and jobs can be processed now; otherwise each fault is named."""
     seen = await parts_of(request).readiness.report()
     if seen.faults:
         raise NotReady(seen.faults)
@@ -48,8 +48,8 @@ async def ready(request: Request) -> Ready:
 @metrics_router.get(
     "/metrics",
     response_class=Response,
-    responses={200: {"content": {"text/plain": {}}, "description": "In the text format of Prometheus."}},
+    responses={200: {"content": {"text/plain": {}}, "description": "Prometheus text format."}},
 )
 def metrics(request: Request) -> Response:
-    """Requests, jobs, workers and disk, for Prometheus."""
+    """Metrics of requests, jobs, workers and disk in the Prometheus text format."""
     return Response(generate_latest(request.app.state.metrics.registry), media_type=CONTENT_TYPE_LATEST)

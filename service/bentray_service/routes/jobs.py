@@ -1,4 +1,4 @@
-"""/v1/jobs: start, watch and cancel the work."""
+"""/v1/jobs: start, list, show and cancel jobs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .records import job_record
 
 log = logging.getLogger("bentray.jobs")
 
-# Media type of each format of a turntable.
+# Media types of turntable animations.
 ANIMATIONS = {"zip": "application/zip", "apng": "image/apng"}
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], route_class=SmallBody)
@@ -54,11 +54,11 @@ def start_job(
         Header(
             min_length=1,
             max_length=200,
-            description="A name for this request. Sent again with the same one, it makes no second job.",
+            description="Idempotency key: a repeated request with the same key starts no second job.",
         ),
     ] = None,
 ) -> JobRecord:
-    """Queue a job. It is stored before this answers, and survives a restart of the service."""
+    """Queue a job. It is stored before the response and survives a restart of the service."""
     kind: str = asked.kind
     order = KINDS[kind].plan(asked, tenant, service)
     row = service.jobs.add(
@@ -72,7 +72,7 @@ def start_job(
         key=idempotency_key,
     )
     job = job_record(row)
-    log.info("%s waits, of kind %s", job.id, job.kind, extra={"figures": {"job": job.id}})
+    log.info("%s queued, kind %s", job.id, job.kind, extra={"figures": {"job": job.id}})
     service.runner.notify()
     response.headers["Location"] = job.links["self"]
     return job
@@ -85,9 +85,9 @@ def list_jobs(
     limit: Limit = 100,
     state: Annotated[State | None, Query(description="Only these.")] = None,
     kind: Annotated[JobKind | None, Query(description="Only these.")] = None,
-    before: Annotated[str | None, Query(description="Only jobs older than the one of this id.")] = None,
+    before: Annotated[str | None, Query(description="Only jobs older than this job.")] = None,
 ) -> JobList:
-    """Jobs, newest first; `next` leads to the older ones."""
+    """List jobs, newest first; `next` is the address of the next page."""
     rows = service.jobs.newest(tenant, limit + 1, state, kind, before)
     shown = [job_record(row) for row in rows[:limit]]
     if len(rows) == len(shown):
@@ -99,7 +99,7 @@ def list_jobs(
 
 @router.get("/{job_id}", responses=problems(404))
 def show_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
-    """One job: its state, its progress and the residual of every sweep so far."""
+    """Show one job: state, progress, and the residual after every iteration."""
     return job_record(service.jobs.get(tenant, job_id))
 
 
@@ -109,7 +109,7 @@ def show_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
     responses=problems(404, 409),
 )
 def cancel_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
-    """Ask a job to stop. A queued one ends at once, a running one within a second or so."""
+    """Cancel a job. A queued job ends at once, a running one within a second or so."""
     return job_record(service.jobs.request_cancel(tenant, job_id))
 
 
@@ -120,9 +120,9 @@ def cancel_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord
     responses={**download_of(*ANIMATIONS.values()), **problems(404, 409, 503)},
 )
 def animation(job_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
-    """The pictures of a job of kind refraction, once it has succeeded.
+    """Download the animation of a successful refraction job.
 
-    A download that broke off goes on with Range, and If-Range with the ETag of the first answer.
+    Interrupted downloads can be resumed with Range and If-Range.
     """
     job = service.jobs.get(tenant, job_id)
     if job["kind"] != "refraction" or job["state"] != "succeeded":

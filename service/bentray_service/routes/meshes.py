@@ -1,4 +1,4 @@
-"""/v1/meshes: upload, list and look at triangle meshes; iso-surfaces of volumes as meshes."""
+"""/v1/meshes: upload, list and delete triangle meshes; iso-surfaces of volumes."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ async def upload_mesh(
     response: Response,
     service: Service,
     tenant: CallerTenant,
-    title: Annotated[str, Query(max_length=200, description="What it is.")] = "",
+    title: Annotated[str, Query(max_length=200, description="Title.")] = "",
 ) -> MeshRecord:
-    """Upload a mesh. A process of its own reads it and makes one sound surface of it, or says why not."""
+    """Upload a mesh. A separate process validates and repairs it."""
     row = await receive_upload(request, service, tenant, service.meshes, {"title": title})
     record = mesh_record(row)
     response.headers["Location"] = record.links["self"]
@@ -63,19 +63,19 @@ def list_meshes(
     tenant: CallerTenant,
     limit: Limit = 100,
 ) -> MeshList:
-    """Meshes, newest first."""
+    """List meshes, newest first."""
     return MeshList(meshes=[mesh_record(row) for row in service.meshes.newest(tenant, limit)])
 
 
 @router.get("/meshes/{mesh_id}", responses=problems(404))
 def show_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> MeshRecord:
-    """One mesh: its size, its handles and holes, and what was repaired."""
+    """Show one mesh: size, genus, holes and repairs."""
     return mesh_record(service.meshes.get(tenant, mesh_id))
 
 
 @router.delete("/meshes/{mesh_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
 def delete_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> None:
-    """Delete a mesh, its geometry fields and the jobs that made them; not while a job needs it."""
+    """Delete a mesh with its geometry fields and their jobs; rejected while an unfinished job needs it."""
     service.deletion.delete(StoredItem(tenant, "mesh", mesh_id))
 
 
@@ -92,16 +92,16 @@ async def mesh_of_volume(
     tenant: CallerTenant,
     caller: CurrentCaller,
     iso: Annotated[
-        float | None, Query(description="In the unit of the volume; without it the middle of its range.")
+        float | None, Query(description="Iso-value in the unit of the volume; default: middle of its range.")
     ] = None,
-    step: Annotated[int, Query(ge=1, le=MOST_STEP, description="Take every so many nodes: fewer faces.")] = 1,
+    step: Annotated[int, Query(ge=1, le=MOST_STEP, description="Use every n-th node: fewer faces.")] = 1,
 ) -> MeshRecord:
-    """Make a mesh of a volume's iso-surface: the largest piece of it, closed at the faces of the volume."""
+    """Extract an iso-surface of a volume as a mesh: the largest component, closed at the boundary."""
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     check_renderable(volume)
     check_nodes(tuple(volume["shape"]), step)
     low, high = volume["value_range"]
-    # NaN is between nothing.
+    # NaN fails both comparisons.
     if iso is not None and not (math.isfinite(iso) and low <= iso < high):
         raise InvalidInput("iso", iso, f"{low:g} to less than {high:g}, the range of the volume")
     mesh_id, files = new_id("mesh"), service.files.of(tenant)
@@ -112,8 +112,8 @@ async def mesh_of_volume(
         service.quota.resize(tenant, mesh_id, made.stat().st_size)
         content = files.adopt(mesh_id).read_bytes()
         digest = hashlib.sha256(content).hexdigest()
-        told = summary | {"title": volume["title"], "volume_id": volume["id"]}
-        return service.meshes.add(tenant, mesh_id, size=len(content), sha256=digest, summary=told)
+        columns = summary | {"title": volume["title"], "volume_id": volume["id"]}
+        return service.meshes.add(tenant, mesh_id, size=len(content), sha256=digest, summary=columns)
 
     async with service.quota.reserved(tenant, mesh_id, largest_bytes(volume["shape"], step)):
         try:

@@ -1,4 +1,4 @@
-"""The pages for people: the viewer at /, the reference at /docs and their static files."""
+"""The web pages: viewer at /, REST reference at /docs, and static files."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ router = APIRouter(include_in_schema=False)
 
 @router.get("/")
 def viewer() -> FileResponse:
-    """Upload, start, watch."""
+    """The viewer."""
     return FileResponse(WEB / "index.html", headers={"Cache-Control": "no-cache"})
 
 
 @router.get("/docs")
 def docs(request: Request) -> HTMLResponse:
-    """The REST interface, written out from its OpenAPI description."""
+    """The REST reference, generated from the OpenAPI description."""
     return HTMLResponse(reference_page(request.app.openapi()))
 
 
 @router.get("/problems/{slug}")
 def problem(slug: str) -> RedirectResponse:
-    """Where the ``type`` of a problem leads."""
+    """Redirect from the ``type`` of a problem to its description."""
     return RedirectResponse("/docs#problems")

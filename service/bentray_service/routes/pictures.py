@@ -1,4 +1,4 @@
-"""Pictures of volumes over HTTP, each with a tag, so that none is drawn twice for one client."""
+"""Rendered PNG images with an ETag and rate limit; rendering stops when the client disconnects."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from ..wiring import caller_of, parts_of
 
 Made = TypeVar("Made")
 
-# What a route that gives a picture may answer.
+# Responses of a rendered image.
 PICTURE: dict[int | str, dict[str, Any]] = {
     200: {"content": {"image/png": {}}, "description": "The picture."},
-    304: {"description": "The picture that the client has is still right."},
+    304: {"description": "Not modified."},
     **problems(404, 422, 429, 503),
 }
 
@@ -27,24 +27,24 @@ PICTURE: dict[int | str, dict[str, Any]] = {
 async def picture(
     request: Request, volume: Mapping[str, Any], how: Mapping[str, Any], draw: Callable[[], Awaitable[bytes]]
 ) -> Response:
-    """A PNG with its tag, or 304 where the client has it.
+    """The response with a PNG, or 304.
 
     Args:
-        request: what is asked. HEAD is answered without drawing, so without Content-Length.
+        request: HEAD is answered without rendering, hence without Content-Length.
         volume: its row.
-        how: all that the picture depends on beside it.
-        draw: makes the picture; called where it is needed, and given up when the client leaves.
+        how: all other parameters of the image.
+        draw: renders the image; cancelled when the client disconnects.
     """
     known = request.headers.get("if-none-match")
     seed = repr((__version__, volume["id"], volume["created"], sorted(how.items())))
     tag = f'"{hashlib.sha256(seed.encode()).hexdigest()[:32]}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
-    # A star stands for whichever the client has.
+    # "*" matches any version.
     if known is not None and (tag in known or known.strip() == "*"):
         return Response(status_code=304, headers=headers)
     if request.method == "HEAD":
         answer = Response(media_type="image/png", headers=headers)
-        # That of the empty body; the picture's is not known before it is drawn.
+        # The length of the image is unknown before it is rendered.
         del answer.headers["content-length"]
         return answer
     parts_of(request).sign_in.check_render(caller_of(request))
@@ -52,14 +52,14 @@ async def picture(
 
 
 async def while_connected(request: Request, work: Awaitable[Made]) -> Made:
-    """What the work makes; it is cancelled when the client leaves.
+    """Await ``work``; it is cancelled when the client disconnects.
 
     Args:
-        request: whose body has been read, or has none.
-        work: that waits on the cluster.
+        request: its body has been read, or is empty.
+        work: on the cluster.
 
     Raises:
-        ClientDisconnect: when nobody is left to read the answer.
+        ClientDisconnect: when the client has disconnected.
     """
     making, leaving = asyncio.ensure_future(work), asyncio.ensure_future(_left(request))
     try:

@@ -1,4 +1,4 @@
-"""/v1/datasets/{id}/quality: what is wrong with a scan, as figures and as a page."""
+"""/v1/datasets/{id}/quality: quality report of a scan as JSON and as an image."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ router = APIRouter()
 
 Picker = Annotated[
     Literal["aic", "threshold", "energy-ratio", "sta-lta", "correlation", "matched"],
-    Query(description="What reads times from traces; of no matter where the scan brought its times."),
+    Query(description="Picker of first arrivals in traces; ignored for scans with travel times."),
 ]
 
 
 async def check_render_rate(request: Request) -> None:
-    """A scan is examined where a picture may be drawn: it takes a worker for seconds."""
+    """Limit the rate of quality reports like that of rendered images."""
     parts_of(request).sign_in.check_render(caller_of(request))
 
 
@@ -33,7 +33,7 @@ async def check_render_rate(request: Request) -> None:
 async def show_quality(
     dataset_id: str, request: Request, service: Service, tenant: CallerTenant, picker: Picker = "aic"
 ) -> QualityRecord:
-    """Examine a scan on a worker: dead, swapped, inverted elements, wrong times, and what is done of it."""
+    """Check the quality of a scan on a worker: faulty elements and times, and the action taken for each."""
     dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
     path = service.files.of(tenant).dataset(dataset["id"])
     work = service.pictures.quality(tenant, dataset, path, picker)
@@ -45,7 +45,7 @@ async def show_quality(
 async def quality_png(
     dataset_id: str, request: Request, service: Service, tenant: CallerTenant, picker: Picker = "aic"
 ) -> Response:
-    """The same as a page: gathers with their picks, the matrix of times, what was left out, and why."""
+    """The quality report as an image: gathers with picks, matrix of times, findings."""
     dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
     path = service.files.of(tenant).dataset(dataset["id"])
     how = {"picker": picker, "what": "quality"}

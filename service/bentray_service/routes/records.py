@@ -1,4 +1,4 @@
-"""From the rows of the database to the records of the REST interface."""
+"""Conversion of database rows to records of the REST interface."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .models.records import DatasetRecord, JobRecord, VolumeRecord
 from .models.surface_records import FieldRecord, FieldSeconds, MeshRecord
 from .models.upload_records import UploadRecord
 
-# What jobs read, and where it is found.
+# Inputs of jobs, and the resources in which they are listed.
 READ = ("dataset", "volume", "mesh")
 LISTED = {"dataset": "datasets", "volume": "volumes", "mesh": "meshes"}
 
@@ -88,5 +88,5 @@ def upload_record(row: UploadRow, offset: int) -> UploadRecord:
 
 
 def result_link(row: UploadRow) -> str:
-    """The address of what an upload became."""
+    """The address of the result of an upload."""
     return f"/v1/{LISTED[row['what']]}/{row['result_id']}"

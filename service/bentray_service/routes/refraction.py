@@ -1,4 +1,4 @@
-"""/v1/volumes/{id}/refraction.png: a volume as glass before a backdrop."""
+"""/v1/volumes/{id}/refraction.png: refractive rendering of a volume."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ async def refraction_png(
     tenant: CallerTenant,
     view: ViewParameters,
 ) -> Response:
-    """A volume as glass before a backdrop, or its surface, cast by a worker.
+    """Render a volume as refracting glass before a backdrop, or its surface, on a worker.
 
-    Works for volumes in space with even spacing, reconstructed or uploaded. HEAD gives the tag at once,
-    without drawing, so Content-Length is absent.
+    Requires a 3-D volume with uniform spacing. HEAD returns the ETag without rendering, so Content-Length is
+    absent.
     """
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     check_renderable(volume)

@@ -1,4 +1,4 @@
-"""/v1/volumes/{id}/slice.png: a slice of a volume as a picture."""
+"""/v1/volumes/{id}/slice.png: a slice of a volume as an image."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ router = APIRouter()
 COLOUR_SCHEMA = cast("dict[str, Any]", COLOUR_VALUE.schema)
 
 
-async def read_look(
+async def read_style(
     colormap: Annotated[
         str,
         Query(
@@ -38,20 +38,22 @@ async def read_look(
         int | None,
         Query(
             description=f"Longest side in pixels, {LEAST_FRAMED} to {MOST_SIZE}, without a frame from "
-            f"{LEAST_SIZE}. Without it text has its usual size, and the bare image a pixel a node.",
+            f"{LEAST_SIZE}. Default: standard text size, and one pixel per node without a frame.",
             json_schema_extra={"minimum": LEAST_SIZE, "maximum": MOST_SIZE},
         ),
     ] = None,
     interpolation: Annotated[
-        Literal["nearest", "cubic"], Query(description="Between the values of nodes.")
+        Literal["nearest", "cubic"], Query(description="Interpolation between nodes.")
     ] = "nearest",
-    scale_bar: Annotated[bool, Query(description="A bar of a round length in the image.")] = False,
-    colour_bar: Annotated[bool, Query(description="The colours with values and unit; in a frame.")] = True,
+    scale_bar: Annotated[bool, Query(description="Draw a scale bar.")] = False,
+    colour_bar: Annotated[
+        bool, Query(description="Draw a colour bar with values and unit; framed only.")
+    ] = True,
     frame: Annotated[
-        bool, Query(description="Title, axes in mm and notes; without it there is the image alone.")
+        bool, Query(description="Draw title, axes in mm and notes; false: the image alone.")
     ] = True,
 ) -> SliceStyle:
-    """How a picture shall look."""
+    """The appearance of a slice image."""
     return SliceStyle(colormap, size, interpolation, scale_bar, colour_bar, frame)
 
 
@@ -62,16 +64,16 @@ async def slice_png(
     request: Request,
     service: Service,
     tenant: CallerTenant,
-    look: Annotated[SliceStyle, Depends(read_look)],
-    axis: Annotated[Literal["x", "y", "z"], Query(description="The axis that the slice cuts across.")] = "z",
+    style: Annotated[SliceStyle, Depends(read_style)],
+    axis: Annotated[Literal["x", "y", "z"], Query(description="Axis perpendicular to the slice.")] = "z",
     index: Annotated[
-        int | None, Query(ge=0, description="Along this axis; the middle slice without it.")
+        int | None, Query(ge=0, description="Index along this axis; default: the middle.")
     ] = None,
     quantity: Annotated[
         Literal["speed", "coverage", "attenuation", "recovery", "value"] | None,
         Query(
-            description="What to show. Of a reconstruction: speed, which it is without this, coverage, "
-            "attenuation where the scan had amplitudes, recovery where resolution_check was set. Of an "
+            description="Quantity to show. Reconstructions: speed (default), coverage, "
+            "attenuation if the scan has amplitudes, recovery if resolution_check was set. "
             "upload: value."
         ),
     ] = None,
@@ -83,21 +85,21 @@ async def slice_png(
         float | None, Query(description="Value of the brightest colour.", json_schema_extra=COLOUR_SCHEMA)
     ] = None,
 ) -> Response:
-    """One slice as a PNG, drawn by a worker.
+    """Render one slice as PNG on a worker.
 
-    HEAD gives the tag at once, without drawing, so Content-Length is absent.
+    HEAD returns the ETag without rendering, so Content-Length is absent.
     """
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     check_plane(volume["shape"], volume["spacing_m"], axis, index)
     for name, value in (("low", low), ("high", high)):
         if value is not None:
             COLOUR_VALUE.check(name, value)
-    how: dict[str, Any] = {"axis": axis, "index": index, "low": low, "high": high, **asdict(look)}
+    how: dict[str, Any] = {"axis": axis, "index": index, "low": low, "high": high, **asdict(style)}
     if "job_id" in volume:
         if quantity == "value":
             raise InvalidInput("quantity", "'value'", "speed, coverage, attenuation or recovery")
         how["quantity"] = quantity or "speed"
     elif quantity not in (None, "value"):
-        raise InvalidInput("quantity", repr(quantity), "value: this volume was uploaded")
+        raise InvalidInput("quantity", repr(quantity), "value: this is an uploaded volume")
     path = service.files.of(tenant).volume(volume["id"])
     return await picture(request, volume, how, lambda: service.pictures.slice_png(tenant, volume, path, how))

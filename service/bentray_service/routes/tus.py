@@ -1,8 +1,7 @@
-"""/v1/uploads: large files in pieces, by tus 1.0 (creation, checksum, expiration, termination).
+"""/v1/uploads: resumable uploads by tus 1.0 (creation, checksum, expiration, termination).
 
-Once the last byte is there, the upload is read as a one-shot POST would be, but in the background: its
-record goes from ``receiving`` over ``reading`` to ``done``, which names what it became, or ``refused``, with
-the problem.
+A complete upload is ingested in the background. Its state changes from ``receiving`` through ``reading`` to
+``done`` with the id of the result, or to ``refused`` with the problem.
 """
 
 from __future__ import annotations
@@ -30,18 +29,18 @@ from .upload_metadata import METADATA, read_metadata
 MEDIA_TYPE = "application/offset+octet-stream"
 EXTENSIONS = "creation,checksum,expiration,termination"
 
-Offset = Annotated[int, Header(ge=0, le=2**63 - 1, description="Where the body begins: what HEAD says.")]
+Offset = Annotated[int, Header(ge=0, le=2**63 - 1, description="Offset of the body, as HEAD returns it.")]
 
 
-# The protocol wants 412 for another version, and 400 for a checksum of an unknown kind, where a form that
-# FastAPI checks itself would be 422; so the forms of both are only described here.
+# tus requires 412 for another version and 400 for an unknown checksum algorithm. FastAPI would answer 422,
+# so both values are validated here and only described to FastAPI.
 Version = Annotated[
-    str, Header(max_length=20, description="Of the protocol.", json_schema_extra={"const": VERSION})
+    str, Header(max_length=20, description="Version of tus.", json_schema_extra={"const": VERSION})
 ]
 
 
 def check_tus_version(tus_resumable: Version) -> None:
-    """A dependency that refuses every other version of the protocol."""
+    """A dependency that rejects other versions of tus."""
     if tus_resumable != VERSION:
         raise WrongProtocol("Tus-Resumable", repr(tus_resumable), VERSION)
 
@@ -54,7 +53,7 @@ BODY = {"requestBody": {"required": True, "content": {MEDIA_TYPE: BYTES}}}
 
 @router.options("", status_code=status.HTTP_204_NO_CONTENT)
 def show_upload_options(service: Service) -> Response:
-    """What of tus there is."""
+    """Show the supported options of tus."""
     return Response(
         status_code=status.HTTP_204_NO_CONTENT,
         headers={
@@ -75,18 +74,18 @@ def create_upload(
     response: Response,
     service: Service,
     tenant: CallerTenant,
-    upload_length: Annotated[int, Header(ge=1, le=2**63 - 1, description="Of all of it, bytes.")],
+    upload_length: Annotated[int, Header(ge=1, le=2**63 - 1, description="Total size, bytes.")],
     upload_metadata: Annotated[
         str,
         Header(
             max_length=4000,
-            description="Names, each with its value in base 64: kind (dataset, volume or mesh; dataset "
-            "without it), title, and of a volume spacing_m, shape and dtype; others are left alone.",
+            description="Names with values in base 64: kind (dataset, volume or mesh; default dataset), "
+            "title; for volumes spacing_m, shape and dtype; other names are ignored.",
             json_schema_extra={"pattern": METADATA},
         ),
     ] = "",
 ) -> UploadRecord:
-    """Begin an upload; the answer's Location is where PATCH sends the pieces."""
+    """Create an upload; send its data with PATCH to the Location of the response."""
     what, given = read_metadata(upload_metadata)
     most = service.settings.max_upload_bytes
     if upload_length > most:
@@ -95,7 +94,7 @@ def create_upload(
         )
     free = shutil.disk_usage(service.files.root).free
     if upload_length > free:
-        raise StorageFull("Upload-Length", f"{upload_length} bytes", f"at most {free} bytes, which are free")
+        raise StorageFull("Upload-Length", f"{upload_length} bytes", f"at most {free} bytes, the free space")
     service.upload_limits.check_begin(tenant)
     keep_s, most_bytes = service.settings.upload_keep_s, service.quota.most_bytes
     row = service.uploads.add(tenant, what, upload_length, given, upload_metadata, keep_s, most_bytes)
@@ -107,7 +106,7 @@ def create_upload(
 
 @router.head("/{upload_id}", dependencies=[TusVersion], responses=problems(404, 412), include_in_schema=False)
 def show_upload_offset(upload_id: str, service: Service, tenant: CallerTenant) -> Response:
-    """How many bytes are there, and what has become of them."""
+    """Show the offset and the state of an upload."""
     row = service.uploads.get(tenant, upload_id)
     headers = {
         "Upload-Offset": str(offset_of(service, tenant, row)),
@@ -125,7 +124,7 @@ def show_upload_offset(upload_id: str, service: Service, tenant: CallerTenant) -
 
 @router.get("/{upload_id}", responses=problems(404))
 def show_upload(upload_id: str, service: Service, tenant: CallerTenant) -> UploadRecord:
-    """One upload: how far it is, and what it became or why it was refused."""
+    """Show one upload: offset, state, and its result or problem."""
     row = service.uploads.get(tenant, upload_id)
     return upload_record(row, offset_of(service, tenant, row))
 
@@ -146,18 +145,18 @@ async def append_upload(
     upload_checksum: Annotated[
         str | None,
         Header(
-            description="sha256, sha1 or md5, and the body's in base 64.",
+            description="Algorithm (sha256, sha1 or md5) and digest of the body in base 64.",
             json_schema_extra={"pattern": CHECKSUM},
             examples=["sha1 Kq5sNclPz7QV2+lfQIuc6R7oRu0="],
         ),
     ] = None,
 ) -> Response:
-    """Append a piece. What came stays when the connection breaks; HEAD says where to go on.
+    """Append data. Received data is kept if the connection breaks; HEAD returns the offset to continue from.
 
-    After the last one the upload is read in the background: `GET` of the same address tells when it is done.
+    A complete upload is ingested in the background; poll it with `GET`.
     """
     checksum = None if upload_checksum is None else Checksum.of(upload_checksum)
-    # Of another tenant's it must not even be told that it is held.
+    # First check the owner, so that uploads of other tenants are not reported as locked.
     await run_in_threadpool(service.uploads.get, tenant, upload_id)
     with service.hold(upload_id):
         row = await run_in_threadpool(service.uploads.get, tenant, upload_id)
@@ -188,16 +187,16 @@ async def append_upload(
     responses=problems(404, 409, 412, 422, 423),
 )
 def delete_upload(upload_id: str, service: Service, tenant: CallerTenant) -> None:
-    """Forget an upload and what came of it; what it has become stays."""
+    """Delete an upload and its data; a stored result is kept."""
     service.uploads.get(tenant, upload_id)
     with service.hold(upload_id):
         service.housekeeper.forget(service.uploads.get(tenant, upload_id))
 
 
 def offset_of(service: Parts, tenant: Tenant, row: UploadRow) -> int:
-    """How many bytes are there: the size of the file, of one that is whole its length.
+    """The offset of an upload.
 
-    Those of a piece that is to be checked do not count before it is.
+    Data with a checksum counts after it has been verified.
     """
     if row["state"] != "receiving":
         return int(row["length"])

@@ -1,4 +1,4 @@
-"""What a client says of an upload: in the query of a one-shot POST, or in the metadata of tus."""
+"""Metadata of an upload: from query parameters or from the metadata header of tus."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from ..ingest.child import ACCEPTED
 LONGEST_TITLE = 200
 # Nodes along an axis of a volume of raw bytes.
 SIDE = Range(2, 2**31)
-FORM = "names, each with its value in base 64, parted by commas"
+FORM = "names, each with its value in base 64, separated by commas"
 KNOWN = ("kind", "title", "spacing_m", "shape", "dtype")
 
-# The forms of what is text in a request, as the description says them. A space may follow a comma.
+# Formats of text in requests, for the OpenAPI description. A space may follow a comma.
 _PAIR = r"[!-+\--~]+( ([A-Za-z0-9+/]{4})*([A-Za-z0-9+/]{2}==|[A-Za-z0-9+/]{3}=)?)?"
 METADATA = f"^({_PAIR}(, ?{_PAIR})*)?$"
 _DISTANCE = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?"
@@ -29,13 +29,16 @@ SHAPE = f"^{_COUNT}, ?{_COUNT}, ?{_COUNT}$"
 
 
 def read_metadata(header: str) -> tuple[str, dict[str, Any]]:
-    """What the upload becomes, and what the ingest process is told of it.
+    """Parse the metadata header of tus.
 
     Args:
-        header: as ``kind bWVzaA==,title Tm9zZQ==``; the values of names that are not known may be any bytes.
+        header: e.g. ``kind bWVzaA==,title Tm9zZQ==``; unknown names may have any bytes as values.
+
+    Returns:
+        type of the result, and metadata for the ingest process.
 
     Raises:
-        InvalidInput: for what is not of that form, and for values that cannot be used.
+        InvalidInput: for a wrong format or invalid values.
     """
     if not re.fullmatch(METADATA, header):
         raise InvalidInput("Upload-Metadata", repr(header[:80]), FORM)
@@ -48,7 +51,7 @@ def read_metadata(header: str) -> tuple[str, dict[str, Any]]:
             found[name] = base64.b64decode(value).decode()
         except UnicodeDecodeError:
             raise InvalidInput(
-                "Upload-Metadata", repr(pair[:80]), f"{FORM}; that of {name} is text"
+                "Upload-Metadata", repr(pair[:80]), f"{FORM}; the value of {name} is text"
             ) from None
     what = found.get("kind", "dataset")
     if what not in ACCEPTED:
@@ -62,10 +65,10 @@ def read_metadata(header: str) -> tuple[str, dict[str, Any]]:
 
 
 def volume_given(title: str, spacing_m: str | None, shape: str | None, dtype: str | None) -> dict[str, Any]:
-    """As ``volume_formats.Given`` takes it.
+    """The metadata of a volume as arguments of ``volume_formats.Given``.
 
     Raises:
-        InvalidInput: for what are no numbers, or are out of range.
+        InvalidInput: for values that are not numbers or out of range.
     """
     return {
         "title": title,
@@ -80,7 +83,7 @@ def volume_given(title: str, spacing_m: str | None, shape: str | None, dtype: st
 def _numbers(
     field: str, text: str | None, form: str, kind: Callable[[str], float], within: Range, accepted: str
 ) -> list[float] | None:
-    """The numbers in a text of some form, which commas part."""
+    """Parse numbers separated by commas."""
     if text is None:
         return None
     if not re.fullmatch(form, text):

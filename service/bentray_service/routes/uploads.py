@@ -1,4 +1,4 @@
-"""How an upload comes in: received, read by a process of its own, kept as a canonical file, and stored."""
+"""One-shot uploads: receive the body, ingest it in a separate process, and insert its row."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..rows.stored_tables import UploadedTable
 from ..rows.tenants import Tenant
 from ..wiring import Parts
 
-# How long a request waits for its turn, s. Proxies hardly wait longer; uploads in pieces do.
+# Longest wait of a request in the ingest queue, s; proxies rarely wait longer.
 LONGEST_WAIT_S = 300.0
 
 Record = TypeVar("Record")
@@ -29,7 +29,7 @@ Made = TypeVar("Made")
 
 
 def body_of(what: str, media_types: tuple[str, ...]) -> dict[str, Any]:
-    """How OpenAPI describes the body of an upload."""
+    """The body of an upload, for the OpenAPI description."""
     content = {media: {"schema": {"type": "string", "format": "binary"}} for media in media_types}
     problems = ACCEPTED[what][0].upper() + ACCEPTED[what][1:] + "."
     return {"requestBody": {"required": True, "description": problems, "content": content}}
@@ -42,14 +42,14 @@ async def receive_upload(
     table: UploadedTable[Record],
     given: Mapping[str, Any],
 ) -> Record:
-    """From the body of a request to a stored row; nothing is left behind when it is refused.
+    """Receive an upload and insert its row; a rejected upload leaves nothing behind.
 
     Args:
-        request: whose body is read.
-        service: the parts of the service.
-        tenant: whose upload it is.
-        table: of what it becomes.
-        given: what the user says of it.
+        request: with the file as its body.
+        service: parts of the service.
+        tenant: owner.
+        table: of the result.
+        given: metadata.
     """
     what, upload_id = table.what, new_id(table.what)
     announced = request.headers.get("content-length")
@@ -76,17 +76,17 @@ async def receive_upload(
 
 
 async def run_in_turn(request: Request, queue: FairQueue, tenant: Tenant, work: Callable[[], Made]) -> Made:
-    """What ``work`` returns, once it is the tenant's turn.
+    """Run ``work`` in the ingest queue.
 
     Args:
-        request: whose body has been read; when its client goes away, it leaves the queue.
+        request: its body has been read; if the client disconnects, the queued work is cancelled.
         queue: of all tenants.
-        tenant: whose request it is.
-        work: what is to be done.
+        tenant: whose turn is used.
+        work: to run.
 
     Raises:
-        ClientDisconnect: when the client went away before its turn came.
-        Busy: when its turn did not come in ``LONGEST_WAIT_S``.
+        ClientDisconnect: when the client disconnected before the work started.
+        Busy: when the work did not start in ``LONGEST_WAIT_S``.
     """
     task = queue.submit(tenant, work)
     result: asyncio.Future[Made] = asyncio.wrap_future(task)
@@ -94,13 +94,13 @@ async def run_in_turn(request: Request, queue: FairQueue, tenant: Tenant, work: 
     either: list[asyncio.Future[Any]] = [result, gone]
     try:
         await asyncio.wait(either, timeout=LONGEST_WAIT_S, return_when=asyncio.FIRST_COMPLETED)
-        # What has begun comes to its end: nobody knows how far it is.
+        # Work that has started is completed.
         if result.done() or not task.cancel():
             return await result
         if gone.done():
             raise ClientDisconnect
-        found = f"no turn in {LONGEST_WAIT_S:g} s, {queue.waiting(tenant)} of this tenant still wait"
-        raise Busy("uploads", found, "another try later, or an upload in pieces, which waits by itself")
+        found = f"no turn in {LONGEST_WAIT_S:g} s, {queue.waiting(tenant)} requests of this tenant queued"
+        raise Busy("uploads", found, "a later request, or a resumable upload, which is queued on the server")
     finally:
         task.cancel()
         gone.cancel()

@@ -1,4 +1,4 @@
-"""/v1/volumes/{id}/data: a volume as a file, in any of the formats."""
+"""/v1/volumes/{id}/data: download of a volume in several formats."""
 
 from __future__ import annotations
 
@@ -39,27 +39,26 @@ async def volume_data(
     format: Annotated[  # noqa: A002 - the name of the query parameter
         Literal["hdf5", "h5", "nifti", "metaimage", "mat", "npy"],
         Query(
-            description="hdf5 or h5: everything; mat: every image and the grid for MATLAB (version 5); npy: "
-            "the values alone, speed in m/s; nifti and metaimage (.mha): these with spacing and origin in "
-            "mm, for even spacing."
+            description="hdf5 or h5: all data; mat: all images and the grid for MATLAB (version 5); npy: "
+            "values only, speed in m/s; nifti and metaimage (.mha): values with spacing and origin in "
+            "mm, for uniform spacing."
         ),
     ] = "hdf5",
 ) -> Response:
-    """The volume as a file.
+    """Download a volume.
 
-    A download that broke off goes on with Range, and If-Range with the ETag of the first answer. Formats
-    other than hdf5 are made by a worker when first asked for; HEAD makes none, so that Content-Length is
-    absent until then.
+    Interrupted downloads can be resumed with Range and If-Range. Formats other than hdf5 are exported by a
+    worker on the first request; before, HEAD returns no Content-Length.
     """
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     files = service.files.of(tenant)
-    # For other formats too: what is made of a volume stays as long as it does.
+    # Exports are deleted together with the volume.
     path = await run_in_threadpool(service.files.store.fetch, files.volume(volume["id"]))
     seed = repr((volume["id"], volume["created"], "hdf5" if format == "h5" else format))
     if format in ("hdf5", "h5"):
         return download(request, path, seed, HDF5)
     chosen = FORMATS[format]
-    # The same volume gives the same bytes, so what it is made of tells one file from all others.
+    # Exports are deterministic, so the ETag is computed from the volume.
     tag = tag_of(path, repr((__version__, seed)))
     if (answer := unchanged(request, tag)) is not None:
         return answer
@@ -74,7 +73,7 @@ async def volume_data(
             try:
                 await while_connected(request, service.pictures.export(tenant, volume, path, made, format))
             except InvalidInput:
-                # Of a volume that was deleted meanwhile nothing is wrong but that it is not there.
+                # Report a volume that was deleted in the meantime as unknown.
                 await run_in_threadpool(service.volumes.get, tenant, volume["id"])
                 raise
             await run_in_threadpool(service.quota.stored, tenant, made.name, file_bytes(made))
@@ -82,7 +81,7 @@ async def volume_data(
     try:
         await run_in_threadpool(service.volumes.get, tenant, volume["id"])
     except UnknownId:
-        # Made after its files were removed: nobody else would remove it.
+        # The export was written after the files of the volume had been deleted.
         made.unlink(missing_ok=True)
         await run_in_threadpool(service.quota.gone, tenant, made.name)
         raise
@@ -90,10 +89,10 @@ async def volume_data(
 
 
 def _not_made(tag: str, media_type: str, name: str) -> Response:
-    """What is known of a file before it is made."""
+    """The response to HEAD for a format that has not been exported."""
     headers = {**headers_of(tag), "Accept-Ranges": "bytes"}
     answer = Response(media_type=media_type, headers=headers)
     answer.headers["Content-Disposition"] = f'attachment; filename="{name}"'
-    # That of the empty body; the file's is not known yet.
+    # The length of the file is unknown.
     del answer.headers["content-length"]
     return answer

@@ -1,4 +1,4 @@
-"""/v1/volumes: results and uploads as metadata, pictures and files."""
+"""/v1/volumes: upload, list, show and delete volumes."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ async def upload_volume(
     response: Response,
     service: Service,
     tenant: CallerTenant,
-    title: Annotated[str, Query(max_length=200, description="In place of the file's own.")] = "",
+    title: Annotated[str, Query(max_length=200, description="Title; default: that in the file.")] = "",
     spacing_m: Annotated[
         str | None,
         Query(
             max_length=100,
-            description="One distance or three, m; NumPy and raw only, 0.001 without it.",
+            description="One or three distances, m; NumPy and raw files only, default 0.001.",
             json_schema_extra={"pattern": SPACING},
         ),
     ] = None,
@@ -50,7 +50,7 @@ async def upload_volume(
         str | None,
         Query(
             max_length=100,
-            description="nx,ny,nz of raw bytes, in which x runs fastest.",
+            description="nx,ny,nz of a raw file, x fastest.",
             json_schema_extra={"pattern": SHAPE},
         ),
     ] = None,
@@ -58,12 +58,12 @@ async def upload_volume(
         str | None,
         Query(
             max_length=20,
-            description="Of raw bytes: uint8, int16, float32, ...; big-endian as uint16-be.",
+            description="Data type of a raw file: uint8, int16, float32, ...; big-endian as uint16-be.",
             json_schema_extra={"pattern": "^(" + "|".join(RAW_TYPES) + ")$"},
         ),
     ] = None,
 ) -> VolumeRecord:
-    """Upload a volume. Its content tells the format; a process of its own reads it, or says why not."""
+    """Upload a volume. The format is detected from the content; a separate process validates it."""
     given = volume_given(title, spacing_m, shape, dtype)
     row = await receive_upload(request, service, tenant, service.volumes, given)
     record = volume_record(row)
@@ -77,17 +77,17 @@ def list_volumes(
     tenant: CallerTenant,
     limit: Limit = 100,
 ) -> VolumeList:
-    """Volumes, reconstructed and uploaded, newest first."""
+    """List volumes, reconstructed and uploaded, newest first."""
     return VolumeList(volumes=[volume_record(row) for row in service.volumes.newest(tenant, limit)])
 
 
 @router.get("/{volume_id}", responses=problems(404))
 def show_volume(volume_id: str, service: Service, tenant: CallerTenant) -> VolumeRecord:
-    """Shape, axes, spacing, origin and range of one volume."""
+    """Show one volume: shape, axes, spacing, origin and range."""
     return volume_record(service.volumes.get(tenant, volume_id))
 
 
 @router.delete("/{volume_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
 def delete_volume(volume_id: str, service: Service, tenant: CallerTenant) -> None:
-    """Delete a volume, the job that made it and its turntables; not while a job needs it."""
+    """Delete a volume with its job and turntables; rejected while an unfinished job needs it."""
     service.deletion.delete(StoredItem(tenant, "volume", volume_id))

@@ -1,1 +1,1 @@
-"""The database: its schema, and the rows of everything stored."""
+"""The database: schema, migration, and the tables of everything stored."""

@@ -1,4 +1,4 @@
-"""How many threads may be at the database: while it is slow, or with very many, the next one is refused."""
+"""Limit on the number of threads that use the database at once; further requests are rejected."""
 
 from __future__ import annotations
 
@@ -10,41 +10,37 @@ from contextlib import contextmanager
 
 from ..refusals import DatabaseUnavailable
 
-# The service answers requests by 40 threads: some are left for what needs no database.
+# The service answers requests with 40 threads; the rest stays free for requests without the database.
 MOST_AT_ONCE = 32
-# How long one more waits for a place, s: all of them have ended by then while the database is well.
+# Longest wait for a place, s.
 PLACE_SECONDS = 2.0
-# Once a transaction has taken so long, s, the database is slow, and only so many may wait for it.
+# A transaction that takes longer than this marks the database as slow; then fewer threads may wait, s.
 SLOW_SECONDS = 2.0
 MOST_WHILE_SLOW = 8
 
 
 class Admission:
-    """Lets threads to the database, as long as they do not pile up before it.
-
-    Args:
-        clock: seconds.
-    """
+    """Limits the number of threads in database transactions."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._changed = threading.Condition()
         self._numbers = itertools.count()
-        # When each of those inside came, the oldest first.
+        # Start time of each running transaction, oldest first.
         self._inside: dict[int, float] = {}
 
     @contextmanager
     def __call__(self) -> Iterator[None]:
-        """Be inside for a block.
+        """Take a place for the duration of the block.
 
         Raises:
-            DatabaseAway: where too many are.
+            DatabaseUnavailable: when too many threads hold or wait for a place.
         """
         with self._changed:
             if self._slow() and len(self._inside) >= MOST_WHILE_SLOW:
-                raise DatabaseUnavailable(f"{len(self._inside)} requests that wait for a slow database")
+                raise DatabaseUnavailable(f"{len(self._inside)} requests waiting for a slow database")
             if not self._changed.wait_for(lambda: len(self._inside) < MOST_AT_ONCE, PLACE_SECONDS):
-                raise DatabaseUnavailable(f"{len(self._inside)} requests that wait for the database")
+                raise DatabaseUnavailable(f"{len(self._inside)} requests waiting for the database")
             number = next(self._numbers)
             self._inside[number] = self._clock()
         try:

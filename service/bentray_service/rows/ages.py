@@ -1,4 +1,4 @@
-"""The rows of what is older than it may become: marked first, and gone only if it stays so."""
+"""Marks of items past their maximum age; an item is deleted only after it stayed expired for long enough."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .tenants import Tenant
 
 
 class ExpiredItem(NamedTuple):
-    """Something that has an age; ``what`` is ``dataset``, ``volume``, ``mesh``, ``job`` or ``upload``."""
+    """An expired item; ``what`` is ``dataset``, ``volume``, ``mesh``, ``job`` or ``upload``."""
 
     tenant: Tenant
     what: str
@@ -21,24 +21,24 @@ class ExpiredItem(NamedTuple):
 
 
 class ExpiryMarks:
-    """Marks what was found to be too old, with the time observed by then, see :class:`ObservedTime`.
+    """Marks expired items with the observed time, see :class:`ObservedTime`.
 
-    The clock of the machine, by which ages are told, may be wrong for a while; so nothing goes before its age
-    has been found again and again for long enough.
+    Ages are computed from the system clock, which may be wrong for a while. Therefore an item is deleted only
+    if it was found expired repeatedly over a period of observed time.
     """
 
     def __init__(self, database: Database) -> None:
         self._database = database
 
     def mark(self, found: Collection[ExpiredItem], observed_s: float) -> dict[ExpiredItem, float]:
-        """Mark all that is too old now, and take back the marks of what is not any more.
+        """Mark all items that are expired now, and remove the marks of items that are not.
 
         Args:
-            found: everything that is too old, of every kind.
-            observed_s: the time observed by now, s.
+            found: all expired items.
+            observed_s: current observed time, s.
 
         Returns:
-            for how long each of them has been found too old, s.
+            for each item, for how long it has been found expired, s.
         """
         now = set(found)
         with self._database.write() as connection:
@@ -53,6 +53,6 @@ class ExpiryMarks:
         return {one: observed_s - marked.get(one, observed_s) for one in now}
 
     def clear(self) -> None:
-        """Take back every mark: the clock by which ages were told was wrong, or is."""
+        """Remove all marks, after the system clock was found to be wrong."""
         with self._database.write() as connection:
             connection.execute(delete(too_old))

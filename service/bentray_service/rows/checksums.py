@@ -1,4 +1,4 @@
-"""The rows of checksums: what every stored file held when it was written."""
+"""The table of checksums: size and SHA-256 of every stored file when it was written."""
 
 from __future__ import annotations
 
@@ -14,38 +14,39 @@ from .records import ChecksumRow, Plain
 from .schema import checksums, datasets, geometry_fields, jobs, meshes, uploaded_volumes, volumes
 from .tenants import Tenant
 
-# Where a thing that is stored has its row; that of a turntable is its job's.
+# Tables whose rows have stored files; the file of a turntable belongs to its job.
 STORED = (datasets, uploaded_volumes, volumes, meshes, geometry_fields, jobs)
 
 
 class Checksums:
-    """A row for each thing that is stored, by its tenant and its id."""
+    """Checksums by tenant and id."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
 
     def record(self, tenant: Tenant, name: str, path: str, found: Digest, *, as_written: bool) -> None:
-        """Store what a thing holds, in place of what it held before.
+        """Insert or replace the checksum of an item.
 
         Args:
-            tenant: whose it is.
-            name: its id.
-            path: in the tenant's folder, as ``volumes/vol-0123456789abcdef0123.h5``.
-            found: what is in it.
-            as_written: whether that is known to be as it was written.
+            tenant: owner.
+            name: id of the item.
+            path: below the folder of the tenant, e.g. ``volumes/vol-0123456789abcdef0123.h5``.
+            found: the checksum.
+            as_written: whether it was computed when the file was written.
         """
         with self._database.write() as connection:
             _record(connection, tenant, name, path, found, as_written)
 
     def record_first_seen(self, tenant: Tenant, name: str, path: str, found: Digest) -> bool:
-        """The same of a thing from before there were checksums; False, and no row, if it has been deleted.
+        """Insert the checksum of an item stored before version 4.
 
-        Its file may still lie there: rows go first.
+        Returns:
+            False, without a change, if the item has been deleted; its file may remain for a moment.
         """
         with self._database.write() as connection:
             known = any(
                 connection.execute(
-                    # Whoever deletes it now is waited for.
+                    # A concurrent deletion finishes first.
                     select(table.c.id).where(table.c.tenant == tenant, table.c.id == name).with_for_update()
                 ).first()
                 for table in STORED
@@ -55,24 +56,24 @@ class Checksums:
             return known
 
     def get(self, tenant: Tenant, name: str) -> ChecksumRow | None:
-        """The row of a thing; None of one that has none, as from before version 4 or deleted."""
+        """The checksum of an item; None if it was stored before version 4 or has been deleted."""
         mine = select(checksums).where(checksums.c.tenant == tenant, checksums.c.id == name)
         found = self._database.rows(mine)
         return cast(ChecksumRow, found[0]) if found else None
 
     def all(self) -> list[ChecksumRow]:
-        """Every tenant's."""
+        """The checksums of all tenants."""
         query = select(checksums).order_by(checksums.c.tenant, checksums.c.path)
         return cast(list[ChecksumRow], self._database.rows(query))
 
     def damaged(self, tenant: Tenant, name: str, since: float | None) -> None:
-        """Say since when a thing holds something else, in s since 1970; None: it is as it was."""
+        """Store since when an item is damaged, s since 1970; None: it is not damaged."""
         mine = checksums.c.tenant == tenant, checksums.c.id == name
         with self._database.write() as connection:
             connection.execute(update(checksums).where(*mine).values(damaged=since))
 
     def delete(self, tenant: Tenant, names: Collection[str]) -> None:
-        """Delete the rows of things with these ids."""
+        """Delete the checksums of items by id."""
         with self._database.write() as connection:
             delete_checksums(connection, tenant, names)
 
@@ -88,5 +89,5 @@ def _record(
 
 
 def delete_checksums(connection: Connection, tenant: Tenant, names: Collection[str]) -> None:
-    """The same in the transaction of the caller."""
+    """The same within the transaction of the caller."""
     connection.execute(delete(checksums).where(checksums.c.tenant == tenant, checksums.c.id.in_(names)))

@@ -1,4 +1,4 @@
-"""The database connection: how it is opened, brought up to date, and how a read and a write begin."""
+"""The database connection: opening, schema update, read and write transactions."""
 
 from __future__ import annotations
 
@@ -22,47 +22,47 @@ from .migration import SQLITE_PRAGMAS, STEPS, migrate
 
 log = logging.getLogger("bentray.storage")
 
-# How long a transaction waits for another's to end, or for a connection, s.
+# Longest wait for another transaction, or for a connection, s.
 BUSY_SECONDS = 5.0
-# Connections to PostgreSQL that stay open, and that come on top while many ask.
+# Connections to PostgreSQL kept open, and additional ones under load.
 KEPT_CONNECTIONS, MORE_CONNECTIONS = 5, 10
 
-# How often the log tells that the database cannot be used, s; every refused request would be too often.
+# Shortest interval between two log lines about an unavailable database, s.
 SILENCE_SECONDS = 60.0
 
-# How SQLite and PostgreSQL say that there is no space.
+# Error messages of SQLite and PostgreSQL for a full disk.
 FULL = ("database or disk is full", "No space left on device")
 
 
 class Database:
-    """One engine and the two ways to use it.
+    """An SQLAlchemy engine with read and write transactions.
 
-    Both raise ``DatabaseUnavailable`` while the database does not answer or is held by another program, and
-    ``DatabaseFull`` where it has no space; a write has not happened then, unless the connection broke just
-    when it was to become durable.
+    Both raise ``DatabaseUnavailable`` while the database does not answer or is locked by another program, and
+    ``DatabaseFull`` when its disk is full. In both cases the write has not happened, except when the
+    connection breaks during the commit.
     """
 
     def __init__(self, engine: Engine) -> None:
         self._writer = engine
         self._reader = engine.execution_options(bentray_read_only=True)
         self._admission = Admission()
-        self._said = -SILENCE_SECONDS
+        self._logged = -SILENCE_SECONDS
 
     @contextmanager
     def read(self) -> Iterator[Connection]:
-        """A transaction that only reads; it never waits for a writer."""
-        with self._told(), self._reader.begin() as connection:
+        """A read-only transaction; it never waits for a writer."""
+        with self._checked(), self._reader.begin() as connection:
             yield connection
 
     @contextmanager
     def write(self) -> Iterator[Connection]:
-        """A transaction that is durable once the block ends without an error."""
-        with self._told(), self._writer.begin() as connection:
+        """A transaction that is committed when the block ends without an error."""
+        with self._checked(), self._writer.begin() as connection:
             yield connection
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
-        """Let a thread to the database, and tell what is no fault of its statement as a refusal."""
+    def _checked(self) -> Iterator[None]:
+        """Limit the number of threads, and convert errors of the connection to refusals."""
         with self._admission():
             try:
                 yield
@@ -70,19 +70,19 @@ class Database:
                 refusal = _refusal(error)
                 if refusal is None:
                     raise
-                # Callers are not told where the database is.
-                if time.monotonic() - self._said >= SILENCE_SECONDS:
-                    self._said = time.monotonic()
-                    log.warning("the database cannot be used: %s", getattr(error, "orig", None) or error)
+                # The address of the database is logged, not sent to callers.
+                if time.monotonic() - self._logged >= SILENCE_SECONDS:
+                    self._logged = time.monotonic()
+                    log.warning("the database is unavailable: %s", getattr(error, "orig", None) or error)
                 raise refusal from error
 
     def rows(self, query: Select[Any]) -> list[dict[str, Any]]:
-        """The rows that a query gives, in a transaction of its own."""
+        """The rows of a query, in a transaction of its own."""
         with self.read() as connection:
             return [dict(row) for row in connection.execute(query).mappings()]
 
     def probe(self) -> None:
-        """Write one number, as a proof that writing works; raises what goes wrong."""
+        """Write one number to verify that writing works; any error is raised."""
         with self.write() as connection:
             connection.execute(update(schema.about).values(probed=time.time()))
 
@@ -91,10 +91,10 @@ class Database:
 
 
 def open_database(address: str) -> Database:
-    """Open the database, make its tables where it is new, and change them where an older Bentray made them.
+    """Open the database, create its tables if it is new, and migrate an older schema.
 
     Raises:
-        InvalidInput: when it cannot be opened, or was made by a later version of Bentray.
+        InvalidInput: when it cannot be opened, or was created by a later version of Bentray.
     """
     shown = address
     try:
@@ -126,7 +126,7 @@ def _options(address: str) -> dict[str, Any]:
 
 
 def _refusal(error: exc.SQLAlchemyError) -> DatabaseUnavailable | DatabaseFull | None:
-    """What to tell of an error that says more about the database than about the statement; None of others."""
+    """The refusal for an error of the connection or the disk; None for an error of the statement."""
     if isinstance(error, exc.DBAPIError):
         if any(words in str(error.orig) for words in FULL):
             return DatabaseFull()
@@ -138,16 +138,16 @@ def _refusal(error: exc.SQLAlchemyError) -> DatabaseUnavailable | DatabaseFull |
 
 
 def _engine(address: str, pragmas: tuple[str, ...], *, patient: bool = True) -> Engine:
-    """An engine.
+    """Create an engine.
 
     Args:
         address: of the database.
-        pragmas: for SQLite alone.
-        patient: whether it gives up statements that take long; PostgreSQL alone.
+        pragmas: for SQLite only.
+        patient: whether statements have a time limit; PostgreSQL only.
     """
 
     def configure_sqlite(connection: Any, _record: object) -> None:
-        # The driver's own idea of when a transaction begins is switched off; _begin_sqlite says it instead.
+        # Transactions are started by _begin_sqlite, not by the driver.
         connection.isolation_level = None
         for pragma in ("journal_mode=WAL", "synchronous=FULL", *pragmas):
             connection.execute(f"PRAGMA {pragma}")
@@ -162,7 +162,7 @@ def _engine(address: str, pragmas: tuple[str, ...], *, patient: bool = True) -> 
 
 
 def _json(value: Any) -> str:
-    """As JSON that every database takes: null for NaN and infinity."""
+    """Serialise to JSON; NaN and infinity become null."""
     try:
         return json.dumps(value, allow_nan=False)
     except ValueError:
@@ -187,14 +187,14 @@ def _connect_patiently(_dialect: object, _record: object, words: list[Any], how:
 
 
 def _begin_sqlite(connection: Connection) -> None:
-    # A transaction that turns from reader to writer half-way fails at once when another one writes.
-    # So a writer says so at the start, and waits its turn there.
+    # A read transaction of SQLite that starts to write fails at once when another one writes.
+    # Therefore a write transaction takes the lock at its start.
     read_only = connection.get_execution_options().get("bentray_read_only", False)
     connection.exec_driver_sql("BEGIN" if read_only else "BEGIN IMMEDIATE")
 
 
 def _make_or_check(connection: Connection, shown: str) -> bool:
-    """Make the tables of a new database; whether they are those of this version."""
+    """Create the tables of a new database; returns whether the schema is current."""
     if not inspect(connection).has_table(schema.about.name):
         schema.metadata.create_all(connection)
         connection.execute(insert(schema.about).values(version=schema.VERSION, probed=time.time()))
@@ -204,19 +204,19 @@ def _make_or_check(connection: Connection, shown: str) -> bool:
         raise InvalidInput(
             "database_url",
             f"{shown} with schema version {found}",
-            f"{min(STEPS)} to {schema.VERSION}: use the Bentray that made it, or another database",
+            f"{min(STEPS)} to {schema.VERSION}: use the Bentray version that created it, or another database",
         )
     return found == schema.VERSION
 
 
 def _update(address: str, shown: str) -> None:
-    """Change the tables by a connection of its own: SQLite takes the pragmas before a transaction only."""
-    # A large table may take its time.
+    """Migrate over a separate connection: SQLite accepts the pragmas only outside of a transaction."""
+    # Migration of a large table may take long.
     engine = _engine(address, SQLITE_PRAGMAS, patient=False)
     try:
         with engine.begin() as connection:
             found = _version(connection)
-            log.warning("%s goes from schema version %d to %d", shown, found, schema.VERSION)
+            log.warning("migrating %s from schema version %d to %d", shown, found, schema.VERSION)
             migrate(connection, found)
     finally:
         engine.dispose()

@@ -1,4 +1,4 @@
-"""What tells one database from all others, for the files that belong to it."""
+"""The unique id of a database, used to match it with a bucket and a data folder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .schema import bucket_mark
 
 
 def mark_of(database: Database) -> str:
-    """The mark of a database; made when first asked for."""
+    """The id of a database, created on first use."""
     with database.write() as connection:
         found = connection.execute(select(bucket_mark.c.database)).scalar_one_or_none()
         if found is None:

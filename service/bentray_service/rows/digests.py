@@ -1,4 +1,4 @@
-"""What a stored thing holds, as a number of bytes and a SHA-256."""
+"""Size and SHA-256 of a stored file or folder."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 
 class Digest(NamedTuple):
-    """Of a file, or of all files in a folder.
+    """The digest of a file, or of all files in a folder.
 
     Attributes:
-        bytes: how many.
-        sha256: in hexadecimal; of a folder that of its files' names, each with its SHA-256.
+        bytes: total size.
+        sha256: hexadecimal; for a folder, of the names and digests of its files.
     """
 
     bytes: int
@@ -20,10 +20,10 @@ class Digest(NamedTuple):
 
 
 def digest_of(path: Path) -> Digest:
-    """Of what lies at ``path``, read a piece at a time.
+    """Compute the digest of a file or folder, read in blocks.
 
     Raises:
-        FileNotFoundError: when there is nothing.
+        FileNotFoundError: when ``path`` does not exist.
     """
     if not path.is_dir():
         with path.open("rb") as file:
@@ -38,7 +38,7 @@ def digest_of(path: Path) -> Digest:
 
 
 def stamp_of(path: Path) -> tuple[int, ...]:
-    """What tells a thing that was written anew from the old one without reading it."""
+    """Inode, modification time and size of each file, to detect changes without reading the files."""
     inside = sorted(path.iterdir()) if path.is_dir() else [path]
     states = [one.stat() for one in inside]
     return tuple(figure for one in states for figure in (one.st_ino, one.st_mtime_ns, one.st_size))

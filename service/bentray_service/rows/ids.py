@@ -1,4 +1,4 @@
-"""Ids of all that is stored: made here, and checked here before one becomes part of a path."""
+"""Ids of stored items: creation, and validation before an id becomes part of a path."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ _RANDOM = re.compile(r"[0-9a-f]{20}")
 
 
 def new_id(what: str) -> str:
-    """A new random id, such as ``ds-`` and 20 hexadecimal digits; ``what`` is a key of ``PREFIXES``."""
+    """A new random id, e.g. ``ds-`` and 20 hexadecimal digits; ``what`` is a key of ``PREFIXES``."""
     return f"{PREFIXES[what]}-{secrets.token_hex(10)}"
 
 
 def checked(what: str, text: str) -> str:
-    """``text`` if it has the form of an id of ``what``.
+    """Return ``text`` if it has the format of an id of ``what``.
 
     Raises:
-        UnknownId: otherwise; no string that a user invents goes further.
+        UnknownId: otherwise.
     """
     prefix, _, random = text.partition("-")
     if prefix != PREFIXES[what] or not _RANDOM.fullmatch(random):
@@ -29,7 +29,7 @@ def checked(what: str, text: str) -> str:
 
 
 def volume_of(job_id: str) -> str:
-    """The volume id of a job; fixed, so a job that is run again writes the same file."""
+    """The volume id of a reconstruction; it is fixed, so that a repeated job writes the same file."""
     return PREFIXES["volume"] + checked("job", job_id).removeprefix(PREFIXES["job"])
 
 
@@ -39,5 +39,5 @@ def dataset_of(job_id: str) -> str:
 
 
 def field_of(content: str) -> str:
-    """The geometry field id of a SHA-256 in hexadecimal: the same content has the same id."""
+    """The geometry field id of a SHA-256 in hexadecimal; the same content has the same id."""
     return f"{PREFIXES['field']}-{content[:20]}"

@@ -1,4 +1,4 @@
-"""The queue of all tenants' jobs as the service that runs them sees it; no caller's request comes here."""
+"""The job queue of all tenants, used by the job runner of the service."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from .tenants import Tenant
 
 MAX_ATTEMPTS = 3
 
-# How long a service that says nothing is believed to be at work on its jobs, s.
+# Time after which a service that does not renew its lease is considered dead, s.
 LEASE_S = 30.0
 
 
 class Queue:
-    """Jobs from ``queued`` through ``running`` (and ``cancelling``) to their end.
+    """Job states from ``queued`` through ``running`` (and ``cancelling``) to the end.
 
-    Who claims a job has a lease of it, renewed as long as the service lives. A service that lost its lease,
-    because it stood still for too long, changes nothing of the job any more.
+    A service that claims a job holds a lease, which it renews while it is alive. A service that has lost its
+    lease no longer changes the job.
     """
 
     def __init__(self, database: Database) -> None:
@@ -36,17 +36,17 @@ class Queue:
         self._owner = f"{socket.gethostname()[:40]}-{os.getpid()}-{secrets.token_hex(4)}"
 
     def state(self, job_id: str) -> str:
-        """The state of one job; cheap."""
+        """The state of one job."""
         with self._database.read() as connection:
             return str(connection.execute(select(jobs.c.state).where(jobs.c.id == job_id)).scalar_one())
 
     def held_state(self, job_id: str) -> str | None:
-        """The state of a job that this service runs; None when it has lost the job to another."""
+        """The state of a job that this service holds; None if another service holds it."""
         with self._database.read() as connection:
             return connection.execute(select(jobs.c.state).where(self._held(job_id))).scalar_one_or_none()
 
     def load(self) -> tuple[dict[str, int], float | None]:
-        """How many jobs are in each state, and since when the oldest of those that wait is waiting."""
+        """The number of jobs in each state, and the creation time of the oldest queued job."""
         with self._database.read() as connection:
             counts = connection.execute(select(jobs.c.state, func.count()).group_by(jobs.c.state))
             found = {state: int(count) for state, count in counts}
@@ -54,18 +54,18 @@ class Queue:
             return found, connection.execute(waiting).scalar_one()
 
     def unfinished(self) -> set[str]:
-        """The ids of all jobs that are not at their end."""
+        """The ids of all jobs that have not ended."""
         with self._database.read() as connection:
             return set(connection.execute(select(jobs.c.id).where(jobs.c.state.not_in(ENDED))).scalars())
 
     def claim(self, *, idle_only: bool = False) -> JobRow | None:
-        """Turn a queued job into a running one of this service and return it; None when none waits.
+        """Claim the next queued job and return it; None when no job is queued.
 
-        Of the tenants that wait, the one with the fewest running jobs is next, then the one whose last job
-        began longest ago; of its jobs the oldest.
+        The next tenant is the one with the fewest running jobs, then the one whose last job started first;
+        the oldest job of this tenant is claimed.
 
         Args:
-            idle_only: only of tenants of whom no job is running.
+            idle_only: only consider tenants without a running job.
         """
         of_tenant = jobs.alias()
         same = of_tenant.c.tenant == jobs.c.tenant
@@ -97,18 +97,18 @@ class Queue:
             return cast(JobRow, dict(connection.execute(claimed).mappings().one()))
 
     def renew(self, held: Collection[str]) -> None:
-        """Say that this service is still at work on some jobs."""
+        """Renew the leases of running jobs."""
         with self._database.write() as connection:
             mine = jobs.c.id.in_(held), jobs.c.lease_owner == self._owner, jobs.c.state.in_(RUNNING)
             connection.execute(update(jobs).where(*mine).values(lease_until=time.time() + LEASE_S))
 
     def reset_attempts(self, job_id: str) -> None:
-        """A job that has kept something is no job that kills its service: its attempts count anew."""
+        """Reset the number of attempts of a job that has saved a checkpoint."""
         with self._database.write() as connection:
             connection.execute(update(jobs).where(self._held(job_id), jobs.c.attempts > 1).values(attempts=1))
 
     def record_size(self, job_id: str, size: int) -> None:
-        """Store how many bytes a running job takes by now, where that is more than was reserved for it."""
+        """Store the disk usage of a running job, if it exceeds the reserved size, bytes."""
         with self._database.write() as connection:
             mine = select(jobs.c.tenant).where(self._held(job_id))
             tenant = connection.execute(mine).scalar_one_or_none()
@@ -119,19 +119,22 @@ class Queue:
         return and_(jobs.c.id == job_id, jobs.c.lease_owner == self._owner, jobs.c.state.in_(RUNNING))
 
     def progress(self, job_id: str, done: int, total: int, history: list[Plain], phase: str = "") -> None:
-        """Store how far a running job is."""
+        """Store the progress of a running job."""
         now: Plain = {"done": done, "total": total, "history": history, "phase": phase}
         with self._database.write() as connection:
             connection.execute(update(jobs).where(self._held(job_id)).values(**now))
 
     def succeed(self, job_id: str, result: Plain | None, into: str = volumes.name, size: int = 0) -> bool:
-        """Store the success and the result, if there is one; False when it was cancelled in the meantime.
+        """Store the success and the result of a job.
 
         Args:
             job_id: of the job.
-            result: a row; where its tenant has one with this id already, that one stays.
+            result: a row; an existing row with this id is kept.
             into: the name of its table.
-            size: bytes of a result that has no row.
+            size: bytes of a result without a row.
+
+        Returns:
+            False if the job was cancelled in the meantime.
         """
         with self._database.write() as connection:
             now = time.time()
@@ -152,18 +155,18 @@ class Queue:
             return True
 
     def fail(self, job_id: str, problem: Plain) -> None:
-        """End a job with the problem that stopped it."""
+        """End a job with the problem that made it fail."""
         with self._database.write() as connection:
             note, now = str(problem["detail"])[:500], time.time()
             self._end(connection, job_id, RUNNING, "failed", note, finished=now, error=problem)
 
     def mark_cancelled(self, job_id: str) -> None:
-        """End a job that has stopped as it was asked to."""
+        """End a job after a cancellation."""
         with self._database.write() as connection:
             self._end(connection, job_id, RUNNING, "cancelled", finished=time.time())
 
     def release(self, job_id: str, note: str) -> None:
-        """Put a running job back in the queue for a reason that is no fault of the job."""
+        """Put a running job back in the queue for a reason outside of the job."""
         with self._database.write() as connection:
             again: Plain = {"started": None, "attempts": jobs.c.attempts - 1}
             if not self._end(connection, job_id, ("running",), "queued", note, **again):
@@ -178,27 +181,24 @@ class Queue:
         note: str = "",
         **values: Any,
     ) -> bool:
-        """End a job of this service, or give it back; whether it was still its own and in ``before``."""
+        """Change the state of a job held by this service and drop the lease; returns whether it was held."""
         held = jobs.c.lease_owner == self._owner
         return change(
             connection, job_id, before, after, note, held, **values, lease_owner=None, lease_until=None
         )
 
     def recover(self, crashed: Plain, *, alone: bool, held: Collection[str] = ()) -> int:
-        """Take up what a dead service left: running jobs go back to the queue, cancelling ones end.
+        """Take over jobs of dead services: running jobs are queued again, cancelling jobs end.
 
-        A job that saw ``MAX_ATTEMPTS`` services die without getting any further is failed with the problem
-        ``crashed``.
+        A job whose service died ``MAX_ATTEMPTS`` times without progress fails with ``crashed``.
 
         Args:
             crashed: the problem.
-            alone: no other service uses this database, so that what is running and not of this one is left
-                over; otherwise its lease must have ended.
-            held: the jobs that this service is at work on. Another one of its own it does not know of: the
-                connection broke when the claim was to become durable.
+            alone: whether no other service uses this database; otherwise only expired leases are taken over.
+            held: the jobs that run in this service; its other jobs were claimed over a broken connection.
 
         Returns:
-            how many wait again.
+            the number of jobs queued again.
         """
         now, again = time.time(), 0
         dead: ColumnElement[bool] = func.coalesce(jobs.c.lease_until, 0.0) < now

@@ -1,6 +1,6 @@
-"""How a job changes its state: one update and one appended event, in the transaction of the caller.
+"""Changes of the state of a job: an update and an appended event in the transaction of the caller.
 
-At its end the room that was reserved for it is given up.
+When a job ends, its reserved storage is released.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def change(
     only: ColumnElement[bool] | None = None,
     **values: Any,
 ) -> bool:
-    """Change the state if it is one of ``before`` and ``only`` holds; whether it was changed."""
+    """Change the state if it is one of ``before`` and ``only`` holds; returns whether it was changed."""
     where = [jobs.c.id == job_id, jobs.c.state.in_(before)]
     if only is not None:
         where.append(only)

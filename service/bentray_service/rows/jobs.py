@@ -1,4 +1,4 @@
-"""The rows of jobs as their tenants see them: asked for, listed, watched, called off."""
+"""The table of jobs for their tenants: submit, list, watch, cancel."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BATCH = 500
 
 
 class Jobs(TenantTable[JobRow]):
-    """Jobs of a tenant; who runs them is :class:`bentray_service.rows.job_queue.Queue`."""
+    """Jobs of a tenant; :class:`bentray_service.rows.job_queue.Queue` runs them."""
 
     table, what = jobs, "job"
 
@@ -44,39 +44,39 @@ class Jobs(TenantTable[JobRow]):
         most_queued: int | None = None,
         key: str | None = None,
     ) -> JobRow:
-        """Store a queued job on its dataset, volume or mesh; it survives a crash once this returns.
+        """Insert a queued job; it survives a crash once this method returns.
+
+        A ``key`` that this tenant has used before returns the job of that request.
 
         Args:
-            tenant: whose it is.
+            tenant: owner.
             kind: a key of ``jobs.kinds.KINDS``.
-            settings: as its kind reads them.
-            dataset_id, volume_id, mesh_id: what it reads.
-            field_id: what it makes, where that is named before.
-            plan: how a reconstruction is cut into tasks.
-            reserve: bytes that it will store at most while it runs, and that the tenant may store over all.
-            most_queued: how many may wait.
-            key: what the client calls the request.
-
-        With a ``key`` that this tenant has used before, the job of that time is returned, and none is made.
+            settings: of the job, as JSON.
+            dataset_id, volume_id, mesh_id: inputs.
+            field_id: output, if its id is known in advance.
+            plan: decomposition into tasks.
+            reserve: maximum bytes that the job stores while it runs, and the quota of the tenant.
+            most_queued: maximum number of queued jobs.
+            key: idempotency key of the request.
 
         Raises:
-            KeyReused: when something else was asked under this key.
-            QuotaUsedUp: when the tenant has less room than is to be reserved.
-            QueueFull: when ``most_queued`` jobs of this tenant wait already.
-            UnknownId: when the dataset has been deleted meanwhile.
+            KeyReused: when the key was used with another request.
+            QuotaExceeded: when less than the reserved size is available.
+            QueueFull: when ``most_queued`` jobs of this tenant are queued.
+            UnknownId: when the dataset has been deleted in the meantime.
         """
         job_id = new_id("job")
         asked = json.dumps([kind, settings, dataset_id, volume_id, mesh_id], sort_keys=True)
         digest = hashlib.sha256(asked.encode()).hexdigest()
         with _still_there(dataset_id), self._database.write() as connection:
             if key is not None and connection.dialect.name != "sqlite":
-                # SQLite's writers wait for each other from the start; elsewhere this makes them.
+                # Write transactions of SQLite are serialised; this lock serialises those of PostgreSQL.
                 lock = int.from_bytes(hashlib.sha256(f"{tenant}/{key}".encode()).digest()[:8], signed=True)
                 connection.execute(select(func.pg_advisory_xact_lock(lock)))
             before = _of_key(connection, tenant, key) if key is not None else None
             if before is not None:
                 if before["request_sha256"] != digest:
-                    accepted = "a key of its own for every request; this one came with another before"
+                    accepted = "a unique key for every request; this key was used with another request"
                     raise KeyReused("Idempotency-Key", repr(key), accepted)
                 return before
             if most_queued is not None:
@@ -84,7 +84,7 @@ class Jobs(TenantTable[JobRow]):
                 waiting = connection.execute(mine).scalar_one()
                 if waiting >= most_queued:
                     raise QueueFull(
-                        "jobs", f"{waiting} that wait", f"fewer than {most_queued}; try again later"
+                        "jobs", f"{waiting} queued", f"fewer than {most_queued} queued; try again later"
                     )
             if reserve is not None:
                 usage.reserve(connection, tenant, job_id, *reserve)
@@ -119,13 +119,13 @@ class Jobs(TenantTable[JobRow]):
         """Up to ``limit`` jobs of this tenant, newest first.
 
         Args:
-            tenant: whose.
-            limit: at most how many.
-            state, kind: only those.
-            before: only those older than the job of this id.
+            tenant: owner.
+            limit: maximum number.
+            state, kind: only jobs with these values.
+            before: only jobs older than the job with this id.
 
         Raises:
-            UnknownId: when it has no such job.
+            UnknownId: when the tenant has no such job.
         """
         query = select(jobs).where(jobs.c.tenant == tenant).order_by(jobs.c.number.desc()).limit(limit)
         if state is not None:
@@ -137,7 +137,7 @@ class Jobs(TenantTable[JobRow]):
         return cast(list[JobRow], self._database.rows(query))
 
     def events(self, tenant: Tenant, job_id: str, after: int = 0) -> list[EventRow]:
-        """The events of one job of this tenant, oldest first, from the one after number ``after``."""
+        """The events of one job of this tenant after event ``after``, oldest first."""
         table = schema.events
         mine = (
             select(table)
@@ -148,19 +148,18 @@ class Jobs(TenantTable[JobRow]):
         return cast(list[EventRow], self._database.rows(mine))
 
     def updates(self, known: Mapping[str, int]) -> tuple[dict[str, JobProgress], dict[str, list[EventRow]]]:
-        """How jobs are, and their events after those that are known, whoever's they are.
+        """The progress of jobs, and their new events, of all tenants.
 
         Args:
-            known: by the id of each job the number of its last event that is known; 0 where none is.
+            known: for each job id, the number of its last known event, or 0.
 
         Returns:
-            the jobs that there are, by id, with ``state``, ``done``, ``total`` and ``phase``; and, of those
-            that have new ones, the events, oldest first.
+            progress by job id; new events by job id, oldest first.
         """
         found: dict[str, JobProgress] = {}
         events: dict[str, list[EventRow]] = {}
         table = schema.events
-        # The jobs first: an event that comes in between is told next time, never left out at the end.
+        # Jobs before events: an event in between is returned next time, and none is lost at the end.
         for ids in _batches(list(known)):
             with self._database.read() as connection:
                 columns = jobs.c.id, jobs.c.state, jobs.c.done, jobs.c.total, jobs.c.phase
@@ -182,11 +181,11 @@ class Jobs(TenantTable[JobRow]):
         return found, events
 
     def request_cancel(self, tenant: Tenant, job_id: str) -> JobRow:
-        """Ask a job to stop: a queued one ends at once, a running one when it next looks.
+        """Cancel a job: a queued one ends at once, a running one after its next poll.
 
         Raises:
             UnknownId: when this tenant has no such job.
-            Finished: when it has ended already.
+            JobFinished: when it has ended.
         """
         with self._database.write() as connection:
             mine = jobs.c.tenant == tenant, jobs.c.id == checked("job", job_id)
@@ -202,13 +201,13 @@ class Jobs(TenantTable[JobRow]):
 
 
 def _batches(ids: list[str]) -> Iterator[list[str]]:
-    """Not more at a time than any database takes in one query."""
+    """Batches small enough for one query of any database."""
     for begin in range(0, len(ids), BATCH):
         yield ids[begin : begin + BATCH]
 
 
 def _of_key(connection: Connection, tenant: Tenant, key: str) -> JobRow | None:
-    """The job that was asked for under a key."""
+    """The job that was submitted with an idempotency key."""
     mine = select(jobs).where(jobs.c.tenant == tenant, jobs.c.idempotency_key == key)
     found = connection.execute(mine).mappings().one_or_none()
     return None if found is None else cast(JobRow, dict(found))
@@ -216,7 +215,7 @@ def _of_key(connection: Connection, tenant: Tenant, key: str) -> JobRow | None:
 
 @contextmanager
 def _still_there(dataset_id: str | None) -> Iterator[None]:
-    """Tell of a dataset that was deleted after the request had been checked, as of one that never was."""
+    """Report a dataset that was deleted after the validation of the request as unknown."""
     try:
         yield
     except IntegrityError:

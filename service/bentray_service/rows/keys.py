@@ -1,4 +1,4 @@
-"""The rows of API keys: who holds the secret of one acts for its tenant."""
+"""The table of API keys."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from .tenants import Tenant
 
 log = logging.getLogger("bentray.access")
 
-# How exactly it is kept when a key was last used, s: a write for each request would be a slow one.
+# Resolution of the stored time of last use, s; it avoids one write per request.
 USED_S = 60.0
 
 
 class Keys:
-    """The keys of all tenants; only who can read the database gets at them, never a request."""
+    """The keys of all tenants, for the command line and authentication."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -34,10 +34,10 @@ class Keys:
     def add(
         self, token: ApiKey, tenant: Tenant, name: str, scopes: Sequence[str], expires: float | None = None
     ) -> KeyRow:
-        """Store a key, without its secret.
+        """Insert a key without its secret.
 
         Raises:
-            InvalidInput: when there is one with this id.
+            InvalidInput: when the id exists.
         """
         row = {"id": token.id, "tenant": tenant, "name": name, "scopes": list(scopes)}
         made = {"sha256": token.digest(), "created": time.time(), "expires": expires}
@@ -45,18 +45,18 @@ class Keys:
             with self._database.write() as connection:
                 connection.execute(insert(keys).values(**row, **made))
         except IntegrityError:
-            raise InvalidInput("key", f"{token.id}, which exists", "one with an id of its own") from None
+            raise InvalidInput("key", f"{token.id}, which exists", "a key with a new id") from None
         return self._row(token.id)
 
     def any(self) -> bool:
-        """Whether there is, or was, a key: from then on one is asked for."""
+        """Whether a key exists or existed; authentication is required from then on."""
         with self._database.read() as connection:
             return connection.execute(select(keys.c.number).limit(1)).first() is not None
 
     def owner(self, token: ApiKey) -> KeyRow | None:
-        """The row of a key that is valid now; None for one that is unknown, revoked or expired."""
+        """The row of a valid key; None if it is unknown, revoked or expired."""
         row = self._find(token.id)
-        # Compared in constant time, and against nothing as long as against something.
+        # Constant time, also for an unknown key.
         same = hmac.compare_digest(token.digest(), row["sha256"] if row is not None else "0" * 64)
         now = time.time()
         if row is None or not same or row["revoked"] is not None:
@@ -68,7 +68,7 @@ class Keys:
         return row
 
     def ended(self, key_ids: Sequence[str]) -> list[str]:
-        """Those of some keys that are not valid any more."""
+        """The keys among ``key_ids`` that are revoked or expired."""
         query = select(keys.c.id).where(
             keys.c.id.in_(key_ids), or_(keys.c.revoked.is_not(None), keys.c.expires <= time.time())
         )
@@ -76,17 +76,17 @@ class Keys:
             return list(connection.execute(query).scalars())
 
     def all(self, tenant: Tenant | None = None) -> list[KeyRow]:
-        """Every key, or those of one tenant, oldest first."""
+        """All keys, or those of one tenant, oldest first."""
         query = select(keys).order_by(keys.c.number)
         if tenant is not None:
             query = query.where(keys.c.tenant == tenant)
         return cast(list[KeyRow], self._database.rows(query))
 
     def revoke(self, key_id: str) -> KeyRow:
-        """End a key for good, at once.
+        """Revoke a key permanently.
 
         Raises:
-            InvalidInput: when there is none with this id.
+            InvalidInput: when the id is unknown.
         """
         with self._database.write() as connection:
             mine = update(keys).where(keys.c.id == key_id, keys.c.revoked.is_(None))
@@ -108,4 +108,4 @@ class Keys:
             with self._database.write() as connection:
                 connection.execute(update(keys).where(keys.c.id == key_id).values(used=now))
         except SQLAlchemyError:
-            log.warning("when key %s was used could not be stored", key_id, exc_info=True)
+            log.warning("the last use of key %s could not be stored", key_id, exc_info=True)

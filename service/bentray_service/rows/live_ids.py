@@ -1,4 +1,4 @@
-"""What the database knows of: the ids of everything stored, and of what unfinished jobs need."""
+"""Ids that are in use: of all stored items, and of inputs and outputs of unfinished jobs."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from .database import Database
 from .ids import PREFIXES
 from .schema import ENDED, datasets, geometry_fields, jobs, meshes, uploaded_volumes, uploads, volumes
 
-# A tenant and an id.
+# Tenant and id.
 Name = tuple[str, str]
 
 
 class LiveIds:
-    """Asks for all tenants at once; no caller's request comes here."""
+    """Queries over all tenants, for cleaning up files."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
 
     def names(self) -> set[Name]:
-        """Whatever may rightly lie in a store, with what is about to come there."""
+        """All ids that may have files, including those of uploads and jobs in progress."""
         with self._database.read() as connection:
             found = self._of_jobs(connection)
             for table in (datasets, uploaded_volumes, volumes, meshes, geometry_fields, jobs):
@@ -31,7 +31,7 @@ class LiveIds:
             return found | {(row.tenant, row.result_id) for row in connection.execute(coming)}
 
     def needed(self) -> set[str]:
-        """The ids of all that unfinished jobs read or write."""
+        """The ids of inputs and outputs of unfinished jobs."""
         with self._database.read() as connection:
             return {name for _, name in self._of_jobs(connection)}
 
@@ -40,7 +40,7 @@ class LiveIds:
         found: set[Name] = set()
         unfinished = select(jobs.c.tenant, jobs.c.id, *reads).where(jobs.c.state.not_in(ENDED))
         for row in connection.execute(unfinished):
-            # What a job makes is called as the job is, but for what stands in front.
+            # The result of a job has the id of the job with another prefix.
             own = row.id.removeprefix(PREFIXES["job"])
             made = (prefix + own for prefix in PREFIXES.values())
             found |= {(row.tenant, name) for name in (*row[2:], *made) if name is not None}

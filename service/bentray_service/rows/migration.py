@@ -1,4 +1,4 @@
-"""From the schema of an older version to the present one, in one transaction."""
+"""Migration of an older schema to the current one, in one transaction."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from sqlalchemy import (
 
 from . import schema
 
-# SQLite rebuilds a table to change a column; what points at the old table must not follow it meanwhile.
+# SQLite rebuilds a table to change a column; references to the old table must not be rewritten meanwhile.
 SQLITE_PRAGMAS = ("foreign_keys=OFF", "legacy_alter_table=ON")
 
-# As SQLite kept it.
+# As created by SQLite.
 JOBS_OF_VERSION_2 = """
 CREATE TABLE jobs (
     number INTEGER NOT NULL, id VARCHAR(32) NOT NULL, kind VARCHAR(32) NOT NULL, dataset_id VARCHAR(32),
@@ -57,26 +57,28 @@ UPLOADED_VOLUMES_OF_VERSION_2 = Table(
 
 
 def migrate(connection: Connection, found: int) -> None:
-    """Bring the tables of version ``found``, a key of ``STEPS`` or a later one, to ``rows.schema.VERSION``.
+    """
+    Migrate the tables from version ``found``, a key of ``STEPS`` or later, to ``rows.schema.VERSION``.
 
     Args:
-        connection: in a transaction, which the caller ends; with SQLite under ``SQLITE_PRAGMAS``.
-        found: the version of the tables.
+        connection: in a transaction of the caller; with SQLite under ``SQLITE_PRAGMAS``.
+        found: version of the tables.
 
     Raises:
-        RuntimeError: when a row would point at nothing afterwards; nothing has been changed then.
+        RuntimeError: when a reference would become invalid; the transaction must be rolled back.
     """
     for version in range(found, schema.VERSION):
         STEPS[version](connection)
     if connection.dialect.name == "sqlite":
         lost: list[Any] = list(connection.execute(text("PRAGMA foreign_key_check")))
         if lost:
-            raise RuntimeError(f"{len(lost)} rows would point at nothing")
+            raise RuntimeError(f"{len(lost)} rows with invalid references")
     connection.execute(update(schema.about).values(version=schema.VERSION))
 
 
 def _to_2(connection: Connection) -> None:
-    """Jobs may read a volume in place of a dataset; uploaded volumes have a table."""
+    """
+    Version 2: jobs with volumes as inputs; a table of uploaded volumes."""
     UPLOADED_VOLUMES_OF_VERSION_2.create(connection)
     if connection.dialect.name != "sqlite":
         connection.execute(text("ALTER TABLE jobs ALTER COLUMN dataset_id DROP NOT NULL"))
@@ -95,7 +97,7 @@ def _to_2(connection: Connection) -> None:
 
 
 def _to_3(connection: Connection) -> None:
-    """Every row has a tenant, jobs a lease; meshes, geometry fields, keys and uploads have tables."""
+    """Version 3: tenants, leases, meshes, geometry fields, keys and uploads."""
     for table in ("datasets", "uploaded_volumes", "volumes", "jobs"):
         tenant = "tenant VARCHAR(64) NOT NULL DEFAULT 'local'"
         connection.execute(text(f"ALTER TABLE {table} ADD COLUMN {tenant}"))
@@ -126,7 +128,7 @@ def _to_3(connection: Connection) -> None:
 
 
 def _to_4(connection: Connection) -> None:
-    """Files have checksums, what is too old is marked before it goes, and what tenants store is counted."""
+    """Version 4: checksums, marks of expired items, and storage accounting."""
     connection.execute(text("ALTER TABLE about ADD COLUMN observed_s FLOAT NOT NULL DEFAULT 0"))
     connection.execute(text("ALTER TABLE about ADD COLUMN begun INTEGER NOT NULL DEFAULT 0"))
     connection.execute(text("ALTER TABLE datasets ADD COLUMN counts JSON"))
@@ -136,9 +138,9 @@ def _to_4(connection: Connection) -> None:
 
 
 def _count_what_is_stored(connection: Connection) -> None:
-    """As far as rows tell; the service corrects the sizes by those of the files when it starts."""
+    """Initialise storage accounting from the rows; the service corrects the sizes when it starts."""
     rows = [f"SELECT tenant, id, bytes, false FROM {table}" for table in STORED_IN_VERSION_3]  # noqa: S608
-    # A service that died may have stored what an upload became.
+    # A service that died may have stored the result of an upload.
     coming = "state IN ('receiving', 'reading') AND result_id NOT IN (SELECT name FROM storage)"
     rows.append(f"SELECT tenant, result_id, length, true FROM uploads WHERE {coming}")  # noqa: S608
     for query in rows:

@@ -1,4 +1,4 @@
-"""How long services have been at work on a database: a clock that stops while none is, and is never set."""
+"""Observed time: the total running time of services on a database, independent of the system clock."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from .schema import about
 
 
 class ObservedTime:
-    """Counts seconds in the database, by the monotonic clock; they outlive the service.
+    """Counts seconds of the monotonic clock in the database.
 
-    However many services count at once, it runs no faster than time does: each adds what it saw to where the
-    count stood when it looked last, and the greatest wins.
+    With several services the count does not run faster than real time: each adds its own elapsed time to the
+    count at its last call, and the largest value is stored.
     """
 
     def __init__(self, database: Database, clock: Callable[[], float] = time.monotonic) -> None:
         """Args:
-        database: which holds the count.
-        clock: seconds that only grow.
+        database: stores the count.
+        clock: monotonic seconds.
         """
         self._database = database
         self._clock = clock
         self._last: tuple[float, float] | None = None
 
     def count(self) -> float:
-        """Add what has passed since the last call; returns the count, s."""
+        """Add the time since the last call; returns the count, s."""
         with self._database.write() as connection:
             total = float(connection.execute(select(about.c.observed_s).with_for_update()).scalar_one())
             now = self._clock()

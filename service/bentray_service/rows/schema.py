@@ -1,4 +1,4 @@
-"""The database schema, in terms that SQLite and Postgres both take."""
+"""The database schema for SQLite and PostgreSQL."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ metadata = MetaData()
 
 
 def _tenant() -> Column[str]:
-    """Whose the row is; every query for a caller asks for it."""
+    """The owner; every query of a caller selects by it."""
     return Column("tenant", String(64), nullable=False, server_default="local")
 
 
-# Times are seconds since 1970 UTC: SQLite has no type for them that keeps the zone.
+# Times are seconds since 1970 UTC: SQLite has no type with a time zone.
 about = Table(
     "about",
     metadata,
     Column("version", Integer, primary_key=True, autoincrement=False),
     Column("probed", Float, nullable=False),
-    # How long services have been at work on this database, s: no clock that can be set tells it.
+    # Total running time of services on this database, s; independent of the system clock.
     Column("observed_s", Float, nullable=False, server_default="0"),
-    # How often a service has begun on this database; a data folder that knows of more belongs to a later
-    # state of it than this one.
+    # Number of service starts on this database; a data folder with a larger number belongs to a later
+    # state of it.
     Column("begun", Integer, nullable=False, server_default="0"),
 )
 
@@ -64,9 +64,9 @@ datasets = Table(
     Column("has_travel_times", Boolean, nullable=False),
     Column("has_truth", Boolean, nullable=False),
     Column("water_speed_mps", Float, nullable=False),
-    # What plans are made of; none of one from before version 4.
+    # Numbers for planning; null for datasets from before version 4.
     Column("counts", JSON(none_as_null=True)),
-    # The simulation that made it; no key, for jobs point at datasets already.
+    # The simulation that created it; not a foreign key, since jobs reference datasets.
     Column("job_id", String(32)),
     _tenant(),
     Index("datasets_by_tenant", "tenant", "number"),
@@ -78,34 +78,34 @@ jobs = Table(
     Column("number", Integer, primary_key=True, autoincrement=True),
     Column("id", String(32), nullable=False, unique=True),
     Column("kind", String(32), nullable=False),
-    # What the job reads: a reconstruction a dataset, a refraction a volume of either table, a geometry
+    # Input: a reconstruction has a dataset, a refraction a volume of either table, a geometry
     # field a mesh.
     Column("dataset_id", String(32), ForeignKey("datasets.id")),
     Column("volume_id", String(32)),
     Column("mesh_id", String(32)),
-    # The geometry field that it makes, or finds made.
+    # The geometry field that it creates or reuses.
     Column("field_id", String(32)),
     Column("settings", JSON, nullable=False),
     Column("state", String(16), nullable=False),
     Column("attempts", Integer, nullable=False, default=0),
     Column("done", Integer, nullable=False, default=0),
     Column("total", Integer, nullable=False, default=0),
-    # What is done of how much, where a job has several such things to do.
+    # The current phase of a job with several phases.
     Column("phase", String(32)),
     Column("history", JSON, nullable=False, default=list),
     Column("error", JSON(none_as_null=True)),
-    # How a reconstruction was to be cut into tasks, and what ``auto`` chose once it has.
+    # The planned decomposition into tasks, and the choice of ``auto``.
     Column("plan", JSON(none_as_null=True)),
     Column("advice", String(2000)),
     Column("created", Float, nullable=False),
     Column("started", Float),
     Column("finished", Float),
-    # Tenants take turns.
+    # Owner.
     _tenant(),
-    # What the client calls the request, so that one sent twice makes one job; and a digest of what was asked.
+    # Idempotency key of the request, and a digest of the request.
     Column("idempotency_key", String(200)),
     Column("request_sha256", String(64)),
-    # Which service runs it, and until when that may be believed.
+    # The service that runs it, and the end of its lease.
     Column("lease_owner", String(64)),
     Column("lease_until", Float),
     CheckConstraint("state IN ('" + "', '".join(STATES) + "')", name="known_state"),
@@ -115,7 +115,7 @@ jobs = Table(
     Index("jobs_by_age", "tenant", "number"),
 )
 
-# Only ever appended to; the number of a row is the id of a server-sent event. Their tenant is their job's.
+# Append-only; the number of a row is the id of a server-sent event. The tenant is that of the job.
 events = Table(
     "events",
     metadata,
@@ -126,7 +126,7 @@ events = Table(
     Column("note", String(500), nullable=False, default=""),
 )
 
-# Results of reconstructions; what was uploaded is in a table of its own.
+# Results of reconstructions; uploaded volumes have their own table.
 volumes = Table(
     "volumes",
     metadata,
@@ -169,11 +169,11 @@ meshes = Table(
     Column("id", String(32), nullable=False, unique=True),
     Column("created", Float, nullable=False),
     Column("bytes", BigInteger, nullable=False),
-    # Of what was uploaded, or of the file that was made of a volume.
+    # Of the uploaded file, or of the file created from a volume.
     Column("sha256", String(64), nullable=False),
     Column("title", String(200), nullable=False),
     Column("format", String(16), nullable=False),
-    # Of an iso-surface.
+    # Source of an iso-surface.
     Column("volume_id", String(32)),
     Column("iso", Float),
     Column("vertices", Integer, nullable=False),
@@ -181,22 +181,22 @@ meshes = Table(
     Column("genus", Integer, nullable=False),
     Column("holes", Integer, nullable=False),
     Column("coloured", Boolean, nullable=False),
-    # How many vertices and faces were mended, by what was done to them.
+    # Numbers of repaired vertices and faces by type of repair.
     Column("repairs", JSON, nullable=False),
-    # SHA-256 of vertices, faces and colours: what a geometry field depends on.
+    # SHA-256 of vertices, faces and colours; geometry fields are identified by it.
     Column("content", String(64), nullable=False),
     _tenant(),
     Index("meshes_by_tenant", "tenant", "number"),
 )
 
-# A field is named by its content: the same mesh and settings have one field, however often a tenant asks for
-# it. Another tenant has one of its own, and cannot learn that there is another.
+# A field is identified by its content: the same mesh and settings have one field per tenant.
+# Fields are not shared between tenants, so that no tenant learns about data of another.
 geometry_fields = Table(
     "geometry_fields",
     metadata,
     Column("number", Integer, primary_key=True, autoincrement=True),
     Column("id", String(32), nullable=False),
-    # The mesh and the job that it was first made for.
+    # The first mesh and job.
     Column("mesh_id", String(32), nullable=False),
     Column("job_id", String(32), ForeignKey("jobs.id"), nullable=False),
     Column("created", Float, nullable=False),
@@ -208,20 +208,20 @@ geometry_fields = Table(
     Index("geometry_fields_by_tenant", "tenant", "number"),
 )
 
-# What comes in by pieces. How far one is, the size of its file tells.
+# Resumable uploads. The offset is the size of the file.
 uploads = Table(
     "uploads",
     metadata,
     Column("number", Integer, primary_key=True, autoincrement=True),
     Column("id", String(32), nullable=False, unique=True),
-    # What it becomes, and the id that this will have.
+    # Type of the result, and its id.
     Column("what", String(16), nullable=False),
     Column("result_id", String(32), nullable=False),
     Column("length", BigInteger, nullable=False),
-    # What the user says of it: as the ingest process takes it, and as it was sent.
+    # Metadata for the ingest process, and as sent by the client.
     Column("given", JSON, nullable=False),
     Column("metadata", String(4000), nullable=False),
-    # receiving, reading, done or refused, and then why.
+    # receiving, reading, done, or refused with the problem.
     Column("state", String(16), nullable=False),
     Column("problem", JSON(none_as_null=True)),
     Column("created", Float, nullable=False),
@@ -230,7 +230,7 @@ uploads = Table(
     Index("uploads_by_state", "state", "number"),
 )
 
-# What lets a caller in. The secret itself is nowhere: only its digest is.
+# API keys. Only the digest of the secret is stored.
 keys = Table(
     "keys",
     metadata,
@@ -246,12 +246,12 @@ keys = Table(
     Column("used", Float),
 )
 
-# What tells this database from all others, for the bucket that keeps its files; one row, made when asked for.
+# The unique id of this database, to match it with a bucket; at most one row.
 bucket_mark = Table("bucket_mark", metadata, Column("database", String(32), primary_key=True))
 
-# What a file held when it was written, or, of one from before version 4, when it was first read. Of a folder
-# it is the digest of its files. The id is that of the dataset, the volume, the mesh, the field or the job of
-# the turntable; the path begins in the tenant's folder.
+# Checksums of files when they were written, or, for files from before version 4, when they were first read.
+# For a folder, of all its files. The id is that of the dataset, volume, mesh, field or turntable job;
+# the path is relative to the folder of the tenant.
 checksums = Table(
     "checksums",
     metadata,
@@ -261,14 +261,14 @@ checksums = Table(
     Column("bytes", BigInteger, nullable=False),
     Column("sha256", String(64), nullable=False),
     Column("noted", Float, nullable=False),
-    # Whether it is that of the file as it was written.
+    # Whether it was computed when the file was written.
     Column("as_written", Boolean, nullable=False),
-    # Since when it is known to hold something else.
+    # Since when the content is known to differ.
     Column("damaged", Float),
 )
 
-# What is older than it may become, and how much time (``about.observed_s``) had been observed when that was
-# first noticed. It goes if it still is a day of such time later.
+# Expired items, with the observed time (``about.observed_s``) when they were first found expired. They are
+# deleted after one further day of observed time.
 too_old = Table(
     "too_old",
     metadata,
@@ -278,8 +278,8 @@ too_old = Table(
     Column("noticed_s", Float, nullable=False),
 )
 
-# What each tenant stores, in bytes, and what it has reserved for what is on its way: an upload under the id
-# of what it becomes, a job under its own, a volume in another format as ``ID.EXTENSION``.
+# Bytes stored and reserved by each tenant: an upload has the id of its result, a job its own id, an exported
+# volume ``ID.EXTENSION``.
 storage = Table(
     "storage",
     metadata,
@@ -287,7 +287,7 @@ storage = Table(
     Column("name", String(64), primary_key=True),
     Column("bytes", BigInteger, nullable=False),
     Column("reserved", Boolean, nullable=False),
-    # Of a reservation that ends with its process: which one, and until when it is believed to live.
+    # For a reservation that ends with its process: the process, and the end of its lease.
     Column("lease_owner", String(64)),
     Column("lease_until", Float),
 )

@@ -1,4 +1,4 @@
-"""The tables of what tenants store: one implementation, and the datasets, meshes, fields and volumes."""
+"""Tables of stored items, one row per item: datasets, volumes, meshes and geometry fields."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Record = TypeVar("Record")
 
 
 class TenantTable(Generic[Record]):
-    """The rows of one table, each query for one tenant only.
+    """A table whose queries are restricted to one tenant.
 
     Attributes:
-        table: which one.
-        what: its things, a key of ``ids.PREFIXES``.
+        table: the SQL table.
+        what: the type of its items, a key of ``ids.PREFIXES``.
     """
 
     table: ClassVar[Table]
@@ -34,10 +34,10 @@ class TenantTable(Generic[Record]):
         self._database = database
 
     def get(self, tenant: Tenant, name: str) -> Record:
-        """One row of this tenant, by its id.
+        """One row of this tenant by id.
 
         Raises:
-            UnknownId: when it has no such one.
+            UnknownId: when the tenant has no such item.
         """
         found = self._select(tenant, 1, checked(self.what, name))
         if not found:
@@ -57,10 +57,10 @@ class TenantTable(Generic[Record]):
 
 
 class UploadedTable(TenantTable[Record]):
-    """A table of what is uploaded; its rows are never changed."""
+    """A table of uploaded items; rows are never changed."""
 
     def add(self, tenant: Tenant, name: str, *, size: int, sha256: str, summary: Plain) -> Record:
-        """Store a row; ``summary`` holds the columns that describe the content of its file."""
+        """Insert a row; ``summary`` holds the columns that describe the content of the file."""
         row = {"tenant": tenant, "id": name, "created": time.time(), "bytes": size, "sha256": sha256}
         with self._database.write() as connection:
             connection.execute(insert(self.table).values(**row, **summary))
@@ -75,19 +75,19 @@ class Datasets(UploadedTable[DatasetRow]):
 
 
 class Meshes(UploadedTable[MeshRow]):
-    """Meshes, uploaded or made of a volume."""
+    """Meshes, uploaded or iso-surfaces of volumes."""
 
     table, what = schema.meshes, "mesh"
 
 
 class GeometryFields(TenantTable[FieldRow]):
-    """Geometry fields; jobs write their rows when they succeed."""
+    """Geometry fields; rows are inserted when a job succeeds."""
 
     table, what = schema.geometry_fields, "field"
 
 
 class Volumes(UploadedTable[VolumeRow]):
-    """Volumes: uploads, and the results of reconstructions, which are in a table of their own."""
+    """Volumes: uploads, and results of reconstructions from a second table."""
 
     table, what = uploaded_volumes, "volume"
 

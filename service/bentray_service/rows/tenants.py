@@ -1,4 +1,4 @@
-"""Tenants: whose everything is, as a type of its own, so that no other string passes for one."""
+"""Tenants: the owners of all data, as a type of its own."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import NewType
 
 from bentray_kernels.errors import InvalidInput
 
-# A folder is named by it, so it holds nothing that a path would read.
+# A folder has this name, so it must not contain path separators.
 PATTERN = re.compile(r"[a-z0-9][a-z0-9._@+-]{0,63}")
 ACCEPTED = "1 to 64 of a-z, 0-9 and . _ @ + -, beginning with a letter or digit"
 
-# Names that are made from others below; nobody can be called so.
+# Digests of user names, see below; not accepted as names.
 _DIGEST = re.compile(r"user-[0-9a-f]{40}")
 
 Tenant = NewType("Tenant", str)
 
-# Whose everything is where no key is asked for.
+# The owner of all data when authentication is not required.
 LOCAL = Tenant("local")
 
 
 def checked_tenant(text: str) -> Tenant:
-    """``text`` if it can name a tenant.
+    """Return ``text`` if it is a valid tenant name.
 
     Raises:
         InvalidInput: otherwise.
@@ -33,9 +33,9 @@ def checked_tenant(text: str) -> Tenant:
 
 
 def tenant_of_user(user: str) -> Tenant:
-    """The tenant of whoever a proxy calls ``user``: the name itself, or a digest of one that cannot be it.
+    """The tenant of a user named by a proxy: the name itself, or its digest if the name is not valid.
 
-    Two users never share a tenant, and none becomes ``LOCAL``.
+    Two users never share a tenant, and no user becomes ``LOCAL``.
     """
     if PATTERN.fullmatch(user) and user != LOCAL and not _DIGEST.fullmatch(user):
         return Tenant(user)

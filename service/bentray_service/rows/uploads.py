@@ -1,4 +1,4 @@
-"""The rows of uploads that come in pieces; how far one is, the size of its file tells."""
+"""The table of resumable uploads; the offset of an upload is the size of its file."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from .schema import uploads
 from .stored_tables import TenantTable
 from .tenants import Tenant
 
-# Of a tenant, begun and not whole. A client that is done with one ends it; the others expire.
+# Incomplete uploads of one tenant; they are deleted by the client or expire.
 MOST_BEGUN = 100
-# After which it is worth another try, s.
+# Suggested time before the next attempt, s.
 AGAIN_S = 60.0
 
 
 class Uploads(TenantTable[UploadRow]):
     """Uploads from ``receiving`` through ``reading`` to ``done`` or ``refused``.
 
-    A row goes some time after its last change, however it ended.
+    A row expires some time after its last change.
     """
 
     table, what = uploads, "upload"
@@ -40,26 +40,26 @@ class Uploads(TenantTable[UploadRow]):
         keep_s: float,
         most_bytes: int,
     ) -> UploadRow:
-        """Store a new upload, and reserve the room for it.
+        """Insert a new upload, and reserve storage for it.
 
         Args:
-            tenant: whose it is.
-            what: it becomes: ``dataset``, ``volume`` or ``mesh``.
-            length: of all of it, bytes.
-            given: what the user says of it, as the ingest process wants it.
-            metadata: the same as it was sent.
-            keep_s: how long it is kept unless something comes, s.
-            most_bytes: that the tenant may store.
+            tenant: owner.
+            what: type of the result: ``dataset``, ``volume`` or ``mesh``.
+            length: size of the complete upload, bytes.
+            given: metadata for the ingest process.
+            metadata: metadata as sent by the client.
+            keep_s: time until it expires without further data, s.
+            most_bytes: quota of the tenant.
 
         Raises:
-            QuotaUsedUp: when there is less room than ``length``.
-            TooOften: when ``MOST_BEGUN`` of the tenant have been begun and are not whole.
+            QuotaExceeded: when less than ``length`` is available.
+            RateLimited: when the tenant has ``MOST_BEGUN`` incomplete uploads.
         """
         upload_id, now = new_id("upload"), time.time()
-        # Named at once, so that reading it a second time makes the same file.
+        # The id of the result is fixed here, so that repeated ingestion writes the same file.
         result_id = new_id(what)
         with self._database.write() as connection:
-            # First, for it lets the uploads of a tenant begin one after the other.
+            # First, since it serialises the transactions of one tenant.
             usage.reserve(connection, tenant, result_id, length, most_bytes)
             _check_begun(connection, tenant)
             connection.execute(
@@ -79,15 +79,15 @@ class Uploads(TenantTable[UploadRow]):
         return self.get(tenant, upload_id)
 
     def unread(self) -> list[UploadRow]:
-        """Every tenant's uploads that are whole and not yet read, the oldest first."""
+        """Complete uploads of all tenants that wait for ingestion, oldest first."""
         return self._where(uploads.c.state == "reading")
 
     def receiving(self) -> list[UploadRow]:
-        """Every tenant's uploads that are not whole, as far as was noticed."""
+        """Incomplete uploads of all tenants."""
         return self._where(uploads.c.state == "receiving")
 
     def expired(self, now: float) -> list[UploadRow]:
-        """Every tenant's uploads whose time is over, but for those that are being read.
+        """Expired uploads of all tenants, except those being read.
 
         Args:
             now: s since 1970.
@@ -95,25 +95,25 @@ class Uploads(TenantTable[UploadRow]):
         return self._where(uploads.c.state != "reading", uploads.c.expires < now)
 
     def keep(self, upload_id: str, keep_s: float) -> float:
-        """Something came: keep it that much longer, s. Returns when it goes."""
+        """Extend the expiry after data was received; returns the new expiry, s since 1970."""
         expires = time.time() + keep_s
         self._change(upload_id, expires=expires)
         return expires
 
     def mark_complete(self, upload_id: str) -> None:
-        """All of it is there."""
+        """Mark an upload as complete."""
         self._change(upload_id, state="reading")
 
     def mark_done(self, upload_id: str, keep_s: float) -> None:
-        """It has become what it was sent as."""
+        """Mark an upload as ingested."""
         self._change(upload_id, state="done", expires=time.time() + keep_s)
 
     def mark_refused(self, upload_id: str, problem: Plain, keep_s: float) -> None:
-        """It cannot be read."""
+        """Mark an upload as refused."""
         self._change(upload_id, released=True, state="refused", problem=problem, expires=time.time() + keep_s)
 
     def remove(self, upload_id: str) -> None:
-        """Forget it."""
+        """Delete an upload."""
         with self._database.write() as connection:
             _release(connection, upload_id)
             connection.execute(delete_from(uploads).where(uploads.c.id == upload_id))
@@ -133,12 +133,12 @@ def _check_begun(connection: Connection, tenant: Tenant) -> None:
     begun = uploads.c.tenant == tenant, uploads.c.state == "receiving"
     count = connection.execute(select(func.count()).where(*begun)).scalar_one()
     if count >= MOST_BEGUN:
-        accepted = f"fewer than {MOST_BEGUN} of a tenant at a time; end those that are no longer needed"
-        raise RateLimited("uploads", f"{count} that are begun and not whole", accepted, AGAIN_S)
+        accepted = f"fewer than {MOST_BEGUN} incomplete uploads per tenant; delete those no longer needed"
+        raise RateLimited("uploads", f"{count} incomplete uploads", accepted, AGAIN_S)
 
 
 def _release(connection: Connection, upload_id: str) -> None:
-    """Give up what is reserved for it; what it has become stays stored."""
+    """Release the reservation of an upload; a stored result is kept."""
     query = select(uploads.c.tenant, uploads.c.result_id).where(uploads.c.id == upload_id)
     for row in connection.execute(query):
         usage.release(connection, Tenant(row.tenant), row.result_id)

@@ -1,1 +1,1 @@
-"""The pages of the service; everything they load comes from here."""
+"""HTTP server, protocol limits, errors and the web page; no external resources are loaded."""

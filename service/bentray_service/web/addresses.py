@@ -1,4 +1,4 @@
-"""Addresses that are this machine, and proxies that are believed."""
+"""Loopback addresses and networks of trusted proxies."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Network = IPv4Network | IPv6Network
 
 
 def is_loopback(host: str) -> bool:
-    """Whether all that ``host`` means, a name or an address, is reached from this machine alone."""
+    """Whether a host name or address is reachable from this machine only."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -25,7 +25,7 @@ def is_loopback(host: str) -> bool:
 
 
 def names_loopback(host: str) -> bool:
-    """Whether a Host or Origin header names this machine, as ``localhost:8000``; no name is looked up."""
+    """Whether a Host or Origin header is a loopback address or localhost; names are not resolved."""
     name = host.rpartition("://")[2]
     bare = name[1:].partition("]")[0] if name.startswith("[") else name.partition(":")[0]
     try:
@@ -35,7 +35,7 @@ def names_loopback(host: str) -> bool:
 
 
 def networks(words: str) -> tuple[Network, ...]:
-    """The networks in a list with commas; a single address is one too.
+    """Parse networks or addresses separated by commas.
 
     Raises:
         InvalidInput: naming ``BENTRAY_TRUSTED_PROXIES``.

@@ -1,4 +1,4 @@
-"""How many connections may be open, of one address and in all, and which one goes beyond that."""
+"""Limits on the number of open connections, in total and per client address."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from .addresses import Network, within
 
 log = logging.getLogger("bentray.connections")
 
-# Beyond all of these a browser or a program of one address does not go, and memory is not the bound.
+# Maximum number of connections, independent of the number of file descriptors.
 MOST = 4096
-# Of one address where no other number is set: this part of all.
+# Default limit per address, as a fraction of all connections.
 PART = 4
-# Kept for connections that are closed or refused, and for those that ask whether the service lives.
+# Additional connections for health checks and refusals.
 SPARE = 64
-# Descriptors kept for the database, Dask and the files of the jobs.
+# File descriptors reserved for the database, Dask and files of jobs.
 KEPT = 128
-# A connection and the file that is written or read for it.
+# File descriptors per connection: the socket and a file.
 EACH = 2
-# Of an IPv6 network that one customer is given, every address is the same to us.
+# All addresses of an IPv6 network of this size count as one.
 IPV6_PREFIX = 64
 
 
 @dataclass(frozen=True)
 class ConnectionLimits:
-    """Numbers of open connections: in all, of one address, and beyond them for short questions."""
+    """Maximum numbers of connections: in total, per address, and spare ones for short requests."""
 
     most: int
     of_address: int
@@ -36,37 +36,37 @@ class ConnectionLimits:
 
     @classmethod
     def of(cls, descriptors: int, in_use: int, of_address: int | None) -> ConnectionLimits:
-        """What ``descriptors``, of which some are in use, suffice for."""
+        """The limits for a number of file descriptors, of which some are in use."""
         most = max(1, min(MOST, (descriptors - in_use - KEPT - SPARE) // EACH))
         return cls(most, min(most, of_address or max(1, most // PART)), SPARE)
 
 
 class CountedConnection(Protocol):
-    """One that is counted."""
+    """A connection that is counted."""
 
     def drop(self) -> None:
         """Close it at once."""
 
 
 class Connections:
-    """All that are open.
+    """All open connections.
 
-    A new one that goes beyond a limit takes the place of one on which nothing is asked: of the longest silent
-    one of its address, or of the address with the most. Where every one is at work it is *spare*: the
-    service then answers on it only what is short, and closes it.
+    A new connection beyond a limit replaces the one that is idle for longest, of the same address or of the
+    address with the most connections. If no connection is idle, the new one is *spare*: only short requests
+    are answered before it is closed.
 
     Attributes:
-        limits: may be set anew.
+        limits: current limits.
     """
 
     def __init__(self, limits: ConnectionLimits, trusted: tuple[Network, ...] = ()) -> None:
         """Args:
-        limits: see there.
-        trusted: proxies, which bring the requests of many: for each of them only the limit in all holds.
+        limits: initial limits.
+        trusted: proxies; only the total limit applies to them.
         """
         self.limits = limits
         self._trusted = trusted
-        # Per address, in the order in which they came or fell silent.
+        # Per address, in order of arrival or of becoming idle.
         self._open: dict[str, dict[CountedConnection, None]] = {}
         self._silent: dict[str, dict[CountedConnection, None]] = {}
         self._spare: dict[CountedConnection, str] = {}
@@ -76,15 +76,15 @@ class Connections:
         return len(self._where)
 
     def add(self, one: CountedConnection, address: str) -> bool:
-        """Count a new connection; whether it is spare."""
+        """Add a new connection; returns whether it is spare."""
         group = _group(address)
         self._where[one] = group
         limited = not within(address, self._trusted)
         if limited and len(self._open.get(group, ())) >= self.limits.of_address:
-            log.warning("more than %d connections of one address are open", self.limits.of_address)
+            log.warning("more than %d connections from one address", self.limits.of_address)
             full = not self._drop_silent(group)
         elif len(self._where) - len(self._spare) > self.limits.most:
-            log.warning("more than %d connections are open", self.limits.most)
+            log.warning("more than %d connections in total", self.limits.most)
             full = not (self._silent and self._drop_silent(_longest(self._silent)))
         else:
             full = False
@@ -96,17 +96,17 @@ class Connections:
         return full
 
     def busy(self, one: CountedConnection) -> None:
-        """A request has come."""
+        """A request has started."""
         _take_out(self._silent, self._where.get(one), one)
 
     def silent(self, one: CountedConnection) -> None:
-        """It has been answered, and no other has come."""
+        """The connection has become idle."""
         group = self._where.get(one)
         if group is not None and one not in self._spare:
             self._silent.setdefault(group, {})[one] = None
 
     def remove(self, one: CountedConnection) -> None:
-        """It is closed; may be called more than once."""
+        """The connection is closed; may be called more than once."""
         group = self._where.pop(one, None)
         self._spare.pop(one, None)
         _take_out(self._silent, group, one)
@@ -121,7 +121,7 @@ class Connections:
 
     def _take_spare(self, one: CountedConnection, group: str) -> None:
         if len(self._spare) >= self.limits.spare:
-            # The oldest of whoever has the most: an answer on one of these takes no time.
+            # Replace the oldest spare connection of the address with the most.
             groups: dict[str, dict[CountedConnection, None]] = {}
             for other, its in self._spare.items():
                 groups.setdefault(its, {})[other] = None
@@ -145,7 +145,7 @@ def _take_out(
 
 
 def _group(address: str) -> str:
-    """What counts as one address."""
+    """The group of addresses that are counted together."""
     try:
         found = ipaddress.ip_address(address.partition("%")[0])
     except ValueError:

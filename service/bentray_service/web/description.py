@@ -1,4 +1,4 @@
-"""The OpenAPI description as FastAPI makes it, but for parameters, which are left out and never null."""
+"""The OpenAPI description without null types of parameters."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from fastapi import FastAPI
 
 
 class OpenApiApp(FastAPI):
-    """An application whose description calls no parameter null.
+    """A FastAPI application whose description has no null parameters.
 
-    A parameter that may be left out has the default None in Python, which FastAPI describes as null; a query
-    or a header can only hold the text "null".
+    FastAPI describes an optional parameter with the default None as null, but queries and headers cannot be
+    null.
     """
 
     def openapi(self) -> dict[str, Any]:
-        """The description; made once."""
+        """The description, generated once."""
         made = self.openapi_schema is None
         document = super().openapi()
         if made:

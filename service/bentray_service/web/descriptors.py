@@ -1,4 +1,4 @@
-"""How many files and connections this process may have open, and has."""
+"""The limit of open file descriptors of this process."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from pathlib import Path
 
 from bentray_kernels.errors import InvalidInput
 
-# Enough for any number of connections that we take.
+# Enough for the maximum number of connections.
 WANTED = 65_536
-# With fewer there is no room for anybody beside the database and Dask.
+# Minimum for the database, Dask and some connections.
 LEAST = 512
 
 
 def raise_limit() -> int:
-    """Raise the number of open files to what the system lets it be raised to; returns it.
+    """Raise the limit of open files as far as the system permits; returns it.
 
     Raises:
-        InvalidInput: where it stays below ``LEAST``.
+        InvalidInput: when it is below ``LEAST``.
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = WANTED if hard == resource.RLIM_INFINITY else min(hard, WANTED)
@@ -34,6 +34,6 @@ def raise_limit() -> int:
 
 
 def in_use() -> int:
-    """How many are open now; 0 where the system does not tell."""
+    """Number of open file descriptors; 0 if unknown."""
     folder = Path("/proc/self/fd")
     return sum(1 for _ in folder.iterdir()) if folder.is_dir() else 0

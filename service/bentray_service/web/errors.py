@@ -1,4 +1,4 @@
-"""Every error as RFC 9457 problem+json: one table from exception to status, and the handlers that use it."""
+"""Error responses as problem+json (RFC 9457): a table from exception to status, and exception handlers."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ log = logging.getLogger("bentray.errors")
 
 MEDIA_TYPE = "application/problem+json"
 LONGEST_FOUND = 120
-# Seconds after which it is worth another try, where workers or the queue are full, or the storage is away.
+# Suggested time before the next attempt, s.
 RETRY_AFTER = "10"
 METHODS = ("DELETE", "GET", "HEAD", "OPTIONS", "PATCH", "POST", "PUT")
 
 
 @dataclass(frozen=True)
 class ProblemType:
-    """A kind of problem: its HTTP status, the last part of its address and its title."""
+    """A type of problem: HTTP status, slug of its address, title."""
 
     status: int
     slug: str
@@ -45,47 +45,43 @@ class ProblemType:
 
 
 PROBLEMS: Mapping[type[Exception], ProblemType] = {
-    InvalidInput: ProblemType(422, "invalid-input", "A value cannot be used"),
-    refusals.UnknownId: ProblemType(404, "unknown-id", "There is nothing with this id"),
-    refusals.Deleted: ProblemType(404, "deleted", "It has been deleted"),
-    refusals.Damaged: ProblemType(500, "stored-data-damaged", "What was stored has changed on the disk"),
-    refusals.WrongMediaType: ProblemType(415, "wrong-media-type", "The media type is not accepted"),
-    refusals.EmptyBody: ProblemType(422, "empty-body", "The request has no body"),
-    refusals.TooLarge: ProblemType(413, "too-large", "The body is too large"),
-    refusals.BodyTimeout: ProblemType(408, "too-slow", "The body came too slowly"),
-    refusals.TinyChunks: ProblemType(400, "tiny-chunks", "The body comes in too many small chunks"),
-    refusals.MalformedRequest: ProblemType(400, "malformed-request", "The request is no HTTP"),
-    refusals.UnknownMethod: ProblemType(501, "unknown-method", "The method is unknown"),
-    refusals.HeadersTooLarge: ProblemType(431, "head-too-large", "The head of the request is too long"),
-    refusals.TooManyConnections: ProblemType(503, "too-many-connections", "Too many connections are open"),
-    refusals.WrongProtocol: ProblemType(412, "wrong-protocol", "The upload protocol is another"),
-    refusals.WrongOffset: ProblemType(409, "wrong-offset", "The upload stands elsewhere"),
-    refusals.Locked: ProblemType(423, "locked", "Another request is at work on it"),
-    # The number is that of tus, which HTTP does not know.
-    refusals.WrongChecksum: ProblemType(460, "wrong-checksum", "What came is not what was sent"),
-    refusals.UnknownChecksum: ProblemType(400, "unknown-checksum", "The checksum is of an unknown kind"),
-    refusals.InUse: ProblemType(409, "in-use", "A job needs it"),
-    refusals.JobFinished: ProblemType(409, "job-finished", "The job has ended already"),
-    refusals.KeyReused: ProblemType(409, "key-reused", "The key belongs to another request"),
-    refusals.QueueFull: ProblemType(429, "queue-full", "Too many jobs wait"),
-    refusals.NotAuthenticated: ProblemType(401, "not-let-in", "A key is needed"),
-    refusals.Forbidden: ProblemType(403, "not-allowed", "This is not allowed"),
+    InvalidInput: ProblemType(422, "invalid-input", "Invalid value"),
+    refusals.UnknownId: ProblemType(404, "unknown-id", "Unknown id"),
+    refusals.Deleted: ProblemType(404, "deleted", "Deleted"),
+    refusals.Damaged: ProblemType(500, "stored-data-damaged", "Stored data is damaged"),
+    refusals.WrongMediaType: ProblemType(415, "wrong-media-type", "Unsupported media type"),
+    refusals.EmptyBody: ProblemType(422, "empty-body", "Empty body"),
+    refusals.TooLarge: ProblemType(413, "too-large", "Body too large"),
+    refusals.BodyTimeout: ProblemType(408, "too-slow", "Body received too slowly"),
+    refusals.TinyChunks: ProblemType(400, "tiny-chunks", "Too many small chunks"),
+    refusals.MalformedRequest: ProblemType(400, "malformed-request", "Malformed request"),
+    refusals.UnknownMethod: ProblemType(501, "unknown-method", "Unknown method"),
+    refusals.HeadersTooLarge: ProblemType(431, "head-too-large", "Request headers too long"),
+    refusals.TooManyConnections: ProblemType(503, "too-many-connections", "Too many connections"),
+    refusals.WrongProtocol: ProblemType(412, "wrong-protocol", "Unsupported version of the upload protocol"),
+    refusals.WrongOffset: ProblemType(409, "wrong-offset", "Wrong offset of the upload"),
+    refusals.Locked: ProblemType(423, "locked", "Upload in use by another request"),
+    # Status code of tus, not of HTTP.
+    refusals.WrongChecksum: ProblemType(460, "wrong-checksum", "Checksum mismatch"),
+    refusals.UnknownChecksum: ProblemType(400, "unknown-checksum", "Unknown checksum algorithm"),
+    refusals.InUse: ProblemType(409, "in-use", "Needed by an unfinished job"),
+    refusals.JobFinished: ProblemType(409, "job-finished", "The job has ended"),
+    refusals.KeyReused: ProblemType(409, "key-reused", "Idempotency key used with another request"),
+    refusals.QueueFull: ProblemType(429, "queue-full", "Too many queued jobs"),
+    refusals.NotAuthenticated: ProblemType(401, "not-let-in", "Authentication required"),
+    refusals.Forbidden: ProblemType(403, "not-allowed", "Permission denied"),
     refusals.RateLimited: ProblemType(429, "too-often", "Too many requests"),
-    refusals.TooManyStreams: ProblemType(429, "too-many-streams", "Too many event streams are open"),
-    refusals.QuotaExceeded: ProblemType(507, "quota-used-up", "The tenant stores as much as it may"),
-    refusals.RangeNotSatisfiable: ProblemType(416, "no-such-part", "The part of the file is not there"),
-    refusals.NoAnimation: ProblemType(409, "no-animation", "The job has no animation"),
-    refusals.StorageFull: ProblemType(507, "storage-full", "The disk of the service is full"),
-    refusals.StorageUnavailable: ProblemType(
-        503, "storage-away", "The storage of the service does not answer"
-    ),
-    refusals.DatabaseUnavailable: ProblemType(
-        503, "database-away", "The database of the service does not answer"
-    ),
-    refusals.Busy: ProblemType(503, "busy", "No worker was free in time"),
-    refusals.NotReady: ProblemType(503, "not-ready", "The service cannot work now"),
+    refusals.TooManyStreams: ProblemType(429, "too-many-streams", "Too many event streams"),
+    refusals.QuotaExceeded: ProblemType(507, "quota-used-up", "Storage quota exceeded"),
+    refusals.RangeNotSatisfiable: ProblemType(416, "no-such-part", "Range not satisfiable"),
+    refusals.NoAnimation: ProblemType(409, "no-animation", "No animation"),
+    refusals.StorageFull: ProblemType(507, "storage-full", "Disk full"),
+    refusals.StorageUnavailable: ProblemType(503, "storage-away", "Storage unavailable"),
+    refusals.DatabaseUnavailable: ProblemType(503, "database-away", "Database unavailable"),
+    refusals.Busy: ProblemType(503, "busy", "No worker available in time"),
+    refusals.NotReady: ProblemType(503, "not-ready", "Service not ready"),
 }
-# What may go well after a while.
+# Temporary problems; the response has Retry-After.
 LATER = (
     refusals.Busy,
     refusals.DatabaseUnavailable,
@@ -94,15 +90,15 @@ LATER = (
     refusals.TooManyConnections,
     refusals.TooManyStreams,
 )
-INVALID_REQUEST = ProblemType(422, "invalid-request", "The request is not as it should be")
-UNREADABLE = ProblemType(400, "unreadable-body", "The body cannot be read")
-NOT_FOUND = ProblemType(404, "not-found", "There is nothing at this address")
-INTERNAL = ProblemType(500, "internal", "The service failed")
-FAILED = ProblemType(500, "job-failed", "The job failed")
+INVALID_REQUEST = ProblemType(422, "invalid-request", "Invalid request")
+UNREADABLE = ProblemType(400, "unreadable-body", "Unreadable body")
+NOT_FOUND = ProblemType(404, "not-found", "Unknown address")
+INTERNAL = ProblemType(500, "internal", "Internal error")
+FAILED = ProblemType(500, "job-failed", "Job failed")
 
 
 def make_problem(kind: ProblemType, detail: str, faults: Sequence[Fault] = (), **more: Any) -> Problem:
-    """A problem of one kind; the first fault also stands at the top level."""
+    """A problem of a type; the fields of the first fault are repeated at the top level."""
     first = faults[0].model_dump() if faults else {}
     return Problem(
         type=f"/problems/{kind.slug}", title=kind.title, status=kind.status, detail=detail, **first, **more
@@ -110,14 +106,14 @@ def make_problem(kind: ProblemType, detail: str, faults: Sequence[Fault] = (), *
 
 
 def problem_of(error: InvalidInput, instance: str | None = None) -> Problem:
-    """The problem that says what an :class:`InvalidInput` (or a refusal) says."""
+    """The problem for an :class:`InvalidInput` or a refusal."""
     kind = next(PROBLEMS[cls] for cls in type(error).__mro__ if cls in PROBLEMS)
     fault = Fault(field=error.field, found=error.value, accepted=error.accepted)
     return make_problem(kind, str(error), [fault], instance=instance)
 
 
 def problems(*statuses: int | str) -> dict[int | str, dict[str, Any]]:
-    """The problems of a route, for its OpenAPI description."""
+    """The error responses of a route, for the OpenAPI description."""
     content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
     titles: dict[int | str, list[str]] = {"default": ["A problem"]}
     for kind in (*PROBLEMS.values(), INVALID_REQUEST, UNREADABLE):
@@ -127,11 +123,11 @@ def problems(*statuses: int | str) -> dict[int | str, dict[str, Any]]:
 
 
 def fault_of(error: Mapping[str, Any], job_kinds: Sequence[str] = ()) -> Fault:
-    """One entry of ``ValidationError.errors()`` as field, found, accepted."""
+    """Convert an entry of ``ValidationError.errors()`` to field, found, accepted."""
     where = [str(part) for part in error["loc"]]
     if where and where[0] in ("body", "query", "path", "header") and len(where) > 1:
         where = where[1:]
-        # Pydantic names the kind of a job in the place of an error; the user wrote none there.
+        # Pydantic adds the kind of job to the location; it is not part of the request.
         if where[0] in job_kinds:
             where = where[1:] or ["body"]
     context = error.get("ctx", {})
@@ -158,7 +154,7 @@ def fault_of(error: Mapping[str, Any], job_kinds: Sequence[str] = ()) -> Fault:
 
 
 def install_handlers(app: FastAPI, job_kinds: Sequence[str] = ()) -> None:
-    """Make every error of ``app`` a problem; ``job_kinds`` are the accepted kinds of job."""
+    """Convert all errors of ``app`` to problems; ``job_kinds`` are the accepted kinds of job."""
 
     def invalid_request(request: Request, error: Exception) -> Response:
         assert isinstance(error, RequestValidationError)
@@ -171,14 +167,14 @@ def install_handlers(app: FastAPI, job_kinds: Sequence[str] = ()) -> None:
     app.add_exception_handler(InvalidInput, _refused)
     app.add_exception_handler(refusals.NotReady, _not_ready)
     app.add_exception_handler(RequestValidationError, invalid_request)
-    app.add_exception_handler(ClientDisconnect, _gone)
+    app.add_exception_handler(ClientDisconnect, _disconnected)
     app.add_exception_handler(HTTPException, _http)
-    app.add_exception_handler(OSError, _of_the_system)
+    app.add_exception_handler(OSError, _system_error)
     app.add_exception_handler(Exception, _unexpected)
 
 
 def _respond(problem: Problem, headers: Mapping[str, str] | None = None) -> Response:
-    # Escaped to ASCII: what was found may hold half characters, which UTF-8 cannot carry.
+    # Escaped to ASCII, since the found value may contain lone surrogates.
     body = json.dumps(problem.model_dump(exclude_none=True))
     return Response(body, problem.status, headers=headers, media_type=MEDIA_TYPE)
 
@@ -189,7 +185,7 @@ def _refused(request: Request, error: Exception) -> Response:
 
 
 def problem_response(error: InvalidInput, path: str | None) -> Response:
-    """The answer that says what an :class:`InvalidInput` (or a refusal) says."""
+    """The response for an :class:`InvalidInput` or a refusal."""
     headers: dict[str, str] = {}
     if isinstance(error, LATER):
         headers["Retry-After"] = RETRY_AFTER
@@ -202,10 +198,10 @@ def problem_response(error: InvalidInput, path: str | None) -> Response:
     return _respond(problem_of(error, path), headers)
 
 
-def _of_the_system(request: Request, error: Exception) -> Response:
-    """A full disk, whatever was to be written; all else is unexpected."""
+def _system_error(request: Request, error: Exception) -> Response:
+    """A full disk; all other errors are unexpected."""
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        full = refusals.StorageFull("disk", "no space left", "another try, once there is room")
+        full = refusals.StorageFull("disk", "no space left", "a later request, when there is free space")
         return problem_response(full, request.url.path)
     raise error
 
@@ -224,11 +220,11 @@ def _http(request: Request, error: Exception) -> Response:
     path = request.url.path
     if error.status_code == NOT_FOUND.status:
         return _respond(
-            make_problem(NOT_FOUND, f"nothing is at {path}; /docs lists every address", instance=path)
+            make_problem(NOT_FOUND, f"unknown address {path}; see /docs for all addresses", instance=path)
         )
     if error.status_code == UNREADABLE.status:
         fault = Fault(
-            field="body", found="no readable JSON", accepted="a JSON object in UTF-8, not nested deeply"
+            field="body", found="unreadable JSON", accepted="a JSON object in UTF-8, not deeply nested"
         )
         words = f"{fault.field}: found {fault.found}; accepted: {fault.accepted}"
         return _respond(make_problem(UNREADABLE, words, [fault], instance=path))
@@ -237,13 +233,13 @@ def _http(request: Request, error: Exception) -> Response:
     if error.status_code != HTTPStatus.METHOD_NOT_ALLOWED:
         return _respond(make_problem(kind, str(error.detail), instance=path), error.headers)
     allowed = ", ".join(_methods(request))
-    detail = f"{request.method} is not possible at {path}; accepted: {allowed}"
+    detail = f"{request.method} is not allowed at {path}; accepted: {allowed}"
     return _respond(make_problem(kind, detail, instance=path), {"Allow": allowed})
 
 
 def _methods(request: Request) -> list[str]:
-    """What can be asked of this address; the router itself names the first route alone."""
-    # A mount takes every method at first; it holds static files, which can only be read.
+    """The allowed methods of an address; the router only reports those of the first route."""
+    # Mounts match every method; they contain static files, which are read-only.
     routes = [route for route in request.app.routes if not isinstance(route, Mount)]
     found = [
         method
@@ -253,20 +249,20 @@ def _methods(request: Request) -> list[str]:
     return found or ["GET", "HEAD"]
 
 
-def _gone(request: Request, error: Exception) -> Response:
-    """Nobody is left to read an answer; it is no fault of the service either."""
-    log.info("%s %s was broken off by the client", request.method, request.url.path)
+def _disconnected(request: Request, error: Exception) -> Response:
+    """The client has disconnected; nobody reads this response."""
+    log.info("%s %s: the client disconnected", request.method, request.url.path)
     return Response(status_code=UNREADABLE.status)
 
 
 def _unexpected(request: Request, error: Exception) -> Response:
-    # The id of the request is in every line that it logged, and the client has it or gave it.
+    # The request id is in all log lines of the request.
     number = getattr(request.state, "request_id", None) or secrets.token_hex(8)
     figures = {"request": number}
     words = "%s %s failed [%s]"
     log.error(words, request.method, request.url.path, number, exc_info=error, extra={"figures": figures})
-    detail = f"an error of the service, not of the request; it is in the log under {number}"
-    # This answer passes by every middleware.
+    detail = f"internal error of the service; see the log entry {number}"
+    # This response bypasses the middleware.
     headers = {**SECURITY, REQUEST_ID: number}
     return _respond(make_problem(INTERNAL, detail, instance=request.url.path, correlation_id=number), headers)
 

@@ -1,4 +1,4 @@
-"""Headers on every answer: nothing is loaded from elsewhere, framed, sniffed or sent on."""
+"""Security headers of every response."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 HEADERS = {
     "Content-Security-Policy": (
-        # Pictures that a key was sent for are shown from memory.
+        # Images requested with a key are shown from blobs.
         "default-src 'self'; img-src 'self' blob:; base-uri 'none'; form-action 'self'; "
         "frame-ancestors 'none'; object-src 'none'"
     ),

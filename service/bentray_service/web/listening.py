@@ -1,4 +1,4 @@
-"""The socket on which the service listens: a want of descriptors neither blocks it nor floods the log."""
+"""The listening socket; it handles a lack of file descriptors without blocking or flooding the log."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from typing import Any
 log = logging.getLogger("bentray.connections")
 
 EXHAUSTED = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
-# Connections that are taken in before others are served again.
+# Number of connections accepted in a row.
 AT_ONCE = 64
 
 
 class Listening(socket.socket):
-    """Takes a connection in at any time, and closes it at once where no descriptor is left for it.
+    """Accepts connections, and closes them at once when there is no file descriptor left.
 
-    asyncio would leave it in the queue, try again two thousand times a second, and log each.
+    asyncio would keep them in the queue, retry two thousand times a second, and log each attempt.
     """
 
     def __init__(self, *given: Any, **named: Any) -> None:
@@ -28,10 +28,10 @@ class Listening(socket.socket):
         self._taken = 0
 
     def accept(self) -> tuple[socket.socket, Any]:
-        """The next connection.
+        """Accept the next connection.
 
         Raises:
-            BlockingIOError: where there is none, or others are to be served first.
+            BlockingIOError: when there is none, or other work comes first.
         """
         self._taken += 1
         if self._taken > AT_ONCE:
@@ -45,19 +45,19 @@ class Listening(socket.socket):
         except OSError as error:
             if error.errno not in EXHAUSTED:
                 raise
-            log.error("no connection can be taken in (%s)", error.strerror)
+            log.error("cannot accept connections (%s)", error.strerror)
             self._turn_away()
             raise BlockingIOError from error
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._give_up_kept()
         super().close()
 
     def _turn_away(self) -> None:
-        """Use the descriptor that is kept for this to take one connection in, and close it."""
+        """Use the spare file descriptor to accept and close one connection."""
         self._give_up_kept()
-        # Nobody may be left who waits, or another thread was faster with the descriptor.
+        # The client may have left, or another thread may have used the descriptor.
         with suppress(OSError):
             super().accept()[0].close()
         try:

@@ -8,9 +8,9 @@ from pydantic import BaseModel, ConfigDict, Field
 class Fault(BaseModel):
     """One wrong value."""
 
-    field: str = Field(description="The name of what is wrong.")
-    found: str = Field(description="What was there.")
-    accepted: str = Field(description="What would have been taken.")
+    field: str = Field(description="Name of the invalid value.")
+    found: str = Field(description="Value found.")
+    accepted: str = Field(description="Values accepted.")
 
 
 class Problem(BaseModel):
@@ -21,7 +21,7 @@ class Problem(BaseModel):
             "examples": [
                 {
                     "type": "/problems/invalid-input",
-                    "title": "A value cannot be used",
+                    "title": "Invalid value",
                     "status": 422,
                     "detail": "index: found 99; accepted: 0 to 29",
                     "instance": "/v1/volumes/vol-0123456789abcdef0123/slice.png",
@@ -33,13 +33,13 @@ class Problem(BaseModel):
         }
     )
 
-    type: str = Field(description="Relative address that names the kind of problem.")
+    type: str = Field(description="Relative address of the type of problem.")
     title: str
     status: int
-    detail: str = Field(description="What went wrong, in words.")
-    instance: str | None = Field(None, description="The path that was asked for.")
+    detail: str = Field(description="Explanation of this problem.")
+    instance: str | None = Field(None, description="Path of the request.")
     field: str | None = None
     found: str | None = None
     accepted: str | None = None
-    errors: list[Fault] | None = Field(None, description="Every wrong value, where there may be several.")
-    correlation_id: str | None = Field(None, description="Quote it to find the error in the log.")
+    errors: list[Fault] | None = Field(None, description="All invalid values.")
+    correlation_id: str | None = Field(None, description="Identifier of the error in the log.")

@@ -1,4 +1,4 @@
-"""HTTP as the service speaks it: patient with bodies, not with silence, and with a bound on connections."""
+"""The HTTP protocol of one connection, counted against the limits, with a time limit for slow readers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .connections import Connections
 from .errors import problem_response
 from .unread_bodies import UnreadBodies, last
 
-# In which so much of an answer must be taken, or its rest: who does not read holds a file open.
+# Time in which a client must read this many bytes of a response, or its rest, s.
 ANSWER_S = 60.0
 LEAST_BYTES = 64 * 1024
 
@@ -21,7 +21,7 @@ JOB = "/v1/jobs/job-"
 
 
 class CountedProtocol(UnreadBodies):
-    """One connection, which is counted."""
+    """A connection that is counted."""
 
     _spare = False
     _stuck: asyncio.TimerHandle | None = None
@@ -31,33 +31,33 @@ class CountedProtocol(UnreadBodies):
         self._counted = connections
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Count it."""
+        """Count the connection."""
         super().connection_made(transport)
         self._spare = self._counted.add(self, self.client[0] if self.client else "")
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Count it no more."""
+        """Remove the connection."""
         self._counted.remove(self)
         self.resume_writing()
         super().connection_lost(exc)
 
     def drop(self) -> None:
-        """Close it: another needs its place."""
+        """Close the connection to make room for another."""
         self.transport.abort()
 
     def on_response_complete(self) -> None:
-        """Silent, unless a further request is there."""
+        """Mark the connection as idle, unless another request is waiting."""
         super().on_response_complete()
-        if not self.answering():
+        if not self.in_progress():
             self._counted.silent(self)
 
     def pause_writing(self) -> None:
-        """The client does not take what is sent as fast as it is made."""
+        """The client reads more slowly than the response is produced."""
         super().pause_writing()
         self._stuck = self.loop.call_later(ANSWER_S, self._look_again, self._left())
 
     def resume_writing(self) -> None:
-        """It has taken it."""
+        """The client has read the response so far."""
         if self._stuck is not None:
             self._stuck.cancel()
             self._stuck = None
@@ -89,13 +89,13 @@ class CountedProtocol(UnreadBodies):
             if _short(scope["method"], scope["path"]):
                 await app(scope, receive, send_last)
                 return
-            found = f"more than {most.of_address} of your address, or {most.most} in all"
-            error = TooManyConnections("connections", found, "fewer, each used again; see Retry-After")
+            found = f"more than {most.of_address} from your address, or {most.most} in total"
+            error = TooManyConnections("connections", found, "fewer, reused connections; see Retry-After")
             await problem_response(error, scope["path"])(scope, receive, send_last)
 
         return answer
 
 
 def _short(method: str, path: str) -> bool:
-    """Whether it is answered at once: how the service is, and how a job is."""
+    """Whether a request is answered at once: health checks and job records."""
     return method == "GET" and (path in SHORT or (path.startswith(JOB) and "/" not in path[len(JOB) :]))

@@ -1,4 +1,4 @@
-"""The page /docs: the REST interface written out from its OpenAPI description; it loads nothing foreign."""
+"""The page /docs: a REST reference generated from the OpenAPI description."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ curl http://127.0.0.1:8000/v1/jobs/job-…
 
 curl -o slice.png http://127.0.0.1:8000/v1/volumes/vol-…/slice.png
 
-# Where a key is asked for, every request but those of /health brings it:
+# If authentication is required, every request except /health needs a key:
 curl -H "Authorization: Bearer $BENTRAY_KEY" http://127.0.0.1:8000/v1/access"""
 
 
-# What FastAPI writes where a route says nothing.
+# Default description of FastAPI.
 UNSAID = "Successful Response"
 
 
@@ -104,7 +104,7 @@ def _answer(answer: Node) -> str:
 
 
 def type_words(schema: Node) -> str:
-    """A JSON schema in a few words."""
+    """A short description of a JSON schema."""
     if "$ref" in schema:
         return str(schema["$ref"]).rpartition("/")[2]
     if "anyOf" in schema:

@@ -1,4 +1,4 @@
-"""The id of a request: taken from the caller or made, told back, and put into every line that is logged."""
+"""Request ids: from the client or generated, returned in a header and added to all log lines."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from ..logs import about
 
 REQUEST_ID = "X-Request-ID"
-# Nothing that could end a line of a log or begin another.
+# Excludes line breaks, which would split log lines.
 _FORM = re.compile(r"[A-Za-z0-9._-]{1,64}")
 
 
 class RequestIds:
-    """ASGI middleware: the id is in ``request.state.request_id`` and in the header of the answer."""
+    """ASGI middleware that sets ``request.state.request_id`` and the response header."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app

@@ -1,4 +1,4 @@
-"""Bodies that hardly come are broken off: a slow or vanished client must not hold a file open for ever."""
+"""Time limit for slow request bodies."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ..refusals import BodyTimeout
 
-# So many bytes must come in the time allowed, or the rest of the body.
+# Bytes of the body that must arrive within the time limit.
 LEAST_BYTES = 64 * 1024
 
 
 class RequestRate:
-    """ASGI middleware: of every body, ``LEAST_BYTES`` or the end must come in each ``seconds``.
+    """ASGI middleware: ``LEAST_BYTES`` or the end of each body must arrive in every period of ``seconds``.
 
-    Otherwise whoever reads the body gets :class:`BodyTimeout`.
+    Otherwise reading the body raises :class:`BodyTimeout`.
     """
 
     def __init__(self, app: ASGIApp, seconds: float) -> None:
@@ -32,7 +32,7 @@ class RequestRate:
         async def receive_in_time() -> Message:
             nonlocal due, came, ended
             if ended:
-                # What is waited for now is that the client leaves.
+                # Only the disconnection is awaited now.
                 return await receive()
             try:
                 async with asyncio.timeout_at(due):

@@ -1,4 +1,4 @@
-"""Uvicorn as the service runs it: with our protocol, and connections for which there are descriptors."""
+"""The Uvicorn server with limits on connections."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .addresses import networks
 from .connections import ConnectionLimits, Connections
 from .protocol import CountedProtocol
 
-# What requests under way may take once the service is told to stop, s: an upload that never ends must not
-# keep it from stopping, and a client goes on with what it sent by tus.
+# Time for requests in progress when the service stops, s; longer uploads are aborted and can be
+# resumed with tus.
 PATIENCE_S = 5
 
 
@@ -24,7 +24,7 @@ class Server(uvicorn.Server):
 
     def __init__(self, app: Any, settings: ServiceSettings) -> None:
         """Raises:
-        InvalidInput: where this process may open too few files.
+        InvalidInput: if the limit of open files is too low.
         """
         self._descriptors = descriptors.raise_limit()
         self._of_address = settings.connections_per_address
@@ -32,13 +32,13 @@ class Server(uvicorn.Server):
         config = uvicorn.Config(
             app,
             http=cast("type[Any]", partial(CountedProtocol, self.connections)),
-            # Nobody speaks WebSocket here; and what asyncio does with sockets is what ours is made for.
+            # No WebSockets; the listening socket is made for asyncio.
             ws="none",
             loop="asyncio",
             log_config=None,
             log_level="warning",
             access_log=False,
-            # Whether a proxy is believed is for the door to say, by who really called.
+            # Trusted proxies are handled by the authentication.
             proxy_headers=False,
             lifespan="on",
             timeout_graceful_shutdown=PATIENCE_S,
@@ -46,7 +46,7 @@ class Server(uvicorn.Server):
         super().__init__(config)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Start the application, then serve."""
+        """Start the application and the server."""
         await super().startup(sockets)
         self.connections.limits = self._limits(descriptors.in_use())
 

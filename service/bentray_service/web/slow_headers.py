@@ -1,4 +1,4 @@
-"""Heads of requests come in time and are short, or the connection is closed: nobody is known before."""
+"""Time and size limits for request headers, before authentication."""
 
 from __future__ import annotations
 
@@ -14,61 +14,61 @@ from bentray_kernels.errors import InvalidInput
 from ..refusals import HeadersTooLarge, MalformedRequest, UnknownMethod
 from .errors import METHODS, problem_response
 
-# Within it the whole head of a request must be there.
+# Time limit for all headers of a request, s.
 HEAD_S = 10.0
-# Its length, and that of what follows a body in chunks.
+# Maximum length of the headers, and of trailers.
 LONGEST_HEAD = 32 * 1024
-# Requests that a client may send before it has the answer to the first of them.
+# Maximum number of pipelined requests.
 MOST_PIPELINED = 8
-# Of what has come, read at once, bytes: others wait for as long as it is parsed.
+# Bytes read at once; other connections wait while they are parsed.
 READ_BYTES = 64 * 1024
 # RFC 9112, section 3; the method is a token of RFC 9110, section 5.6.2.
 REQUEST_LINE = re.compile(rb"(?:\r?\n)*([!#$%&'*+.^_`|~0-9A-Za-z-]+) [!-~]+ HTTP/\d\.\d\r?\n")
 
 
 class HeaderTimeout(HttpToolsProtocol):
-    """HTTP/1.1 as Uvicorn speaks it by httptools, with a time and a length within which each head must come.
+    """The HTTP/1.1 protocol of Uvicorn with httptools, with limits for request headers.
 
-    What cannot be parsed is refused with a problem. Headers that follow a body are dropped: they came after
-    the caller was let in. A wish for another protocol is not heard (RFC 9110, section 7.8).
+    Malformed requests are rejected with a problem. Trailers are ignored, since they follow the
+    authentication, and so are upgrade requests (RFC 9110, section 7.8).
     """
 
     _due: asyncio.TimerHandle | None = None
     _in_head = False
-    # Of the head that comes, or of what follows a body; and all that was read with it.
+    # Length of the current headers or trailers, and of all data read with them.
     _head_bytes = _read_bytes = 0
-    # The head that just came asks for another protocol, so that the parser took no body for it.
+    # Whether the headers request an upgrade, so that the parser ignores the body.
     _upgrade = False
-    # Nothing that comes is heard any more.
-    _deaf = False
+    # Whether further data is ignored.
+    _ignoring = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Begin to wait for the first request."""
+        """Start the time limit of the first request."""
         if hasattr(transport, "max_size"):
             transport.max_size = READ_BYTES
         super().connection_made(transport)
         self._wait()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Wait no longer."""
+        """Stop the time limit."""
         if self._due is not None:
             self._due.cancel()
         super().connection_lost(exc)
 
     def on_response_complete(self) -> None:
-        """Begin to wait for the next request."""
+        """Start the time limit of the next request."""
         super().on_response_complete()
         self._wait()
 
     def data_received(self, data: bytes) -> None:
-        """Parse what came."""
-        if self._deaf or self.transport.is_closing():
+        """Parse received data."""
+        if self._ignoring or self.transport.is_closing():
             return
         self._unset_keepalive_if_required()
         try:
             self._parse(data)
             if self._in_head:
-                # The parser holds a header back until its end; the first of these bytes may be of a body.
+                # The parser reports a header after its end; the first bytes may belong to a body.
                 self._read_bytes += len(data)
                 _check_length(self._read_bytes - READ_BYTES)
         except httptools.HttpParserError as error:
@@ -77,12 +77,12 @@ class HeaderTimeout(HttpToolsProtocol):
             self.refuse(error)
 
     def _reason(self, error: httptools.HttpParserError, data: bytes) -> InvalidInput:
-        """What is wrong with what came last, which the parser did not take."""
+        """The reason why the last data is invalid."""
         cause = error.__context__
         if isinstance(cause, InvalidInput):
             return cause
-        # The parser reads nothing of a request whose method it does not know. Where others came before it
-        # in these data, they are being answered, and nobody is told.
+        # The parser stops at an unknown method. Earlier requests in the same data are still
+        # answered, without this error.
         line = REQUEST_LINE.match(data) if self._in_head else None
         if line is not None and line[1].decode() not in METHODS:
             return _unknown(line[1].decode())
@@ -96,7 +96,7 @@ class HeaderTimeout(HttpToolsProtocol):
             except httptools.HttpParserUpgrade as upgrade:
                 data = data[upgrade.args[0] :]
                 if self._upgrade:
-                    # As the parser would have taken it without the wish; only then it reads the body.
+                    # Parse again without the upgrade, so that the body is read.
                     self._upgrade = False
                     self.parser = httptools.HttpRequestParser(self)
                     data = self._plain_head() + data
@@ -113,23 +113,23 @@ class HeaderTimeout(HttpToolsProtocol):
         return b"\r\n".join([*lines, b"", b""])
 
     def on_message_begin(self) -> None:
-        """A head begins."""
+        """Headers begin."""
         super().on_message_begin()
         self._in_head, self._head_bytes, self._read_bytes = True, 0, 0
 
     def on_url(self, url: bytes) -> None:
-        """A part of the address came."""
+        """A part of the address was received."""
         self._count(len(url))
         super().on_url(url)
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """A header came, or what follows a body."""
+        """A header or trailer was received."""
         self._count(len(name) + len(value))
         if self._in_head:
             super().on_header(name, value.strip(b" \t"))
 
     def on_headers_complete(self) -> None:
-        """The head is there: begin to answer."""
+        """All headers were received."""
         self._in_head, self._head_bytes = False, 0
         if self.parser.should_upgrade():
             method = self.parser.get_method().decode("ascii")
@@ -139,32 +139,32 @@ class HeaderTimeout(HttpToolsProtocol):
             return
         hosts = sum(name == b"host" for name, _ in self.headers)
         if hosts != 1 and self.parser.get_http_version() == "1.1":
-            raise MalformedRequest("Host", f"{hosts} of it", "one, as HTTP/1.1 asks for")
+            raise MalformedRequest("Host", f"{hosts} Host headers", "exactly one in HTTP/1.1")
         if len(self.pipeline) >= MOST_PIPELINED:
-            accepted = f"at most {MOST_PIPELINED} that wait for an answer"
+            accepted = f"at most {MOST_PIPELINED} pipelined requests"
             raise MalformedRequest("requests", f"more than {MOST_PIPELINED} at once", accepted)
         super().on_headers_complete()
 
     def on_message_complete(self) -> None:
-        """The request is there."""
+        """The request was received completely."""
         if not self._upgrade:
             super().on_message_complete()
 
-    def answering(self) -> bool:
-        """Whether a request is being answered."""
+    def in_progress(self) -> bool:
+        """Whether a request is in progress."""
         return self.cycle is not None and (not self.cycle.response_complete or bool(self.pipeline))
 
     def refuse(self, error: InvalidInput) -> None:
-        """Tell what is wrong with what came, and close; an answer that is being made is finished first."""
-        self._deaf = True
-        if self.answering():
+        """Send an error and close; a response in progress is completed first."""
+        self._ignoring = True
+        if self.in_progress():
             self.cycle.keep_alive = False
             return
         self.transport.write(_written(problem_response(error, None)))
         self.leave()
 
     def leave(self) -> None:
-        """Close the connection once all that was written has gone."""
+        """Close the connection after all data was sent."""
         self.transport.close()
 
     def _count(self, more: int) -> None:
@@ -177,17 +177,17 @@ class HeaderTimeout(HttpToolsProtocol):
         self._due = self.loop.call_later(HEAD_S, self._close_if_still_waiting)
 
     def _close_if_still_waiting(self) -> None:
-        if not self.answering() and not self.transport.is_closing():
+        if not self.in_progress() and not self.transport.is_closing():
             self.transport.close()
 
 
 def _check_length(head: int) -> None:
     if head > LONGEST_HEAD:
-        raise HeadersTooLarge("head", f"more than {LONGEST_HEAD} bytes", f"at most {LONGEST_HEAD} bytes")
+        raise HeadersTooLarge("headers", f"more than {LONGEST_HEAD} bytes", f"at most {LONGEST_HEAD} bytes")
 
 
 def _malformed(reason: str) -> MalformedRequest:
-    return MalformedRequest("request", f"no HTTP/1.1 ({reason})", "a request as RFC 9112 writes it")
+    return MalformedRequest("request", f"malformed HTTP/1.1 ({reason})", "a request as in RFC 9112")
 
 
 def _unknown(method: str) -> UnknownMethod:
@@ -195,7 +195,7 @@ def _unknown(method: str) -> UnknownMethod:
 
 
 def _written(response: Response) -> bytes:
-    """An answer as it goes over the line, the last one of its connection."""
+    """The bytes of a response that closes its connection."""
     headers = [*response.raw_headers, (b"connection", b"close")]
     lines = b"".join(b"%s: %s\r\n" % one for one in headers)
     return STATUS_LINE[response.status_code] + lines + b"\r\n" + bytes(response.body)

@@ -1,4 +1,4 @@
-"""The upload protocol on every answer below /v1/uploads, and methods that a proxy does not let through."""
+"""Headers of tus on all responses below /v1/uploads, and the method override header."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ PLACE = "/v1/uploads"
 
 
 class TusHeaders:
-    """ASGI middleware: names the version, also where a request is refused."""
+    """ASGI middleware that adds the version of tus, also to errors."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -21,7 +21,7 @@ class TusHeaders:
             return
         wanted = Headers(scope=scope).get("x-http-method-override", "").upper()
         if scope["method"] == "POST" and wanted in ("PATCH", "DELETE"):
-            # In place: who counts and records requests outside of this is to see what was done.
+            # In place, so that the outer middleware logs the actual method.
             scope["method"] = wanted
 
         async def send_with_version(message: Message) -> None:

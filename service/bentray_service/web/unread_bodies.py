@@ -1,8 +1,9 @@
-"""After an answer to a request whose body was not read to its end, the connection is closed.
+"""Closes the connection after a response to a request whose body was not read completely.
 
-It would otherwise live for as long as the client sends a byte of that body now and then. What still comes is
-read for a moment and thrown away: data that nobody has read makes the kernel reset the connection, and the
-client might not see the answer.
+Otherwise a client could keep the connection open by sending a byte now and then. Further data is read and
+discarded for a moment: unread data makes the kernel reset the connection, and the client might not receive
+    the
+response.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
 
 from .small_chunks import MergedChunks
 
-# How long and how much is thrown away at most.
+# Limits for discarding data.
 LINGER_S = 2.0
 LINGER_BYTES = 8 * 1024 * 1024
 
@@ -22,20 +23,20 @@ CLOSE = (b"connection", b"close")
 
 
 class UnreadBodies(MergedChunks):
-    """Says ``Connection: close`` in such an answer, and does it."""
+    """Adds ``Connection: close`` to such a response, and closes the connection."""
 
     _leaving = False
     _thrown_away = 0
     _end: asyncio.TimerHandle | None = None
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """It is gone."""
+        """Stop the timer."""
         if self._end is not None:
             self._end.cancel()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Once the answer is given, nothing that comes matters."""
+        """Discard data after the response."""
         if not self._leaving:
             super().data_received(data)
             return
@@ -44,28 +45,28 @@ class UnreadBodies(MergedChunks):
             self.transport.abort()
 
     def on_headers_complete(self) -> None:
-        """The answer closes by way of us."""
+        """Let the response close through this protocol."""
         before = self.cycle
         super().on_headers_complete()
         if self.cycle is not before:
             self.cycle.transport = cast(asyncio.Transport, _Closing(self))
 
     def on_response_complete(self) -> None:
-        """There is no next request where this was the last."""
+        """Handle the end of the last response."""
         if self._leaving:
             self.server_state.total_requests += 1
         else:
             super().on_response_complete()
 
-    def answering(self) -> bool:
-        """What was answered is left to its end."""
-        return not self._leaving and super().answering()
+    def in_progress(self) -> bool:
+        """Whether a response is in progress."""
+        return not self._leaving and super().in_progress()
 
     def leave(self) -> None:
-        """Close, at once where nothing of a request is left to come."""
+        """Close the connection, after discarding data if the body was not read."""
         if self._leaving or self.transport.is_closing():
             return
-        if not self._deaf and not (self.cycle is not None and self.cycle.more_body):
+        if not self._ignoring and not (self.cycle is not None and self.cycle.more_body):
             super().leave()
             return
         self._leaving = True
@@ -73,7 +74,7 @@ class UnreadBodies(MergedChunks):
         try:
             self.transport.write_eof()
         except OSError:
-            # The client has closed its end, which nobody sees while reading is paused.
+            # The client has closed its side, which is not noticed while reading is paused.
             self.transport.abort()
             return
         self._end = self.loop.call_later(LINGER_S, self.transport.abort)
@@ -91,13 +92,13 @@ class UnreadBodies(MergedChunks):
 
 
 def last(message: Any) -> Any:
-    """The same beginning of an answer, which says that it is the last one of its connection."""
+    """The start of a response, with ``Connection: close``."""
     headers = [one for one in message.get("headers", []) if one != CLOSE]
     return {**message, "headers": [*headers, CLOSE]}
 
 
 class _Closing:
-    """The transport as an answer sees it."""
+    """The transport for a response."""
 
     def __init__(self, protocol: UnreadBodies) -> None:
         self._protocol = protocol

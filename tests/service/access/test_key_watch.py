@@ -124,6 +124,6 @@ def test_a_request_that_ended_is_not_watched(keys, held, tmp_path):
             await key_watch.asyncio.sleep(0.5)
         assert ended == [1]
         await key_watch.asyncio.sleep(0.2)
-        assert watch._looking is None
+        assert watch._polling is None
 
     key_watch.asyncio.run(go())

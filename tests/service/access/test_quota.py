@@ -111,7 +111,7 @@ def test_a_packed_volume_counts_as_it_will_be_stored_before_it_is_written(start,
         problem = settled(http, place)["problem"]
         assert (problem["status"], problem["type"]) == (507, "/problems/quota-used-up")
         said = problem["found"]
-    assert said == "0 bytes stored, 0 reserved, 11000000 more asked for"
+    assert said == "0 bytes stored, 0 reserved, 11000000 more requested"
     assert used(http) == (0, 0)
     assert kept(http) == 0
     assert http.get("/v1/volumes").json() == {"volumes": []}

@@ -40,7 +40,7 @@ def test_it_fails_in_one_line_when_bent_rays_do_not_win(
     monkeypatch.setattr(module, "JOBS", {"straight": {"rays": "straight"}, "bent": {"rays": "straight"}})
     result = bentray("demo", *SMALL, "-o", tmp_path)
     assert result.exit_code == 1
-    assert "do not beat straight ones" in result.stderr.splitlines()[-1]
+    assert "are not better than straight rays" in result.stderr.splitlines()[-1]
     assert "rms error" in result.stdout, "the figures are shown all the same"
 
 

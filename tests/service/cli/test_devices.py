@@ -12,7 +12,7 @@ from typer.testing import Result
 from bentray_kernels import opencl
 from bentray_kernels.opencl import Choice, Device, OpenCLFallbackWarning, Verdict
 from bentray_service.cli import opencl_help
-from bentray_service.cli.output.terminal import show_our_warnings_in_a_line
+from bentray_service.cli.output.terminal import show_warnings_on_one_line
 
 GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True, "/usr/lib/libfast.so.1")
 CPU = Device(
@@ -66,11 +66,11 @@ def test_without_devices_the_way_out_is_said(
     monkeypatch.setattr(opencl_help.shutil, "which", lambda name: f"/usr/bin/{name}")
     first, second = bentray("devices").stdout.splitlines()
     assert first == "this machine has no OpenCL device; fim-opencl computes without OpenCL, as fim"
-    assert second.startswith("what helps: ")
+    assert second.startswith("suggestion: ")
     assert "apt-get install pocl-opencl-icd" in second
     figures = json.loads(bentray("devices", "--json").stdout)
     assert (figures["chosen"], figures["devices"]) == (None, [])
-    assert figures["help"] == second.removeprefix("what helps: ")
+    assert figures["help"] == second.removeprefix("suggestion: ")
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_hidden_devices_are_said_to_be_hidden(
     monkeypatch.setenv("BENTRAY_OPENCL_DEVICE", "none")
     first, second = bentray("devices").stdout.splitlines()
     assert first.startswith("BENTRAY_OPENCL_DEVICE=none hides every device; ")
-    assert second.startswith("what helps: unset BENTRAY_OPENCL_DEVICE")
+    assert second.startswith("suggestion: unset BENTRAY_OPENCL_DEVICE")
 
 
 def test_a_wish_that_fits_nothing_lists_what_there_is(
@@ -118,7 +118,7 @@ def test_that_another_method_takes_over_is_one_line_on_stderr(
 ) -> None:
     others: list[object] = []
     monkeypatch.setattr(warnings, "showwarning", lambda message, *more: others.append(message))
-    show_our_warnings_in_a_line()
+    show_warnings_on_one_line()
     warnings.showwarning(
         "no OpenCL device can be used, fim takes over", OpenCLFallbackWarning, "choice.py", 1
     )

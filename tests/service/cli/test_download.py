@@ -66,7 +66,7 @@ def test_a_format_by_its_name(bentray: Callable[..., Result], tmp_path: Path, as
     ("what", "name", "said"),
     [
         ("mesh-1", "m.ply", "id: found 'mesh-1'"),
-        (SCAN, "scan.mat", "a name that ends in .h5"),
+        (SCAN, "scan.mat", "a name ending in .h5"),
         (VOLUME, "v.png", ".nii, .mha, .mat, .npy"),
         (SCAN, "there.h5", "(exists)"),
     ],

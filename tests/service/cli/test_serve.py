@@ -87,8 +87,8 @@ def test_an_option_wins_over_the_environment(monkeypatch: pytest.MonkeyPatch, tm
 
 
 def test_who_can_reach_it_is_said() -> None:
-    assert "open on loopback only" in module._reach(asks=False)
-    assert "asked for a key" in module._reach(asks=True)
+    assert "Only this machine can reach the service" in module._access_note(required=False)
+    assert "Authentication by API key" in module._access_note(required=True)
 
 
 def test_it_is_not_open_to_others(bentray: Callable[..., Result], tmp_path: Path) -> None:
@@ -97,7 +97,7 @@ def test_it_is_not_open_to_others(bentray: Callable[..., Result], tmp_path: Path
     assert "Traceback" not in result.stderr
     last = result.stderr.splitlines()[-1]
     assert last.startswith(
-        "bentray: host: found 0.0.0.0, which others reach, without any key; accepted: 127.0."
+        "bentray: host: found 0.0.0.0, reachable by others, without any key; accepted: 127.0."
     )
     assert "bentray keys create" in last
 

@@ -104,7 +104,7 @@ def test_the_last_words_of_one_that_ends_at_once_are_told(
 ) -> None:
     stand_in(monkeypatch, "import sys; sys.exit('bentray: the disk is full')")
     with (
-        pytest.raises(WorkFailed, match="ended at once: bentray: the disk is full"),
+        pytest.raises(WorkFailed, match="exited at once: bentray: the disk is full"),
         running_service(tmp_path, tmp_path / "log"),
     ):
         pytest.fail("it cannot have started")

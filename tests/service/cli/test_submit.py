@@ -157,7 +157,7 @@ def test_options_that_exclude_each_other_and_bad_addresses_are_refused(
 ) -> None:
     both = bentray("submit", scan_file, "-o", tmp_path, "--no-wait")
     assert both.exit_code == 2
-    assert "there is no result to fetch yet" in both.stderr
+    assert "there is no result to download yet" in both.stderr
     address = bentray("submit", scan_file, "--url", "lab:8000")
     assert address.exit_code == 2
     assert address.stderr.startswith("bentray: url: found 'lab:8000'")

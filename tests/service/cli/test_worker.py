@@ -132,7 +132,7 @@ def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path)
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        (("--memory-limit", "plenty"), "bentray: memory_limit: found 'plenty'; accepted: a size, as 4GiB"),
+        (("--memory-limit", "plenty"), "bentray: memory_limit: found 'plenty'; accepted: a size, e.g. 4GiB"),
         (("--tls", "nowhere"), "bentray: tls: found nowhere (without authority.pem)"),
         ((), "bentray: scheduler_address: found nonsense"),
     ],

@@ -117,15 +117,15 @@ def test_a_key_is_given_or_in_the_environment(serve, tmp_path, monkeypatch):
     key = ApiKey.new().shown()
     (tmp_path / "key").write_text(key)
     address = serve(first_key_file=tmp_path / "key")
-    with Client(address) as nobody, pytest.raises(ClientError, match="A key is needed") as refusal:
+    with Client(address) as nobody, pytest.raises(ClientError, match="Authentication required") as refusal:
         nobody.job("job-" + "0" * 20)
     assert refusal.value.status == 401
     monkeypatch.setenv("BENTRAY_KEY", key)
-    with Client(address) as client, pytest.raises(ClientError, match="nothing with this id") as unknown:
+    with Client(address) as client, pytest.raises(ClientError, match="Unknown id") as unknown:
         client.job("job-" + "0" * 20)
     assert key not in str(unknown.value)
     monkeypatch.delenv("BENTRAY_KEY")
-    with Client(address, key=key) as client, pytest.raises(ClientError, match="nothing with this id"):
+    with Client(address, key=key) as client, pytest.raises(ClientError, match="Unknown id"):
         client.job("job-" + "0" * 20)
 
 

@@ -79,7 +79,7 @@ def test_it_waits_longer_each_time_and_says_so_once(walk: Walk) -> None:
     away = [REFUSED, GONE, answered(502), answered(503), answered(504), answered(500)]
     assert walk.ask(LOOK, *away, "here") == "here"
     assert walk.pauses == [0.5, 1.0, 2.0, 4.0, 8.0, 15.0]
-    assert walk.told == ["refused; trying again for up to 300 s.", "The service answers again."]
+    assert walk.told == ["refused; retrying for up to 300 s.", "The service answers again."]
 
 
 def test_it_waits_as_long_as_the_service_asks(walk: Walk) -> None:
@@ -154,7 +154,7 @@ def test_a_job_whose_answer_was_lost_is_started_once(
     cuts = [1_000]
     told: list[str] = []
     with cutting(url, cuts) as proxy, Client(proxy.url, on_wait=told.append) as client:
-        with pytest.raises(ClientError, match="nothing with this id"):
+        with pytest.raises(ClientError, match="Unknown id"):
             client.job("job-" + 20 * "0")
         # As long as it takes to pass the cut.
         jobs = [client.submit(dataset, {"nodes": 16, "iterations": 1}).id for _ in range(4)]
@@ -177,7 +177,7 @@ def test_an_upload_is_stored_once_wherever_the_line_breaks(
     # In the creation, in the middle of the piece, and after it.
     cuts = [400, 400 + size // 2, 1200 + size]
     with cutting(url, cuts) as proxy, Client(proxy.url) as client:
-        with pytest.raises(ClientError, match="nothing with this id"):
+        with pytest.raises(ClientError, match="Unknown id"):
             client.job("job-" + 20 * "0")
         record = client.upload(source)
     assert cuts == []
@@ -189,7 +189,7 @@ def test_an_upload_is_stored_once_wherever_the_line_breaks(
 def test_so_it_is_asynchronously(serve: Callable[..., str], scan: Callable[..., Path], soon: None) -> None:
     async def call(url: str, told: list[str]) -> str:
         async with AsyncClient(url, on_wait=told.append) as client:
-            with pytest.raises(ClientError, match="nothing with this id"):
+            with pytest.raises(ClientError, match="Unknown id"):
                 await client.job("job-" + 20 * "0")
             dataset = (await client.upload(scan())).id
             return str((await client.submit(dataset)).id)
@@ -238,7 +238,7 @@ def test_a_job_is_waited_for_while_its_service_is_started_again(
             record = done.result(timeout=60.0)
             assert client.download(record.volume, "h5", tmp_path / "image.h5").stat().st_size > 0
     assert (record.id, record.state, len(work.calls)) == (job, "succeeded", 2)
-    assert told[0].endswith("trying again for up to 300 s.")
+    assert told[0].endswith("retrying for up to 300 s.")
     assert told[-1] == "The service answers again."
 
 

@@ -15,7 +15,7 @@ def test_lists_and_removals_go_beyond_a_page(bucket_url, monkeypatch):
     monkeypatch.setattr(module, "MOST_REMOVED", 2)
     names = [f"a/{number}" for number in range(5)]
     for name in (*names, "b"):
-        bucket.note(name, {})
+        bucket.put_metadata(name, {})
     assert [one.key for one in bucket.listed("a/")] == names
     bucket.remove([*names, "c"])
     assert [one.key for one in bucket.listed()] == ["b"]
@@ -23,9 +23,9 @@ def test_lists_and_removals_go_beyond_a_page(bucket_url, monkeypatch):
 
 def test_two_prefixes_of_a_bucket_do_not_meet(bucket_url):
     one, two = Bucket(bucket_url), Bucket(f"{bucket_url}-2/")
-    one.note("a", {"of": "one"})
-    two.note("a", {"of": "two"})
-    assert (one.told("a")["of"], two.told("a")["of"]) == ("one", "two")
+    one.put_metadata("a", {"of": "one"})
+    two.put_metadata("a", {"of": "two"})
+    assert (one.metadata("a")["of"], two.metadata("a")["of"]) == ("one", "two")
     assert [held.key for held in one.listed()] == ["a"]
 
 
@@ -37,7 +37,7 @@ def test_a_removal_that_is_refused_is_no_removal(bucket_url, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "ask", [lambda it: list(it.listed()), lambda it: it.note("a", {}), lambda it: it.remove("a")]
+    "ask", [lambda it: list(it.listed()), lambda it: it.put_metadata("a", {}), lambda it: it.remove("a")]
 )
 def test_a_bucket_that_is_not_there_is_no_missing_object(bucket_url, ask):
     with pytest.raises(StorageUnavailable):
@@ -50,8 +50,8 @@ def test_a_bucket_that_says_nothing_is_given_up(bucket_url, s3_server, monkeypat
     s3_server.silent.set()
     try:
         with pytest.raises(StorageUnavailable):
-            bucket.told("a")
+            bucket.metadata("a")
     finally:
         s3_server.silent.clear()
     monkeypatch.setattr(module, "ANSWER_S", 20.0)
-    assert bucket.told("a") is None
+    assert bucket.metadata("a") is None

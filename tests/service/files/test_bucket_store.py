@@ -41,7 +41,7 @@ class TestBucketStore(StoreSuite):
     @pytest.fixture
     def bucket(self, bucket_url):
         bucket = Bucket(bucket_url)
-        bucket.note(MARK, {"database": "mine"})
+        bucket.put_metadata(MARK, {"database": "mine"})
         return bucket
 
     @pytest.fixture
@@ -140,7 +140,7 @@ class TestBucketStore(StoreSuite):
     def test_what_was_damaged_in_the_bucket_is_not_brought(self, files, bucket):
         path = self.file(files)
         key = path.relative_to(files.root).as_posix()
-        told = bucket.told(key)
+        told = bucket.metadata(key)
         self.forget(path)
         (files.scratch / "damaged").write_bytes(b"abd")
         bucket.put(files.scratch / "damaged", key, {name: told[name] for name in told if name != "size"})
@@ -195,6 +195,6 @@ class TestBucketStore(StoreSuite):
         path = self.file(files)
         self.forget(path)
         bucket.remove([MARK, path.relative_to(files.root).as_posix()])
-        assert "not the one of this database" in files.store.fault()
+        assert "belongs to another database" in files.store.fault()
         with pytest.raises(StorageUnavailable):
             files.store.fetch(path)

@@ -72,7 +72,7 @@ def test_a_flipped_bit_is_found_by_the_next_process(opened, rows, caplog):
     flip(path)
     store = opened().store
     for _ in range(2):
-        with pytest.raises(Damaged, match=f"{path.stem}, other bytes than were stored"):
+        with pytest.raises(Damaged, match=f"{path.stem}, different content"):
             store.fetch(path)
     assert rows.get(LOCAL, path.stem)["damaged"] is not None
     assert len(caplog.records) == 1, "said once"
@@ -91,7 +91,7 @@ def test_a_file_that_another_program_writes_to_is_found_at_once(opened):
 def test_a_cut_file(opened, left):
     path = stored(opened())
     os.truncate(path, left)
-    with pytest.raises(Damaged, match=f"{left} bytes in place of 25600"):
+    with pytest.raises(Damaged, match=f"{left} bytes instead of 25600"):
         opened().store.fetch(path)
 
 
@@ -180,7 +180,7 @@ def test_the_work_of_a_job_changes_freely(opened, rows):
 def test_what_is_being_deleted_gets_no_checksum_again(opened, rows):
     # The rows are gone, the file is not yet.
     path = stored(opened())
-    rows.forget(LOCAL, [path.stem])
+    rows.delete(LOCAL, [path.stem])
     with pytest.raises(Deleted):
         opened().store.fetch(path)
     assert rows.all() == []

@@ -282,11 +282,11 @@ def test_a_clock_that_is_wrong_for_a_while_deletes_nothing(shelf, caplog):
         clocks.pass_by(60.0)
         keeper.sweep()
     assert shelf.rows() == {"datasets": 1, "too_old": 1}
-    assert "was set by +2678400 s" in caplog.text
+    assert "was changed by +2678400 s" in caplog.text
     clocks.wall -= 31 * DAY_S
     clocks.pass_by(60.0)
     keeper.sweep()
-    assert "was set by -2678400 s" in caplog.text
+    assert "was changed by -2678400 s" in caplog.text
     assert shelf.rows() == {"datasets": 1}
     for _ in range(3):
         clocks.pass_by(DAY_S)
@@ -342,7 +342,7 @@ class Clocks:
 
 def housekeeper(shelf, clocks, keep_days=30.0, uploads=None):
     observed = ObservedTime(shelf.database, lambda: clocks.steady)
-    orphans = Orphans(shelf.files, shelf.database, keeps=True)
+    orphans = Orphans(shelf.files, shelf.database, is_store=True)
     return Housekeeper(
         uploads or Uploads(shelf.database),
         shelf.files,

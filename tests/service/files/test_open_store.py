@@ -34,8 +34,8 @@ def test_a_bucket_belongs_to_one_database(databases, tmp_path, bucket_url):
 
 
 def test_a_prefix_that_others_use_is_left_alone(databases, tmp_path, bucket_url):
-    Bucket(bucket_url).note("photographs/1.jpg", {})
-    with pytest.raises(InvalidInput, match="where other things lie"):
+    Bucket(bucket_url).put_metadata("photographs/1.jpg", {})
+    with pytest.raises(InvalidInput, match="which contains other objects"):
         open_store(bucket_url, tmp_path, databases[0], 0)
 
 
@@ -43,7 +43,7 @@ def test_one_that_does_not_answer_or_is_not_there_is_refused(databases, tmp_path
     with pytest.raises(InvalidInput, match="BENTRAY_STORAGE_URL"):
         open_store("s3://nobody-made-this-one", tmp_path, databases[0], 0)
     s3_server.away.set()
-    with pytest.raises(InvalidInput, match="does not do what it is asked"):
+    with pytest.raises(InvalidInput, match="error of the bucket"):
         open_store(bucket_url, tmp_path, databases[0], 0)
 
 

@@ -59,7 +59,7 @@ def fill(files, database):
 
 
 def started(files, database, clock=None):
-    found = Orphans(files, database, keeps=True, clock=clock or Clock())
+    found = Orphans(files, database, is_store=True, clock=clock or Clock())
     found.begin()
     return found
 
@@ -127,5 +127,5 @@ def test_the_first_start_removes_nothing(files, database):
 def test_of_a_cache_only_what_is_made_of_things_goes(files, database):
     started(files, database)
     _, orphans = fill(files, database)
-    Orphans(files, database, keeps=False).begin()
+    Orphans(files, database, is_store=False).begin()
     assert sorted(path.parent.name for path in orphans if not path.exists()) == ["exports", "uploads"]

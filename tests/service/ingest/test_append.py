@@ -86,7 +86,7 @@ def test_one_writer_at_a_time_also_after_a_failure():
 
     def fail():
         with hold("a"), hold("b"):
-            with pytest.raises(Locked, match="one at a time"), hold("a"):
+            with pytest.raises(Locked, match="one request at a time"), hold("a"):
                 raise AssertionError
             raise ConnectionError
 

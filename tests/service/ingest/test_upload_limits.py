@@ -18,7 +18,7 @@ def test_a_tenant_may_have_so_many_and_the_service_takes_so_many():
             stack.enter_context(limits(tenant))
         with pytest.raises(RateLimited, match="2 on their way; accepted: at most 2 of a tenant"), limits(ONE):
             raise AssertionError
-        with pytest.raises(Busy, match="3 on their way"), limits(THIRD):
+        with pytest.raises(Busy, match="3 in progress"), limits(THIRD):
             raise AssertionError
     with limits(ONE), limits(THIRD):
         pass
@@ -35,7 +35,7 @@ def test_so_many_may_be_begun_in_a_minute_by_each_tenant():
     limits = UploadLimits(begun_per_minute=3)
     for _ in range(3):
         limits.check_begin(ONE)
-    with pytest.raises(RateLimited, match="more than 3 begun in a minute") as refused:
+    with pytest.raises(RateLimited, match="more than 3 new uploads per minute") as refused:
         limits.check_begin(ONE)
     assert 0.0 < refused.value.wait_s <= 20.0
     limits.check_begin(OTHER)

@@ -67,7 +67,7 @@ def test_silence_is_broken(start, uploaded, submitted, until, work, monkeypatch)
     job = submitted(http, uploaded(http))
     until(http, job["id"], "running")
     threading.Timer(0.5, http.app.state.leaving.set).start()
-    assert ": nothing new" in http.get(f"/v1/jobs/{job['id']}/events").text
+    assert ": keep-alive" in http.get(f"/v1/jobs/{job['id']}/events").text
 
 
 @pytest.mark.parametrize("last", ["x", "-1", str(2**70)])

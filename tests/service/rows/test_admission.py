@@ -31,7 +31,7 @@ def test_few_once_the_oldest_has_taken_long():
         for _ in range(MOST_WHILE_SLOW):
             stack.enter_context(sign_in())
         clock.now = 2.5
-        with pytest.raises(DatabaseUnavailable, match="8 requests that wait for a slow database"):
+        with pytest.raises(DatabaseUnavailable, match="8 requests waiting for a slow database"):
             stack.enter_context(sign_in())
     with sign_in():
         pass
@@ -63,5 +63,5 @@ def test_the_one_after_all_places_is_refused(monkeypatch):
     with ExitStack() as stack:
         for _ in range(MOST_AT_ONCE):
             stack.enter_context(sign_in())
-        with pytest.raises(DatabaseUnavailable, match="32 requests that wait for the database"):
+        with pytest.raises(DatabaseUnavailable, match="32 requests waiting for the database"):
             stack.enter_context(sign_in())

@@ -53,7 +53,7 @@ def test_held_by_another_program(tmp_path, monkeypatch, caplog):
             assert jobs.newest(LOCAL, 9) == [], "reading goes on"
         assert jobs.add(LOCAL, "simulation", {})["state"] == "queued"
     assert [record.message for record in caplog.records] == [
-        "the database cannot be used: database is locked"
+        "the database is unavailable: database is locked"
     ], "once a minute, not once a request"
 
 

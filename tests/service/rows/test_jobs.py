@@ -41,7 +41,7 @@ def test_a_queued_job_is_cancelled_at_once(jobs, queue, dataset):
 def test_a_full_queue_refuses_of_this_tenant_alone(jobs, queue, dataset):
     for _ in range(2):
         jobs.add(Tenant("a"), "reconstruction", {}, dataset, most_queued=2)
-    with pytest.raises(QueueFull, match="2 that wait"):
+    with pytest.raises(QueueFull, match="2 queued"):
         jobs.add(Tenant("a"), "reconstruction", {}, dataset, most_queued=2)
     jobs.add(Tenant("b"), "reconstruction", {}, dataset, most_queued=2)
     queue.claim()

@@ -181,7 +181,7 @@ def test_a_row_that_points_at_nothing_stops_it(old, tmp_path):
     with sqlite3.connect(tmp_path / "old.sqlite") as connection:
         connection.execute("INSERT INTO events VALUES (99, 'job-gone', 1.0, 'queued', '')")
     connection.close()
-    with pytest.raises(RuntimeError, match="1 rows would point at nothing"):
+    with pytest.raises(RuntimeError, match="1 rows with invalid references"):
         open_database(old)
 
 

@@ -99,11 +99,11 @@ def test_a_job_that_ends_while_it_is_cancelled_has_one_end(jobs, queue, dataset,
     def ask(number):
         if number:
             return jobs.request_cancel(LOCAL, job)
-        return queue.succeed(job, None) if end == "succeed" else queue.cancelled(job)
+        return queue.succeed(job, None) if end == "succeed" else queue.mark_cancelled(job)
 
     at_once(ask)
     if jobs.get(LOCAL, job)["state"] == "cancelling":
-        queue.cancelled(job)
+        queue.mark_cancelled(job)
     told = states(jobs, job)
     assert len([state for state in told if state in ("succeeded", "cancelled")]) == 1
     assert len(told) == len(set(told))

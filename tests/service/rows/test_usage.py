@@ -66,9 +66,7 @@ def test_of_many_uploads_begun_at_once_there_are_no_more_than_a_tenant_may_have(
     monkeypatch.setattr(uploading, "MOST_BEGUN", 5)
     uploads = Uploads(database)
     assert at_once(lambda n: uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)).count(True) == 5
-    with pytest.raises(
-        RateLimited, match="5 that are begun and not whole; accepted: fewer than 5"
-    ) as refused:
+    with pytest.raises(RateLimited, match="5 incomplete uploads; accepted: fewer than 5") as refused:
         uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)
     assert refused.value.wait_s > 0.0
     uploads.add(OTHER, "dataset", 1, {}, "", 60.0, 100)
@@ -90,7 +88,7 @@ def test_the_refusal_says_what_is_stored_reserved_and_allowed(database):
     quota = Quota(database, 100)
     quota.stored(LOCAL, "vol-1.nii", 50)
     quota.resize(LOCAL, "ds-1", 30)
-    found = "50 bytes stored, 30 reserved, 21 more asked for; accepted: at most 100 bytes for a tenant"
+    found = "50 bytes stored, 30 reserved, 21 more requested; accepted: at most 100 bytes per tenant"
     with pytest.raises(QuotaExceeded, match=found):
         quota.resize(LOCAL, "ds-2", 21)
     quota.resize(LOCAL, "ds-2", 20)
@@ -138,7 +136,7 @@ def test_an_upload_has_its_room_until_it_is_forgotten_refused_or_stored(database
     forgotten, refused, stored = (uploads.add(LOCAL, "dataset", 20, {}, "", 60.0, 100) for _ in range(3))
     assert quota.of(LOCAL) == Usage(0, 60)
     uploads.remove(forgotten["id"])
-    uploads.refuse(refused["id"], {"detail": "no scan"}, 60.0)
+    uploads.mark_refused(refused["id"], {"detail": "no scan"}, 60.0)
     quota.resize(LOCAL, stored["result_id"], 70)
     Datasets(database).add(LOCAL, stored["result_id"], size=20, sha256="0" * 64, summary=SUMMARY)
     uploads.done(stored["id"], 60.0)
@@ -176,7 +174,7 @@ def test_a_job_has_its_room_until_its_end(database, jobs, queue, dataset, end):
         "succeed": lambda: queue.succeed(job, volume),
         "animation": lambda: queue.succeed(job, None, size=9),
         "fail": lambda: queue.fail(job, {"detail": "odd"}),
-        "cancelled": lambda: queue.cancelled(job),
+        "cancelled": lambda: queue.mark_cancelled(job),
     }[end]()
     assert quota.of(LOCAL) == Usage(before + (9 if end in ("succeed", "animation") else 0), 0)
 

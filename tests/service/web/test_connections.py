@@ -176,7 +176,7 @@ def test_health_is_answered_where_all_are_at_work(app):
             assert b"retry-after: " in head.lower()
             problem = json.loads(body)
             assert problem["type"] == "/problems/too-many-connections"
-            assert "more than 3 of your address" in problem["found"]
+            assert "more than 3 from your address" in problem["found"]
         app.go.set()
         for one in working:
             assert read_answer(one) == (200, b"ok")
@@ -243,7 +243,9 @@ def test_a_want_of_descriptors_closes_and_goes_on(app, monkeypatch, caplog):
             assert read_answer(again) == (200, b"ok")
         for one in (*sockets, *waiting):
             one.close()
-    told = [record.getMessage() for record in caplog.records if "can be taken in" in record.getMessage()]
+    told = [
+        record.getMessage() for record in caplog.records if "cannot accept connections" in record.getMessage()
+    ]
     assert 1 <= len(told) <= 10
 
 

@@ -55,7 +55,7 @@ def test_invalid_input_names_field_found_accepted(http):
     assert answer.headers["content-type"] == "application/problem+json"
     assert answer.json() == {
         "type": "/problems/invalid-input",
-        "title": "A value cannot be used",
+        "title": "Invalid value",
         "status": 422,
         "detail": "speed: found -1; accepted: a speed > 0",
         "instance": "/refused",
@@ -117,7 +117,7 @@ def test_methods_are_told_of_included_routers_and_static_files_too(tmp_path):
 def test_a_body_that_is_no_readable_json_is_named(http, body):
     answer = http.post("/refused", content=body, headers={"Content-Type": "application/json"})
     assert (answer.status_code, answer.json()["type"]) == (400, "/problems/unreadable-body")
-    assert (answer.json()["field"], answer.json()["found"]) == ("body", "no readable JSON")
+    assert (answer.json()["field"], answer.json()["found"]) == ("body", "unreadable JSON")
 
 
 @pytest.mark.parametrize("body", [b"[]", b"null", b'"x"'])

@@ -280,7 +280,7 @@ def test_where_a_key_is_needed_the_page_asks_for_it_and_sends_it(page, serve, sc
     (tmp_path / "key").write_text(key.shown())
     address = serve(first_key_file=tmp_path / "key")
     page.goto(address)
-    page.locator("#access").get_by_text("A key is needed").wait_for()
+    page.locator("#access").get_by_text("Authentication required").wait_for()
     page.get_by_label("API key").fill(ApiKey.new().shown())
     page.get_by_role("button", name="Use key").click()
     page.locator("#key-error").get_by_text("unknown, revoked or expired").wait_for()

@@ -1,4 +1,4 @@
-"""The paths a command is given: checked before the work starts."""
+"""Validation of input and output paths before the work starts."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from bentray_kernels.errors import InvalidInput
 
 
 def input_file(path: Path, accepted: str = "the path of a dataset in HDF5") -> Path:
-    """``path`` if it is a file.
+    """Return ``path`` if it is a file.
 
     Raises:
-        InvalidInput: saying what was found there.
+        InvalidInput: otherwise.
     """
     if not path.is_file():
         found = "a folder" if path.is_dir() else "no such file"
@@ -22,10 +22,10 @@ def input_file(path: Path, accepted: str = "the path of a dataset in HDF5") -> P
 
 
 def output_folder(path: Path) -> Path:
-    """``path`` as a folder, made if it is absent.
+    """Return ``path`` as a folder, created if needed.
 
     Raises:
-        InvalidInput: where a file is in the way, or nothing can be written.
+        InvalidInput: when it cannot be created or written.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -35,42 +35,42 @@ def output_folder(path: Path) -> Path:
             "output", f"{path} (a file is in the way)", "a folder, or where one can be made"
         ) from error
     except OSError as error:
-        raise InvalidInput("output", f"{path} ({error.strerror})", "a folder that can be written") from error
+        raise InvalidInput("output", f"{path} ({error.strerror})", "a writable folder") from error
     return path
 
 
 def output_file(path: Path, *, force: bool, suffix: str = "") -> Path:
-    """``path`` if it may be written: absent, or a file that ``force`` gives up.
+    """Return ``path`` if it may be written.
 
     Args:
         path: of the file.
-        force: whether a file that is there may be replaced.
-        suffix: how its name must end, in small letters or capitals; empty for any name.
+        force: whether an existing file may be replaced.
+        suffix: required extension, case-insensitive; empty for any name.
 
     Raises:
-        InvalidInput: for another name, where something is in the way, or nothing can be written.
+        InvalidInput: for another name, an existing file, or a folder that cannot be written.
     """
     if not path.name.lower().endswith(suffix):
-        raise InvalidInput("output", path, f"a name that ends in {suffix}, the format of the file")
+        raise InvalidInput("output", path, f"a name ending in {suffix}")
     if path.is_dir():
         raise InvalidInput("output", f"{path} (a folder)", "the path of a file")
     if path.exists() and not force:
-        raise InvalidInput("output", f"{path} (exists)", "a new file, or --force to replace this one")
+        raise InvalidInput("output", f"{path} (exists)", "a new file, or --force to replace it")
     if not path.parent.is_dir():
-        raise InvalidInput("output", f"{path} (its folder is absent)", "a path in a folder that exists")
+        raise InvalidInput("output", f"{path} (its folder does not exist)", "a path in an existing folder")
     try:
         _try_writing(path.parent)
     except OSError as error:
         found = f"{path} (its folder: {error.strerror})"
-        raise InvalidInput("output", found, "a path in a folder that can be written") from error
+        raise InvalidInput("output", found, "a path in a writable folder") from error
     return path
 
 
 def check_apart(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path | None]) -> None:
-    """Refuse an output that would replace an input or another output, by whatever links it is reached.
+    """Reject an output that would replace an input or another output, also through links.
 
     Args:
-        outputs, inputs: paths by the words of the user's that gave them; None where there is none.
+        outputs, inputs: paths by option; None if absent.
 
     Raises:
         InvalidInput: naming the output.
@@ -81,10 +81,10 @@ def check_apart(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path | 
             continue
         other = seen.setdefault(path.resolve(), name)
         if other != name:
-            raise InvalidInput(name, f"{path}, which is {other} too", "a path of its own")
+            raise InvalidInput(name, f"{path}, the same file as {other}", "a separate file")
 
 
 def _try_writing(folder: Path) -> None:
-    """Find out now, not when the work is done; permissions alone do not tell."""
+    """Test write access now; permissions alone are not reliable."""
     with TemporaryFile(dir=folder):
         pass

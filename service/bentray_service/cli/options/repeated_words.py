@@ -1,4 +1,4 @@
-"""Options that may be given once for each value take their values in a row too: `--spacing 1 2 3`."""
+"""Repeated options with several values in a row: `--spacing 1 2 3`."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from typing import Any
 
 from typer.core import TyperCommand
 
-# In a row at most, one an axis.
+# Maximum number of values, one per axis.
 AXES = 3
 
 
 class RepeatedSpacing(TyperCommand):
-    """A command whose ``--spacing`` takes one number or a row of them."""
+    """A command whose ``--spacing`` takes one or several numbers."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         return super().parse_args(ctx, list(repeat_option("--spacing", args)))
 
 
 def repeat_option(option: str, words: Sequence[str]) -> Iterator[str]:
-    """``words`` with ``option`` before each number of the row that follows it."""
+    """``words`` with ``option`` repeated before each following number."""
     left = 0
     for word in words:
         if word == option:

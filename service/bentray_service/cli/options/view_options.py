@@ -1,64 +1,67 @@
-"""The options that set a view of a volume as glass, made into parameters of a command."""
+"""The options of the refractive rendering of a volume."""
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .option_tables import with_options
 from .settings_options import Option
 
 if TYPE_CHECKING:
     from bentray_workers.rendering.refraction_view import RefractionView
 
-# By field of the view, in the order of the help. The defaults are the view's own; a test compares them.
+# By field, in the order of the help. A test compares the defaults with those of the dataclass.
 OPTIONS = {
-    "iso": Option("--iso", list[float], "the middle of the range", "Rising iso-values; may be repeated."),
-    "index": Option("--index", list[float], "1.5", "Refractive index above each iso-value."),
-    "outside": Option("--outside", float, "1.0", "Refractive index below the first one."),
+    "iso": Option("--iso", list[float], "the middle of the range", "Increasing iso-values; repeatable."),
+    "index": Option("--index", list[float], "1.5", "Refractive index above each iso-value; repeatable."),
+    "outside": Option("--outside", float, "1.0", "Refractive index below the first iso-value."),
     "surroundings": Option(
-        "--surroundings", int, "0", "Layer that goes on around: 0 is below the first one."
+        "--surroundings", int, "0", "Layer that surrounds the volume; 0 is below the first iso-value."
     ),
-    "filter": Option("--filter", str, "bspline3", "central, trilinear, catmull-rom, bspline2 to bspline6."),
+    "filter": Option(
+        "--filter",
+        str,
+        "bspline3",
+        "Reconstruction filter: central, trilinear, catmull-rom, bspline2 to bspline6.",
+    ),
     "smoothing": Option(
-        "--smoothing", float, "0.0", "Of a B-spline; 10 to 100 takes off the steps of 8 bits."
+        "--smoothing", float, "0.0", "Smoothing of a B-spline; 10 to 100 removes 8-bit quantisation steps."
     ),
-    "camera": Option("--camera", str, "orthographic", "orthographic or perspective."),
-    "azimuth_deg": Option("--azimuth", float, "30.0", "Of the camera about the z axis, degrees."),
-    "elevation_deg": Option("--elevation", float, "20.0", "Of the camera above the x-y plane, degrees."),
-    "zoom": Option("--zoom", float, "1.0", "1 shows the whole volume."),
+    "camera": Option("--camera", str, "orthographic", "Projection: orthographic or perspective."),
+    "azimuth_deg": Option("--azimuth", float, "30.0", "Azimuth of the camera about the z axis, degrees."),
+    "elevation_deg": Option(
+        "--elevation", float, "20.0", "Elevation of the camera above the x-y plane, degrees."
+    ),
+    "zoom": Option("--zoom", float, "1.0", "Zoom factor; 1 shows the whole volume."),
     "backdrop": Option(
-        "--backdrop", str, "checkerboard", "checkerboard, picture (a test card), or a picture file."
+        "--backdrop", str, "checkerboard", "Backdrop: checkerboard, picture (a test image), or an image file."
     ),
-    "squares": Option("--squares", int, "16", "Of the checkerboard, across the shorter side."),
-    "backdrop_distance": Option("--distance", float, "1.0", "Of the backdrop, in diagonals of the volume."),
+    "squares": Option("--squares", int, "16", "Squares of the checkerboard across the shorter side."),
+    "backdrop_distance": Option(
+        "--distance", float, "1.0", "Distance of the backdrop, in diagonals of the volume."
+    ),
     "supersampling": Option(
-        "--supersampling", str, "prss", "none, prss (after refraction), real (more rays)."
+        "--supersampling", str, "prss", "Supersampling: none, prss (after refraction), or real (more rays)."
     ),
-    "degree": Option("--degree", int, "1", "Of the supersampling."),
-    "fresnel": Option("--fresnel", bool, "False", "Weaken light by what each surface mirrors away."),
+    "degree": Option("--degree", int, "1", "Degree of supersampling."),
+    "fresnel": Option("--fresnel", bool, "False", "Attenuate light by Fresnel reflection at each surface."),
     "mode": Option("--mode", str, "refract", "refract, or shaded: the first surface, lit."),
-    "width": Option("--width", int, "512", "Pixels."),
-    "height": Option("--height", int, "512", "Pixels."),
-    "depth": Option("--depth", int, "16", "Most surfaces that a ray may meet."),
+    "width": Option("--width", int, "512", "Image width, pixels."),
+    "height": Option("--height", int, "512", "Image height, pixels."),
+    "depth": Option("--depth", int, "16", "Maximum number of surfaces that a ray intersects."),
 }
 
 
 @dataclass(frozen=True)
 class ViewOptions:
-    """What a command line says of a view: the values of the options that were given, by field."""
+    """Values of the given options, by field."""
 
     given: dict[str, Any]
 
     def view(self) -> tuple[RefractionView, Path | None]:
-        """The view, and the picture file of its backdrop if it has one.
-
-        Raises:
-            InvalidInput: naming the first field that is wrong.
-        """
+        """The view, and the image file of its backdrop, if any; raises InvalidInput for an invalid field."""
         from bentray_workers.rendering.refraction_view import CHOICES, RefractionView
 
         given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in self.given.items()}
@@ -68,20 +71,4 @@ class ViewOptions:
         return RefractionView(**given), file
 
 
-def with_view_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with the options in place of its parameter ``asked``, an ``ViewOptions``."""
-
-    @wraps(command)
-    def run(**given: Any) -> None:
-        # Typer gives an empty list for an option that may be repeated and was not given.
-        options = {name: value for name in OPTIONS if (value := given.pop(name)) not in (None, [])}
-        command(asked=ViewOptions(options), **given)
-
-    parameters: list[inspect.Parameter] = []
-    for parameter in inspect.signature(command, eval_str=True).parameters.values():
-        if parameter.name == "asked":
-            parameters += [option.parameter(name) for name, option in OPTIONS.items()]
-        else:
-            parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
-    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    return run
+with_view_options = with_options(OPTIONS, ViewOptions)

@@ -1,1 +1,1 @@
-"""What commands print and write."""
+"""Output of commands: tables, JSON, progress bars and files."""

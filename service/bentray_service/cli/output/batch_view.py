@@ -1,4 +1,4 @@
-"""A batch as a person sees it: a live table while it runs, and what became of each dataset at the end."""
+"""Progress and report of a batch of datasets."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ if TYPE_CHECKING:
 COLUMNS = ("name", "state", "progress", "misfit", "seconds")
 NUMBERS = ("progress", "misfit", "seconds")
 
-# Lines of a terminal that the table needs beside its rows.
+# Lines of the table besides its rows.
 FRAME = 6
 
 
 @contextmanager
 def watching(entries: Sequence[Entry]) -> Iterator[Callable[[], None]]:
-    """What to call while a batch runs: on a terminal it renews a table, else it tells of each that ended."""
+    """Yield a function that shows the progress: a live table on a terminal, else one line per dataset."""
     console = Console(stderr=True)
     if console.is_terminal:
         with Live(console=console, transient=True, auto_refresh=False) as live:
             yield lambda: live.update(live_table(entries, console.height), refresh=True)
         return
-    told = {entry.name for entry in entries if entry.state == "skipped"}
+    reported = {entry.name for entry in entries if entry.state == "skipped"}
 
     def tell() -> None:
         for entry in entries:
-            if entry.state in ("succeeded", "failed") and entry.name not in told:
-                told.add(entry.name)
+            if entry.state in ("succeeded", "failed") and entry.name not in reported:
+                reported.add(entry.name)
                 remark(f"{entry.name} {entry.state} after {entry.seconds:.1f} s {entry.reason}".rstrip())
 
     yield tell
 
 
 def live_table(entries: Sequence[Entry], height: int) -> Table:
-    """What runs, then what ended last, as many as fit; above them how many there are of each."""
+    """Running datasets, then the most recently completed ones, with the number of datasets in each state."""
     counts = Counter(entry.state for entry in entries)
     running = [entry for entry in entries if entry.state == "running"]
     ended = [entry for entry in entries if entry.state in ("succeeded", "failed")]
@@ -70,10 +70,10 @@ def cells(entry: Entry) -> tuple[str, ...]:
 
 
 def report(folder: Path, results: Path, entries: Sequence[Entry], *, as_json: bool) -> None:
-    """The end of a batch: every dataset in a table, and why some failed; or all as JSON.
+    """Print the results of a batch as a table with the reasons of failures, or as JSON.
 
     Raises:
-        WorkFailed: when one failed.
+        WorkFailed: when a dataset failed.
     """
     counts = Counter(entry.state for entry in entries)
     failed = [entry for entry in entries if entry.state == "failed"]

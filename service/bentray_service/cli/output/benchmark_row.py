@@ -1,4 +1,4 @@
-"""One row of a benchmark: what was measured, the goal, and whether it is met."""
+"""One row of a benchmark: measured value, goal, and whether the goal is met."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ OPERATORS: dict[str, Callable[[float, float], bool]] = {
 
 @dataclass(frozen=True)
 class Row:
-    """A figure measured in this run beside the goal it is held to.
+    """A measured value and its goal.
 
     Attributes:
-        target: the label of the target, as ``R3 curved``.
-        value: what was measured; None where it could not be, and then ``detail`` says why.
-        goal: what it is compared with.
-        op: how: ``value op goal`` must hold.
+        target: label of the target, e.g. ``R3 curved``.
+        value: measured value; None if it could not be measured, with the reason in ``detail``.
+        goal: to compare with.
+        op: comparison: ``value op goal`` must hold.
         unit: of value and goal; empty for a ratio.
-        detail: how it was measured, short enough for a table.
+        detail: how it was measured, in a few words.
 
     Raises:
         InvalidInput: for an unknown ``op``, or a missing value without a reason.
@@ -49,11 +49,11 @@ class Row:
 
     @property
     def met(self) -> bool:
-        """Whether the goal is reached; a missing value or NaN never is."""
+        """Whether the goal is met; never for a missing value or NaN."""
         return self.value is not None and bool(OPERATORS[self.op](self.value, self.goal))
 
     def to_dict(self) -> dict[str, Any]:
-        """The row for JSON, keys in the order of a sentence."""
+        """The row for JSON."""
         return {
             "target": self.target,
             "value": None if self.value is None else float(self.value),

@@ -1,4 +1,4 @@
-"""How a command ends: exit code 0 when done, 1 when the work failed, 2 for bad input, 130 after Ctrl-C."""
+"""Exit codes: 0 success, 1 failure, 2 invalid input, 130 after Ctrl-C."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ BAD_INPUT = 2
 
 
 class WorkFailed(Exception):  # noqa: N818 - the command's ending, not a fault of the program
-    """The work could not be done although the input was good; the message is all the user needs."""
+    """The work failed although the input was valid; the message is for the user."""
 
 
 class Commands(TyperGroup):
-    """The group of all commands; turns what they raise into one line on stderr and an exit code.
+    """The group of all commands; converts errors to one line on stderr and an exit code.
 
-    A fault of the program itself is not hidden: its traceback is printed, with exit code 1.
+    Unexpected errors are shown with a traceback, with exit code 1.
     """
 
     def main(self, *args: Any, **options: Any) -> Any:
@@ -42,15 +42,15 @@ class Commands(TyperGroup):
             hint = f" (see {context.command_path} --help)" if context is not None else ""
             _end(error.format_message().rstrip(".") + hint, error.exit_code)
         except MemoryError as error:
-            _end(f"memory is too short: {str(error) or 'no more can be had'}", WORK_FAILED)
+            _end(f"out of memory: {str(error) or 'no details'}", WORK_FAILED)
         except OSError as error:
             _end(f"{error.filename or 'the system'}: {error.strerror or error}", WORK_FAILED)
         sys.exit(code if isinstance(code, int) else 0)
 
 
 @contextmanager
-def service_answers() -> Iterator[None]:
-    """Turn what the service refuses into bad input, and what it cannot do into failed work."""
+def client_errors() -> Iterator[None]:
+    """Convert errors of the client to invalid input or failed work."""
     from bentray_kernels.errors import InvalidInput
 
     from ...client import ClientError

@@ -1,4 +1,4 @@
-"""The figures of a reconstruction: what `reconstruction.json` holds and the closing tables show."""
+"""Metrics of a reconstruction, for `reconstruction.json` and the summary table."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from bentray_kernels.tomography.model_selection.selection import advice_of
 from bentray_workers.images.residuals import within
 from bentray_workers.images.truth_comparison import NotComparable, compare
 
-# Shares of the residuals, per cent, whose size the figures tell.
+# Percentages for the quantiles of the residuals.
 SHARES = (50, 90, 99)
 
 
 def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[str, Any]:
-    """Plain values for JSON, SI units, the unit in the name.
+    """The metrics of a reconstruction as plain values in SI units.
 
     Args:
-        result: what was reconstructed.
-        dataset: what it was reconstructed from; its truth, if any, gives the errors.
+        result: the reconstruction.
+        dataset: its input; errors are computed from its ground truth, if any.
         seconds: wall-clock time of the reconstruction, s.
 
     Returns:
-        Settings, residual history, speed range, time and provenance; ``residual_within_s`` tells the size
-        that a share of the last sweep's residuals does not exceed, by per cent; ``recovery_mean`` is that of
-        the resolution check inside the array; ``trials`` and ``reason`` say how ``auto`` chose.
-        What there is not is None, or empty for trials and reason.
+        settings, residual history, speed range, time and provenance; ``residual_within_s``: quantiles of the
+        absolute residuals of the last iteration by percentage; ``recovery_mean``: mean of the resolution
+        check inside the array; ``trials`` and ``reason``: candidate models and choice of ``auto``.
+        Missing values are None, missing trials and reasons are empty.
     """
     return {
         "seconds": round(seconds, 3),
@@ -58,7 +58,7 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
 
 
 def errors(result: Reconstruction, truth: Truth, roi: NDArray[np.bool_] | None = None) -> dict[str, Any]:
-    """What ``images.truth_comparison.compare`` found, or why nothing was compared, as plain values."""
+    """Errors against the ground truth, or the reason why they were not computed, as plain values."""
     try:
         found = compare(result, truth, roi)
     except NotComparable as reason:
@@ -77,13 +77,13 @@ def errors(result: Reconstruction, truth: Truth, roi: NDArray[np.bool_] | None =
 def _recovery_mean(result: Reconstruction) -> float | None:
     if result.recovery is None:
         return None
-    # Exactly 0 is what lies outside of what was reconstructed.
+    # Exactly 0 outside the reconstructed region.
     inside = result.recovery != 0.0
     return float(result.recovery[inside].mean()) if inside.any() else 0.0
 
 
 def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
-    """Rows (name, value) of the closing table, from what ``figures`` gave."""
+    """Rows (name, value) of the summary table, from the result of ``figures``."""
     low, high = found["speed_range_mps"]
     rows = [
         ("rays", found["settings"]["rays"]),

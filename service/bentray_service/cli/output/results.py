@@ -1,4 +1,4 @@
-"""The three files of a result: `reconstruction.h5`, `.png` and `.json` in one folder."""
+"""The files of a result: `reconstruction.h5`, `.png` and `.json`."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def write_results(
     draw: Callable[[], bytes] | None = None,
     **more: object,
 ) -> dict[str, Any]:
-    """Write the three files, each whole or not at all, and return the figures, ``more`` first among them.
+    """Write the three files atomically and return the metrics, preceded by ``more``.
 
-    The picture is drawn here, unless ``draw`` gives it once the ``.h5`` is there; the ``.json`` comes last.
+    The image is rendered here, or by ``draw`` after the ``.h5`` was written; the ``.json`` is written last.
     """
     from bentray_workers.files.reconstruction import write_reconstruction
     from bentray_workers.images.report import report_png
@@ -47,7 +47,7 @@ def write_results(
 
 
 def show_results(title: str, found: dict[str, Any], *, as_json: bool) -> None:
-    """The figures as a table, why ``auto`` chose what it chose, and the three paths; or all as JSON."""
+    """Print the summary table, the choice of ``auto`` and the paths; or all metrics as JSON."""
     from .figures import summary
 
     if as_json:

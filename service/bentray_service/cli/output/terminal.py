@@ -1,4 +1,4 @@
-"""What a command shows: figures on stdout; progress and remarks on stderr, progress on a terminal only."""
+"""Terminal output: results on stdout, progress and messages on stderr."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-# Columns of a table that goes into a file or a pipe.
+# Width of tables in files and pipes.
 WIDTH = 120
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON; nothing else is on stdout.")]
 
 
 class Step(Protocol):
-    """Moves a progress bar: so many done of so many, with a word beside it."""
+    """Updates a progress bar."""
 
     def __call__(self, done: int, total: int, note: str = "") -> None: ...
 
 
 def remark(text: str) -> None:
-    """One line for the person who watches, on stderr."""
+    """Print a message to stderr."""
     sys.stderr.write(text + "\n")
     sys.stderr.flush()
 
 
-def show_our_warnings_in_a_line() -> None:
-    """From now on a warning of ours is a remark; those of libraries look as Python shows them."""
+def show_warnings_on_one_line() -> None:
+    """Print warnings of Bentray as one-line messages."""
     usual = warnings.showwarning
 
     def show(message: Any, category: type[Warning], *place: Any, **more: Any) -> None:
@@ -48,13 +48,13 @@ def show_our_warnings_in_a_line() -> None:
 
 
 def print_json(figures: object) -> None:
-    """``figures`` as JSON, the only thing on stdout; NaN and infinity become null, as JSON has neither."""
+    """Print JSON to stdout; NaN and infinity become null."""
     sys.stdout.write(json.dumps(without_nan(figures), indent=2, allow_nan=False) + "\n")
     sys.stdout.flush()
 
 
 def without_nan(value: object) -> object:
-    """``value`` with every non-finite number replaced by None, in lists and dicts at any depth."""
+    """Replace non-finite numbers by None, in lists and dicts at any depth."""
     if isinstance(value, dict):
         return {key: without_nan(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -67,7 +67,7 @@ def without_nan(value: object) -> object:
 def print_table(
     title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], numbers: Collection[str] = ()
 ) -> None:
-    """A table on stdout; the columns named in ``numbers`` are set flush right."""
+    """Print a table to stdout; ``numbers`` are right-aligned columns."""
     table = Table(title=title, title_justify="left")
     for name in columns:
         table.add_column(name, justify="right" if name in numbers else "left", overflow="fold")
@@ -77,19 +77,19 @@ def print_table(
 
 
 def print_lines(lines: Iterable[str]) -> None:
-    """Lines on stdout as they are; paths are never folded, so that they can be copied."""
+    """Print lines to stdout without wrapping, so that paths can be copied."""
     sys.stdout.writelines(line + "\n" for line in lines)
     sys.stdout.flush()
 
 
 def residual_note(rms_s: float | None) -> str:
-    """The residual as it stands beside a progress bar; empty before the first sweep has ended."""
+    """The residual for a progress bar; empty before the end of the first iteration."""
     return "" if rms_s is None else f"residual {rms_s * 1e9:.0f} ns"
 
 
 @contextmanager
 def progress_bar(description: str) -> Iterator[Step]:
-    """A bar on stderr; call what it yields with (done, total, remark). Nothing is drawn off a terminal."""
+    """Show a progress bar on stderr, on a terminal only; yields a function to update it."""
     console = Console(stderr=True)
     columns: list[Any] = [
         TextColumn("{task.description}"),

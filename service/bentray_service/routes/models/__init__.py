@@ -1,1 +1,1 @@
-"""The records of the REST interface."""
+"""Pydantic models of the records of the REST interface."""

@@ -1,4 +1,4 @@
-"""What the REST interface answers of the quality of a scan."""
+"""Models of the quality report of a scan."""
 
 from __future__ import annotations
 
@@ -8,29 +8,31 @@ from pydantic import BaseModel, Field
 
 
 class FindingRecord(BaseModel):
-    """One thing that is wrong with a scan."""
+    """One finding about a scan."""
 
-    check: str = Field(description="Which check found it.")
+    check: str = Field(description="Name of the check.")
     found: str
     accepted: str
-    action: Literal["left out", "corrected", "refused", "reported"] = Field(
-        description="What is done about it."
-    )
+    action: Literal["left out", "corrected", "refused", "reported"] = Field(description="Action taken.")
     slice: int
-    elements: list[int] = Field(description="Those at fault.")
-    role: Literal["emission", "reception", ""] = Field(description="In which they are, if in one of the two.")
-    value: float | None = Field(description="The figure that decided.")
+    elements: list[int] = Field(description="Faulty elements.")
+    role: Literal["emission", "reception", ""] = Field(
+        description="Role of these elements, if only one is affected."
+    )
+    value: float | None = Field(description="The value compared with the threshold.")
     unit: str
-    pair_count: int | None = Field(None, description="How many pairs are at fault.")
-    first_pairs: list[tuple[int, int]] = Field([], description="The first of them, as (emission, reception).")
+    pair_count: int | None = Field(None, description="Number of affected pairs.")
+    first_pairs: list[tuple[int, int]] = Field(
+        [], description="First affected pairs, as (emission, reception)."
+    )
 
 
 class QualityRecord(BaseModel):
-    """The quality of a scan: what was checked and found."""
+    """The quality report of a scan: checks and findings."""
 
     verdict: Literal["clean", "usable", "refused"]
     pairs: int = Field(description="Pairs of different elements, over all slices.")
-    usable_pairs: int = Field(description="Those that go on; 0 of a refused scan.")
-    picker: str = Field(description="What read the times; empty where they came with the scan.")
-    checked: list[str] = Field(description="The checks that could be made.")
+    usable_pairs: int = Field(description="Pairs used for a reconstruction; 0 for a refused scan.")
+    picker: str = Field(description="Picker of first arrivals; empty for scans with travel times.")
+    checked: list[str] = Field(description="Names of the applicable checks.")
     findings: list[FindingRecord]

@@ -1,4 +1,4 @@
-"""What the REST interface answers: one model a resource, and how it is made of a row."""
+"""Models of datasets, jobs and volumes."""
 
 from __future__ import annotations
 
@@ -10,31 +10,29 @@ from pydantic import BaseModel, Field
 from ...web.problem import Problem
 
 State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
-# A list in the description, and no tuple: some generators of clients know none.
+# Described as a list, since some client generators do not support tuples.
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class DatasetRecord(BaseModel):
-    """One scan: an upload, or what a simulation made."""
+    """One scan, uploaded or simulated."""
 
     id: str
     title: str
     source: str
     license: str
-    dimension: int = Field(description="Coordinates of an element: 2 or 3.")
+    dimension: int = Field(description="Dimension of the element coordinates, 2 or 3.")
     elements: int = Field(description="Transducer elements.")
     ntx: int = Field(description="Emitters.")
     nrx: int = Field(description="Receivers.")
-    slices: int = Field(description="Axial slices; 1 for a plain 2-D scan.")
+    slices: int = Field(description="Number of axial slices; 1 for a 2-D scan.")
     has_traces: bool
     has_travel_times: bool
-    has_truth: bool = Field(
-        description="Whether the file tells what the object really is, as a phantom does."
-    )
+    has_truth: bool = Field(description="Whether the file contains the ground truth, as for a phantom.")
     water_speed_mps: float
-    job: str | None = Field(description="The simulation that made it.")
-    bytes: int = Field(description="Size of the file that was uploaded, or made.")
-    sha256: str = Field(description="SHA-256 of that.")
+    job: str | None = Field(description="Id of the simulation that created it.")
+    bytes: int = Field(description="Size of the uploaded or simulated file.")
+    sha256: str = Field(description="SHA-256 of this file.")
     created: datetime
     links: dict[str, str]
 
@@ -46,55 +44,56 @@ class DatasetList(BaseModel):
 
 
 class ProgressRecord(BaseModel):
-    """Emitter passes done and to do, over all slices and sweeps, pictures, or tasks; 0 of 0 at first."""
+    """Completed and total number of tasks, e.g. emitters over all iterations; 0 of 0 at first."""
 
     done: int
     total: int
     phase: str = Field(
-        description="What they are of: of a reconstruction examining, picking, or reconstructing, each of "
-        "which counts anew; else empty."
+        description="Current phase of a reconstruction: examining, picking or reconstructing, each counted "
+        "separately; else empty."
     )
 
 
 class SweepRecord(BaseModel):
-    """One pass over all emitters of one slice, or of the volume."""
+    """One iteration over all emitters of a slice, or of the volume."""
 
     slice: int
-    sweep: int = Field(description="Number of the pass, from 1.")
+    sweep: int = Field(description="Number of the iteration, from 1.")
     residual_rms_s: float | None = Field(description="Rms of measured minus predicted travel time, s.")
-    emitters: int = Field(description="Emitters that had data.")
-    stage: int = Field(0, description="From 0: coarser grids and straight rays that come first.")
-    given: bool = Field(True, description="Whether the misfit is that of the image which the stage gave.")
+    emitters: int = Field(description="Number of emitters with valid data.")
+    stage: int = Field(0, description="Stage, from 0: coarser grids and straight rays come first.")
+    given: bool = Field(True, description="Whether the misfit is that of the initial image of the stage.")
     band_hz: Pair | None = Field(
-        None, description="Of an image refined by waveforms; its residual is the shift that its misfit means."
+        None,
+        description="Frequency band of full-waveform inversion; the residual is the equivalent time shift.",
     )
-    misfit: float | None = Field(None, description="Of these waveforms: 0 where they agree.")
-    held_out_misfit: float | None = Field(None, description="The same of emitters that only judge.")
-    of_attenuation: bool = Field(False, description="Whether waveforms refined that, not the speed.")
+    misfit: float | None = Field(None, description="Waveform misfit in this band; 0 is a perfect match.")
+    held_out_misfit: float | None = Field(None, description="Waveform misfit of held-out emitters.")
+    of_attenuation: bool = Field(False, description="Whether the attenuation was updated, not the speed.")
 
 
 class PlanRecord(BaseModel):
-    """How a job was to be cut into tasks when it was asked for."""
+    """The planned decomposition of a job into tasks."""
 
-    decomposition: str = Field(description="slices or emitters side by side, or a volume.")
-    lane: str = Field(description="Which workers take the tasks: recon, or opencl for those with a device.")
-    tasks: int = Field(description="About how many there will be.")
-    workers: int = Field(description="Workers that could hold each of them.")
+    decomposition: str = Field(description="Parallel slices or emitters, or a volume.")
+    lane: str = Field(description="Worker resource of the tasks: recon, or opencl for workers with a device.")
+    tasks: int = Field(description="Approximate number of tasks.")
+    workers: int = Field(description="Number of workers with enough memory for each task.")
     call_bytes: dict[str, int] = Field(description="Memory of each kind of task.")
-    largest_bytes: int = Field(description="The most of these.")
-    field_bytes: int | None = Field(
-        None, description="Of a travel time while it is made, in a reconstruction."
+    largest_bytes: int = Field(description="Largest of these values.")
+    field_bytes: int | None = Field(None, description="Memory of a travel-time field of a reconstruction.")
+    rows_bytes: int | None = Field(
+        None, description="Memory of the rays of all emitters of a reconstruction."
     )
-    rows_bytes: int | None = Field(None, description="Of the rays of all emitters, in a reconstruction.")
-    state_bytes: int | None = Field(None, description="Of what comes back from a task of it.")
+    state_bytes: int | None = Field(None, description="Size of the result of a task of a reconstruction.")
     stored_bytes: int | None = Field(
-        None, description="The most that a reconstruction stores, its checkpoints among it."
+        None, description="Maximum storage of a reconstruction, including checkpoints."
     )
-    result_bytes: int | None = Field(None, description="The most that the file of a simulation takes.")
+    result_bytes: int | None = Field(None, description="Maximum size of the file of a simulation.")
     minutes: float | None = Field(
-        None, description="About how long a simulation takes these workers, with nothing else to do."
+        None, description="Estimated time of a simulation on these workers, without other jobs."
     )
-    why: str = Field(description="All of it in a sentence.")
+    why: str = Field(description="Summary of the plan in one sentence.")
 
 
 class JobRecord(BaseModel):
@@ -104,27 +103,25 @@ class JobRecord(BaseModel):
     kind: str
     state: State
     dataset: str | None = Field(
-        description="Id of the scan that a reconstruction reads, or that a simulation has made."
+        description="Id of the input of a reconstruction, or of the result of a simulation."
     )
     settings: dict[str, Any]
     plan: PlanRecord | None = Field(
-        description="Of a reconstruction or a simulation; none of one from before plans were made."
+        description="Of a reconstruction or a simulation; null for jobs of earlier versions."
     )
-    advice: str | None = Field(description="What method auto chose and why, once it has.")
+    advice: str | None = Field(description="Method chosen by auto, and the reason.")
     progress: ProgressRecord
-    history: list[SweepRecord] = Field(
-        description="Sweeps so far; of very many an even choice with the first and the last."
-    )
+    history: list[SweepRecord] = Field(description="Iterations so far; a long history is thinned evenly.")
     volume: str | None = Field(
-        description="Of a reconstruction its result, once there is one; of a refraction what it shows."
+        description="Id of the result of a reconstruction, or of the input of a refraction."
     )
-    mesh: str | None = Field(description="Id of the mesh that a geometry field is made of.")
-    field: str | None = Field(description="Id of that geometry field, once it is made.")
-    error: Problem | None = Field(description="Why it failed.")
+    mesh: str | None = Field(description="Id of the mesh of a geometry field.")
+    field: str | None = Field(description="Id of the resulting geometry field.")
+    error: Problem | None = Field(description="Problem of a failed job.")
     created: datetime
     started: datetime | None
     finished: datetime | None
-    seconds: float | None = Field(description="How long it has run.")
+    seconds: float | None = Field(description="Running time so far, s.")
     links: dict[str, str]
 
 
@@ -132,7 +129,7 @@ class JobList(BaseModel):
     """Jobs, newest first."""
 
     jobs: list[JobRecord]
-    next: str | None = Field(description="Address of the older ones; null where there are none.")
+    next: str | None = Field(description="Address of the next page; null on the last page.")
 
 
 class VolumeRecord(BaseModel):
@@ -140,22 +137,22 @@ class VolumeRecord(BaseModel):
 
     id: str
     source: Literal["reconstruction", "upload"]
-    title: str = Field(description="Of the scan, or of the upload.")
-    job: str | None = Field(description="The reconstruction that made it.")
-    dataset: str | None = Field(description="The scan that it was made of.")
+    title: str = Field(description="Title of the scan, or of the upload.")
+    job: str | None = Field(description="Id of the reconstruction that created it.")
+    dataset: str | None = Field(description="Id of the reconstructed scan.")
     axes: str = Field(description="Names of the axes, in order.")
     shape: list[int] = Field(description="Nodes along each axis.")
-    spacing_m: list[float | None] = Field(description="Node spacing; null where it is not even.")
+    spacing_m: list[float | None] = Field(description="Node spacing; null if not uniform.")
     origin_m: list[float | None] = Field(description="Position of node 0.")
-    value_range: Pair = Field(description="Least and greatest value.")
-    unit: str = Field(description="Of the values: m/s of a reconstruction; empty where it is not known.")
-    speed_range_mps: Pair | None = Field(description="The range of a reconstruction.")
+    value_range: Pair = Field(description="Minimum and maximum.")
+    unit: str = Field(description="Unit of the values: m/s for reconstructions; empty if unknown.")
+    speed_range_mps: Pair | None = Field(description="Speed range of a reconstruction.")
     water_speed_mps: float | None
     provenance: dict[str, str]
-    bytes: int = Field(description="Size of the file of a reconstruction, or of what was uploaded.")
-    sha256: str | None = Field(description="SHA-256 of what was uploaded.")
+    bytes: int = Field(description="Size of the result file, or of the uploaded file.")
+    sha256: str | None = Field(description="SHA-256 of the uploaded file.")
     created: datetime
-    links: dict[str, str] = Field(description="refraction is there for volumes in space with even spacing.")
+    links: dict[str, str] = Field(description="refraction is present for 3-D volumes with uniform spacing.")
 
 
 class VolumeList(BaseModel):

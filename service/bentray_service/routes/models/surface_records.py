@@ -1,4 +1,4 @@
-"""What the REST interface answers of meshes and geometry fields."""
+"""Models of meshes and geometry fields."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pydantic import BaseModel, Field
 
 
 class Repairs(BaseModel):
-    """What was done to make one sound surface of a mesh."""
+    """Repairs of a mesh."""
 
-    merged_vertices: int = Field(description="Vertices that lay in the place of another one.")
-    unused_vertices: int = Field(description="Vertices of no face.")
-    turned_faces: int = Field(description="Faces that ran against the others.")
-    parted_vertices: int = Field(description="Vertices added where parts of the surface only touched.")
-    dropped_pieces: int = Field(description="Of an iso-surface, all pieces but the largest.")
+    merged_vertices: int = Field(description="Merged duplicate vertices.")
+    unused_vertices: int = Field(description="Removed vertices without a face.")
+    turned_faces: int = Field(description="Faces with reversed orientation.")
+    parted_vertices: int = Field(description="Vertices duplicated at non-manifold points.")
+    dropped_pieces: int = Field(description="Removed components of an iso-surface, all but the largest.")
 
 
 class MeshRecord(BaseModel):
@@ -23,18 +23,18 @@ class MeshRecord(BaseModel):
 
     id: str
     title: str
-    format: str = Field(description="Of the file that was uploaded; isosurface of a volume's.")
-    volume: str | None = Field(description="The volume whose iso-surface it is.")
+    format: str = Field(description="Format of the uploaded file, or isosurface.")
+    volume: str | None = Field(description="Id of the volume of an iso-surface.")
     iso: float | None = Field(description="Its iso-value.")
     vertices: int
     faces: int
-    genus: int = Field(description="Handles: 0 of a ball, 1 of a ring.")
+    genus: int = Field(description="Number of handles: 0 for a sphere, 1 for a torus.")
     closed: bool
-    holes: int = Field(description="Boundaries; 0 where it is closed.")
-    coloured: bool = Field(description="Whether its vertices have colours.")
+    holes: int = Field(description="Number of boundary loops; 0 for a closed mesh.")
+    coloured: bool = Field(description="Whether the vertices have colours.")
     repairs: Repairs
-    bytes: int = Field(description="Size of what was uploaded, or of the file that was made.")
-    sha256: str = Field(description="SHA-256 of that.")
+    bytes: int = Field(description="Size of the uploaded or generated file.")
+    sha256: str = Field(description="SHA-256 of this file.")
     created: datetime
     links: dict[str, str]
 
@@ -46,57 +46,57 @@ class MeshList(BaseModel):
 
 
 class FieldSizes(BaseModel):
-    """How much there is of each."""
+    """Sizes of a geometry field."""
 
     faces: int
     vertices: int
-    points: int = Field(description="Of the surface, from which rays leave it in the inner field.")
-    image_pixels: int = Field(description="Along a side of the geometry image.")
-    outer_bytes: int = Field(description="Of the table of rays from outside.")
-    inner_bytes: int = Field(description="Of the table of rays that leave the surface.")
+    points: int = Field(description="Surface points of the inner field.")
+    image_pixels: int = Field(description="Pixels per side of the geometry image.")
+    outer_bytes: int = Field(description="Size of the outer field, the table of rays from outside.")
+    inner_bytes: int = Field(description="Size of the inner field, the table of rays from the surface.")
 
 
 class FieldErrors(BaseModel):
-    """How far things are from what they stand for, in edges of the unit cube; null where nothing was met."""
+    """Errors of a geometry field, in edges of the unit cube; null without any hit."""
 
-    image_rms: float = Field(description="Rms distance of the geometry image from the surface, either way.")
-    image_greatest: float = Field(description="Its greatest distance.")
-    conformal: bool = Field(description="Whether the layout of the geometry image keeps angles.")
+    image_rms: float = Field(description="Symmetric rms distance between geometry image and surface.")
+    image_greatest: float = Field(description="Symmetric maximum distance between them.")
+    conformal: bool = Field(description="Whether the parameterisation is conformal.")
     median_quasi_conformal: float | None = Field(
-        description="1 where a face keeps its angles; of half the faces less."
+        description="Median quasi-conformal distortion; 1 preserves angles."
     )
-    area_stretch: float = Field(description="How unevenly the layout scales areas; 1 is evenly.")
+    area_stretch: float = Field(description="Area distortion of the parameterisation; 1 is uniform.")
     lookup_wrong: float | None = Field(
-        description="Share of rays whose hit or miss accurate lookups tell wrong."
+        description="Share of rays with a wrong hit or miss in accurate lookups."
     )
     lookup_median: float | None = Field(
-        description="Distance of accurate lookups from the exact place, half of them."
+        description="Median distance between accurate lookups and exact intersections."
     )
-    lookup_99: float | None = Field(description="The same, 99 of 100.")
+    lookup_99: float | None = Field(description="99th percentile of this distance.")
 
 
 class FieldSeconds(BaseModel):
-    """Seconds of tasks, added up over those that ran side by side."""
+    """Computing times of a geometry field, summed over parallel tasks, s."""
 
     parameterisation: float
     image: float
-    error: float = Field(description="Of measuring the image, where no threshold had it measured before.")
+    error: float = Field(description="Measuring the error of the image, if not done for a threshold.")
     outer: float
     inner: float
-    border: float = Field(description="Of marking, in entries without a face, what is met beside them.")
+    border: float = Field(description="Marking table entries at the silhouette.")
 
 
 class FieldRecord(BaseModel):
-    """One geometry field; the same mesh and settings have the same one."""
+    """One geometry field, identified by mesh and settings."""
 
     id: str
-    mesh: str = Field(description="The mesh that it was first made of.")
-    job: str = Field(description="The job that made it.")
+    mesh: str = Field(description="Id of its first mesh.")
+    job: str = Field(description="Id of the job that created it.")
     settings: dict[str, Any]
     sizes: FieldSizes
     errors: FieldErrors
     seconds: FieldSeconds
-    bytes: int = Field(description="Of all of its files.")
+    bytes: int = Field(description="Size of all its files.")
     created: datetime
     links: dict[str, str]
 

@@ -1,4 +1,4 @@
-"""What the REST interface answers of uploads that come in pieces."""
+"""Models of resumable uploads."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from ...web.problem import Problem
 
 
 class UploadRecord(BaseModel):
-    """One upload that comes in pieces."""
+    """One resumable upload."""
 
     id: str
-    kind: Literal["dataset", "volume", "mesh"] = Field(description="What it becomes.")
+    kind: Literal["dataset", "volume", "mesh"] = Field(description="Type of the result.")
     state: Literal["receiving", "reading", "done", "refused"]
-    offset: int = Field(description="Bytes that are there.")
-    length: int = Field(description="Bytes of all of it.")
-    result: str | None = Field(description="Id of what it became, once it is done.")
-    problem: Problem | None = Field(description="Why it was refused.")
+    offset: int = Field(description="Bytes received.")
+    length: int = Field(description="Total size, bytes.")
+    result: str | None = Field(description="Id of the result of a completed upload.")
+    problem: Problem | None = Field(description="Problem of a refused upload.")
     created: datetime
-    expires: datetime = Field(description="When it goes, unless something comes; what it became stays.")
+    expires: datetime = Field(description="Expiry without further data; the result is kept.")
     links: dict[str, str]

@@ -104,7 +104,7 @@ export async function admitted(request) {
     return true;
   } catch (error) {
     // Where no key helps, the reason stands here.
-    at("access").textContent = at("key").hidden ? error.message : "A key is needed";
+    at("access").textContent = at("key").hidden ? error.message : "Authentication required";
     return false;
   }
 }

@@ -48,12 +48,12 @@ def test_an_output_file_needs_a_folder_and_is_none(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_takes_no_file_is_refused_before_the_work() -> None:
-    with pytest.raises(InvalidInput, match="a folder that can be written"):
+    with pytest.raises(InvalidInput, match="a writable folder"):
         output_folder(Path("/proc/self"))
 
 
 def test_a_file_that_cannot_be_written_or_has_another_name_is_refused_before_the_work(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="a folder that can be written"):
+    with pytest.raises(InvalidInput, match="a writable folder"):
         output_file(Path("/proc/self/p.png"), force=False)
     with pytest.raises(InvalidInput, match=r"ends in \.png"):
         output_file(tmp_path / "p.jpg", force=False, suffix=".png")

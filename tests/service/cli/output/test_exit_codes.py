@@ -11,7 +11,7 @@ import typer
 from typer.testing import CliRunner, Result
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.cli.output.exit_codes import Commands, WorkFailed, service_answers
+from bentray_service.cli.output.exit_codes import Commands, WorkFailed, client_errors
 from bentray_service.client import ClientError
 from bentray_service.client.errors import from_problem
 from bentray_service.web.problem import Problem
@@ -75,7 +75,7 @@ def refused(status: int, title: str, **fault: str) -> ClientError:
 def test_answers_of_the_service_end_a_command_as_they_should(
     error: ClientError, becomes: type[Exception], words: str
 ) -> None:
-    with pytest.raises(becomes, match=words), service_answers():
+    with pytest.raises(becomes, match=words), client_errors():
         raise error
 
 

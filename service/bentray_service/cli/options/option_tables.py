@@ -1,0 +1,41 @@
+"""Options generated from tables: they replace one parameter of a command."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from functools import wraps
+from typing import Any
+
+from .settings_options import Option
+
+Command = Callable[..., None]
+
+
+def with_options(
+    options: Mapping[str, Option], collect: Callable[[dict[str, Any]], Any]
+) -> Callable[[Command], Command]:
+    """A decorator that replaces the parameter ``asked`` of a command by options.
+
+    Args:
+        options: by field.
+        collect: makes the argument ``asked`` of the values of the given options, by field.
+    """
+
+    def decorate(command: Command) -> Command:
+        @wraps(command)
+        def run(**given: Any) -> None:
+            # Typer passes an empty list for a repeatable option that is not given.
+            values = {name: value for name in options if (value := given.pop(name)) not in (None, [])}
+            command(asked=collect(values), **given)
+
+        parameters: list[inspect.Parameter] = []
+        for parameter in inspect.signature(command, eval_str=True).parameters.values():
+            if parameter.name == "asked":
+                parameters += [option.parameter(name) for name, option in options.items()]
+            else:
+                parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        return run
+
+    return decorate
