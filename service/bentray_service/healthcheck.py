@@ -1,5 +1,6 @@
-"""Health check of a service, scheduler or worker: ``python -m bentray_service.healthcheck [ADDRESS
-[worker]]``.
+"""Health check of a service, scheduler or worker.
+
+Usage: ``python -m bentray_service.healthcheck [ADDRESS [worker]]``
 
 Without an address, checks the service on port 8000 of this machine. The address of a Dask scheduler, e.g.
 ``tcp://127.0.0.1:8786``, checks the scheduler; with ``worker``, a worker of this machine. The exit code is 0,
@@ -104,7 +105,7 @@ def main(words: list[str]) -> None:
     address, *part = words or ["http://127.0.0.1:8000"]
     chosen = CHECKS.get((address.partition("://")[0], *part))
     if chosen is None:
-        sys.stderr.write((__doc__ or "").partition("\n")[0] + "\n")
+        sys.stderr.write((__doc__ or "").splitlines()[2] + "\n")
         sys.exit(2)
     if trouble := chosen(address):
         sys.exit(trouble)

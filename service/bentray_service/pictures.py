@@ -96,7 +96,7 @@ class Pictures:
     async def field_map_png(self, tenant: Tenant, field: FieldRow, folder: Path, which: str) -> bytes:
         """Render the geometry image of a field, see ``bentray_workers.rendering.field_picture.map_png``."""
         what = "field", str(field["id"]), picture_cost.map_cost(field["figures"])
-        return bytes(await self._one(tenant, what, folder, field_picture.map_png, {"what": which}))
+        return bytes(await self._one(tenant, what, folder, field_picture.map_png, {"quantity": which}))
 
     async def quality(self, tenant: Tenant, dataset: DatasetRow, path: Path, picker: str) -> dict[str, Any]:
         """Create the quality report of a dataset, see ``bentray_workers.reconstruction.quality_report``."""

@@ -64,7 +64,7 @@ def test_the_plan_is_stored_and_told(http, dataset):
     assert found == job["plan"]
     assert (found["decomposition"], found["lane"], found["workers"]) == ("slices", "recon", 1)
     assert found["largest_bytes"] == max(found["call_bytes"].values()) > 0
-    assert "1 of 1 workers can hold it" in found["why"]
+    assert "1 of 1 workers can run it" in found["why"]
 
 
 def test_a_task_that_no_worker_can_hold_is_refused_before_it_is_stored(http, dataset, cluster):
