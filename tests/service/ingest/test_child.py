@@ -112,8 +112,8 @@ def test_the_readers_of_scans_and_volumes_load_nothing_compiled():
 def test_reading_a_scan_loads_no_compiled_kernels(scan, tmp_path):
     # They take seconds for every upload, and the reader's environment names no place to keep them.
     program = (
-        "import sys; from pathlib import Path; from bentray_service.ingest.child import convert\n"
-        "found = convert('dataset', Path(sys.argv[1]), Path(sys.argv[2]), {})\n"
+        "import sys; from pathlib import Path; from bentray_service.ingest.child import convert_upload\n"
+        "found = convert_upload('dataset', Path(sys.argv[1]), Path(sys.argv[2]), {})\n"
         "print(sorted(found), 'numba' in sys.modules)"
     )
     command = [sys.executable, "-c", program, str(scan()), str(tmp_path / "canonical.h5")]

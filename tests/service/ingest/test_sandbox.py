@@ -158,8 +158,8 @@ def test_a_full_disk_is_told_as_such(program, scan, tmp_path):
 def test_memory_is_limited(program, scan, tmp_path):
     program(
         "import sys, json\n"
-        "from bentray_service.ingest.child import limit\n"
-        "limit(int(sys.argv[sys.argv.index('--memory') + 1]), 60)\n"
+        "from bentray_service.ingest.child import limit_resources\n"
+        "limit_resources(int(sys.argv[sys.argv.index('--memory') + 1]), 60)\n"
         "try:\n    bytearray(2 * 1024**3)\n    found = 'room'\n"
         "except MemoryError:\n    found = 'no room'\n"
         "print(json.dumps({'error': {'field': 'file', 'found': found, 'accepted': ''}}))\n"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.limits import ELEMENTS, EMISSIONS, SAMPLES, SLICES
-from bentray_service.ingest.child import convert
+from bentray_service.ingest.child import convert_upload
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
 
@@ -47,7 +47,7 @@ def test_it_is_refused_by_its_name_its_number_and_the_limit(scan, tmp_path, plac
     assert path.stat().st_size < 8 * 2**20
     tracemalloc.start()
     try:
-        answer = convert("dataset", path, tmp_path / "out.h5", {})
+        answer = convert_upload("dataset", path, tmp_path / "out.h5", {})
         # HDF5 reads by itself, but into arrays of NumPy, which are counted.
         assert tracemalloc.get_traced_memory()[1] < 8 * 2**20
     finally:
@@ -62,7 +62,7 @@ def test_it_is_refused_by_its_name_its_number_and_the_limit(scan, tmp_path, plac
 
 def test_an_array_that_its_pairs_have_no_room_for_is_not_read(scan, tmp_path):
     path = scan(packed("traveltime/delta_tof_s", (4096, 4096), chunk=(512, 4096)))
-    error = convert("dataset", path, tmp_path / "out.h5", {})["error"]
+    error = convert_upload("dataset", path, tmp_path / "out.h5", {})["error"]
     assert error == {
         "field": "traveltime/delta_tof_s",
         "found": "shape (4096, 4096)",
@@ -107,6 +107,6 @@ def test_a_sampling_rate_that_nothing_has_is_refused(scan, tmp_path, rate):
     def change(file):
         file["acquisition"].attrs["sampling_rate_hz"] = rate
 
-    error = convert("dataset", scan(change), tmp_path / "out.h5", {})["error"]
+    error = convert_upload("dataset", scan(change), tmp_path / "out.h5", {})["error"]
     assert error["field"] == "acquisition@sampling_rate_hz"
     assert error["accepted"].endswith("Hz")

@@ -7,7 +7,7 @@ from threading import Barrier
 import pytest
 
 from bentray_service.files.data_folder import Files
-from bentray_service.files.deletion import Deletion, Stored
+from bentray_service.files.deletion import Deletion, StoredItem
 from bentray_service.refusals import InUse, JobFinished, KeyReused, UnknownId
 from bentray_service.rows import admission
 from bentray_service.rows.tenants import LOCAL
@@ -67,7 +67,7 @@ def test_a_scan_is_deleted_or_has_jobs(jobs, database, dataset, tmp_path):
 
     def ask(number):
         if number == AT_ONCE // 2:
-            return deletion.delete(Stored(LOCAL, "dataset", dataset))
+            return deletion.delete(StoredItem(LOCAL, "dataset", dataset))
         return jobs.add(LOCAL, "reconstruction", {}, dataset)
 
     told = at_once(ask)

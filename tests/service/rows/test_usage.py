@@ -9,7 +9,7 @@ import pytest
 
 from bentray_service.access.quota import LEASE_S, Quota
 from bentray_service.files.data_folder import Files
-from bentray_service.files.deletion import Deletion, Stored
+from bentray_service.files.deletion import Deletion, StoredItem
 from bentray_service.refusals import DatabaseUnavailable, QuotaExceeded, RateLimited
 from bentray_service.rows import uploads as uploading
 from bentray_service.rows.database import open_database
@@ -189,7 +189,7 @@ def test_what_is_deleted_gives_its_room_back_with_all_that_was_made_of_it(databa
     quota.stored(LOCAL, f"{dataset}.nii", 5)
     quota.stored(LOCAL, "vol-of-another", 7)
     assert quota.of(LOCAL) == Usage(60 + 9 + 5 + 7, 0)
-    Deletion(database, files).delete(Stored(LOCAL, "dataset", dataset))
+    Deletion(database, files).delete(StoredItem(LOCAL, "dataset", dataset))
     assert quota.of(LOCAL) == Usage(7, 0)
 
 
