@@ -104,7 +104,7 @@ def test_jobs_of_a_dead_process(tmp_path, cluster, uploaded, submitted, until, w
         done = until(http, job["id"])
     assert done["state"] == end
     if end == "failed":
-        assert "died" in done["error"]["detail"]
+        assert "crashed" in done["error"]["detail"]
 
 
 def test_two_services_cannot_share_a_folder(start):

@@ -34,7 +34,7 @@ def test_made_listed_and_revoked(bentray: Run, tmp_path: Path) -> None:
     assert "clinic" in table
     assert "never" in table
     revoked = bentray("keys", "revoke", key["id"], "--data", tmp_path)
-    assert (revoked.exit_code, revoked.stdout) == (0, f"{key['id']} of clinic is revoked\n")
+    assert (revoked.exit_code, revoked.stdout) == (0, f"{key['id']} of clinic revoked\n")
     listed = bentray("keys", "list", "--data", tmp_path, "--tenant", "clinic", "--json")
     assert json.loads(listed.stdout)[0]["state"] == "revoked"
 
