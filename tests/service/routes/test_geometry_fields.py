@@ -138,7 +138,7 @@ def test_a_known_picture_is_not_drawn_again(http, here, cluster, name):
     assert first.headers["content-type"] == "image/png"
     assert first.headers["cache-control"] == "private, no-cache"
     assert cluster.submitted[-1] == {"pure": False, "resources": {"render": 1}, "priority": 10} | (
-        {} if name == "image.png" else {"what": cluster.submitted[-1]["what"]}
+        {} if name == "image.png" else {"quantity": cluster.submitted[-1]["quantity"]}
     )
     drawn = len(cluster.submitted)
     tag = {"If-None-Match": first.headers["etag"]}
