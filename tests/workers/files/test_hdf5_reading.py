@@ -182,3 +182,17 @@ def test_the_file_is_closed_again(tmp_path):
         assert not reader.has("geometry/nothing")
     with h5py.File(path, "a"):
         pass
+
+
+def test_a_file_that_is_deleted_while_it_is_opened_is_rejected(tmp_path, monkeypatch):
+    path = tmp_path / "scan.h5"
+    write_dataset(path, small())
+    whole = h5py.File
+
+    def delete_first(name, *mode, **how):
+        path.unlink()
+        return whole(name, *mode, **how)
+
+    monkeypatch.setattr(h5py, "File", delete_first)
+    with pytest.raises(InvalidInput, match="accepted: a whole HDF5 file"), opened(path, Limits()):
+        pass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -35,6 +36,8 @@ def opened(path: Path, limits: Limits) -> Iterator[Reader]:
     try:
         with path.open("rb") as raw:
             start = raw.read(len(SIGNATURE))
+            # Of the open file: by its name it may be deleted at any time.
+            size = os.fstat(raw.fileno()).st_size
     except OSError as error:
         raise InvalidInput("file", f"{path.name}: {error.strerror}", accepted) from None
     try:
@@ -43,7 +46,7 @@ def opened(path: Path, limits: Limits) -> Iterator[Reader]:
         if not start:
             found = "an empty file"
         elif start == SIGNATURE:
-            found = f"an HDF5 file that is cut short or damaged ({path.stat().st_size} bytes)"
+            found = f"an HDF5 file that is cut short or damaged ({size} bytes)"
         else:
             found = f"a file that is not HDF5 (it begins with {start!r})"
         raise InvalidInput("file", found, accepted) from None
