@@ -102,7 +102,7 @@ def test_requests_and_jobs_can_be_followed_and_no_key_is_told(start, uploaded, s
     http.get("/v1/datasets", headers={"X-Request-ID": "bad\tid", "Authorization": "Bearer " + "bentray_x"})
     told = lines()
     assert token.shown().rpartition("_")[2] not in json.dumps(told)
-    started = next(one for one in told if one["message"].startswith(f"{job['id']} waits"))
+    started = next(one for one in told if one["message"].startswith(f"{job['id']} queued"))
     answered = next(one for one in told if one.get("route") == "/v1/jobs" and one["method"] == "POST")
     assert started["request"] == answered["request"]
     assert (started["job"], answered["status"], answered["who"]) == (job["id"], 202, token.id)

@@ -33,7 +33,9 @@ def bench(
     Example:  bentray bench reconstruction --json rows.json
     """
     if not json_file.parent.is_dir():
-        raise InvalidInput("--json", f"{json_file} (its folder is absent)", "a path in a folder that exists")
+        raise InvalidInput(
+            "--json", f"{json_file} (its folder does not exist)", "a path in an existing folder"
+        )
     measure = load(name, benchmark_folder())
     with progress_bar(f"Measuring {name}") as step:
         rows = list(measure(quick, step))

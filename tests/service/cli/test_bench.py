@@ -92,7 +92,7 @@ def test_the_file_for_the_rows_is_checked_before_anything_runs(
     (folder / "table" / "fake.py").write_text("raise SystemError('ran')")
     result = bentray("bench", "fake", "--json", tmp_path / "absent" / "rows.json")
     assert result.exit_code == 2
-    assert "its folder is absent" in result.stderr
+    assert "its folder does not exist" in result.stderr
 
 
 def test_outside_a_checkout_the_reason_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

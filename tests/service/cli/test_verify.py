@@ -64,7 +64,7 @@ def test_damage_is_named_until_it_is_restored(
         path.write_bytes(content[:-1] + b"?" if spoil == "flip" else content[:3])
     result = bentray("verify", "--data", tmp_path)
     assert result.exit_code == 1
-    assert result.stderr.endswith("bentray: 1 of 3 stored things are damaged\n")
+    assert result.stderr.endswith("bentray: 1 of 3 stored items are damaged\n")
     assert f"damaged: local datasets/{path.name}" in result.stdout
     path.write_bytes(content)
     assert bentray("verify", "--data", tmp_path).exit_code == 0

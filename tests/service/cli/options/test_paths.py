@@ -41,7 +41,7 @@ def test_an_output_file_is_overwritten_only_by_force(tmp_path: Path) -> None:
 
 
 def test_an_output_file_needs_a_folder_and_is_none(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="its folder is absent"):
+    with pytest.raises(InvalidInput, match="its folder does not exist"):
         output_file(tmp_path / "absent" / "scan.h5", force=True)
     with pytest.raises(InvalidInput, match=r"\(a folder\)"):
         output_file(tmp_path, force=True)
@@ -55,7 +55,7 @@ def test_a_folder_that_takes_no_file_is_refused_before_the_work() -> None:
 def test_a_file_that_cannot_be_written_or_has_another_name_is_refused_before_the_work(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="a writable folder"):
         output_file(Path("/proc/self/p.png"), force=False)
-    with pytest.raises(InvalidInput, match=r"ends in \.png"):
+    with pytest.raises(InvalidInput, match=r"ending in \.png"):
         output_file(tmp_path / "p.jpg", force=False, suffix=".png")
     assert output_file(tmp_path / "P.PNG", force=False, suffix=".png").name == "P.PNG"
 
@@ -64,7 +64,7 @@ def test_outputs_and_inputs_lie_apart(tmp_path: Path) -> None:
     (tmp_path / "a").touch()
     (tmp_path / "link").symlink_to(tmp_path / "a")
     check_apart({"-o": tmp_path / "b", "--map": None}, {"file": tmp_path / "a", "other": tmp_path / "a"})
-    with pytest.raises(InvalidInput, match="which is file too"):
+    with pytest.raises(InvalidInput, match="the same file as file"):
         check_apart({"-o": tmp_path / "link"}, {"file": tmp_path / "a"})
-    with pytest.raises(InvalidInput, match=r"--map: .*which is -o too"):
+    with pytest.raises(InvalidInput, match=r"--map: .*the same file as -o"):
         check_apart({"-o": tmp_path / "b", "--map": tmp_path / ".." / tmp_path.name / "b"}, {})
