@@ -35,7 +35,7 @@ def test_a_torn_line_is_passed_over_and_said(tmp_path, caplog):
     path.write_bytes(path.read_bytes() + b'{"time": "2026\xff\n')
     audit.append(ENTRY)
     assert len(list(entries(tmp_path))) == 2
-    assert f"{path.name}:2 is torn" in caplog.text
+    assert f"{path.name}:2 is incomplete" in caplog.text
 
 
 def test_what_cannot_be_stored_is_in_the_log(tmp_path, caplog):

@@ -93,5 +93,5 @@ def test_a_folder_that_cannot_be_closed_is_refused(tmp_path: Path, monkeypatch: 
     """As one of another user, or of a file system without modes."""
     tmp_path.chmod(0o755)
     monkeypatch.setattr(Path, "chmod", lambda path, mode: None)
-    with pytest.raises(InvalidInput, match=r"mode 0755\).*a folder that this user can close"):
+    with pytest.raises(InvalidInput, match=r"mode 0755\).*a folder whose permissions this user can change"):
         close_to_others(tmp_path)

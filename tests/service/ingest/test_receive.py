@@ -48,9 +48,9 @@ def test_what_is_sent_is_on_the_disk(tmp_path_factory, chunks, batch):
 
 def test_tiny_chunks_do_not_wait_by_the_million(tmp_path, monkeypatch):
     waiting = []
-    write = receiving._Behind._write
+    write = receiving._BatchWriter._write
     monkeypatch.setattr(
-        receiving._Behind, "_write", lambda self, batch: (waiting.append(len(batch)), write(self, batch))
+        receiving._BatchWriter, "_write", lambda self, batch: (waiting.append(len(batch)), write(self, batch))
     )
     assert run(tmp_path / "body", [b"x"] * 5000).size == 5000
     assert max(waiting) <= receiving.BATCH_CHUNKS < 5000

@@ -128,8 +128,8 @@ def test_a_canonical_file_may_be_larger_than_the_memory(program, scan, tmp_path)
         "import sys, json, resource\n"
         "from pathlib import Path\n"
         "from bentray_service.ingest import child\n"
-        "most = resource.getrlimit(resource.RLIMIT_FSIZE)[0]\n"
-        "child.convert_upload = lambda *given: {'ok': {'most': most}}\n"
+        "most = lambda: resource.getrlimit(resource.RLIMIT_FSIZE)[0]\n"
+        "child.convert_upload = lambda *given: {'ok': {'most': most()}}\n"
         "child.main()\n"
     )
     with (tmp_path / "large").open("wb") as file:

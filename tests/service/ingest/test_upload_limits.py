@@ -16,7 +16,7 @@ def test_a_tenant_may_have_so_many_and_the_service_takes_so_many():
     with ExitStack() as stack:
         for tenant in (ONE, ONE, OTHER):
             stack.enter_context(limits(tenant))
-        with pytest.raises(RateLimited, match="2 on their way; accepted: at most 2 of a tenant"), limits(ONE):
+        with pytest.raises(RateLimited, match="2 in progress; accepted: at most 2 per tenant"), limits(ONE):
             raise AssertionError
         with pytest.raises(Busy, match="3 in progress"), limits(THIRD):
             raise AssertionError

@@ -33,7 +33,7 @@ class FakeJobs:
         self.check()
         self.written.append((done, total, history, phase))
 
-    def told(self, job_id):
+    def held_state(self, job_id):
         self.check()
         self.asked += 1
         return self.now

@@ -139,7 +139,7 @@ def test_an_upload_has_its_room_until_it_is_forgotten_refused_or_stored(database
     uploads.mark_refused(refused["id"], {"detail": "no scan"}, 60.0)
     quota.resize(LOCAL, stored["result_id"], 70)
     Datasets(database).add(LOCAL, stored["result_id"], size=20, sha256="0" * 64, summary=SUMMARY)
-    uploads.done(stored["id"], 60.0)
+    uploads.mark_done(stored["id"], 60.0)
     # Its row goes, and what it has become stays.
     for one in (refused, stored):
         uploads.remove(one["id"])
