@@ -40,7 +40,7 @@ def test_what_runs_is_what_was_chosen(scans, monkeypatch, rays, cut, eikonal):
     problem = Problem.of(scans[cut], settings, 0)
     chosen = solver_of(settings, problem.region.ndim)
     solved, passed = [], []
-    solve, look = sart_update.solve, sart_update.EmitterPass.trace
+    solve, trace = sart_update.solve, sart_update.EmitterPass.trace
 
     def watched(speed, spacing, source, method):
         solved.append(method)
@@ -48,10 +48,10 @@ def test_what_runs_is_what_was_chosen(scans, monkeypatch, rays, cut, eikonal):
 
     def counted(self, slowness, front, *given):
         passed.append(front is not None)
-        return look(self, slowness, front, *given)
+        return trace(self, slowness, front, *given)
 
     monkeypatch.setattr(sart_update, "solve", watched)
-    monkeypatch.setattr(sart_update.EmitterPass, "look", counted)
+    monkeypatch.setattr(sart_update.EmitterPass, "trace", counted)
     advance(problem, settings, begin(initial_slowness(problem)), 1)
     assert bool(passed) is chosen.compiled
     if chosen.compiled:
