@@ -24,7 +24,7 @@ def test_a_look_at_waves_ends_with_its_job(tmp_path, monkeypatch):
     problem = waves.problem(0)
     water = Model(problem.water.speed + 0.0 * problem.region)
     assert evaluate_emitter(waves, 0, water, 0).misfit > 0.0
-    monkeypatch.setattr(time_blocks, "STRIP", 10**5)
+    monkeypatch.setattr(time_blocks, "BLOCK", 10**5)
     folder.rename(tmp_path / "job.ended")
     with pytest.raises(JobEnded):
         evaluate_emitter(waves, 0, water, 0)

@@ -98,7 +98,7 @@ def test_a_stop_does_not_wait_for_the_emission_at_work_which_ends_with_the_folde
 
 
 def test_an_emission_asks_between_its_steps_whether_anybody_waits(tmp_path, monkeypatch):
-    monkeypatch.setattr(time_blocks, "STRIP", 10**6)
+    monkeypatch.setattr(time_blocks, "BLOCK", 10**6)
     settings = PhantomScan(**WAVES).chosen()
     polled = []
 

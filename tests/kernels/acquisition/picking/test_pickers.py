@@ -9,7 +9,7 @@ import pytest
 from bentray_kernels.acquisition import PICKERS
 from bentray_kernels.acquisition.picking.pickers import picker_named
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography.settings import PickingSettings
 
 
 def test_every_picker_has_a_name_a_code_of_its_own_and_a_line_of_help():
@@ -18,7 +18,7 @@ def test_every_picker_has_a_name_a_code_of_its_own_and_a_line_of_help():
 
 
 def test_the_settings_offer_them_all():
-    assert get_args(get_type_hints(Settings)["picker"]) == tuple(PICKERS)
+    assert get_args(get_type_hints(PickingSettings)["picker"]) == tuple(PICKERS)
 
 
 def test_an_unknown_one_is_refused_with_the_names_known():
