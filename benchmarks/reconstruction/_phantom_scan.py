@@ -70,7 +70,7 @@ class PhantomScan:
     def of_table7(
         cls, z_m: float, nodes: int, elements: int, coupling_mps: float, snr: float | None, progress: Step
     ) -> PhantomScan:
-        """A slice of the Table 7 phantom as a world of its own, with amplitudes."""
+        """A slice of the 3-D breast phantom (Li 2008, Table 7) as a world of its own, with amplitudes."""
         ring = Ring(elements, ring_radius(TABLE7_SIDE_M, nodes))
         scan = TravelTimeScan(table7(coupling_mps, max(nodes, 128)).at(z_m), ring, TABLE7_SIDE_M, nodes)
         medium, everyone = scan.medium(attenuation=True), np.arange(elements)

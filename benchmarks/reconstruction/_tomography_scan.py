@@ -39,7 +39,7 @@ SOLVER = "eikonalfm factored"
 
 
 def breast(coupling_mps: float) -> PhantomSlice:
-    """The shapes of the Table 7 phantom between its slices, with ``SPEEDS_MPS``, in water of some speed."""
+    """Shapes of the 3-D breast phantom between its slices, with ``SPEEDS_MPS``, in water of some speed."""
     whole = table7(coupling_mps)
     parts = tuple(replace(part, speed_mps=SPEEDS_MPS[part.name]) for part in whole.parts)
     return replace(whole, parts=parts).at(HEIGHT_M)

@@ -23,7 +23,7 @@ def picture(truth: Truth, found: Mapping[str, Reconstruction]) -> bytes:
     axes_of = ((0, 1, "xy"), (0, 2, "xz"), (1, 2, "yz"))
     with drawing():
         figure = new_figure(2.4 * len(volumes) + 1.0, 5.6)
-        figure.suptitle("Table 7 phantom: sections through the middle")
+        figure.suptitle("3-D breast phantom (Li 2008, Table 7): sections through the middle")
         heights = [truth.sound_speed_mps.shape[b] * spacing[b] for _, b, _ in axes_of]
         panels = figure.subplots(3, len(volumes), squeeze=False, height_ratios=heights)
         for column, (name, volume) in enumerate(volumes.items()):

@@ -63,4 +63,9 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             )
     if not quick:
         PICTURE.parent.mkdir(exist_ok=True)
-        write_bytes(PICTURE, picture("Table 6 phantom: what chapter 6 compares, speed in m/s", panels, 11))
+        write_bytes(
+            PICTURE,
+            picture(
+                "2-D breast phantom (Li 2008, Table 6): what chapter 6 compares, speed in m/s", panels, 11
+            ),
+        )

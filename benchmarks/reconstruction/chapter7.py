@@ -53,5 +53,5 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
                 )
     if not quick:
         PICTURE.parent.mkdir(exist_ok=True)
-        title = "Table 7 phantom: what chapter 7 shows, speed in m/s, rms error over the range"
+        title = "3-D breast phantom (Li 2008, Table 7): speed in m/s, rms error over the range"
         write_bytes(PICTURE, picture(title, panels, 2 * (1 + len(WAYS))))

@@ -63,7 +63,7 @@ def ball(holes: int = 0) -> np.ndarray:
 
 
 def breast() -> np.ndarray:
-    """The speed of the Table 7 phantom without skin in a liquid slower than fat, m/s, as a cube."""
+    """The speed of the 3-D breast phantom without skin in a liquid slower than fat, m/s, as a cube."""
     whole = table7(1400.0)
     parts = tuple(replace(part, speed_mps=1440.0) if part.name == "skin" else part for part in whole.parts)
     phantom = replace(whole, parts=parts)

@@ -47,10 +47,12 @@ class Range:
     def words(self) -> str:
         """As a refusal and a description say it."""
         unit = f" {self.unit}" if self.unit else ""
+        # Whole numbers in full: 9.0072e+15 is above the highest seed.
+        least, most = (str(one) if isinstance(one, int) else f"{one:g}" for one in (self.least, self.most))
         if self.above or self.below:
             low, high = "above" if self.above else "from", "below" if self.below else "at most"
-            return f"a number {low} {self.least:g} and {high} {self.most:g}{unit}"
-        return f"a number from {self.least:g} to {self.most:g}{unit}"
+            return f"a number {low} {least} and {high} {most}{unit}"
+        return f"a number from {least} to {most}{unit}"
 
     @property
     def schema(self) -> dict[str, float]:

@@ -106,6 +106,8 @@ class FakeWork:
         self.calls: list[tuple[Path, Settings]] = []
         self.hold = threading.Event()
         self.hold.set()
+        # Set once the work of a job begins; its row says "running" before.
+        self.begun = threading.Event()
         self.error: Exception | None = None
         # Of one node, in place of its speed.
         self.spoil: float | None = None
@@ -125,6 +127,7 @@ class FakeWork:
     ) -> Reconstruction:
         self.calls.append((path, settings))
         assert work_dir.is_dir()
+        self.begun.set()
         history: tuple[Sweep, ...] = ()
         passes = [(stage, n) for stage in range(self.stages) for n in range(1, settings.iterations + 1)]
         on_progress(Progress(0, 8 * len(passes)))

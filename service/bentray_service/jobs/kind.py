@@ -70,7 +70,7 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Task:
+class JobRun:
     """A job to run.
 
     Attributes:
@@ -94,6 +94,12 @@ class Task:
     on_saved: Callable[[], None]
     stop: Callable[[], bool]
     share: Share
+
+    @property
+    def control(self) -> dict[str, Any]:
+        """The keyword arguments that every pipeline takes for progress, cancellation and its share."""
+        names = "on_progress", "on_saved", "stop", "share"
+        return {name: getattr(self, name) for name in names}
 
 
 class Kind(ABC, Generic[R]):
@@ -131,8 +137,8 @@ class Kind(ABC, Generic[R]):
         """The output file; it is fixed, so that a repeated job writes the same file."""
 
     @abstractmethod
-    def run(self, task: Task) -> Plain | None:
-        """Run the job, write ``task.target`` and return the row of the result, if any."""
+    def run(self, run: JobRun) -> Plain | None:
+        """Run the job, write ``run.target`` and return the row of the result, if any."""
 
     @abstractmethod
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:

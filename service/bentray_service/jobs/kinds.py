@@ -33,7 +33,7 @@ from ..rows import schema
 from ..rows.ids import dataset_of, field_of, volume_of
 from ..rows.records import JobRow, Plain
 from ..rows.tenants import Tenant
-from .kind import JobRequest, Kind, Order, Sources, Task
+from .kind import JobRequest, JobRun, Kind, Order, Sources
 
 DEFAULTS = "Omitted settings take their defaults."
 
@@ -74,19 +74,18 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
     def target(self, files: TenantFiles, job: JobRow) -> Path:
         return files.volume(volume_of(job["id"]))
 
-    def run(self, task: Task) -> Plain | None:
+    def run(self, run: JobRun) -> Plain | None:
         # A job may have been stored by an earlier version.
-        settings = from_stored(task.settings)
-        progress = task.on_progress, task.stop, task.work_dir, task.on_saved
+        settings = from_stored(run.settings)
         result = reconstruction_run.reconstruct(
-            task.client, task.source, settings, *progress, share=task.share
+            run.client, run.source, settings, work_dir=run.work_dir, **run.control
         )
         if not np.isfinite(result.speed).all():
             found = f"no finite speed at {np.count_nonzero(~np.isfinite(result.speed))} nodes"
             accepted = "settings with which it converges: smaller relaxation or larger penalty_strength"
             raise InvalidInput("settings", found, accepted)
-        write_reconstruction(task.target, result)
-        return {"id": task.target.stem, **_describe(result), "bytes": task.target.stat().st_size}
+        write_reconstruction(run.target, result)
+        return {"id": run.target.stem, **_describe(result), "bytes": run.target.stat().st_size}
 
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
         volume = volume_of(job["id"])
@@ -124,11 +123,10 @@ class SimulationKind(Kind[SimulationRequest]):
     def target(self, files: TenantFiles, job: JobRow) -> Path:
         return files.dataset(dataset_of(job["id"]))
 
-    def run(self, task: Task) -> Plain | None:
-        asked = self.settings.validate_python(task.settings)
-        progress = task.on_progress, task.on_saved, task.stop, task.share
-        found = simulate_to_file(task.client, asked.chosen(), task.target, task.work_dir, *progress)
-        return {"id": task.target.stem, **found}
+    def run(self, run: JobRun) -> Plain | None:
+        asked = self.settings.validate_python(run.settings)
+        found = simulate_to_file(run.client, asked.chosen(), run.target, run.work_dir, **run.control)
+        return {"id": run.target.stem, **found}
 
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
         dataset = dataset_of(job["id"])
@@ -168,10 +166,9 @@ class RefractionKind(Kind[RefractionRequest]):
     def target(self, files: TenantFiles, job: JobRow) -> Path:
         return files.animation(job["id"], job["settings"]["format"])
 
-    def run(self, task: Task) -> Plain | None:
-        settings = self.settings.validate_python(task.settings)
-        progress = task.on_progress, task.on_saved, task.stop, task.share
-        draw_turntable(task.client, task.source, settings, task.target, task.work_dir, *progress)
+    def run(self, run: JobRun) -> Plain | None:
+        settings = self.settings.validate_python(run.settings)
+        draw_turntable(run.client, run.source, settings, run.target, run.work_dir, **run.control)
         return None
 
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
@@ -210,13 +207,12 @@ class GeometryFieldKind(Kind[GeometryFieldRequest]):
     def target(self, files: TenantFiles, job: JobRow) -> Path:
         return files.field(job["field_id"] or "")
 
-    def run(self, task: Task) -> Plain | None:
-        settings = self.settings.validate_python(task.settings)
-        paths = task.source, settings, task.target, task.work_dir
-        progress = task.on_progress, task.on_saved, task.stop, task.share
-        figures = geometry_field.build_field(task.client, *paths, *progress)
-        size = geometry_field.bytes_of(task.target)
-        found = {"id": task.target.name, "mesh_id": task.source.stem, "bytes": size}
+    def run(self, run: JobRun) -> Plain | None:
+        settings = self.settings.validate_python(run.settings)
+        paths = run.source, settings, run.target, run.work_dir
+        figures = geometry_field.build_field(run.client, *paths, **run.control)
+        size = geometry_field.bytes_of(run.target)
+        found = {"id": run.target.name, "mesh_id": run.source.stem, "bytes": size}
         return {**found, "settings": settings.plain(), "figures": figures}
 
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:

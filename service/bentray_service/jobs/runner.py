@@ -30,7 +30,7 @@ from ..rows.job_queue import LEASE_S, Queue
 from ..rows.records import JobRow
 from ..rows.schema import ENDED
 from .failures import CRASHED, explain
-from .kind import Kind, Task
+from .kind import JobRun, Kind
 from .kinds import KINDS
 from .reporter import Reporter
 
@@ -217,7 +217,7 @@ class Runner:
             client = self._compute.client
             with self._shares.of(job["tenant"], kind.lane, client) as share:
                 result = kind.run(
-                    Task(
+                    JobRun(
                         client=client,
                         source=source,
                         settings=job["settings"],

@@ -73,7 +73,7 @@ def test_smoothed_over_the_fresnel_zone():
 
 
 def test_taken_off_it_leaves_the_line_integrals():
-    """Amplitudes made on a grid three times as fine, in a smoothed Table 6 phantom that absorbs 5 Np/m."""
+    """Amplitudes made on a grid three times as fine, in a smoothed 2-D breast phantom that absorbs 5 Np/m."""
     phantom, elements = table6(1375.0), ring(24, 0.088) - MIDDLE + 0.5 * TABLE6_SIDE_M
 
     def sampled(nodes):

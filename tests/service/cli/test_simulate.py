@@ -53,7 +53,7 @@ def test_a_scan_in_space(
     assert said["slices"] == 2
     assert said["three_d"] is ("--three-d" in words)
     dataset = read_dataset(path)
-    assert dataset.title == "Table 7 phantom, coupling 1500 m/s"
+    assert dataset.title == "3-D breast phantom (Li 2008, Table 7), coupling 1500 m/s"
     assert dataset.array_type == array
     assert dataset.delta_tof_s is not None
     assert dataset.delta_tof_s.shape == shape

@@ -45,7 +45,8 @@ def test_everything_that_a_service_writes_is_for_its_user_alone(
     http = start()
     work.hold.clear()
     job = submitted(http, uploaded(http))
-    until(http, job["id"], "running")
+    # The job is running before its folder exists; both exist once the work has begun.
+    assert work.begun.wait(240.0)
     during = modes(tmp_path / "data")
     assert any("work/job-" in name for name in during), "where checkpoints are"
     assert [name for name, mode in during.items() if mode & 0o077] == []

@@ -103,7 +103,7 @@ def test_three_pictures(serving, until, form, media):
 
 def test_without_settings_the_middle_of_the_range(serving, until, monkeypatch):
     asked = []
-    draw = lambda *given: asked.append(given) or given[3].write_bytes(b"")  # noqa: E731
+    draw = lambda *given, **control: asked.append(given) or given[3].write_bytes(b"")  # noqa: E731
     monkeypatch.setattr(kinds, "draw_turntable", draw)
     with serving() as http:
         volume = put(http)
@@ -146,7 +146,7 @@ def test_a_stopped_job_runs_again_at_the_next_start(serving, until, monkeypatch)
 
 
 def test_what_the_worker_refuses_fails_in_words(serving, until, monkeypatch):
-    def refuse(*given):
+    def refuse(*given, **control):
         raise InvalidInput("iso", "0.5", "what the filter leaves")
 
     monkeypatch.setattr(kinds, "draw_turntable", refuse)
@@ -219,9 +219,8 @@ def test_a_torn_field_is_gone_on_from_at_the_next_start(serving, until, monkeypa
     monkeypatch.setattr(geometry_field, "TASK_RAYS", 32 * 216)
     plain, calls, torn = geometry_field.build_field, [], threading.Event()
 
-    def held(*given):
+    def held(*given, on_progress, on_saved, stop, share):
         """As a service that leaves once three tasks have ended: the rest is still to do."""
-        *others, on_saved, stop, share = given
         told = []
         calls.append(told)
 
@@ -238,7 +237,7 @@ def test_a_torn_field_is_gone_on_from_at_the_next_start(serving, until, monkeypa
                 time.sleep(0.01)
             return True
 
-        return plain(*others, saved, leave, share)
+        return plain(*given, on_progress=on_progress, on_saved=saved, stop=leave, share=share)
 
     monkeypatch.setattr(geometry_field, "build_field", held)
     with serving() as http:
@@ -266,8 +265,8 @@ def wait_until_empty(folder):
 
 
 def test_a_cancelled_field_leaves_nothing(serving, until, monkeypatch):
-    def hold(*given):
-        while not given[-2]():
+    def hold(*given, stop, **control):
+        while not stop():
             pass
         raise Cancelled
 

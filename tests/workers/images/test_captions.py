@@ -1,4 +1,4 @@
-"""The words of the pictures: stages as they are made, sweeps of all of them."""
+"""The words of the pictures: stages as they are made, iterations of all of them."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def test_one_stage_needs_no_name():
 
 def test_the_sweeps_of_all_stages_are_counted():
     history = (Sweep(0, 1, 2e-7, 4), Sweep(0, 2, 1e-7, 4), Sweep(0, 1, 1e-7, 4, 1), Sweep(1, 1, 1e-7, 4, 1))
-    assert "3 sweeps in 2 stages" in facts(replace(made(slices=2), history=history))
-    assert "  1 sweep  " in facts(replace(made(), history=history[:1]))
+    assert "3 iterations in 2 stages" in facts(replace(made(slices=2), history=history))
+    assert "  1 iteration  " in facts(replace(made(), history=history[:1]))
 
 
 @pytest.mark.parametrize(
@@ -66,6 +66,6 @@ def test_waveforms_are_named_after_the_rays_that_they_began_with():
         made(), settings=Settings(method="waveform"), trials=(rays,), history=(Sweep(0, 1, 2e-7, 36), *bands)
     )
     assert facts(result).startswith(
-        "straight rays  ·  SART  ·  then waveforms  ·  4 sweeps in 4 stages  ·  24 by"
+        "straight rays  ·  SART  ·  then waveforms  ·  4 iterations in 4 stages  ·  24 by"
     )
     assert stage_names(result) == ("128 nodes", "200 kHz", "450 kHz", "attenuation")

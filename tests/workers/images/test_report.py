@@ -77,7 +77,7 @@ def test_the_stages_are_named_and_the_choice_of_auto_is_told(drawn):
     report_png(replace(made(), history=history, settings=plan, trials=trials))
     assert {"32 nodes", "64 nodes"} <= set(drawn.words())
     under = " ".join(drawn[-1].get_supxlabel().split())
-    assert "3 sweeps in 2 stages" in under
+    assert "3 iterations in 2 stages" in under
     assert under.endswith(explain_trials(trials))
 
 

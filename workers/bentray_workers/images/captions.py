@@ -33,7 +33,7 @@ def slice_caption(result: Reconstruction, index: int) -> str:
 
 
 def facts(result: Reconstruction) -> str:
-    """Rays, method, sweeps, size, water and residual in one line."""
+    """Rays, method, iterations, size, water and residual in one line."""
     settings = _of_rays(result)
     size = " by ".join(str(n) for n in result.speed.shape)
     found = [
@@ -45,7 +45,7 @@ def facts(result: Reconstruction) -> str:
     if result.settings.method == "waveform":
         found.insert(2, "then waveforms")
     if result.residual_rms_s is not None:
-        found.insert(-2, _sweeps(result))
+        found.insert(-2, _iterations(result))
         found.append(f"residual {1e9 * result.residual_rms_s:.0f} ns")
     return "  ·  ".join(found)
 
@@ -80,10 +80,10 @@ def _rays(settings: Settings) -> str:
     return f"curved rays ({front})"
 
 
-def _sweeps(result: Reconstruction) -> str:
+def _iterations(result: Reconstruction) -> str:
     most: dict[int, int] = {}
     for sweep in result.history:
         most[sweep.stage] = max(most.get(sweep.stage, 0), sweep.sweep)
     count = sum(most.values())
-    text = f"{count} sweep{'s' if count != 1 else ''}"
+    text = f"{count} iteration{'s' if count != 1 else ''}"
     return text if len(most) == 1 else f"{text} in {len(most)} stages"

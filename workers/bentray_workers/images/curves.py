@@ -21,7 +21,7 @@ WIDE = 20.0
 
 
 def draw_history(axes: Axes, histories: Mapping[str, tuple[Sweep, ...]], stages: Sequence[str] = ()) -> None:
-    """Residual against sweep, a line a name; over slices the root mean square.
+    """Residual against iteration, a line a name; over slices the root mean square.
 
     Stages follow each other from left to right, with a dotted line where a next one begins.
 
@@ -45,7 +45,7 @@ def draw_history(axes: Axes, histories: Mapping[str, tuple[Sweep, ...]], stages:
             every += rms
     slices = {s.slice for history in histories.values() for s in history}
     axes.set_title("Convergence" if len(slices) < 2 else f"Convergence, all {len(slices)} slices")
-    axes.set_xlabel("sweep")
+    axes.set_xlabel("iteration")
     axes.set_ylabel("residual rms (ns)", labelpad=1)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     _scale(axes, every, margin=bool(stages))
@@ -55,7 +55,7 @@ def draw_history(axes: Axes, histories: Mapping[str, tuple[Sweep, ...]], stages:
 
 
 def _courses(history: tuple[Sweep, ...]) -> list[list[float]]:
-    """Of each stage the residual of every sweep, ns; over slices the root mean square."""
+    """Of each stage the residual of every iteration, ns; over slices the root mean square."""
     squares: dict[int, dict[int, list[float]]] = {}
     for s in history:
         squares.setdefault(s.stage, {}).setdefault(s.sweep, []).append(s.residual_rms_s**2)

@@ -27,7 +27,7 @@ SNR = Range(1e-6, 1e12)
 
 @dataclass(frozen=True)
 class SimulationSettings:
-    """A scan of the Table 6 phantom.
+    """A scan of the 2-D breast phantom (Li 2008, Table 6).
 
     Attributes:
         nodes: nodes along a side of the truth image, and of the reconstruction it is meant for.
@@ -128,7 +128,7 @@ def scan_of(settings: SimulationSettings, delta: Floats, ratio: Floats | None) -
         ),
         radius_m=scan.ring.radius_m,
         picker=f"none: simulated travel times, factored fast marching, {scan.fine_nodes}² nodes",
-        title=f"Table 6 phantom, coupling {settings.coupling_mps:g} m/s",
+        title=f"2-D breast phantom (Li 2008, Table 6), coupling {settings.coupling_mps:g} m/s",
         source="made by bentray simulate",
         license="CC0-1.0",
     )

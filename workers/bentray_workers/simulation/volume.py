@@ -26,7 +26,7 @@ LEAST_NODES = min(nodes for nodes, _ in TABLE7_GRIDS)
 
 @dataclass(frozen=True)
 class VolumeSimulationSettings:
-    """A scan of the Table 7 phantom.
+    """A scan of the 3-D breast phantom (Li 2008, Table 7).
 
     Attributes:
         nodes: nodes along x and y of the truth, and of the reconstruction it is meant for.
@@ -139,7 +139,7 @@ def scan_of(settings: VolumeSimulationSettings, delta: Floats, ratio: Floats | N
         array_type="rings" if rings else "ring",
         radius_m=scan.ring.radius_m,
         picker=f"none: simulated travel times, factored fast marching in {2 + scan.three_d} dimensions",
-        title=f"Table 7 phantom, coupling {settings.coupling_mps:g} m/s",
+        title=f"3-D breast phantom (Li 2008, Table 7), coupling {settings.coupling_mps:g} m/s",
         source="made by bentray simulate",
         license="CC0-1.0",
     )

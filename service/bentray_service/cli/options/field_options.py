@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from .option_tables import with_options
-from .settings_options import Option
+from .option_tables import Option, with_options
 
 if TYPE_CHECKING:
     from bentray_workers.rendering.field_settings import FieldSettings

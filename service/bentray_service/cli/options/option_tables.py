@@ -4,12 +4,32 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import wraps
-from typing import Any
+from typing import Annotated, Any
 
-from .settings_options import Option
+import typer
 
 Command = Callable[..., None]
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option that sets one field; ``default`` is what the help says, and never given to the command."""
+
+    name: str
+    kind: Any
+    default: str
+    help: str
+    metavar: str | None = None
+
+    def parameter(self, setting: str) -> inspect.Parameter:
+        """As a parameter of a Typer command, None where it is not given."""
+        shown: Any = self.default or False
+        how = typer.Option(self.name, show_default=shown, help=self.help, metavar=self.metavar)
+        return inspect.Parameter(
+            setting, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[self.kind | None, how]
+        )
 
 
 def with_options(

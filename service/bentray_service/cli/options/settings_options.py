@@ -2,39 +2,17 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
 from dataclasses import Field, dataclass, fields
-from functools import wraps
-from typing import Annotated, Any, get_args, get_type_hints
-
-import typer
+from typing import Any, get_args, get_type_hints
 
 from bentray_kernels.ranges import RANGE
 from bentray_kernels.request_fields import choices_of
 from bentray_kernels.tomography.settings import PLACES, Settings
 
+from .option_tables import Command, Option, with_options
+
 # Left off the name of an option: ``--side`` is in metres, as its help says.
 UNITS = ("_mps", "_m", "_nodes")
-
-
-@dataclass(frozen=True)
-class Option:
-    """An option that sets one field; ``default`` is what the help says, and never given to the command."""
-
-    name: str
-    kind: Any
-    default: str
-    help: str
-    metavar: str | None = None
-
-    def parameter(self, setting: str) -> inspect.Parameter:
-        """As a parameter of a Typer command, None where it is not given."""
-        shown: Any = self.default or False
-        how = typer.Option(self.name, show_default=shown, help=self.help, metavar=self.metavar)
-        return inspect.Parameter(
-            setting, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[self.kind | None, how]
-        )
 
 
 @dataclass(frozen=True)
@@ -86,22 +64,9 @@ def default_of(field: Field[Any]) -> str:
 OPTIONS = _options()
 
 
-def with_settings_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with the options in place of its parameter ``asked``, which gets what was given."""
-
-    @wraps(command)
-    def run(**given: Any) -> None:
-        options = {name: value for name in OPTIONS if (value := given.pop(name)) is not None}
-        command(asked=Asked(options), **given)
-
-    parameters: list[inspect.Parameter] = []
-    for parameter in inspect.signature(command, eval_str=True).parameters.values():
-        if parameter.name == "asked":
-            parameters += [option.parameter(setting) for setting, option in OPTIONS.items()]
-        else:
-            parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
-    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    return run
+def with_settings_options(command: Command) -> Command:
+    """The command with the options in place of its parameter ``asked``, which gets the given values."""
+    return with_options(OPTIONS, Asked)(command)
 
 
 def settings_from(asked: Asked) -> Settings:

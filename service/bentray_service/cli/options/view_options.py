@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .option_tables import with_options
-from .settings_options import Option
+from .option_tables import Option, with_options
 
 if TYPE_CHECKING:
     from bentray_workers.rendering.refraction_view import RefractionView

@@ -106,5 +106,5 @@ def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
             )
         if "rmse_mps" in truth:
             rows.append(("rms error", f"{truth['rmse_mps']:.1f} m/s"))
-        rows.append(("errors read", truth["region"]))
+        rows.append(("error region", truth["region"]))
     return rows

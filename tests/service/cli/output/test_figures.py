@@ -80,10 +80,10 @@ def test_table_and_pictures_tell_the_same_errors(drawn: Any, wide: bool) -> None
     assert scan.truth is not None
     comparison_png(scan.truth, {"bent": image(speed)}, scan.roi)
     assert f"Bent: {shown}" in drawn.words()
-    assert f"Errors in: {rows['errors read']}" in drawn.words()
+    assert f"Errors in: {rows['error region']}" in drawn.words()
     report_png(image(speed), scan.truth, scan.roi)
     assert f"Difference: {shown}" in drawn.words()
-    assert rows["errors read"].startswith("mask/roi" if wide else "the outline")
+    assert rows["error region"].startswith("mask/roi" if wide else "the outline")
 
 
 def dataset(known: Truth | None) -> Dataset:
@@ -112,11 +112,11 @@ def test_the_residual_is_that_of_the_last_sweep_over_all_slices() -> None:
 
 def test_the_summary_tells_the_errors_and_their_region_only_with_a_truth() -> None:
     without = dict(summary(figures(image(disc()), dataset(None), 1.0)))
-    assert not {"rms error", "errors read", "residual"} & set(without)
+    assert not {"rms error", "error region", "residual"} & set(without)
     with_truth = dict(summary(figures(image(disc() + 10.0), dataset(truth(disc())), 1.0)))
     assert with_truth["rms error"] == "10.0 m/s"
     assert with_truth["mean absolute error"] == "10.0 % of the range"
-    assert with_truth["errors read"] == "the outline of what is not water in the truth"
+    assert with_truth["error region"] == "the outline of what is not water in the truth"
 
 
 def test_what_a_result_lacks_is_none_or_empty() -> None:
