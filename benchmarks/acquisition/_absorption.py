@@ -12,8 +12,7 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.compiled import kernel
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.wave.medium import EDGE_NODES, Medium
-from bentray_kernels.wave.points import Points
-from bentray_kernels.wave.simulation import place_elements
+from bentray_kernels.wave.simulation import place_scan
 from bentray_kernels.wave.stencil import HALO, longest_step, weights
 from bentray_kernels.wave.time_step import advance, inject, read
 
@@ -129,8 +128,7 @@ def simulate_absorbed(
     """
     medium = absorbing.medium
     kind = medium.keep.dtype
-    source: Points = place_elements(medium, np.atleast_2d(emitter), wavelet)
-    detectors = place_elements(medium, receivers)
+    source, detectors = place_scan(medium, emitter, receivers, wavelet)
     traces = np.empty((len(detectors.first), wavelet.size), kind)
     fields = np.zeros((3, *medium.keep.shape), kind)
     scale = float(np.abs(wavelet).max())

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.task_graph import Cancelled
-from bentray_kernels.tomography.result import Progress, Reconstruction, Sweep, Trial
+from bentray_kernels.tomography.result import Iteration, Progress, Reconstruction, Trial
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.app import create_app
 from bentray_service.settings import ServiceSettings
@@ -128,7 +128,7 @@ class FakeWork:
         self.calls.append((path, settings))
         assert work_dir.is_dir()
         self.begun.set()
-        history: tuple[Sweep, ...] = ()
+        history: tuple[Iteration, ...] = ()
         passes = [(stage, n) for stage in range(self.stages) for n in range(1, settings.iterations + 1)]
         on_progress(Progress(0, 8 * len(passes)))
         for stage, sweep in passes:
@@ -137,7 +137,7 @@ class FakeWork:
                     raise Cancelled
                 if self.hold.wait(0.01):
                     break
-            history += (Sweep(0, sweep, 2e-6 / sweep, 8, stage),)
+            history += (Iteration(0, sweep, 2e-6 / sweep, 8, stage),)
             on_saved()
             on_progress(Progress(8 * len(history), 8 * len(passes), history))
         if self.error is not None:

@@ -57,10 +57,6 @@ class VolumePhantom:
         """Exact speed at points, m; shapes as they broadcast, m/s."""
         return self._paint(x, y, z, self.speeds_mps)
 
-    def attenuation_at(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> Floats:
-        """As ``speed_at``, Np/m."""
-        return self._paint(x, y, z, self.attenuations_np_m)
-
     def speed(self, nodes: int, side_m: float, z_m: ArrayLike) -> Floats:
         """Speed in a box centred on the z axis, each node the mean over its own cell.
 

@@ -20,9 +20,10 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats
 from ..compiled import kernel
 from ..splines.cubic import jet_2d, jet_3d
-from .bending import STRIDE, allocate_bending, bend
+from .bending import STRIDE, bend
 from .descent import empty_path, trace_curved
 from .fan import Fan
+from .newton_step import allocate_bending
 from .travel_time import log_slowness
 
 # Leapfrog steps per segment of the path, which is STRIDE nodes long.

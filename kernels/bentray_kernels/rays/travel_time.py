@@ -10,9 +10,10 @@ from ..compiled import kernel
 from ..eikonal.problem import SlownessGrid
 from ..errors import InvalidInput
 from ..splines import coefficients
-from .bending import STRIDE, allocate_bending, bend
+from .bending import STRIDE, bend
 from .descent import empty_path, trace_curved
 from .fan import Fan
+from .newton_step import allocate_bending
 
 
 def travel_times(

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from .errors_against_truth import mean_absolute_error, rmse
     from .problem import Problem
     from .reconstruction import reconstruct
-    from .result import RESIDUAL_EDGES_S, Progress, Reconstruction, Sweep, Trial
+    from .result import RESIDUAL_EDGES_S, Iteration, Progress, Reconstruction, Trial
 else:
     MODULES = {
         "errors_against_truth": ("mean_absolute_error", "rmse"),
         "problem": ("Problem",),
         "reconstruction": ("reconstruct",),
-        "result": ("RESIDUAL_EDGES_S", "Progress", "Reconstruction", "Sweep", "Trial"),
+        "result": ("RESIDUAL_EDGES_S", "Progress", "Reconstruction", "Iteration", "Trial"),
     }
 
     def __getattr__(name: str) -> object:
@@ -41,13 +41,13 @@ __all__ = [
     "RESIDUAL_EDGES_S",
     "AttenuationSettings",
     "GaussNewtonSettings",
+    "Iteration",
     "PickingSettings",
     "Problem",
     "Progress",
     "Reconstruction",
     "SartSettings",
     "Settings",
-    "Sweep",
     "Trial",
     "mean_absolute_error",
     "reconstruct",

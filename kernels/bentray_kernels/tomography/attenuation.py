@@ -14,8 +14,7 @@ from .finite_frequency import front_smoothing, ray_slowness
 from .focusing import focusing
 from .gauss_newton import huber
 from .gauss_newton.linear_problem import Linearised, smoothing
-from .gauss_newton.linearisation import Rows, linearise_losses
-from .gauss_newton.ray_matrix import back_project, project
+from .gauss_newton.linearisation import Rows, linearise_losses, ray_density
 from .problem import Problem
 from .settings import GaussNewtonSettings, Settings
 
@@ -23,10 +22,10 @@ from .settings import GaussNewtonSettings, Settings
 # total variation needs more, because none of its solutions is iterated to convergence.
 PASSES, ROBUST_PASSES = 3, 12
 
-# What is read from traces holds diffraction and later paths, more than is absorbed, and far more where these
-# cancel the pulse. Rays do not model details below a Fresnel zone, √(wavelength · longest ray): the image
-# is smooth over so many of them, and values count as outliers from so much less on. Chosen on scans by waves,
-# where total variation did worse (``benchmarks/results/raw_trace_experiments.md``).
+# Log ratios of traces contain diffraction and later paths, more than absorption, and far more where these
+# cancel the pulse. Rays do not model details below a Fresnel zone, √(wavelength · longest ray): the image is
+# smoothed over ``ZONES`` of them, and the outlier limit is divided by ``TRACES_STRICTER``. Chosen on wave
+# simulations, where total variation did worse (``benchmarks/results/raw_trace_experiments.md``).
 ZONES, TRACES_STRICTER = 3.0, 2.0
 
 # More than any tissue has at the frequencies that pass through it, Np/m.
@@ -95,10 +94,7 @@ def solve(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats
     """
     shape = problem.region.shape
     water = np.full(shape, problem.water_attenuation * problem.spacing)
-    passed = np.zeros(shape).ravel()
-    for part in parts:
-        back_project(part.pointers, part.columns, part.lengths, np.ones(part.residual.size), passed)
-    density = problem.density(passed.reshape(shape))
+    density = problem.mean_in_region(ray_density(problem, parts))
     if density == 0.0:
         return water / problem.spacing
     image, dual = water, np.zeros((len(shape), *shape))
@@ -109,16 +105,13 @@ def solve(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats
     if settings.reads_amplitudes:
         spreads, smooth = settings.numerics.huber_scale / TRACES_STRICTER, _smoothing(problem, settings)
     for _ in range(ROBUST_PASSES if spreads and smooth is None else PASSES):
-        left = [
-            Rows(p.pointers, p.columns, p.lengths, p.residual - _projected(p, image - water), p.emitters)
-            for p in parts
-        ]
-        residual = np.concatenate([part.residual for part in left])
+        remaining = [replace(part, residual=part.residual - part.project(image - water)) for part in parts]
+        residual = np.concatenate([part.residual for part in remaining])
         limit = huber.limit(residual, spreads)
         bounds = (0.0, MOST_NP_M * problem.spacing)
         misfit = huber.clipped_rms(residual, limit)
         image, dual = Linearised(
-            left,
+            remaining,
             image,
             density,
             problem.region,
@@ -131,7 +124,7 @@ def solve(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats
 
 
 def _smoothing(problem: Problem, settings: Settings) -> float:
-    """Strength of the penalty of what is read from traces."""
+    """Strength of the penalty for log ratios from traces."""
     finest_m = ZONES * math.sqrt(
         _wavelength(problem, f"amplitudes {settings.attenuation.amplitudes}") * problem.longest_m
     )
@@ -140,16 +133,13 @@ def _smoothing(problem: Problem, settings: Settings) -> float:
 
 
 def _wavelength(problem: Problem, setting: str) -> float:
-    """Wavelength of the amplitudes in water, m; rejected if it is unknown and a setting needs it."""
+    """Wavelength of the amplitudes in water, m.
+
+    Raises:
+        InvalidInput: where it is unknown, naming the setting that needs it.
+    """
     if problem.wavelength_m is None:
         raise InvalidInput(
             "amplitude@frequency_hz", "nothing", f"a frequency in Hz, for the setting {setting}"
         )
     return problem.wavelength_m
-
-
-def _projected(part: Rows, image: Floats) -> Floats:
-    """A·image."""
-    into = np.empty(part.residual.size)
-    project(part.pointers, part.columns, part.lengths, image.ravel(), into)
-    return into

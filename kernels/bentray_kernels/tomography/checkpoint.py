@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..task_graph import Checkpoint
 from .gauss_newton import gauss_newton_step
 from .reconstruction_graph import ReconstructionCheckpoint
-from .result import Sweep
+from .result import Iteration
 from .sart import sart_step
 
 # Records in checkpoints of a reconstruction, by name; ``waveform`` adds its own.
@@ -25,7 +25,7 @@ TYPES: Mapping[str, type] = MappingProxyType(
             sart_step.State,
             gauss_newton_step.Iterate,
             gauss_newton_step.Measured,
-            Sweep,
+            Iteration,
         )
     }
 )

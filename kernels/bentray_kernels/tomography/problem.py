@@ -125,9 +125,9 @@ class Problem:
         """Emitters with travel times."""
         return np.flatnonzero(np.isfinite(self.delta_tof).any(axis=1))
 
-    def density(self, passed: Floats) -> float:
+    def mean_in_region(self, image: Floats) -> float:
         """Mean of an image over the nodes that may change; 0 where none may."""
-        inside = passed[self.region]
+        inside = image[self.region]
         return float(inside.mean()) if inside.size else 0.0
 
     @property

@@ -13,16 +13,16 @@ from .finite_frequency import width_in_nodes
 from .gauss_newton.gauss_newton_step import Iterate
 from .gauss_newton.linearisation import Rows
 from .grid_schedule import initial_slowness
-from .result import Progress, Sweep
+from .result import Iteration, Progress
 from .sart.sart_step import State
-from .stage_graphs import GaussNewtonStage, SartStage, Scan, Stage, batches_of
+from .stage_graphs import GaussNewtonStage, SartStage, Scan, Stage, batches_of, trace_rays
 
 
 class TomographyGraph(ResumableGraph, Protocol):
     """A resumable graph with a history of iterations: a reconstruction, or a refinement of its image."""
 
     @property
-    def history(self) -> tuple[Sweep, ...]: ...
+    def history(self) -> tuple[Iteration, ...]: ...
 
 
 # Runs graphs to their end and reports progress. The numbers are the emitter passes made before, and those
@@ -44,7 +44,7 @@ class ReconstructionCheckpoint:
 
     stage: int
     passes_before: int
-    history: tuple[Sweep, ...]
+    history: tuple[Iteration, ...]
     state: State | Iterate
     values: tuple[Floats | None, ...]
 
@@ -64,7 +64,7 @@ class ReconstructionGraph:
     def __init__(self, scan: Scan, index: int) -> None:
         self._scan, self._index = scan, index
         self._plans = scan.stages()
-        self._history: tuple[Sweep, ...] = ()
+        self._history: tuple[Iteration, ...] = ()
         self._passes_before = 0
         self._stage = self._stage_of(0, initial_slowness(scan.problem(index, 0), None))
         self._evaluations = self._evaluated()
@@ -82,7 +82,7 @@ class ReconstructionGraph:
             emitters = attenuation.active_emitters(problem)
             evaluations.append(Evaluation(trace_attenuation_rays, solve_attenuation, emitters))
         if settings.resolution_check:
-            evaluations.append(Evaluation(trace_resolution_rays, check_resolution, problem.active_emitters))
+            evaluations.append(Evaluation(trace_final_rays, check_resolution, problem.active_emitters))
         return evaluations
 
     @property
@@ -100,7 +100,7 @@ class ReconstructionGraph:
         return next((one.value for one in self._evaluations if one.evaluate is evaluate), None)
 
     @property
-    def history(self) -> tuple[Sweep, ...]:
+    def history(self) -> tuple[Iteration, ...]:
         """Of all stages so far."""
         return self._history + self._stage.history
 
@@ -202,12 +202,9 @@ def solve_attenuation(scan: Scan, index: int, rows: list[Rows]) -> Floats:
     return attenuation.solve(scan.problem(index), scan.stages()[-1], rows)
 
 
-def trace_resolution_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:
+def trace_final_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:
     """Task: rays of one batch of emitters through the finished image."""
-    problem = scan.problem(index)
-    return resolution.trace_rays(
-        problem, scan.stages()[-1], slowness, batches_of(problem.active_emitters)[batch]
-    )
+    return trace_rays(scan, index, -1, slowness, batch)
 
 
 def check_resolution(scan: Scan, index: int, rows: list[Rows]) -> Floats:

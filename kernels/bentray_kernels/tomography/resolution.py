@@ -8,14 +8,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from .finite_frequency import blurred
-from .gauss_newton.gauss_newton_step import trace_rays as rows_of
 from .gauss_newton.linear_problem import Linearised
-from .gauss_newton.linearisation import Rows
-from .gauss_newton.ray_matrix import back_project, project
+from .gauss_newton.linearisation import Rows, ray_density
 from .problem import Problem
-from .settings import Settings
 
 # Side of a field of the checkerboard, nodes.
 FIELD_NODES = 4
@@ -24,13 +21,8 @@ FIELD_NODES = 4
 # of the model hide less.
 DAMPING = 0.03
 
-# A field's contrast over that of the surroundings; any value gives the same recovery, for it is linear.
+# Contrast of a field, relative to water; any value gives the same recovery, which is linear.
 CONTRAST = 0.01
-
-
-def trace_rays(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
-    """Rows of some emitters along the rays of the finished image; any split gives the same."""
-    return rows_of(problem, settings, slowness, emitters)
 
 
 def recovery(problem: Problem, parts: Sequence[Rows], width: float = 0.0) -> Floats:
@@ -38,7 +30,7 @@ def recovery(problem: Problem, parts: Sequence[Rows], width: float = 0.0) -> Flo
 
     A checkerboard with fields of ``FIELD_NODES`` nodes is projected along the rays and reconstructed from
     those times by damped least squares (see Lévêque et al. 1993 for the limits of such a test). The
-    answer at a node is the part of the board's contrast that its neighbourhood gets back.
+    recovery at a node is the part of the board's contrast that is recovered in its neighbourhood.
 
     Args:
         problem: the slice or volume.
@@ -51,21 +43,17 @@ def recovery(problem: Problem, parts: Sequence[Rows], width: float = 0.0) -> Flo
     shape = problem.region.shape
     crossing = problem.spacing / problem.water_speed
     board = np.where(problem.region, _checkerboard(shape) * CONTRAST * crossing, 0.0)
-    passed, rows = np.zeros(board.size), []
-    for part in parts:
-        times = np.empty(part.residual.size)
-        project(part.pointers, part.columns, part.lengths, blurred(board, width).ravel(), times)
-        rows.append(replace(part, residual=times))
-        back_project(part.pointers, part.columns, part.lengths, np.ones(times.size), passed)
-    density = problem.density(passed.reshape(shape))
+    seen = blurred(board, width)
+    rows = [replace(part, residual=part.project(seen)) for part in parts]
+    density = problem.mean_in_region(ray_density(problem, parts))
     bounds = -crossing, crossing
     empty = np.zeros(shape)
-    found, _ = Linearised(
+    image, _ = Linearised(
         rows, empty, density, problem.region, bounds, DAMPING, "tikhonov", reference=empty, width=width
     ).solve(empty)
-    near = gaussian_filter(board * board, FIELD_NODES)
-    alike = gaussian_filter(found * board, FIELD_NODES)
-    return np.where(problem.region, alike / np.maximum(near, 1e-300), 0.0)
+    energy = gaussian_filter(board * board, FIELD_NODES)
+    correlation = gaussian_filter(image * board, FIELD_NODES)
+    return np.where(problem.region, correlation / np.maximum(energy, 1e-300), 0.0)
 
 
 def _checkerboard(shape: tuple[int, ...]) -> Floats:

@@ -23,7 +23,7 @@ def residual_counts(residuals: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class Iteration:
     """One pass over all emitters of one slice, or of the volume.
 
     Attributes:
@@ -64,7 +64,7 @@ class Progress:
 
     done: int
     total: int
-    history: tuple[Sweep, ...] = ()
+    history: tuple[Iteration, ...] = ()
     phase: str = ""
 
 
@@ -111,7 +111,7 @@ class Reconstruction:
     origin_m: tuple[float, ...]
     water_speed_mps: float
     settings: Settings
-    history: tuple[Sweep, ...] = ()
+    history: tuple[Iteration, ...] = ()
     attenuation: NDArray[np.float64] | None = None
     recovery: NDArray[np.float64] | None = None
     residuals: NDArray[np.int64] | None = None

@@ -12,7 +12,7 @@ from ..task_graph import Task
 from .gauss_newton import gauss_newton_step
 from .gauss_newton.linearisation import Rows
 from .problem import Problem
-from .result import Sweep
+from .result import Iteration
 from .sart import sart_step
 from .settings import Settings
 
@@ -60,7 +60,7 @@ class Stage(ABC):
         return self._emitters * self.state.sweep + self.state.emitter
 
     @property
-    def history(self) -> tuple[Sweep, ...]:
+    def history(self) -> tuple[Iteration, ...]:
         """Of this stage."""
         return tuple(replace(sweep, stage=self.number) for sweep in self.state.history)
 

@@ -13,7 +13,7 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from .medium import Medium
 from .points import Points
-from .simulation import Unknown, forward, place_elements
+from .simulation import Unknown, check_2d, forward, place_scan
 from .stencil import weights
 from .time_blocks import Poll, no_poll, split_steps
 from .time_step import advance, inject
@@ -34,11 +34,6 @@ class MisfitGradient(NamedTuple):
     misfit: float
     gradient: Floats
     illumination: Floats
-
-
-def stored_bytes(medium: Medium, samples: int, every: int = 1) -> int:
-    """Bytes of the wave field that ``misfit_gradient`` stores: the image at every ``every``-th step."""
-    return -(-samples // every) * medium.speed.size * medium.keep.dtype.itemsize
 
 
 def misfit_gradient(
@@ -67,14 +62,12 @@ def misfit_gradient(
         poll: see ``time_blocks``.
 
     Raises:
-        InvalidInput: as ``simulate``; a step between fields below 1.
+        InvalidInput: as ``simulate``; a 3-D medium; a step between fields below 1.
     """
     if every < 1:
         raise InvalidInput("every", every, "at least 1 step")
-    source, detectors = (
-        place_elements(medium, np.atleast_2d(emitter), wavelet),
-        place_elements(medium, receivers),
-    )
+    check_2d(medium)
+    source, detectors = place_scan(medium, emitter, receivers, wavelet)
     traces, scattered = forward(medium, source, detectors, wavelet, every, by=by, poll=poll)
     value, residual = misfit(traces)
     image, light = backward(medium, detectors, residual, scattered, every, poll)
@@ -104,22 +97,9 @@ def backward(
     image, light = np.zeros(medium.speed.shape), np.zeros(medium.speed.shape)
     scale = float(np.abs(residual).max())
     taps, sources = weights().astype(kind), (residual / (scale or 1.0)).astype(kind)
+    arguments = (fields[0], fields[1], medium.factors, taps, detectors, sources, medium.margin, every)
     for begin, end in split_steps(residual.shape[1], medium.keep.size, poll):
-        _backward(
-            begin,
-            end,
-            fields[0],
-            fields[1],
-            medium.factors,
-            taps,
-            detectors,
-            sources,
-            medium.margin,
-            every,
-            scattered,
-            image,
-            light,
-        )
+        _backward(begin, end, *arguments, scattered, image, light)
     return scale * image, light
 
 

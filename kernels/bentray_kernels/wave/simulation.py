@@ -12,10 +12,10 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from .medium import Medium
 from .points import Points, place
-from .simulation_3d import forward_3d
 from .stencil import HALO, weights
 from .time_blocks import Poll, no_poll, split_steps
 from .time_step import advance, begin_loss_scattering, curvature, end_loss_scattering, inject, read, spread
+from .time_step_3d import advance_3d, inject_3d, read_3d
 
 # Variables of a gradient.
 Unknown = Literal["speed", "attenuation"]
@@ -56,34 +56,37 @@ def simulate(
     Raises:
         InvalidInput: elements outside the image, a wavelet with waves too short for the grid.
     """
-    source, detectors = (
-        place_elements(medium, np.atleast_2d(emitter), wavelet),
-        place_elements(medium, receivers),
-    )
-    if medium.speed.ndim == 3:
-        return forward_3d(medium, source, detectors, wavelet, order, poll)
+    source, detectors = place_scan(medium, emitter, receivers, wavelet)
     return forward(medium, source, detectors, wavelet, 0, order, poll=poll)[0]
 
 
-def place_elements(medium: Medium, positions: Floats, wavelet: Floats | None = None) -> Points:
-    """Elements on the medium's grid, in its type; checks that the grid resolves the wavelet, if given."""
-    if wavelet is not None:
-        points = points_per_wavelength(medium, wavelet)
-        if points < LEAST_POINTS:
-            raise InvalidInput(
-                "spacing",
-                f"{points:.2f} nodes in the shortest wave",
-                f"at least {LEAST_POINTS:g}: a finer grid or a lower frequency",
-            )
-    found = place(positions, medium.spacing, medium.speed.shape, medium.margin)
-    return Points(found.first, found.weights.astype(medium.keep.dtype))
+def place_scan(medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floats) -> tuple[Points, Points]:
+    """Source and receivers of one emission on the medium's grid; arguments as ``simulate``.
+
+    Raises:
+        InvalidInput: elements outside the image, a wavelet with waves too short for the grid.
+    """
+    points = points_per_wavelength(medium, wavelet)
+    if points < LEAST_POINTS:
+        raise InvalidInput(
+            "spacing",
+            f"{points:.2f} nodes in the shortest wave",
+            f"at least {LEAST_POINTS:g}: a finer grid or a lower frequency",
+        )
+    return place_elements(medium, np.atleast_2d(emitter)), place_elements(medium, receivers)
+
+
+def place_elements(medium: Medium, positions: Floats) -> Points:
+    """Elements on the medium's grid, with weights of its type."""
+    points = place(positions, medium.spacing, medium.speed.shape, medium.margin)
+    return Points(points.first, points.weights.astype(medium.keep.dtype))
 
 
 def check_2d(medium: Medium) -> None:
-    """Raise for a 3-D medium, where only 2-D waves are implemented.
+    """Check that a medium is 2-D, where 3-D waves are not implemented.
 
     Raises:
-        InvalidInput: naming its shape.
+        InvalidInput: for a 3-D medium, naming its shape.
     """
     if medium.speed.ndim != 2:
         raise InvalidInput("speed", f"shape {medium.speed.shape}", "(nx, ny)")
@@ -121,41 +124,29 @@ def forward(
     Returns:
         traces: (nrx, nt).
         scattered: (ceil(nt / every), nx, ny), relative to the wavelet's maximum: h^2 (laplacian p + s), the
-            source radiated by a change of 1/c^2, or next - before + 2 sigma dt now, by one of sigma dt.
-
-    Raises:
-        InvalidInput: for a 3-D medium, which only ``simulate`` accepts.
+            source radiated by a change of 1/c^2, or next - before + 2 sigma dt now, by one of sigma dt. Empty
+            for a 3-D medium.
     """
-    check_2d(medium)
     kind = medium.keep.dtype
     nt = wavelet.size
     traces = np.empty((len(detectors.first), nt), kind)
-    kept = -(-nt // every) if every else 0
-    scattered = np.empty((kept, *medium.speed.shape), kind)
     fields = np.zeros((2, *medium.keep.shape), kind)
     scale = float(np.abs(wavelet).max())
+    taps, pulse = weights(order).astype(kind), (wavelet / scale).astype(kind)
+    arguments = (fields[0], fields[1], medium.factors, taps, source, detectors, pulse, traces)
+    blocks = split_steps(nt, medium.keep.size, poll)
+    if medium.speed.ndim == 3:
+        for begin, end in blocks:
+            _forward_3d(begin, end, *arguments)
+        # A point source is 1 / spacing^3 on its node; the factors contain spacing^2.
+        traces *= kind.type(scale / medium.spacing)
+        return traces, np.empty((0, *medium.speed.shape), kind)
+    scattered = np.empty((-(-nt // every) if every else 0, *medium.speed.shape), kind)
     inner = slice(medium.margin, -medium.margin)
     fade = medium.fade[inner, inner]
     turn = (1 - fade) / (1 + fade)
-    taps, pulse = weights(order).astype(kind), (wavelet / scale).astype(kind)
-    for begin, end in split_steps(nt, medium.keep.size, poll):
-        _forward(
-            begin,
-            end,
-            fields[0],
-            fields[1],
-            medium.factors,
-            taps,
-            source,
-            detectors,
-            pulse,
-            medium.margin,
-            every,
-            by == "attenuation",
-            turn,
-            traces,
-            scattered,
-        )
+    for begin, end in blocks:
+        _forward(begin, end, *arguments, medium.margin, every, by == "attenuation", turn, scattered)
     traces *= kind.type(scale)
     return traces, scattered
 
@@ -171,11 +162,11 @@ def _forward(
     source: Any,
     detectors: Any,
     wavelet: Any,
+    traces: Any,
     margin: int,
     every: int,
     by_loss: bool,
     turn: Any,
-    traces: Any,
     scattered: Any,
 ) -> None:
     keep, fade, drive = factors
@@ -183,14 +174,36 @@ def _forward(
     for n in range(begin, end):
         for r in range(traces.shape[0]):
             traces[r, n] = read(now, detectors.first[r], detectors.weights[r])
-        kept = every > 0 and n % every == 0
-        if kept and by_loss:
+        stored = every > 0 and n % every == 0
+        if stored and by_loss:
             begin_loss_scattering(now, old, turn, margin, scattered[n // every])
-        elif kept:
+        elif stored:
             curvature(now, weights, margin, scattered[n // every])
             spread(scattered[n // every], margin, first, along, wavelet[n])
         advance(now, old, keep, fade, drive, weights)
         inject(old, drive, first, along, wavelet[n])
-        if kept and by_loss:
+        if stored and by_loss:
             end_loss_scattering(old, margin, scattered[n // every])
+        now, old = old, now
+
+
+@kernel
+def _forward_3d(
+    begin: int,
+    end: int,
+    now: Any,
+    old: Any,
+    factors: Any,
+    weights: Any,
+    source: Any,
+    detectors: Any,
+    wavelet: Any,
+    traces: Any,
+) -> None:
+    keep, fade, drive = factors
+    for n in range(begin, end):
+        for r in range(traces.shape[0]):
+            traces[r, n] = read_3d(now, detectors.first[r], detectors.weights[r])
+        advance_3d(now, old, keep, fade, drive, weights)
+        inject_3d(old, drive, source.first[0], source.weights[0], wavelet[n])
         now, old = old, now

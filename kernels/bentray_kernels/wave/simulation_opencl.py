@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats
 from .medium import Medium
 from .points import REACH, Points
-from .simulation import check_2d, forward, place_elements
+from .simulation import check_2d, forward, place_scan
 from .stencil import HALO, weights
 from .time_step import FLUSH
 
@@ -31,10 +31,7 @@ def simulate_opencl(medium: Medium, emitter: Floats, receivers: Floats, wavelet:
     from ..opencl.choice import session_or_warning
 
     check_2d(medium)
-    source, detectors = (
-        place_elements(medium, np.atleast_2d(emitter), wavelet),
-        place_elements(medium, receivers),
-    )
+    source, detectors = place_scan(medium, emitter, receivers, wavelet)
     session = session_or_warning(instead="simulate")
     if session is None:
         return forward(medium, source, detectors, wavelet, 0)[0]
@@ -62,17 +59,17 @@ def _simulated(
         stencil = session.upload(weights().astype(kind))
         pulse = session.upload((wavelet / scale).astype(kind))
         at, along = session.upload(source.first[0].astype(np.int32)), session.upload(source.weights[0])
-        ears, hearing = session.upload(detectors.first.astype(np.int32)), session.upload(detectors.weights)
-        given = session.reserve(traces.nbytes)
+        first, by_tap = session.upload(detectors.first.astype(np.int32)), session.upload(detectors.weights)
+        samples = session.reserve(traces.nbytes)
         for n in range(wavelet.size):
             now, old = fields[n % 2], fields[1 - n % 2]
             step = np.uint32(n)
-            set_arguments(record, now, ears, hearing, given, step, steps, row)
+            set_arguments(record, now, first, by_tap, samples, step, steps, row)
             session.launch(record, (count,), None)
             set_arguments(advance, now, old, keep, fade, drive, stencil, kind.type(FLUSH), row)
             session.launch(advance, (ny - 2 * HALO, nx - 2 * HALO), None)
             set_arguments(inject, old, drive, at, along, pulse, step, row)
             session.launch(inject, (taps, taps), None)
-        session.download(traces, given)
+        session.download(traces, samples)
     traces *= kind.type(scale)
     return traces

@@ -128,8 +128,8 @@ def spread(image: Any, margin: int, first: Any, along: Any, value: Any) -> None:
 @kernel(inline="always")
 def read(field: Any, first: Any, along: Any) -> Any:
     """The field at one element."""
-    found = field.dtype.type(0)
+    value = field.dtype.type(0)
     for i in range(TAPS):
         for j in range(TAPS):
-            found += along[0, i] * along[1, j] * field[first[0] + i, first[1] + j]
-    return found
+            value += along[0, i] * along[1, j] * field[first[0] + i, first[1] + j]
+    return value

@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from bentray_kernels.tomography.result import Progress, Sweep
+from bentray_kernels.tomography.result import Iteration, Progress
 
 from ..refusals import DatabaseUnavailable
 from ..rows.job_queue import Queue
@@ -116,7 +116,7 @@ class Reporter:
         return self._stopped
 
 
-def thin_history(history: Sequence[Sweep]) -> Sequence[Sweep]:
+def thin_history(history: Sequence[Iteration]) -> Sequence[Iteration]:
     """At most ``MOST_SWEEPS`` entries of a history, evenly spaced, including the first and the last."""
     if len(history) <= MOST_SWEEPS:
         return history

@@ -14,7 +14,6 @@ PHANTOM = VolumePhantom(1500.0, (BALL, CORE), 0.5)
 def test_points_have_the_topmost_part():
     x = np.array([0.0, 0.03, 0.06])
     assert PHANTOM.speed_at(x, 0.0, 0.0).tolist() == [1550.0, 1400.0, 1500.0]
-    assert PHANTOM.attenuation_at(0.0, 0.0, x).tolist() == [60.0, 20.0, 0.5]
     assert PHANTOM.at(0.03).speed_at(x, 0.0).tolist() == [1400.0, 1400.0, 1500.0]
     assert PHANTOM.speed_range() == PHANTOM.at(0.0).speed_range() == (1400.0, 1550.0)
 

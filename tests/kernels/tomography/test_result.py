@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bentray_kernels.tomography import Reconstruction, Settings, Sweep
+from bentray_kernels.tomography import Iteration, Reconstruction, Settings
 
 
 @pytest.mark.parametrize(
@@ -11,7 +11,7 @@ from bentray_kernels.tomography import Reconstruction, Settings, Sweep
 )
 def test_residual_of_slices_that_ended_at_different_sweeps(given, first):
     passes = ((0, 1, 4e-7), (1, 1, 1e-7), (0, 2, 2e-7), (0, 3, 3e-7))
-    history = tuple(Sweep(*one, 8, given=bool(is_given)) for one, is_given in zip(passes, given, strict=True))
+    history = tuple(Iteration(*one, 8, given=bool(flag)) for one, flag in zip(passes, given, strict=True))
     image = np.full((4, 4), 1500.0)
     result = Reconstruction(image, image, (1e-3, 1e-3), (0.0, 0.0), 1500.0, Settings(), history=history)
     assert result.residual_rms_s == pytest.approx(np.sqrt((first**2 + 1e-14) / 2))
@@ -20,9 +20,9 @@ def test_residual_of_slices_that_ended_at_different_sweeps(given, first):
 def test_only_the_last_stage_gives_the_image():
     image = np.full((4, 4), 1500.0)
     history = (
-        Sweep(0, 1, 1e-7, 8),
-        Sweep(0, 1, 3e-7, 8, stage=1),
-        Sweep(0, 2, 2e-7, 8, stage=1, given=False),
+        Iteration(0, 1, 1e-7, 8),
+        Iteration(0, 1, 3e-7, 8, stage=1),
+        Iteration(0, 2, 2e-7, 8, stage=1, given=False),
     )
     result = Reconstruction(image, image, (1e-3, 1e-3), (0.0, 0.0), 1500.0, Settings(), history=history)
     assert result.residual_rms_s == pytest.approx(3e-7)

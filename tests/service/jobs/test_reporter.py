@@ -4,7 +4,7 @@ import json
 
 from sqlalchemy.exc import OperationalError
 
-from bentray_kernels.tomography.result import Progress, Sweep
+from bentray_kernels.tomography.result import Iteration, Progress
 from bentray_service.jobs.reporter import MEASURE_SECONDS, Reporter
 
 
@@ -61,7 +61,7 @@ def test_writes_are_throttled_and_the_last_one_arrives():
 
 def test_a_residual_that_json_cannot_hold():
     jobs = FakeJobs()
-    Reporter(jobs, "job", lambda: False).report(Progress(1, 1, (Sweep(0, 1, float("nan"), 0, 2),)))
+    Reporter(jobs, "job", lambda: False).report(Progress(1, 1, (Iteration(0, 1, float("nan"), 0, 2),)))
     told = {"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 0, "stage": 2, "given": True}
     waves = {"band_hz": None, "misfit": None, "held_out_misfit": None, "of_attenuation": False}
     assert jobs.written[0][2] == [told | waves]
@@ -124,7 +124,7 @@ def test_a_job_that_another_service_runs_is_left():
 def test_the_record_of_a_long_job_does_not_grow():
     jobs, clock = FakeJobs(), Clock()
     reporter = Reporter(jobs, "job", lambda: False, clock)
-    history = tuple(Sweep(index, 1, 1e-6, 8) for index in range(30_000))
+    history = tuple(Iteration(index, 1, 1e-6, 8) for index in range(30_000))
     for count in (1, 499, 500, 501, 30_000):
         clock.now += 10.0
         reporter.report(Progress(count, 600_001, history[:count]))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.tomography.reconstruction_graph import ReconstructionCheckpoint
-from bentray_kernels.tomography.result import Sweep
+from bentray_kernels.tomography.result import Iteration
 from bentray_kernels.tomography.sart import sart_step
 from bentray_workers.cluster import checkpoints
 from bentray_workers.cluster.checkpoints import INTERVAL_S, Checkpoints
@@ -22,12 +22,12 @@ class Clock:
 
 def checkpoint(sweep, emitter=0, seed=0):
     image = np.random.default_rng((seed, sweep, emitter)).normal(size=(5, 4))
-    history = tuple(Sweep(0, k + 1, 1.0 / 3.0**k, 8) for k in range(sweep))
+    history = tuple(Iteration(0, k + 1, 1.0 / 3.0**k, 8) for k in range(sweep))
     state = replace(
         sart_step.begin(image), sweep=sweep, emitter=emitter, squares=0.1 + emitter, history=history
     )
     return ReconstructionCheckpoint(
-        1, 24, (Sweep(0, 1, float("nan"), 8),), state, (None, image[:, 0], float("inf"))
+        1, 24, (Iteration(0, 1, float("nan"), 8),), state, (None, image[:, 0], float("inf"))
     )
 
 

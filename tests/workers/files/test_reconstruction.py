@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography import Settings, Sweep
+from bentray_kernels.tomography import Iteration, Settings
 from bentray_kernels.tomography.numerics import recorded
 from bentray_workers.files.reconstruction import read_reconstruction, write_reconstruction
 
@@ -33,9 +33,9 @@ def test_what_is_written_comes_back_bit_by_bit(tmp_path, slices, with_attenuatio
 
 def test_bands_of_a_refinement_come_back(tmp_path):
     waves = (
-        Sweep(0, 1, 3e-8, 36, 1, given=False, band_hz=(1e5, 2e5), misfit=0.3, held_out_misfit=0.4),
-        Sweep(0, 2, 2e-8, 36, 1, band_hz=(1e5, 2e5), misfit=0.1),
-        Sweep(0, 1, 2e-8, 24, 2, band_hz=(2e5, 3e5), misfit=0.2, of_attenuation=True),
+        Iteration(0, 1, 3e-8, 36, 1, given=False, band_hz=(1e5, 2e5), misfit=0.3, held_out_misfit=0.4),
+        Iteration(0, 2, 2e-8, 36, 1, band_hz=(1e5, 2e5), misfit=0.1),
+        Iteration(0, 1, 2e-8, 24, 2, band_hz=(2e5, 3e5), misfit=0.2, of_attenuation=True),
     )
     whole = replace(made(), history=(*made().history, *waves))
     write_reconstruction(tmp_path / "r.h5", whole)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.tomography import Settings, Sweep, Trial
+from bentray_kernels.tomography import Iteration, Settings, Trial
 from bentray_kernels.tomography.grid_schedule import stages
 from bentray_workers.images.captions import facts, stage_names
 
@@ -36,7 +36,12 @@ def test_one_stage_needs_no_name():
 
 
 def test_the_sweeps_of_all_stages_are_counted():
-    history = (Sweep(0, 1, 2e-7, 4), Sweep(0, 2, 1e-7, 4), Sweep(0, 1, 1e-7, 4, 1), Sweep(1, 1, 1e-7, 4, 1))
+    history = (
+        Iteration(0, 1, 2e-7, 4),
+        Iteration(0, 2, 1e-7, 4),
+        Iteration(0, 1, 1e-7, 4, 1),
+        Iteration(1, 1, 1e-7, 4, 1),
+    )
     assert "3 iterations in 2 stages" in facts(replace(made(slices=2), history=history))
     assert "  1 iteration  " in facts(replace(made(), history=history[:1]))
 
@@ -57,13 +62,16 @@ def test_the_wave_front_method_is_the_one_that_was_used(settings, words):
 
 def test_waveforms_are_named_after_the_rays_that_they_began_with():
     bands = (
-        Sweep(0, 1, 1e-7, 36, 1, band_hz=(1e5, 2e5), misfit=0.1),
-        Sweep(0, 1, 5e-8, 36, 3, band_hz=(1e5, 4.5e5), misfit=0.1),
-        Sweep(0, 1, 5e-8, 24, 4, band_hz=(3e5, 4.5e5), misfit=0.1, of_attenuation=True),
+        Iteration(0, 1, 1e-7, 36, 1, band_hz=(1e5, 2e5), misfit=0.1),
+        Iteration(0, 1, 5e-8, 36, 3, band_hz=(1e5, 4.5e5), misfit=0.1),
+        Iteration(0, 1, 5e-8, 24, 4, band_hz=(3e5, 4.5e5), misfit=0.1, of_attenuation=True),
     )
     rays = Trial({"rays": "straight", "method": "sart"}, 1e-7, 1e-7)
     result = replace(
-        made(), settings=Settings(method="waveform"), trials=(rays,), history=(Sweep(0, 1, 2e-7, 36), *bands)
+        made(),
+        settings=Settings(method="waveform"),
+        trials=(rays,),
+        history=(Iteration(0, 1, 2e-7, 36), *bands),
     )
     assert facts(result).startswith(
         "straight rays  ·  SART  ·  then waveforms  ·  4 iterations in 4 stages  ·  24 by"

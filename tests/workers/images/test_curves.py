@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentray_kernels.tomography import Sweep
+from bentray_kernels.tomography import Iteration
 from bentray_workers.images.canvas import drawing, new_figure, to_png
 from bentray_workers.images.curves import draw_history
 
@@ -14,7 +14,7 @@ def axis(*residuals_s: float):
     with drawing():
         figure = new_figure(3.0, 3.0)
         axes = figure.subplots()
-        draw_history(axes, {"one": tuple(Sweep(0, n, r, 4) for n, r in enumerate(residuals_s, start=1))})
+        draw_history(axes, {"one": tuple(Iteration(0, n, r, 4) for n, r in enumerate(residuals_s, start=1))})
         to_png(figure)
     return axes
 
@@ -42,16 +42,16 @@ def test_any_other_begins_at_zero(residuals):
 def test_over_slices_it_is_the_root_mean_square():
     with drawing():
         axes = new_figure(3.0, 3.0).subplots()
-        draw_history(axes, {"one": (Sweep(0, 1, 3e-9, 4), Sweep(1, 1, 4e-9, 4))})
+        draw_history(axes, {"one": (Iteration(0, 1, 3e-9, 4), Iteration(1, 1, 4e-9, 4))})
     np.testing.assert_allclose(axes.lines[0].get_ydata(), [np.sqrt(12.5)])
 
 
 def staged(names: tuple[str, ...]):
     history = (
-        *(Sweep(k, n, 8e-7, 4, 0) for n in (1, 2, 3) for k in (0, 1)),
-        Sweep(0, 1, 3e-7, 4, 1),
-        Sweep(1, 1, 4e-7, 4, 1),
-        Sweep(1, 2, 2e-7, 4, 1),
+        *(Iteration(k, n, 8e-7, 4, 0) for n in (1, 2, 3) for k in (0, 1)),
+        Iteration(0, 1, 3e-7, 4, 1),
+        Iteration(1, 1, 4e-7, 4, 1),
+        Iteration(1, 2, 2e-7, 4, 1),
     )
     with drawing():
         axes = new_figure(3.0, 3.0).subplots()
@@ -79,7 +79,7 @@ def test_the_names_of_stages_stand_above_their_sweeps_and_the_curve_keeps_clear(
 
 
 def test_a_legend_names_each_history_once():
-    stages = tuple(Sweep(0, 1, 1e-7, 4, stage) for stage in (0, 1))
+    stages = tuple(Iteration(0, 1, 1e-7, 4, stage) for stage in (0, 1))
     with drawing():
         axes = new_figure(3.0, 3.0).subplots()
         draw_history(axes, {"straight": stages, "bent": stages})

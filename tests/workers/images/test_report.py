@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Truth
-from bentray_kernels.tomography import Reconstruction, Sweep, Trial
+from bentray_kernels.tomography import Iteration, Reconstruction, Trial
 from bentray_kernels.tomography.model_selection.selection import explain_trials
 from bentray_workers.images.report import report_png
 from bentray_workers.images.truth_comparison import compare
@@ -42,7 +42,7 @@ RESIDUALS = "Residuals, 33.3 ns rms"
     ],
 )
 def test_without_a_truth_it_shows_what_there_is(drawn, change, shown):
-    result = replace(made(), history=tuple(Sweep(0, n, 1e-7 / n, 64) for n in (1, 2, 3)))
+    result = replace(made(), history=tuple(Iteration(0, n, 1e-7 / n, 64) for n in (1, 2, 3)))
     assert pixels(report_png(replace(result, **change))).shape[1] > 900
     assert panels(drawn) == shown
 
@@ -68,7 +68,7 @@ def test_each_image_has_its_own_limits_and_the_resolution_check_those_from_0_to_
 
 
 def test_the_stages_are_named_and_the_choice_of_auto_is_told(drawn):
-    history = (*(Sweep(0, n, 1e-7, 4, 0) for n in (1, 2)), Sweep(0, 1, 9e-8, 4, 1))
+    history = (*(Iteration(0, n, 1e-7, 4, 0) for n in (1, 2)), Iteration(0, 1, 9e-8, 4, 1))
     plan = made().settings.changed(nodes=64, coarser_grids=1)
     trials = (
         Trial({"rays": "curved", "method": "sart"}, 4e-8, 3e-8),

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography import Progress, Sweep
+from bentray_kernels.tomography import Iteration, Progress
 from bentray_workers.reconstruction import batch
 from bentray_workers.reconstruction.batch import Entry, explain_failure, run
 
@@ -81,7 +81,7 @@ def test_an_entry_tells_how_far_it_is_and_keeps_its_time() -> None:
     entry = Entry(Path("a/scan.h5"))
     assert (entry.name, entry.seconds) == ("scan", 0.0)
     entry.begin()
-    entry.show(Progress(3, 8, (Sweep(0, 1, 2e-7, 8),)))
+    entry.show(Progress(3, 8, (Iteration(0, 1, 2e-7, 8),)))
     assert (entry.done, entry.total, entry.residual_rms_s) == (3, 8, 2e-7)
     entry.end("succeeded")
     took = entry.seconds

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography import RESIDUAL_EDGES_S, Reconstruction, Settings, Sweep, Trial
+from bentray_kernels.tomography import RESIDUAL_EDGES_S, Iteration, Reconstruction, Settings, Trial
 from bentray_kernels.tomography.stored_settings import from_stored
 
 from .dataset.write import write_array
@@ -43,7 +43,7 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
     """Write a reconstruction; ``path`` is replaced atomically.
 
     The file holds ``speed_mps``, ``coverage_m`` and, if present, ``attenuation_np_m`` and ``recovery``,
-    each (nx, ny) or (nx, ny, nz); ``history`` with a column for each field of ``Sweep``; ``residuals``
+    each (nx, ny) or (nx, ny, nz); ``history`` with a column for each field of ``Iteration``; ``residuals``
     with ``count`` and the ``edge_s`` of its bins; and root attributes ``spacing_m``, ``origin_m``, ``axes``,
     ``water_speed_mps``, ``settings``, ``trials`` and ``provenance``, the last three JSON.
 
@@ -130,7 +130,7 @@ def _per_axis(reader: Reader, name: str, ndim: int) -> tuple[float, ...]:
     return values
 
 
-def _history(reader: Reader) -> tuple[Sweep, ...]:
+def _history(reader: Reader) -> tuple[Iteration, ...]:
     columns = {}
     for column, dtype in HISTORY.items():
         found = reader.array(f"history/{column}", np.dtype(dtype).kind, "a column of numbers")
@@ -144,9 +144,9 @@ def _history(reader: Reader) -> tuple[Sweep, ...]:
     if len({len(column) for column in (*columns.values(), *waves)}) != 1:
         raise InvalidInput("history", "columns of different lengths", "columns of one length")
     if not waves:
-        return tuple(Sweep(**row) for row in rows)
+        return tuple(Iteration(**row) for row in rows)
     return tuple(
-        Sweep(
+        Iteration(
             **row,
             band_hz=(low, high) if low and high else None,
             misfit=misfit,
@@ -157,7 +157,7 @@ def _history(reader: Reader) -> tuple[Sweep, ...]:
     )
 
 
-def _waves(sweep: Sweep) -> tuple[float, ...]:
+def _waves(sweep: Iteration) -> tuple[float, ...]:
     """What is in ``WAVES`` of one sweep."""
     found = (*(sweep.band_hz or (None, None)), sweep.misfit, sweep.held_out_misfit, sweep.of_attenuation)
     return tuple(math.nan if value is None else value for value in found)

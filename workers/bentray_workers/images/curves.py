@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from bentray_kernels.tomography import Sweep
+from bentray_kernels.tomography import Iteration
 
 Floats = NDArray[np.float64]
 
@@ -20,7 +20,9 @@ LINES = ("#d1495b", "#00798c", "#edae49", "#30638e", "#66a182")
 WIDE = 20.0
 
 
-def draw_history(axes: Axes, histories: Mapping[str, tuple[Sweep, ...]], stages: Sequence[str] = ()) -> None:
+def draw_history(
+    axes: Axes, histories: Mapping[str, tuple[Iteration, ...]], stages: Sequence[str] = ()
+) -> None:
     """Residual against iteration, a line a name; over slices the root mean square.
 
     Stages follow each other from left to right, with a dotted line where a next one begins.
@@ -54,7 +56,7 @@ def draw_history(axes: Axes, histories: Mapping[str, tuple[Sweep, ...]], stages:
         axes.legend()
 
 
-def _courses(history: tuple[Sweep, ...]) -> list[list[float]]:
+def _courses(history: tuple[Iteration, ...]) -> list[list[float]]:
     """Of each stage the residual of every iteration, ns; over slices the root mean square."""
     squares: dict[int, dict[int, list[float]]] = {}
     for s in history:

@@ -16,12 +16,11 @@ from ...arrays import Floats, Ints
 from ...rays.fan import RayKind
 from ..finite_frequency import front_smoothing, ray_slowness, width_in_nodes
 from ..problem import Problem
-from ..result import Sweep, residual_counts
+from ..result import Iteration, residual_counts
 from ..settings import Settings
 from . import huber
 from .linear_problem import Linearised
-from .linearisation import Rows, linearise
-from .ray_matrix import back_project
+from .linearisation import Rows, linearise, ray_density
 
 # A misfit above this part of the best before is no gain, and so many images in a row without one end the
 # iteration; one does not: the first of bent rays may miss as much as straight ones do, and the next far less.
@@ -75,7 +74,7 @@ class Iterate:
     halvings: int = 0
     idle: int = 0
     done: bool = False
-    history: tuple[Sweep, ...] = ()
+    history: tuple[Iteration, ...] = ()
 
     @property
     def sweep(self) -> int:
@@ -133,7 +132,7 @@ def step(
     residual = np.concatenate([part.residual for part in parts])
     rms = math.sqrt(float((residual**2).mean()))
     number = len(state.history) + 1
-    record = Sweep(slice_index, number, rms, len(problem.active_emitters), given=False)
+    record = Iteration(slice_index, number, rms, len(problem.active_emitters), given=False)
     history = (*state.history, record)
     best, limit = state.best, huber.limit(residual, settings.numerics.huber_scale)
     against = huber.loss(residual, best.limit)
@@ -156,13 +155,13 @@ def step(
         nearer = 0.5 * (best.slowness + state.slowness)
         return replace(state, slowness=nearer, halvings=state.halvings + 1, history=history)
     lowest, highest = settings.speed_bounds_mps
-    coverage = _coverage(problem, parts)
+    coverage = ray_density(problem, parts) * problem.spacing
     # Total variation is scaled by the misfit, s; quadratic penalties are relative to the data.
     unit = huber.clipped_rms(residual, limit) if settings.gauss_newton.penalty == "total-variation" else 1.0
     image, dual = Linearised(
         parts,
         state.slowness * problem.spacing,
-        problem.density(coverage) / problem.spacing,
+        problem.mean_in_region(coverage) / problem.spacing,
         problem.region,
         (problem.spacing / highest, problem.spacing / lowest),
         settings.gauss_newton.penalty_strength * unit,
@@ -183,11 +182,3 @@ def step(
         done=settings.iterations == 1,
         history=history,
     )
-
-
-def _coverage(problem: Problem, parts: Sequence[Rows]) -> Floats:
-    """Metres of ray through each node."""
-    nodes = np.zeros(problem.region.size)
-    for part in parts:
-        back_project(part.pointers, part.columns, part.lengths, np.ones(part.residual.size), nodes)
-    return nodes.reshape(problem.region.shape) * problem.spacing

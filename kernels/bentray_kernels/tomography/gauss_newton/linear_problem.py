@@ -13,7 +13,7 @@ from ...arrays import Flags, Floats
 from ..finite_frequency import blurred
 from .linearisation import Rows
 from .penalties import Penalty, adjoint, gradient, laplacian, length, roughness, shrink
-from .ray_matrix import back_project, normal_product, project
+from .ray_matrix import normal_product
 
 # Weight of the split in the alternating direction method, in units of the data's own curvature; on Table 6 a
 # tenth of it ended with a worse image.
@@ -139,7 +139,7 @@ class Linearised:
         weights, downhill = [], np.zeros(image.size)
         for part, residual_part in zip(self.parts, self._residuals(image), strict=True):
             weights.append(self._weights(residual_part))
-            back_project(part.pointers, part.columns, part.lengths, weights[-1] * residual_part, downhill)
+            part.back_project(weights[-1] * residual_part, downhill)
         residual = self._on_image(downhill) - np.where(self.region, steepness, 0.0)
         precondition = self._preconditioner()
         change, direction = np.zeros_like(residual), precondition(residual)
@@ -179,11 +179,9 @@ class Linearised:
 
     def _residuals(self, image: Floats) -> Iterator[Floats]:
         """Residuals of an image, part by part, s."""
-        change = blurred(image - self.image, self.width).ravel()
+        change = blurred(image - self.image, self.width)
         for part in self.parts:
-            explained = np.empty(part.residual.size)
-            project(part.pointers, part.columns, part.lengths, change, explained)
-            yield part.residual - explained
+            yield part.residual - part.project(change)
 
     def _weights(self, residual_part: Floats) -> Floats:
         """Of rows in Huber's loss: 1, less beyond its limit."""

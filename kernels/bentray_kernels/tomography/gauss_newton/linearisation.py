@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from ...arrays import Floats, Ints
 from ...compiled import kernel
 from ...eikonal import solve
-from ...rays.bending import STRIDE, allocate_bending, bend
+from ...rays.bending import STRIDE, bend
 from ...rays.descent import PARTS, empty_path, list_entries, merge_entries, trace_ray
 from ...rays.fan import Fan, RayKind
+from ...rays.newton_step import allocate_bending
 from ...splines import coefficients
 from ..problem import Problem
 from ..sart.sart_update import smoothed
+from .ray_matrix import back_project, project
 
 # A piece of a bent ray is STRIDE nodes long; its parts are as short as those of other rays.
 BENT_PARTS = 3
@@ -40,6 +42,24 @@ class Rows:
     lengths: NDArray[np.float32]
     residual: Floats
     emitters: int
+
+    def project(self, image: Floats) -> Floats:
+        """A·image, (rays,): sums along the rays."""
+        sums = np.empty(self.residual.size)
+        project(self.pointers, self.columns, self.lengths, image.ravel(), sums)
+        return sums
+
+    def back_project(self, values: Floats, into: Floats) -> None:
+        """Add Aᵀ·values to ``into``, (nodes,)."""
+        back_project(self.pointers, self.columns, self.lengths, values, into)
+
+
+def ray_density(problem: Problem, parts: Sequence[Rows]) -> Floats:
+    """Nodes of ray through each node, of the region's shape."""
+    density = np.zeros(problem.region.size)
+    for part in parts:
+        part.back_project(np.ones(part.residual.size), density)
+    return density.reshape(problem.region.shape)
 
 
 def linearise(
@@ -71,7 +91,7 @@ def linearise(
 def linearise_losses(
     problem: Problem, slowness: Floats, emitters: Ints, *, rays: RayKind, eikonal: str, front: float = 0.0
 ) -> Rows:
-    """As ``linearise`` for the amplitudes: the residual, Np, is what water along the same rays does not take.
+    """As ``linearise`` for the amplitudes: the residual, Np, is the log ratio minus that of water on the ray.
 
     Raises:
         ValueError: for a problem without amplitudes.
@@ -103,7 +123,7 @@ def _trace(
             and the lengths of the rays, m.
     """
     speed = smoothed(1.0 / slowness, front)
-    found, splines = [], {}
+    parts, splines = [], {}
     for emitter in emitters:
         valid = np.flatnonzero(np.isfinite(data[emitter]))
         slab = problem.slab(int(emitter))
@@ -121,12 +141,7 @@ def _trace(
             spline = splines[slab.start, slab.stop]
             tof = solve(tof, problem.spacing, source, eikonal)
         fan = Fan.checked(tof, problem.spacing, receivers, source, rays)
-        counts, columns, lengths, predicted = _rows(
-            fan,
-            front > 0.0,
-            inside.ravel(),
-            spline,
-        )
+        counts, columns, lengths, predicted = _rows(fan, front > 0.0, inside.ravel(), spline)
         if inside.shape != slowness.shape:
             column, height = np.divmod(columns, inside.shape[-1])
             columns = (column * slowness.shape[-1] + height + slab.start).astype(np.int32)
@@ -135,8 +150,8 @@ def _trace(
         residual = residual_of(
             int(emitter), valid, distance, predicted * problem.spacing, length * problem.spacing
         )
-        found.append((counts, columns, lengths, residual))
-    counts, columns, lengths, residual = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        parts.append((counts, columns, lengths, residual))
+    counts, columns, lengths, residual = (np.concatenate(part) for part in zip(*parts, strict=True))
     return Rows(np.concatenate(([0], np.cumsum(counts))), columns, lengths, residual, len(emitters))
 
 

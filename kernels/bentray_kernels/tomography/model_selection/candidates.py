@@ -9,10 +9,9 @@ import numpy as np
 
 from ...arrays import Floats
 from ...task_graph import Task
-from ..gauss_newton.gauss_newton_step import trace_rays
 from ..gauss_newton.linearisation import Rows
-from ..reconstruction_graph import Evaluation, ReconstructionGraph
-from ..stage_graphs import Scan, batches_of
+from ..reconstruction_graph import Evaluation, ReconstructionGraph, trace_final_rays
+from ..stage_graphs import Scan
 
 
 class CandidateGraph(ReconstructionGraph):
@@ -47,16 +46,10 @@ class HeldOutMisfit(Evaluation):
 
     def __init__(self, scan: Scan, index: int) -> None:
         self._scan = scan
-        super().__init__(trace_held_out_rays, misfit, scan.problem(index).active_emitters)
+        super().__init__(trace_final_rays, misfit, scan.problem(index).active_emitters)
 
     def first(self, scan: Scan, index: int, image: Floats) -> list[Task]:
         return super().first(self._scan, index, image)
-
-
-def trace_held_out_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:
-    """Task: rays of one batch of emitters of held-out pairs, through the finished image."""
-    problem = scan.problem(index)
-    return trace_rays(problem, scan.stages()[-1], slowness, batches_of(problem.active_emitters)[batch])
 
 
 def misfit(_scan: Scan, _index: int, rows: Sequence[Rows]) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ..problem import Problem
-from ..result import Sweep, residual_counts
+from ..result import Iteration, residual_counts
 from ..settings import Settings
 from .sart_update import update_for
 
@@ -37,7 +37,7 @@ class State:
     count: int = 0
     residuals: Ints = field(default_factory=lambda: residual_counts(np.empty(0)))
     done: bool = False
-    history: tuple[Sweep, ...] = ()
+    history: tuple[Iteration, ...] = ()
 
 
 def begin(slowness: Floats) -> State:
@@ -104,5 +104,5 @@ def _close_sweep(state: State, settings: Settings, slice_index: int, emitters: i
         squares=0.0,
         count=0,
         done=sweep >= settings.iterations or settings.numerics.explained(rms),
-        history=(*state.history, Sweep(slice_index, sweep, rms, emitters)),
+        history=(*state.history, Iteration(slice_index, sweep, rms, emitters)),
     )

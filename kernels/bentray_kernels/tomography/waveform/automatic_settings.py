@@ -1,4 +1,4 @@
-"""How waveforms refine what a reconstruction's settings ask for: bands, window and bounds from the scan."""
+"""Automatic settings of a full-waveform refinement: bands, window and bounds from the scan."""
 
 from __future__ import annotations
 
@@ -14,27 +14,26 @@ from ..settings import Settings
 from .waveform_cost import core_seconds
 from .waveform_settings import Band, WaveSettings, bands, loss_band
 
-# Parts of the time that a wave takes across the array, and periods of the pulse, before and after the arrival
-# in water that traces are compared within: what is faster than water comes before, what is scattered after.
+# The window in which traces are compared, before and after the arrival in water: parts of the travel time
+# across the array, plus periods of the pulse. Waves faster than water come earlier, scattered ones later.
 BEFORE, AFTER, PERIODS = 0.4, 0.25, 4.0
 
-# Pairs nearer than this part of the array's width are left out: they hear what scatters from the skin.
+# Pairs nearer than this part of the array's width are left out: scattering from the skin dominates them.
 NEAREST = 0.16
 
-
-# No band has fewer emitters for the sake of the time budget.
+# The time budget does not reduce the emitters of a band below this number.
 LEAST_EMITTERS = 8
 
 
 class WaveScale(NamedTuple):
-    """What the cost of a refinement depends on.
+    """Properties of a scan that determine the cost of its refinement.
 
     Attributes:
         centre_hz: centre frequency of the pulse, Hz.
         water_mps: speed of the water, m/s.
         width_m: of the array, m.
-        record_s: from the first sample of a trace to the last, s.
-        slices: how many.
+        record_s: duration of a trace, s.
+        slices: their number.
     """
 
     centre_hz: float
@@ -44,24 +43,30 @@ class WaveScale(NamedTuple):
     slices: int
 
     def minutes(self, settings: Settings) -> float:
-        """About how long one core works on the refinement."""
+        """Estimated CPU time of the refinement, minutes of one core."""
         return self._minutes(settings, settings.numerics.bands, settings.numerics.emitters)
 
     def bands(self, settings: Settings) -> tuple[Band, ...]:
-        """The bands that the settings have fixed, or all."""
-        fixed = settings.numerics
-        return bands_of(self.centre_hz, self.water_mps, settings, fixed.bands, fixed.emitters)
+        """The bands of the refinement, that of the attenuation last."""
+        return self._bands(settings, settings.numerics.bands, settings.numerics.emitters)
+
+    def _bands(self, settings: Settings, count: int | None, emitters: int | None) -> tuple[Band, ...]:
+        """The first ``count`` bands of the speed, all for None; ``emitters`` None: the usual number."""
+        plan = bands(self.centre_hz, self.water_mps)[:count]
+        if settings.attenuation.enabled:
+            plan = (*plan, loss_band(self.centre_hz, self.water_mps))
+        return plan if emitters is None else tuple(replace(band, emitters=emitters) for band in plan)
 
     def _minutes(self, settings: Settings, count: int | None, emitters: int | None) -> float:
-        plan = bands_of(self.centre_hz, self.water_mps, settings, count, emitters)
+        plan = self._bands(settings, count, emitters)
         fastest = settings.speed_bounds_mps[1]
         return self.slices * core_seconds(plan, self.width_m, self.record_s, fastest) / 60.0
 
     def budgeted(self, settings: Settings) -> Settings:
         """The settings with the bands and emitters that the time budget allows.
 
-        As many bands as it allows, at least one, and if one takes too long fewer emitters, at least
-        ``LEAST_EMITTERS``. Bands and emitters that are fixed stay; without a budget all bands are used.
+        As many bands as possible, at least one; if a single band takes too long, fewer emitters, at least
+        ``LEAST_EMITTERS``. Fixed bands and emitters are not changed; without a budget all bands are used.
         """
         most, emitters = settings.minutes, settings.numerics.emitters
         if most is None or settings.numerics.bands is not None:
@@ -77,16 +82,17 @@ class WaveScale(NamedTuple):
 
 
 def scale_of(dataset: Dataset, settings: Settings, samples: int, slices: int) -> WaveScale:
-    """The cost factors of a scan that can be refined.
+    """The scale of a scan; checks that it can be refined.
 
     Args:
-        dataset: its traces may still lie in its file.
+        dataset: its traces may still be in its file.
         settings: as requested.
-        samples: of each trace of object and water; 0: there are none of one or both.
-        slices: how many.
+        samples: of each trace of object and water; 0 if one or both are missing.
+        slices: their number.
 
     Raises:
-        InvalidInput: for a scan without traces or a centre frequency, or in space.
+        InvalidInput: for a scan without traces of object and water, without a centre frequency, or with
+            elements in space.
     """
     check_traces(samples)
     if dataset.element_position_m.shape[1] != 2:
@@ -106,7 +112,7 @@ def scale_of(dataset: Dataset, settings: Settings, samples: int, slices: int) ->
 
 
 def wave_settings(scale: WaveScale, settings: Settings) -> WaveSettings:
-    """How to refine a scan."""
+    """The settings of the refinement of a scan."""
     across, pulse = scale.width_m / scale.water_mps, PERIODS / scale.centre_hz
     return WaveSettings(
         scale.bands(settings),
@@ -118,29 +124,11 @@ def wave_settings(scale: WaveScale, settings: Settings) -> WaveSettings:
     )
 
 
-def bands_of(
-    centre_hz: float, water_mps: float, settings: Settings, count: int | None, emitters: int | None
-) -> tuple[Band, ...]:
-    """The bands of a refinement; that of the attenuation comes last.
-
-    Args:
-        centre_hz: of the pulse, Hz.
-        water_mps: speed of the water, m/s.
-        settings: whether the attenuation is refined.
-        count: of the speed's bands, from the lowest frequency; None: all.
-        emitters: of each band; None: as many as is usual.
-    """
-    found = bands(centre_hz, water_mps)[:count]
-    if settings.attenuation.enabled:
-        found = (*found, loss_band(centre_hz, water_mps))
-    return found if emitters is None else tuple(replace(band, emitters=emitters) for band in found)
-
-
 def check_traces(samples: int) -> None:
-    """Hold against what a refinement needs.
+    """Check that a scan has traces of object and water.
 
     Args:
-        samples: of each trace, of object and water; 0: there are none of one or both.
+        samples: of each trace; 0 if object or water is missing.
 
     Raises:
         InvalidInput: without traces of both.

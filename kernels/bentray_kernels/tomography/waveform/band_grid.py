@@ -1,4 +1,4 @@
-"""How large the problem of a band is: nodes of its grid, steps of its clock."""
+"""Grid and time steps of a band: nodes, step, duration and storage interval of its simulations."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from ...wave.stencil import HALO, longest_step
 from .trace_resampling import FALL
 from .waveform_settings import Band
 
-# Part of the stable time step that is used, for the absorbing edges shorten it.
+# Part of the stable time step that is used, because the absorbing edges reduce the limit.
 SAFE = 0.95
 
-# Times the period of the upper corner that the filter may spread ahead of the first sample.
+# Periods of the upper corner that the filter may spread ahead of the first sample.
 LEAD = 2.0
 
 
 class Extent(NamedTuple):
-    """Of a problem.
+    """Extent of the simulations of a band.
 
     Attributes:
         nodes: along each side of the image.
-        step_s: of the simulator, s.
-        steps: of the simulator.
-        lead_s: from its beginning to the first recorded sample, s.
-        every: time steps from one stored field to the next.
+        step_s: time step, s.
+        steps: number of time steps.
+        lead_s: from the first time step to the first recorded sample, s.
+        every: time steps between stored fields.
     """
 
     nodes: int
@@ -37,13 +37,13 @@ class Extent(NamedTuple):
 
     @classmethod
     def of(cls, band: Band, reach_m: float, record_s: float, fastest_mps: float) -> Extent:
-        """Of a scan in a band.
+        """The extent for a scan.
 
         Args:
             band: the band.
-            reach_m: from the middle of the array to its outermost element along an axis, m.
-            record_s: from the first recorded sample to the last, s.
-            fastest_mps: speed that a node may take at most, m/s.
+            reach_m: distance of the outermost element from the middle of the array along an axis, m.
+            record_s: duration of a trace, s.
+            fastest_mps: highest speed of a node, m/s.
         """
         step = SAFE * longest_step(fastest_mps, band.spacing_m)
         lead = LEAD / band.high_hz
@@ -52,7 +52,7 @@ class Extent(NamedTuple):
             step,
             int((record_s + lead) / step),
             lead,
-            # The product of two fields ends at twice the filter's end; twice that is sampled.
+            # The spectrum of the product of two fields ends at twice the filter's end; sampled at twice that.
             max(1, int(1.0 / (2.2 * (1.0 + FALL) * band.high_hz) / step)),
         )
 

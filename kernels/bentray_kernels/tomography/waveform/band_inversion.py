@@ -21,21 +21,21 @@ from .waveform_settings import Steps, WaveSettings
 # Illumination below this part of its mean counts as that part.
 DARK = 0.1
 
-# A step that makes the misfit grow is shortened so often at most.
+# Most times that a step which increases the misfit is shortened.
 MOST_SHORTENINGS = 4
 
-# Held-out emitters may be predicted this much worse than at best before their misfit counts as risen, and it
-# must do so in that many images in turn: the cycle-skip guard.
+# Cycle-skip guard: the band ends once the held-out misfit exceeds ``LEEWAY`` times its minimum in
+# ``PATIENCE`` consecutive images.
 LEEWAY = 1.1
 PATIENCE = 2
 
 
 class Model(NamedTuple):
-    """What waves go through, on the grid of the problem.
+    """Speed and attenuation on the grid of the problem.
 
     Attributes:
         speed: (nx, ny), m/s.
-        attenuation: (nx, ny), beyond the water's, Np/m; None: nowhere.
+        attenuation: (nx, ny), beyond the water's, Np/m; None: zero.
     """
 
     speed: Floats
@@ -46,7 +46,7 @@ class EmitterMisfit(NamedTuple):
     """Misfit and gradient of some emitters, summed in their order.
 
     Attributes:
-        misfit: of the emitters that make the image.
+        misfit: of the emitters used.
         held: of held-out emitters.
         gradient: (nx, ny), by the band's unknown.
         illumination: (nx, ny).
@@ -63,9 +63,9 @@ class Evaluation:
     """Misfits of one image.
 
     Attributes:
-        misfit: a mean over the emitters that make the image.
-        held: over held-out emitters; NaN without any.
-        accepted: whether the iteration continued from it.
+        misfit: mean over the emitters used.
+        held: mean over held-out emitters; NaN without any.
+        accepted: whether the iteration continued from this image.
     """
 
     misfit: float
@@ -80,17 +80,17 @@ class InversionState:
     Images are of the band's unknown, m/s or Np/m.
 
     Attributes:
-        image: (nx, ny), to be evaluated next; at the end the last that was accepted, or ``best`` where
-            skipped and of the attenuation, in which noise and what the speed has wrong show first.
-        base: (nx, ny), the last image that was accepted, with its ``gradient`` (nx, ny).
+        image: (nx, ny), to be evaluated next. At the end the last accepted image; ``best`` if the band was
+            skipped, and for the attenuation, which noise and errors of the speed affect first.
+        base: (nx, ny), the last accepted image, with its ``gradient`` (nx, ny).
         misfit: of the base; infinite before the first evaluation.
-        way: (nx, ny), what was added to the base.
-        illumination: (nx, ny), of the first image; it shapes all steps of the band.
-        steps, changes: (pairs, nx, ny), of images and gradients.
-        best: (nx, ny), the image with the least held-out misfit, ``best_held``.
-        risen: images in turn that held-out emitters were predicted worse in.
-        shortenings: of the step under way.
-        skipped: whether held-out emitters ended it, so that cycles were skipped or noise was fitted.
+        way: (nx, ny), the step from the base to the image.
+        illumination: (nx, ny), of the first image; used in all steps of the band.
+        steps, changes: (pairs, nx, ny), differences of images and of gradients.
+        best: (nx, ny), the image with the lowest held-out misfit, ``best_held``.
+        risen: consecutive images with a higher held-out misfit.
+        shortenings: of the current step.
+        skipped: whether the held-out misfit ended the band: cycles were skipped or noise was fitted.
         done: whether the band has ended.
         history: a record for each image.
     """
@@ -113,23 +113,21 @@ class InversionState:
 
 
 def begin(image: Floats) -> InversionState:
-    """An image to begin with, (nx, ny), on the grid of the problem."""
-    nothing, none = np.zeros_like(image), np.zeros((0, *image.shape))
-    return InversionState(
-        image, image, nothing, float("inf"), nothing, nothing, none, none, image, float("inf")
-    )
+    """The state that begins with an image, (nx, ny), on the grid of the problem."""
+    zero, none = np.zeros_like(image), np.zeros((0, *image.shape))
+    return InversionState(image, image, zero, math.inf, zero, zero, none, none, image, math.inf)
 
 
 def emitters(problem: WaveProblem) -> Ints:
-    """Emitters to evaluate in each iteration: those that make the image, then those held out."""
+    """Emitters to evaluate in each iteration: those used, then those held out."""
     return np.concatenate((problem.used, problem.held))
 
 
 def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, some: Ints) -> EmitterMisfit:
     """Misfit of some of ``emitters(problem)``, and its gradient by the band's unknown."""
-    judging = set(problem.held.tolist())
+    held_out = set(problem.held.tolist())
     medium, by = problem.medium(*model), problem.band.of
-    kind = settings.measure(by)
+    measure = settings.measure(by)
     misfit, held = 0.0, 0.0
     gradient, illumination = np.zeros_like(model.speed), np.zeros_like(model.speed)
     for emitter in some.tolist():
@@ -137,17 +135,17 @@ def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, some: I
         recorded = problem.recorded(emitter, valid)
         window = problem.window(emitter, valid, settings.window_s)
         at, receivers = problem.emitters[emitter], problem.receivers[valid]
-        if emitter in judging:
+        if emitter in held_out:
             traces = simulate(medium, at, receivers, problem.wavelet, poll=problem.poll)
-            held += kind(traces, recorded, window)[0]
+            held += measure(traces, recorded, window)[0]
             continue
-        compare = partial(kind, recorded=recorded, weight=window)
-        found = misfit_gradient(
+        compare = partial(measure, recorded=recorded, weight=window)
+        one = misfit_gradient(
             medium, at, receivers, problem.wavelet, compare, problem.every, by, problem.poll
         )
-        misfit += found.misfit
-        gradient += found.gradient
-        illumination += found.illumination
+        misfit += one.misfit
+        gradient += one.gradient
+        illumination += one.illumination
     return EmitterMisfit(misfit, held, gradient, illumination)
 
 
@@ -156,7 +154,7 @@ def step(
 ) -> InversionState:
     """The next image from the misfits of all emitters, in their order."""
     misfit = sum(part.misfit for part in parts) / problem.used.size
-    held = sum(part.held for part in parts) / problem.held.size if problem.held.size else float("nan")
+    held = sum(part.held for part in parts) / problem.held.size if problem.held.size else math.nan
     gradient = np.where(problem.region, sum(part.gradient for part in parts), 0.0) / problem.used.size
     if not state.history:
         light = sum(part.illumination for part in parts)
@@ -197,13 +195,13 @@ def step(
 
 
 def _search_direction(problem: WaveProblem, limits: Steps, state: InversionState) -> Floats:
-    """What to add to the base, (nx, ny)."""
+    """The step from the base, (nx, ny): L-BFGS with the illumination as preconditioner."""
     light = state.illumination
     dim = 1.0 / np.sqrt(light + DARK * light[problem.region].mean())
     width = problem.band.smoothing_m / problem.band.spacing_m
 
     def prior(image: Floats) -> Floats:
-        # Symmetric, so that it is a metric: half of the light before the smoothing and half after.
+        # Symmetric, as a metric must be: the root of the illumination before the smoothing and after it.
         smooth = gaussian_filter(np.where(problem.region, dim * image, 0.0), width)
         return np.where(problem.region, dim * smooth, 0.0)
 
@@ -220,7 +218,7 @@ def _ended(problem: WaveProblem, state: InversionState) -> InversionState:
 
 
 def _shortened(problem: WaveProblem, limits: Steps, state: InversionState, misfit: float) -> InversionState:
-    """A shorter step along the same way, to the lowest point of the parabola through what is known."""
+    """A shorter step in the same direction, to the minimum of the parabola through both misfits."""
     if state.shortenings == MOST_SHORTENINGS:
         return _ended(problem, state)
     fall = float((state.gradient * state.way).sum())
@@ -232,11 +230,11 @@ def _shortened(problem: WaveProblem, limits: Steps, state: InversionState, misfi
 
 
 def given_by(history: Sequence[Evaluation], *, judged: bool) -> int:
-    """Number of the image that a finished band returned, from 0.
+    """Index of the image that a finished band returned.
 
     Args:
         history: of the band.
-        judged: whether it returned the image with the least held-out misfit, and not the last.
+        judged: whether it returned the image with the lowest held-out misfit instead of the last.
     """
     accepted = [k for k, record in enumerate(history) if record.accepted]
     if judged and not math.isnan(history[0].held):

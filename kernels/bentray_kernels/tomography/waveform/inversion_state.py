@@ -1,4 +1,4 @@
-"""State of a refinement: the active band, and the results of the bands before."""
+"""State of a refinement: the active band and the results of finished bands."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class BandEnd:
 
     Attributes:
         image: the image.
-        skipped: whether held-out emitters ended the band, or one before it, so that it was skipped.
-        history: a record for each evaluated image; empty for a band that was passed over or skipped.
+        skipped: whether the held-out misfit ended the band, or an earlier band so that this one was skipped.
+        history: a record for each evaluated image; empty for a skipped band.
     """
 
     image: Image
@@ -52,13 +52,13 @@ class BandEnd:
 
 @dataclass(frozen=True)
 class ActiveBand:
-    """The band under way, without its problem, which only tasks make.
+    """The active band, without its problem, which only tasks make.
 
     Attributes:
         state: of the inversion.
         origin: of its grid, m.
-        emitters: how many are evaluated in each iteration.
-        frozen: (nx, ny), the speed where the attenuation is refined, m/s; else None.
+        emitters: number evaluated in each iteration.
+        frozen: (nx, ny), the fixed speed while the attenuation is refined, m/s; else None.
     """
 
     state: InversionState
@@ -79,8 +79,8 @@ class RefinementCheckpoint:
     """State of a ``RefinementGraph``; see ``task_graph.Checkpoint``.
 
     Attributes:
-        ends: of the bands before.
-        band: the band under way; None between two.
+        ends: results of the finished bands.
+        band: the active band; None between two bands.
     """
 
     ends: tuple[BandEnd, ...]

@@ -1,11 +1,11 @@
-"""The images of a band as records of a reconstruction's history."""
+"""Records of a reconstruction's history for the images of a band."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
-from ..result import Sweep
+from ..result import Iteration
 from .band_inversion import Evaluation, given_by
 from .waveform_settings import Band, WaveSettings
 
@@ -19,28 +19,28 @@ def iteration_records(
     *,
     over: bool,
     skipped: bool,
-    kept_s: float = math.nan,
-) -> list[Sweep]:
+    speed_residual_s: float = math.nan,
+) -> list[Iteration]:
     """A record for each image that was evaluated in a band.
 
     Args:
-        settings: how it is refined.
+        settings: of the refinement.
         number: of the band, from 0.
         history: of the band.
         index: of the slice.
         stage: number of the band among all stages.
-        over: whether the band is.
-        skipped: whether held-out emitters ended it.
-        kept_s: residual of the speed, s, which a band of the attenuation leaves as it is.
+        over: whether the band is finished.
+        skipped: whether the held-out misfit ended it.
+        speed_residual_s: residual of the speed, s, for a band of the attenuation.
     """
     band = settings.bands[number]
     loss = band.of == "attenuation"
     given = given_by(history, judged=skipped or loss) if over and history else -1
     return [
-        Sweep(
+        Iteration(
             index,
             k + 1,
-            kept_s if loss else shift_s(record.misfit, band),
+            speed_residual_s if loss else shift_s(record.misfit, band),
             band.emitters,
             stage,
             given=k == given,
@@ -54,9 +54,9 @@ def iteration_records(
 
 
 def shift_s(misfit: float, band: Band) -> float:
-    """The shift of a wave in the middle of a band that has this misfit, s; half a period at most.
+    """The time shift of a wave at the middle of a band that causes this misfit, s; at most half a period.
 
-    Of two waves that differ by a phase alone, one minus the correlation is one minus its cosine, and so is
-    half the energy of their difference over that of one.
+    For two waves that differ in phase alone, one minus the correlation is one minus the cosine of the phase,
+    as is half the energy of their difference over that of one wave.
     """
     return math.acos(max(1.0 - misfit, -1.0)) / (math.pi * (band.low_hz + band.high_hz))

@@ -6,7 +6,6 @@ from functools import cache
 
 from ...acquisition import Dataset
 from .preparation import prepare
-from .source_calibration import Mapping
 from .waveform_problem import WaveProblem
 from .waveform_settings import WaveSettings
 
@@ -14,11 +13,9 @@ from .waveform_settings import WaveSettings
 class MemoryWaveScan:
     """See ``refinement_graph.WaveScan``."""
 
-    def __init__(
-        self, dataset: Dataset, settings: WaveSettings, run: Mapping = map, *, index: int = 0
-    ) -> None:
+    def __init__(self, dataset: Dataset, settings: WaveSettings, *, index: int = 0) -> None:
         self._settings = settings
-        self._problem = cache(lambda number: prepare(dataset.slice(index), settings, number, run=run))
+        self._problem = cache(lambda number: prepare(dataset.slice(index), settings, number))
 
     def settings(self) -> WaveSettings:
         return self._settings

@@ -1,4 +1,4 @@
-"""How far simulated traces are from recorded ones, and the derivative by every simulated sample."""
+"""Misfits of simulated and recorded traces, and their derivatives by every simulated sample."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def least_squares(simulated: Floats, recorded: Floats, weight: Floats) -> tuple[
 
 
 def correlation(simulated: Floats, recorded: Floats, weight: Floats) -> tuple[float, Floats]:
-    """One minus the normalised correlation, a mean over traces: blind to the amplitude of each trace.
+    """One minus the normalised correlation, averaged over traces; independent of the amplitude of each trace.
 
     Args:
         simulated, recorded: (nrx, nt).
@@ -47,7 +47,7 @@ def correlation(simulated: Floats, recorded: Floats, weight: Floats) -> tuple[fl
 
 
 def arrival_window(arrival_s: Floats, times_s: Floats, before_s: float, after_s: float) -> Floats:
-    """A window about the predicted arrival of each trace, (nrx, nt): 1 inside, half a cosine at its ends.
+    """A window around the predicted arrival of each trace, (nrx, nt): 1 inside, half a cosine at its ends.
 
     Args:
         arrival_s: (nrx,), s.

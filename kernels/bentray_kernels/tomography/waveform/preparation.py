@@ -1,4 +1,4 @@
-"""A problem from a dataset: grid, clock, pairs, the draw of emitters."""
+"""The inverse problem of a band from a dataset: grid, time steps, pairs and drawn emitters."""
 
 from __future__ import annotations
 
@@ -14,34 +14,26 @@ from ...wave.points import REACH
 from ...wave.time_blocks import Poll, no_poll
 from ..roi import inside
 from .band_grid import Extent
-from .source_calibration import Mapping, WaterShots, with_calibrated_source, with_normalised_amplitudes
+from .source_calibration import WaterShots, with_calibrated_source, with_normalised_amplitudes
 from .trace_resampling import Clock, Water
 from .waveform_problem import WaveProblem
 from .waveform_settings import WaveSettings
 
 
-def prepare(
-    dataset: Dataset,
-    settings: WaveSettings,
-    number: int,
-    *,
-    run: Mapping = map,
-    poll: Poll = no_poll,
-) -> WaveProblem:
-    """The problem of a slice in band ``number``, its wavelet and its water's phase read from water shots.
+def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, poll: Poll = no_poll) -> WaveProblem:
+    """The problem of a slice in band ``number``, with wavelet and phase speed of the water from water shots.
 
-    It holds the object's traces of the emitters that the band uses, no others and none of the water: traces
-    given as ``acquisition.emissions.Emissions`` are read one emission at a time.
+    It holds the object traces of the emitters that the band uses. Traces given as
+    ``acquisition.emissions.Emissions`` are read one emission at a time.
 
     Args:
         dataset: one slice with traces of object and water.
-        settings: how to refine.
+        settings: of the refinement.
         number: of the band, from 0.
-        run: what runs the simulated water shots.
-        poll: of these and of all simulations of the problem, see ``time_blocks``.
+        poll: of all simulations, see ``time_blocks``.
 
     Raises:
-        InvalidInput: for a dataset that lacks one of the above or, where it is asked for, a region of
+        InvalidInput: for a dataset without traces or, if the settings require one, without a region of
             interest; with all emitters held out, no node inside the array, or traces of zeros alone.
     """
     recorded = dataset.waveform
@@ -102,38 +94,38 @@ def prepare(
         poll=poll,
     )
     shots = WaterShots(recorded.water, water_gain, samples, settings.window_s)
-    found = with_calibrated_source(problem, shots, run)
-    return found if band.of == "speed" else with_normalised_amplitudes(found, shots)
+    problem = with_calibrated_source(problem, shots)
+    return problem if band.of == "speed" else with_normalised_amplitudes(problem, shots)
 
 
 def _without_dead_traces(
     recorded: Waveform, use: Flags, emitters: Ints
 ) -> tuple[dict[int, NDArray[Any]], Flags]:
-    """The object's traces of some emitters, and (ntx, nrx) the pairs to use without those of dead traces.
+    """Object traces of some emitters, and (ntx, nrx) the pairs to use without those of dead traces.
 
-    The traces are copies, for an emission that is read may be part of a larger block.
+    The traces are copies, because an emission may be a view of a larger block.
     """
     assert recorded.water is not None
-    found, use = {}, use.copy()
+    by_emitter, use = {}, use.copy()
     for emitter in np.sort(emitters).tolist():
-        found[emitter] = recorded.object[emitter].copy()
-        for traces in (found[emitter], recorded.water[emitter]):
+        by_emitter[emitter] = recorded.object[emitter].copy()
+        for traces in (by_emitter[emitter], recorded.water[emitter]):
             use[emitter] &= (traces != 0).any(axis=-1)
-    return found, use
+    return by_emitter, use
 
 
 def _draw_emitters(candidates: Ints, settings: WaveSettings, number: int) -> tuple[Ints, Ints]:
-    """The emitters of a band, other ones in each, and those held out, the same in all.
+    """The emitters of a band, different in each band, and the held-out ones, the same in all bands.
 
-    The circle is cut into as many parts as emitters are requested, and one is drawn from each.
+    The circle is divided into as many parts as emitters are requested; one is drawn from each part.
     """
     places = np.linspace(0, candidates.size, settings.held_out, endpoint=False).astype(np.int64)
     held = candidates[np.unique(places)] if candidates.size else candidates
     rest = np.setdiff1d(candidates, held)
     if rest.size == 0:
         raise InvalidInput("held_out", settings.held_out, f"fewer than the {candidates.size} emitters")
-    wanted = min(settings.bands[number].emitters, rest.size)
-    edges = np.linspace(0, rest.size, wanted + 1)
-    chance = np.random.default_rng((settings.seed, number)).random(wanted)
+    count = min(settings.bands[number].emitters, rest.size)
+    edges = np.linspace(0, rest.size, count + 1)
+    chance = np.random.default_rng((settings.seed, number)).random(count)
     drawn = (edges[:-1] + chance * np.diff(edges)).astype(np.int64)
     return rest[np.unique(np.minimum(drawn, rest.size - 1))], held

@@ -11,7 +11,8 @@ from scipy.ndimage import map_coordinates
 
 from ...arrays import Floats
 from ...task_graph import Task
-from ..result import Sweep
+from ...wave.simulation import Unknown
+from ..result import Iteration
 from . import band_inversion
 from .band_inversion import EmitterMisfit, InversionState, Model
 from .inversion_state import ActiveBand, BandEnd, Image, RefinementCheckpoint
@@ -19,16 +20,16 @@ from .iterations import iteration_records
 from .waveform_problem import WaveProblem
 from .waveform_settings import WaveSettings
 
-# A band whose water shots are simulated with a lower correlation than this with the recorded ones is passed
-# over: its waves are too long for the array and its absorbing edges, or were not sent.
+# Bands whose simulated water shots have a lower correlation with the recorded ones are skipped: their waves
+# are too long for the array and its absorbing edges, or were not emitted.
 LEAST_CORRELATION = 0.9
 
 
 class WaveScan(Protocol):
-    """Where calls find their data; it travels with them, so it holds a path or the dataset itself."""
+    """The data source of tasks; it is sent with them, so it holds a path or the dataset itself."""
 
     def settings(self) -> WaveSettings:
-        """How to band_inversion."""
+        """Settings of the refinement."""
 
     def problem(self, number: int) -> WaveProblem:
         """The problem of a band, from 0; made once in a process."""
@@ -39,14 +40,14 @@ class RefinementGraph:
 
     Args:
         scan: see ``WaveScan``.
-        start: the image to begin with.
+        start: the initial image.
         index: of the slice, for the history.
-        earlier: what led to the start, and other slices; it comes first in the history.
+        earlier: history of the initial image and of other slices.
         stage: number of the first band among all stages.
 
     Attributes:
-        ends: where bands ended.
-        total: emitter passes that it takes at most, but for shortened steps, which count as none.
+        ends: results of the finished bands.
+        total: largest number of emitter passes, without those of shortened steps.
     """
 
     def __init__(
@@ -54,7 +55,7 @@ class RefinementGraph:
         scan: WaveScan,
         start: Image,
         index: int = 0,
-        earlier: tuple[Sweep, ...] = (),
+        earlier: tuple[Iteration, ...] = (),
         stage: int = 0,
     ) -> None:
         self._scan, self._start = scan, start
@@ -62,62 +63,60 @@ class RefinementGraph:
         self._sizes = [band.evaluations(scan.settings().held_out) for band in scan.settings().bands]
         self.ends: tuple[BandEnd, ...] = ()
         self._band: ActiveBand | None = None
-        self._looks: dict[int, Any] = {}
+        self._misfits: dict[int, Any] = {}
         self.total = sum(self._sizes)
 
     @property
     def number(self) -> int:
-        """Of the band under way, from 0."""
+        """Of the active band, from 0."""
         return len(self.ends)
 
     @property
     def over(self) -> bool:
-        """Whether nothing is left to do."""
+        """Whether all bands are finished."""
         return self.number == len(self._sizes)
 
     @property
     def done(self) -> int:
-        """Emitter passes that are made, or that an early end made needless."""
+        """Emitter passes made, or not needed after an early end."""
         if self.over:
             return self.total
-        passed = sum(self._sizes[: self.number])
+        finished = sum(self._sizes[: self.number])
         if self._band is None:
-            return passed
-        band = self._scan.settings().bands[self.number]
-        each = band.emitters + self._scan.settings().held_out
-        seen = each * len(self._band.state.history) + len(self._looks)
-        return passed + min(seen, self._sizes[self.number])
+            return finished
+        settings = self._scan.settings()
+        passes = settings.bands[self.number].emitters + settings.held_out
+        passes = passes * len(self._band.state.history) + len(self._misfits)
+        return finished + min(passes, self._sizes[self.number])
 
     @property
-    def history(self) -> tuple[Sweep, ...]:
-        """What led to the start, then of each band a stage."""
-        passes = [end.history for end in self.ends]
+    def history(self) -> tuple[Iteration, ...]:
+        """The earlier history, then one stage per band."""
+        bands = [(end.history, True, end.skipped) for end in self.ends]
         if self._band is not None:
-            passes.append(self._band.state.history)
-        found = list(self._earlier)
-        for number, of_band in enumerate(passes):
-            skipped = number < self.number and self.ends[number].skipped
-            over = number < self.number
-            found += iteration_records(
+            bands.append((self._band.state.history, False, False))
+        records = list(self._earlier)
+        for number, (history, over, skipped) in enumerate(bands):
+            records += iteration_records(
                 self._scan.settings(),
                 number,
-                of_band,
+                history,
                 self._index,
                 self._stage + number,
                 over=over,
                 skipped=skipped,
-                kept_s=next((s.residual_rms_s for s in reversed(found) if s.given), math.nan),
+                speed_residual_s=next((r.residual_rms_s for r in reversed(records) if r.given), math.nan),
             )
-        return tuple(found)
+        return tuple(records)
 
     @property
     def image(self) -> Image:
-        """The image that the last finished band left."""
+        """The image of the last finished band."""
         return self.ends[-1].image if self.ends else self._start
 
     @property
     def checkpoint(self) -> RefinementCheckpoint:
-        """The state, without misfits of an iteration that is not finished."""
+        """The state, without misfits of an unfinished iteration."""
         return RefinementCheckpoint(self.ends, self._band)
 
     def restore(self, checkpoint: RefinementCheckpoint) -> None:
@@ -145,40 +144,41 @@ class RefinementGraph:
             return self.first()
         assert self._band is not None
         if task.function is evaluate_emitter:
-            self._looks[task.arguments[-1]] = result
-            if len(self._looks) < self._band.emitters:
+            self._misfits[task.arguments[-1]] = result
+            if len(self._misfits) < self._band.emitters:
                 return []
-            # In the order of the emitters, never in that of their coming.
-            parts = [found for _, found in sorted(self._looks.items())]
+            # In the order of the emitters, not of completion: floating-point sums depend on it.
+            parts = [part for _, part in sorted(self._misfits.items())]
             return [Task(update_image, (self._scan, self.number, self._band.state, parts))]
-        self._looks = {}
+        self._misfits = {}
         self._band = replace(self._band, state=result)
         if result.done:
             spacing = self._scan.settings().bands[self.number].spacing_m
-            image = self._left(Image(result.image, spacing, self._band.origin))
-            # The band is over, so that pairs of changes are not kept any longer.
+            image = self._after_band(Image(result.image, spacing, self._band.origin))
+            # The pairs of changes of a finished band are not kept.
             self.ends = (*self.ends, BandEnd(image, result.skipped, result.history))
-            if result.skipped:
-                self._leave_out()
             self._band = None
+            # Further bands of the speed would skip more cycles or fit more noise.
+            while result.skipped and not self.over and self._of == "speed":
+                self.ends = (*self.ends, BandEnd(self.image, skipped=True, history=()))
         return self.first()
 
-    def _leave_out(self) -> None:
-        """Go past further bands of the speed, which would skip more cycles or fit more noise."""
-        while not self.over and self._scan.settings().bands[self.number].of == "speed":
-            self.ends = (*self.ends, BandEnd(self.image, skipped=True, history=()))
+    @property
+    def _of(self) -> Unknown:
+        """The unknown of the active band."""
+        return self._scan.settings().bands[self.number].of
 
-    def _left(self, found: Image) -> Image:
-        """The image after a band: the speed that it found, or the last one with the attenuation found."""
-        if self._scan.settings().bands[self.number].of == "speed":
-            return found
-        last = self.image
-        on_it = resampled(found, last.spacing, last.origin, last.speed.shape)
-        return replace(last, attenuation=on_it)
+    def _after_band(self, result: Image) -> Image:
+        """The image after a band: its speed, or the previous image with its attenuation."""
+        if self._of == "speed":
+            return result
+        speed = self.image
+        attenuation = resampled(result, speed.spacing, speed.origin, speed.speed.shape)
+        return replace(speed, attenuation=attenuation)
 
 
 def start_band(scan: WaveScan, number: int, image: Image) -> ActiveBand | None:
-    """Task: what a band begins with; None where it is passed over, see ``LEAST_CORRELATION``."""
+    """Task: the initial state of a band; None if it is skipped, see ``LEAST_CORRELATION``."""
     problem = scan.problem(number)
     if problem.water_correlation < LEAST_CORRELATION:
         return None
@@ -189,7 +189,7 @@ def start_band(scan: WaveScan, number: int, image: Image) -> ActiveBand | None:
 
 
 def evaluate_emitter(scan: WaveScan, number: int, model: Model, place: int) -> EmitterMisfit:
-    """Task: one emitter's look at an image, by its place among the band's emitters."""
+    """Task: misfit and gradient of one emitter, by its place among the band's emitters."""
     problem = scan.problem(number)
     return band_inversion.evaluate(
         problem, scan.settings(), model, band_inversion.emitters(problem)[place : place + 1]
@@ -204,18 +204,18 @@ def update_image(
 
 
 def on_grid(image: Image, problem: WaveProblem) -> Floats:
-    """An image on the grid of a problem, (nx, ny), m/s; water where nothing may change."""
+    """An image on the grid of a problem, (nx, ny), m/s; water outside the region."""
     speed = resampled(image, problem.band.spacing_m, problem.origin, problem.region.shape)
     return np.where(problem.region, speed, problem.water.speed)
 
 
 def resampled(image: Image, spacing: float, origin: tuple[float, float], shape: tuple[int, ...]) -> Floats:
-    """An image on another grid, (nx, ny), m/s; beyond its own its outermost nodes go on."""
+    """An image on another grid, (nx, ny), m/s; extrapolated by its outermost nodes."""
     lines = [
         (origin[axis] + spacing * np.arange(nodes) - image.origin[axis]) / image.spacing
         for axis, nodes in enumerate(shape)
     ]
     places = np.meshgrid(*lines, indexing="ij")
-    # Cubic, for linear interpolation takes sharpness off at every change of grid; it may overshoot.
+    # Cubic, because linear interpolation blurs at every change of grid; cubic may overshoot.
     speed = map_coordinates(image.speed, places, order=3, mode="nearest")
     return np.asarray(np.clip(speed, image.speed.min(), image.speed.max()))

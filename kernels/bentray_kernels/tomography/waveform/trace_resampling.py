@@ -1,4 +1,4 @@
-"""Recorded traces as the simulator would give them: filtered, at its time steps, with its dispersion."""
+"""Resampling of recorded traces to the simulator: band-pass filter, time steps, numerical dispersion."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ...wave.stencil import numerical_frequency
 
 
 class Water(NamedTuple):
-    """Waves in water as they were recorded: wave number = omega / speed * (1 - lead - bend * frequency^2).
+    """Recorded waves in water: wave number = omega / speed * (1 - lead - bend * frequency^2).
 
     Attributes:
         speed: m/s.
         lead: relative error of the speed.
-        bend: dispersion, s^2; 0 for real water. Scans that were simulated have that of their simulator.
+        bend: dispersion, s^2; 0 for real water. Simulated scans have the dispersion of their simulator.
     """
 
     speed: float
@@ -26,22 +26,22 @@ class Water(NamedTuple):
 
 
 class Clock(NamedTuple):
-    """The simulator's samples: the time of the first, s, the step from one to the next, s, how many."""
+    """The simulator's samples: time of the first, s, time step, s, and number."""
 
     begin_s: float
     step_s: float
     steps: int
 
 
-# Parts of the lower and the upper corner within which the filter falls to zero, as half a cosine. What
-# lies beyond the upper corner is carried worst by the grid: a fall over half of it left twice the misfit that
-# one over a quarter leaves, with the true image.
+# Parts of the lower and the upper corner within which the filter falls to zero, as half a cosine. The grid
+# resolves frequencies beyond the upper corner worst: with the true image, a fall over half of the corner left
+# twice the misfit of one over a quarter.
 RISE = 0.5
 FALL = 0.25
 
 
 def band_pass(frequency: Floats, band_hz: tuple[float, float]) -> Floats:
-    """Factor of a spectrum without change of phase, 1 inside the band.
+    """Zero-phase band-pass filter: a factor per frequency, 1 inside the band.
 
     It is 0 below ``RISE`` times the lower corner, whose waves are too long for absorbing edges, and above
     ``1 + FALL`` times the upper.
@@ -58,10 +58,10 @@ def resampler(
 ) -> NDArray[np.float32]:
     """Matrix that takes a recorded trace to the simulator's samples, (recorded, steps).
 
-    At the frequency omega the scheme has the waves that a fluid has at another, Omega. Traces and wavelet
-    whose spectrum at omega is the true one at Omega agree with it. Where the time step is the only cause,
-    that holds in all media (Koene et al., Geophys. J. Int. 213, 2018); here the spacing is taken along, which
-    holds in water, and nearly so in tissue, as the error grows slowly with speed.
+    At the frequency omega the scheme has the waves of a fluid at another frequency Omega: traces and wavelet
+    whose spectrum at omega is the true one at Omega agree with it. For the error of the time step this holds
+    in all media (Koene et al., Geophys. J. Int. 213, 2018). Here the error of the spacing is included, for
+    which it holds in water, and nearly in tissue, since the error grows slowly with speed.
 
     Args:
         recorded_s: (recorded,), times of the recorded samples, equally spaced, s.
@@ -70,7 +70,7 @@ def resampler(
         water: as recorded, see ``waveform.water_phase.fitted``.
         spacing: of the simulator's nodes, m.
     """
-    # A period of twice the length, so that nothing that the filter spreads comes round again.
+    # Twice the length, against wrap-around of the filter.
     simulated = 2.0 * np.pi * np.fft.rfftfreq(2 * clock.steps, clock.step_s)
     number = np.linspace(0.0, np.pi / spacing, 2001)
     reached = np.interp(simulated, numerical_frequency(number, water.speed, spacing, clock.step_s), number)

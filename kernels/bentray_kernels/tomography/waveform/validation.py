@@ -1,4 +1,4 @@
-"""Held-out validation of an image: simulated against recorded traces, on emitters that no image uses."""
+"""Held-out validation of an image by simulated and recorded traces of emitters that are not used for it."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...task_graph import Task
-from ..result import Sweep
+from ..result import Iteration
 from .band_inversion import Model, evaluate
 from .inversion_state import Image
 from .refinement_graph import WaveScan, on_grid
 from .waveform_settings import WaveSettings
 
-# The band of the continuation, from 1, that holds the middle of the pulse: there noise counts least.
-WHOLE = 3
+# Number of the band of the continuation, from 1, around the centre of the pulse, where noise matters least.
+CENTRAL = 3
 
-# Where water shots are simulated with a lower correlation than this there is no validation. Noise lowers it
-# too; the limit is lower than for a band that refines, because all compared images have the same noise.
+# No validation below this correlation of simulated and recorded water shots. Noise reduces it too; the limit
+# is lower than that of a refined band, because all compared images have the same noise.
 LEAST_CORRELATION = 0.7
 
 # Emitters whose water shots calibrate the source; held-out ones are the settings' ``held_out``.
@@ -29,8 +29,8 @@ class Validation:
     """Misfits of an image; None where its water shots could not be simulated.
 
     Attributes:
-        misfit: of held-out emitters through the image, a mean.
-        water: of water shots in water: noise, and what the simulator cannot do.
+        misfit: mean over held-out emitters, through the image.
+        water: of water shots in water: noise and errors of the simulator.
     """
 
     misfit: float | None = None
@@ -39,7 +39,7 @@ class Validation:
 
 @dataclass(frozen=True)
 class ValidationCheckpoint:
-    """State of a ``Judge``; see ``task_graph.Checkpoint``."""
+    """State of a ``ValidationGraph``; see ``task_graph.Checkpoint``."""
 
     state: Validation | None
 
@@ -54,13 +54,13 @@ class ValidationGraph:
     Args:
         scan: with the settings of ``validation_settings``.
         image: to be validated.
-        history: of what led to it.
+        history: of the image.
 
     Attributes:
-        total: emitter passes that it takes.
+        total: emitter passes.
     """
 
-    def __init__(self, scan: WaveScan, image: Image, history: tuple[Sweep, ...]) -> None:
+    def __init__(self, scan: WaveScan, image: Image, history: tuple[Iteration, ...]) -> None:
         self._scan, self._image = scan, image
         self.history = history
         self.checkpoint = ValidationCheckpoint(None)
@@ -81,19 +81,19 @@ class ValidationGraph:
         self.checkpoint = checkpoint
 
     def first(self) -> list[Task]:
-        """The call, unless it has been made."""
+        """The task, unless it is finished."""
         return [Task(validate_image, (self._scan, self._image))] if self.checkpoint.state is None else []
 
     def after(self, task: Task, result: Validation) -> list[Task]:
-        """Nothing follows it."""
+        """No further task."""
         self.checkpoint = ValidationCheckpoint(result)
         return []
 
 
 def validation_settings(plan: WaveSettings) -> WaveSettings:
-    """The settings of a refinement in the one band of the validation, with a few emitters."""
+    """The settings of a refinement restricted to the band of the validation, with a few emitters."""
     speed = [band for band in plan.bands if band.of == "speed"]
-    return replace(plan, bands=(replace(speed[:WHOLE][-1], emitters=SHOTS),))
+    return replace(plan, bands=(replace(speed[:CENTRAL][-1], emitters=SHOTS),))
 
 
 def evaluations(settings: WaveSettings) -> int:

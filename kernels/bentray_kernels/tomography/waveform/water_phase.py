@@ -1,4 +1,4 @@
-"""Phase speed in the water, fitted to water shots: what the simulation must share with the recording."""
+"""Fit of the phase speed of the water to water shots."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from ...arrays import Floats
 from ...errors import InvalidInput
 from .trace_resampling import Water
 
-# Frequencies weaker than this part of the strongest are left out.
+# Frequencies below this part of the strongest are left out.
 WEAK = 0.05
 
-# Pairs of one emitter that the line of phase over distance is drawn through, at least.
+# Fewest pairs of one emitter for the line of phase over distance.
 LEAST_PAIRS = 8
 
 
@@ -21,10 +21,10 @@ def fit_water(
     """The water in which simulated traces would have the phases of the recorded ones.
 
     At each frequency the phase between the two is a straight line over distance, whose slope is the error of
-    the wave number; over frequency it is fitted as ``Water`` has it.
+    the wave number. Over frequency this error is fitted by ``lead`` and ``bend`` of ``Water``.
 
     Args:
-        water: that the simulation and the resampling assumed.
+        water: assumed by the simulation and the resampling.
         distance: (pairs,), m, of one emitter's receivers, rising.
         simulated, recorded: (pairs, nt), at the same times.
         time_step_s: s.
@@ -42,7 +42,7 @@ def fit_water(
     power = (np.abs(model) * np.abs(data)).sum(axis=0)
     used = np.flatnonzero(power > WEAK * power.max())
     across = np.exp(1j * np.angle(data[:, used] * np.conj(model[:, used])))
-    # Steps between neighbours are small, so that they add up without a jump.
+    # Phase steps between neighbours are small, so that their sum is unwrapped.
     phase = np.cumsum(np.angle(across[1:] * np.conj(across[:-1])), axis=0)
     phase = np.concatenate((np.zeros((1, used.size)), phase))
     apart = distance - distance.mean()

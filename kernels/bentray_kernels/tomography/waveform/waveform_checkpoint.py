@@ -1,4 +1,4 @@
-"""What a checkpoint may hold of a refinement, beside what it may hold of the rays before it."""
+"""Records in checkpoints of a full-waveform refinement, beside those of the reconstruction by rays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The inverse problem of a scan in one band: elements on a grid, traces in the simulator's time, wavelet."""
+"""The inverse problem of a scan in one band: elements on a grid, resampled traces, wavelet."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Flags, Floats, Ints
-from ...wave.adjoint import stored_bytes
 from ...wave.medium import Medium
 from ...wave.time_blocks import Poll, no_poll
 from .misfits import arrival_window
@@ -20,7 +19,7 @@ from .waveform_settings import Band
 
 @dataclass(frozen=True)
 class WaveProblem:
-    """What a refinement in one band needs, once; ``waveform.preparation.prepare`` makes it from a dataset.
+    """Data of the refinement in one band; made by ``waveform.preparation.prepare``.
 
     Attributes:
         band: the band.
@@ -30,16 +29,16 @@ class WaveProblem:
         origin: position of node 0 in the dataset's coordinates, m.
         clock: of the simulator.
         wavelet: (steps,), the source.
-        water: as the water shots have it.
+        water: fitted to the water shots.
         water_correlation: mean correlation of simulated with recorded water shots.
         weight: (ntx, nrx), 1 for the pairs that are used, else 0.
-        arrival_s: (ntx, nrx), predicted, s.
-        traces: of the object by emitter, (nrx, nt) each, as recorded; of those used and held.
-        gain: (ntx, nrx), pressure per count of each trace; for the attenuation such that the water shots of
-            each pair have the amplitude that is simulated.
+        arrival_s: (ntx, nrx), predicted arrival, s.
+        traces: recorded object traces by emitter, (nrx, nt) each, of ``used`` and ``held``.
+        gain: (ntx, nrx), pressure per count of each trace; for the attenuation normalised so that each water
+            shot has its simulated amplitude.
         sampler: (nt, steps), see ``resampler``.
-        used, held: emitters that make the image, and held-out ones.
-        every: time steps from one stored field to the next.
+        used, held: emitters used for the image, and held-out ones.
+        every: time steps between stored fields.
         poll: of its simulations, see ``time_blocks``.
     """
 
@@ -66,14 +65,8 @@ class WaveProblem:
         """The medium of images on this grid."""
         return Medium.of(speed, self.band.spacing_m, self.clock.step_s, attenuation=attenuation)
 
-    @property
-    def evaluation_bytes(self) -> int:
-        """Bytes of wave field that the evaluation of one emitter keeps; as many may run at once as fit."""
-        still = self.medium(np.full(self.region.shape, self.water.speed))
-        return stored_bytes(still, self.clock.steps, self.every)
-
     def recorded(self, emitter: int, receivers: Ints) -> Floats:
-        """Traces of some receivers in the simulator's time, (receivers, steps)."""
+        """Traces of some receivers, resampled to the simulator's time steps, (receivers, steps)."""
         sampled = self.traces[emitter][receivers] @ self.sampler
         return np.asarray(self.gain[emitter][receivers][:, None] * sampled, dtype=np.float64)
 
@@ -82,7 +75,7 @@ class WaveProblem:
         return np.flatnonzero(self.weight[emitter] > 0.0)
 
     def window(self, emitter: int, receivers: Ints, reach_s: tuple[float, float]) -> Floats:
-        """Weight of each sample, (receivers, steps): about the arrival, and fading before the record ends."""
+        """Weight of each sample, (receivers, steps): a window around the arrival, tapered at the end."""
         times = self.clock.begin_s + self.clock.step_s * np.arange(self.clock.steps, dtype=np.float64)
         ending = np.clip((times[-1] - times) * 0.5 * self.band.high_hz, 0.0, 1.0)
         return np.asarray(arrival_window(self.arrival_s[emitter][receivers], times, *reach_s) * ending)

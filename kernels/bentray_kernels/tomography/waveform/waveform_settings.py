@@ -1,4 +1,4 @@
-"""The settings of a waveform refinement: bands of frequency from low to high, and what holds in all."""
+"""Settings of a full-waveform refinement: frequency bands from low to high, and the settings of all bands."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...ranges import SEED, Range, check_ranges, ranged
 from ...wave.simulation import Unknown
 from .misfits import Misfit, correlation, least_squares
 
-# Of a band, around those that every pulse of a scan asks for.
+# Corners of a band, with a margin around those of all pulses of scans.
 CORNER_HZ = Range(1e2, 1e11, unit="Hz")
 # Wide enough for every record and every array.
 WINDOW_S = Range(0.0, 1.0, above=True, unit="s")
@@ -27,9 +27,9 @@ class Band:
         low_hz, high_hz: corners of the filter, Hz.
         spacing_m: of the grid, m; the shortest wave needs 2.5 nodes.
         iterations: at most.
-        emitters: how many are used, drawn at random; all where there are no more.
-        smoothing_m: standard deviation of the Gaussian on gradients, m; it should shrink with the frequency.
-        of: what is refined; the other stays as it is.
+        emitters: number of emitters, drawn at random; all where there are no more.
+        smoothing_m: standard deviation of the Gaussian on gradients, m; should decrease with the frequency.
+        of: the unknown; the other one is fixed.
     """
 
     low_hz: float = ranged(MISSING, CORNER_HZ)
@@ -46,14 +46,14 @@ class Band:
             raise InvalidInput("band_hz", (self.low_hz, self.high_hz), "low_hz < high_hz, in Hz")
 
     def evaluations(self, held_out: int) -> int:
-        """Looks of single emitters at images, the first one included; shortened steps take more."""
+        """Emitter passes, including those of the first image; shortened steps take more."""
         return (self.iterations + 1) * (self.emitters + held_out)
 
 
 def bands(centre_hz: float, water_mps: float = 1500.0) -> tuple[Band, ...]:
-    """The continuation for a pulse: half its centre frequency, three quarters, one and an eighth, 1.5 times.
+    """The continuation for a pulse, up to 0.5, 0.75, 1.125 and 1.5 times its centre frequency.
 
-    Grids have 5 to 4.5 nodes in the water's wave at the upper corner.
+    Grids have 5 to 4.5 nodes per wavelength in water at the upper corner.
 
     Args:
         centre_hz: of the pulse, Hz.
@@ -69,9 +69,9 @@ def bands(centre_hz: float, water_mps: float = 1500.0) -> tuple[Band, ...]:
 
 
 def loss_band(centre_hz: float, water_mps: float = 1500.0) -> Band:
-    """The band in which the attenuation is refined once the speed is: that of the pulse about its centre.
+    """The band of the attenuation, around the centre of the pulse, after all bands of the speed.
 
-    It ends early, because errors of the speed are soon fitted as attenuation
+    It has few iterations, because errors of the speed are soon fitted as attenuation
     (``benchmarks/results/raw_trace_experiments.md``).
 
     Args:
@@ -83,12 +83,12 @@ def loss_band(centre_hz: float, water_mps: float = 1500.0) -> Band:
 
 
 class Steps(NamedTuple):
-    """How far an image may go, in its unit.
+    """Limits of the values and steps of an image, in its unit.
 
     Attributes:
         bounds: lowest and highest value of a node.
-        first: rms of the first change of a band, before anything is known of the curvature.
-        largest: highest rms change in one iteration.
+        first: rms of the first step of a band, before the curvature is known.
+        largest: highest rms of a step.
     """
 
     bounds: tuple[float, float]
@@ -96,25 +96,25 @@ class Steps(NamedTuple):
     largest: float
 
 
-# Of the attenuation beyond the water's, Np/m: tissue has 3 to 10 at 500 kHz, bone ten times as much.
+# Attenuation beyond the water's, Np/m: tissue has 3 to 10 at 500 kHz, bone ten times as much.
 LOSS_STEPS = Steps((0.0, 100.0), 0.5, 4.0)
 
 
 @dataclass(frozen=True)
 class WaveSettings:
-    """How to refine.
+    """Settings of a refinement.
 
     Attributes:
-        bands: gone through in order, each from the image of the one before.
-        window_s: (before, after) the arrival in water that traces are compared within, s.
+        bands: in order, each starting from the image of the previous one.
+        window_s: (before, after) the arrival in water, the window in which traces are compared, s.
         nearest_m: pairs nearer than this are left out, m.
-        speed_bounds_mps: (lowest, highest) speed that a node may take, m/s.
-        largest_step_mps: highest rms change of the image in one iteration, m/s.
-        first_step_mps: rms of the first change of a band, m/s, before anything is known of the curvature.
-        memory: pairs of changes that the curvature is read from (L-BFGS).
-        held_out: emitters that only judge.
+        speed_bounds_mps: (lowest, highest) speed of a node, m/s.
+        largest_step_mps: highest rms of a step, m/s.
+        first_step_mps: rms of the first step of a band, m/s, before the curvature is known.
+        memory: pairs of changes used for the curvature (L-BFGS).
+        held_out: number of emitters used only for validation.
         seed: of the draw of emitters.
-        roi: let only the dataset's region of interest change (``mask/roi``).
+        roi: whether only the dataset's region of interest may change (``mask/roi``).
     """
 
     bands: tuple[Band, ...]
@@ -142,11 +142,11 @@ class WaveSettings:
             WINDOW_S.check("window_s", end)
 
     def steps(self, of: Unknown) -> Steps:
-        """How far an image of speed or attenuation may go."""
+        """Limits of an image of speed or attenuation."""
         if of == "attenuation":
             return LOSS_STEPS
         return Steps(self.speed_bounds_mps, self.first_step_mps, self.largest_step_mps)
 
     def measure(self, of: Unknown) -> Misfit:
-        """What is made small to find speed or attenuation."""
+        """The misfit that is minimised for speed or attenuation."""
         return correlation if of == "speed" else least_squares

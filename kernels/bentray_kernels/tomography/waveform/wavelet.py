@@ -1,4 +1,4 @@
-"""The source wavelet, from what was recorded in water."""
+"""Estimation of the source wavelet from water shots."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import InvalidInput
 
-# Energy below this part of the strongest frequency's does not determine the source.
+# Regularisation: frequencies with less energy than this part of the strongest do not determine the source.
 NOISE = 1e-3
 
 
 def fit_wavelet(wavelet: Floats, simulated: Floats, recorded: Floats) -> Floats:
-    """The wavelet that makes simulated traces fit recorded ones best, by least squares at each frequency.
+    """The wavelet with which simulated traces fit recorded ones best, by least squares at each frequency.
 
     Args:
-        wavelet: (nt,), that the simulation was made with.
+        wavelet: (nt,), of the simulation.
         simulated: (traces, nt).
-        recorded: (traces, nt), at the same places, in the same time.
+        recorded: (traces, nt), at the same positions and times.
 
     Returns:
         (nt,), as ``wavelet``.

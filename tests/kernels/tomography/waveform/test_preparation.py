@@ -134,12 +134,6 @@ def test_only_the_region_of_interest_may_change():
         prepare(scan(), replace(SETTINGS, roi=True), 0)
 
 
-def test_memory_of_a_look_is_known():
-    problem = prepare(scan(), SETTINGS, 0)
-    stored = -(-problem.clock.steps // problem.every)
-    assert problem.evaluation_bytes == stored * problem.region.size * 4
-
-
 @pytest.mark.parametrize("lacking", ["water", "all"])
 def test_a_scan_without_water_shots_is_refused(lacking):
     data = scan()

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from bentray_kernels.task_graph import Task
-from bentray_kernels.tomography import Sweep
+from bentray_kernels.tomography import Iteration
 from bentray_kernels.tomography.waveform.band_inversion import Evaluation
 from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.refinement_graph import RefinementGraph, on_grid, update_image
@@ -61,7 +61,11 @@ def test_nothing_stands_before_the_first_band():
 
 def test_progress_rises_to_its_end_and_history_tells_the_bands():
     graph = RefinementGraph(
-        MemoryWaveScan(scan(), SETTINGS), water(), 2, (Sweep(2, 1, 1e-7, 24), Sweep(2, 1, 1e-7, 24, 1)), 2
+        MemoryWaveScan(scan(), SETTINGS),
+        water(),
+        2,
+        (Iteration(2, 1, 1e-7, 24), Iteration(2, 1, 1e-7, 24, 1)),
+        2,
     )
     seen, tasks = [graph.done], graph.first()
     while tasks:

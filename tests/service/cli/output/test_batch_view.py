@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
-from bentray_kernels.tomography import Progress, Sweep
+from bentray_kernels.tomography import Iteration, Progress
 from bentray_service.cli.output.batch_view import cells, live_table
 from bentray_workers.reconstruction.batch import Entry
 
@@ -17,7 +17,7 @@ def entry(name: str, state: str) -> Entry:
     found = Entry(Path(f"{name}.h5"))
     if state != "waiting":
         found.begin()
-        found.show(Progress(3, 8, (Sweep(0, 1, 250e-9, 8),)))
+        found.show(Progress(3, 8, (Iteration(0, 1, 250e-9, 8),)))
     if state == "failed":
         found.end(state, "a reason")
     elif state == "succeeded":

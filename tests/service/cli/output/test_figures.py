@@ -12,7 +12,7 @@ import pytest
 
 from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.acquisition.quality.finding import words
-from bentray_kernels.tomography import Reconstruction, Settings, Sweep, Trial
+from bentray_kernels.tomography import Iteration, Reconstruction, Settings, Trial
 from bentray_kernels.tomography.result import residual_counts
 from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_service.cli.output.figures import errors, figures, summary
@@ -93,7 +93,12 @@ def dataset(known: Truth | None) -> Dataset:
 
 
 def test_the_residual_is_that_of_the_last_sweep_over_all_slices() -> None:
-    history = (Sweep(0, 1, 9e-7, 3), Sweep(1, 1, 9e-7, 3), Sweep(0, 2, 3e-7, 3), Sweep(1, 2, 4e-7, 3))
+    history = (
+        Iteration(0, 1, 9e-7, 3),
+        Iteration(1, 1, 9e-7, 3),
+        Iteration(0, 2, 3e-7, 3),
+        Iteration(1, 2, 4e-7, 3),
+    )
     found = figures(replace(image(disc()), history=history), dataset(None), 1.25)
     assert found["residual_rms_s"] == pytest.approx(math.sqrt((9 + 16) / 2) * 1e-7)
     assert len(found["history"]) == 4

@@ -139,7 +139,7 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         found["trace_attenuation_rays"] = tracing(rays)
         found["solve_attenuation"] = solving(rays)
     if settings.resolution_check:
-        found["trace_resolution_rays"] = tracing(rays)
+        found["trace_final_rays"] = tracing(rays)
         found["check_resolution"] = solving(rays)
     return found
 

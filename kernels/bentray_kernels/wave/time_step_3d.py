@@ -1,62 +1,17 @@
-"""3-D wave simulation: the compiled time step along three axes, and the traces of one emitter."""
+"""The compiled finite-difference time step along three axes, point sources and receivers."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..arrays import Floats
 from ..compiled import kernel
-from .medium import Medium
-from .points import Points
-from .stencil import HALO, weights
-from .time_blocks import Poll, split_steps
+from .stencil import HALO
 from .time_step import FLUSH, TAPS
-
-
-def forward_3d(
-    medium: Medium, source: Points, detectors: Points, wavelet: Floats, order: int, poll: Poll
-) -> NDArray[Any]:
-    """Traces, (nrx, nt), of a source in a medium of three axes; arguments as ``simulation.forward``."""
-    kind = medium.keep.dtype
-    scale = float(np.abs(wavelet).max())
-    taps, pulse = weights(order).astype(kind), (wavelet / scale).astype(kind)
-    traces = np.empty((len(detectors.first), wavelet.size), kind)
-    fields = np.zeros((2, *medium.keep.shape), kind)
-    for begin, end in split_steps(wavelet.size, medium.keep.size, poll):
-        _forward(begin, end, fields[0], fields[1], medium.factors, taps, source, detectors, pulse, traces)
-    # A point source is 1 / spacing^3 on its node; the factors contain spacing^2.
-    traces *= kind.type(scale / medium.spacing)
-    return traces
-
-
-@kernel
-def _forward(
-    begin: int,
-    end: int,
-    now: Any,
-    old: Any,
-    factors: Any,
-    weights: Any,
-    source: Any,
-    detectors: Any,
-    wavelet: Any,
-    traces: Any,
-) -> None:
-    keep, fade, drive = factors
-    for n in range(begin, end):
-        for r in range(traces.shape[0]):
-            traces[r, n] = read_3d(now, detectors.first[r], detectors.weights[r])
-        advance_3d(now, old, keep, fade, drive, weights)
-        inject_3d(old, drive, source.first[0], source.weights[0], wavelet[n])
-        now, old = old, now
 
 
 @kernel(inline="always")
 def advance_3d(now: Any, old: Any, keep: Any, fade: Any, drive: Any, weights: Any) -> None:
-    """As ``wave.time_step.advance``, for (nx, ny, nz)."""
+    """As ``time_step.advance``, for (nx, ny, nz)."""
     nx, ny, nz = now.shape
     inner = nz - 2 * HALO
     w0 = weights[0] + weights[0] + weights[0]
@@ -93,7 +48,7 @@ def advance_3d(now: Any, old: Any, keep: Any, fade: Any, drive: Any, weights: An
 
 @kernel(inline="always")
 def inject_3d(field: Any, drive: Any, first: Any, along: Any, value: Any) -> None:
-    """Add a source of one element, as the scheme drives it."""
+    """Add the source of one element, with the factors of the scheme."""
     for i in range(TAPS):
         for j in range(TAPS):
             for k in range(TAPS):
@@ -104,11 +59,11 @@ def inject_3d(field: Any, drive: Any, first: Any, along: Any, value: Any) -> Non
 @kernel(inline="always")
 def read_3d(field: Any, first: Any, along: Any) -> Any:
     """The field at one element."""
-    found = field.dtype.type(0)
+    value = field.dtype.type(0)
     for i in range(TAPS):
         for j in range(TAPS):
             line = field.dtype.type(0)
             for k in range(TAPS):
                 line += along[2, k] * field[first[0] + i, first[1] + j, first[2] + k]
-            found += along[0, i] * along[1, j] * line
-    return found
+            value += along[0, i] * along[1, j] * line
+    return value
