@@ -57,7 +57,7 @@ def split(nodes: int, elements: int) -> Split:
 
     def front() -> None:
         # ``look`` leaves what it gave the wave front in the first field.
-        deviate(work.fields[0], source[0] / spacing, source[1] / spacing, work.sheets, work.fields[2])
+        deviate(work.fields[0], source[0] / spacing, source[1] / spacing, work.front, work.fields[2])
 
     def update() -> None:
         work.update(slowness.copy(), coverage, region, spacing, 0.1, 1.0, (1e-4, 1e-3))

@@ -32,6 +32,11 @@ def with_noise(data: Floats, snr: float, random: np.random.Generator, where: Fla
     return np.where(where, data + sigma * noise, data), sigma
 
 
+def robust_deviation(values: Floats) -> float:
+    """Standard deviation of normally distributed values with outliers, from the median absolute deviation."""
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+
+
 def noise_level(delta: Floats) -> float:
     """Noise estimate from fourth differences of neighbouring pairs, unit of the data.
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Flags, Floats
 from ..errors import InvalidInput
@@ -23,7 +20,7 @@ MOST_PAIRS = 0.5
 NEAR = 0.1
 
 # Slices, emitters and receivers that are sampled, evenly spaced.
-LOOKED_AT = (8, 128, 512)
+SAMPLED = (8, 128, 512)
 
 # Typical array width, m, which decides between several possible units.
 USUAL_M = 0.2
@@ -33,7 +30,7 @@ TIMES = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
 
 
 def check_plausible(dataset: Dataset) -> None:
-    """Raise for a scan whose lengths or times are in another unit, or physically impossible.
+    """Reject a scan whose lengths or times are in another unit, or physically impossible.
 
     Traces are not read: they may remain in the file.
 
@@ -80,10 +77,10 @@ def _check_places(dataset: Dataset) -> None:
 
 def _length_hint(width: float, what: str) -> str:
     """A hint at the unit in which a width would be nearest to the typical one."""
-    found = {unit: width * factor for unit, factor in LENGTHS.items() if WIDTH_M.holds(width * factor)}
-    if not found:
+    widths = {unit: width * factor for unit, factor in LENGTHS.items() if WIDTH_M.holds(width * factor)}
+    if not widths:
         return ""
-    unit = min(found, key=lambda name: abs(np.log(found[name] / USUAL_M)))
+    unit = min(widths, key=lambda name: abs(np.log(widths[name] / USUAL_M)))
     verb = "looks" if what == "radius" else "look"
     this = "this" if what == "radius" else "these"
     return f"; {this} {what} {verb} like {unit}: write m"
@@ -91,46 +88,35 @@ def _length_hint(width: float, what: str) -> str:
 
 def _check_times(dataset: Dataset, place: str, times: Floats) -> None:
     """Compare times with the distances of their pairs."""
-    sampled = _sample_pairs(dataset, times)
-    distance, in_water = sampled.distance, sampled.distance / dataset.water_speed_mps
+    distance, time = _sample_pairs(dataset, times)
+    in_water = distance / dataset.water_speed_mps
     if not distance.size:
         return
     offset = in_water if place == "traveltime/delta_tof_s" else np.zeros_like(in_water)
 
     def plausible(factor: float) -> bool:
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            speed = distance / (offset + factor * sampled.times)
+            speed = distance / (offset + factor * time)
         return bool(np.mean((speed >= BULK_MPS[0]) & (speed <= BULK_MPS[1])) >= MOST_PAIRS)
 
     if plausible(1.0):
         return
     low, high = BULK_MPS
-    middle = np.argsort(sampled.times)[sampled.times.size // 2]
-    found = (
-        f"{sampled.times[middle]:.4g} s between elements {distance[middle]:.3g} m apart, as most pairs have"
-    )
-    accepted = f"times in s of sound that runs at {low:g} to {high:g} m/s between them{_time_hint(plausible)}"
-    raise InvalidInput(place, found, accepted)
+    middle = np.argsort(time)[time.size // 2]
+    value = f"{time[middle]:.4g} s between elements {distance[middle]:.3g} m apart, as most pairs have"
+    hint = next((f"; these times look like {unit}: write s" for unit in TIMES if plausible(TIMES[unit])), "")
+    accepted = f"times in s of sound that runs at {low:g} to {high:g} m/s between them{hint}"
+    raise InvalidInput(place, value, accepted)
 
 
-def _time_hint(plausible: Callable[[float], bool]) -> str:
-    for unit, factor in TIMES.items():
-        if plausible(factor):
-            return f"; these times look like {unit}: write s"
-    return ""
-
-
-class _Sampled:
-    """Sampled pairs with times: distances, m, and times, s."""
-
-    def __init__(self, distance: Floats, times: Floats) -> None:
-        self.distance = distance
-        self.times = times
-
-
-def _sample_pairs(dataset: Dataset, times: Floats) -> _Sampled:
+def _sample_pairs(dataset: Dataset, times: Floats) -> tuple[Floats, Floats]:
+    """Distances, m, and times, s, of sampled pairs that have a time."""
     stacked = times if times.ndim == 3 else times[None]
-    z, e, r = (_even_indices(count, most) for count, most in zip(stacked.shape, LOOKED_AT, strict=True))
+    z, e, r = (
+        # At most so many indices, evenly spaced.
+        np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
+        for count, most in zip(stacked.shape, SAMPLED, strict=True)
+    )
     place = dataset.element_position_m
     offset = place[dataset.tx[e]][:, None, :] - place[dataset.rx[r]][None, :, :]
     distance = np.broadcast_to(np.linalg.norm(offset, axis=-1), (len(z), len(e), len(r)))
@@ -139,9 +125,4 @@ def _sample_pairs(dataset: Dataset, times: Floats) -> _Sampled:
     if dataset.valid is not None:
         valid = dataset.valid if dataset.valid.ndim == 3 else dataset.valid[None]
         known &= valid[np.ix_(z, e, r)]
-    return _Sampled(distance[known], some[known])
-
-
-def _even_indices(count: int, most: int) -> NDArray[np.intp]:
-    """At most ``most`` indices, evenly spaced."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
+    return distance[known], some[known]

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
-from .heap import DONE, FAR, Nodes, change, enter, take
+from .heap import DONE, FAR, Nodes, change, take
 from .problem import PointSource
 from .updates import TIE, factored_update, plain_update
 
@@ -87,7 +87,7 @@ def _march(
     group = np.empty(slowness.size, np.int32)
     length = 0
     for k in range(seeds.size):
-        length = enter(heap, keys, place, length, seeds[k], seed_times[k])
+        length = change(heap, keys, place, length, seeds[k], seed_times[k])
     while length > 0:
         # Nodes that tie are accepted together, or the second differences would depend on their order.
         latest = keys[0] * (1.0 + TIE)
@@ -109,7 +109,7 @@ def _march(
                         neighbour, steps, spacing * slowness[neighbour], settled, second_order
                     )
                     if here == FAR or trial < keys[here]:
-                        length = enter(heap, keys, place, length, neighbour, trial)
+                        length = change(heap, keys, place, length, neighbour, trial)
     return settled
 
 

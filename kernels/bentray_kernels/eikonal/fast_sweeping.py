@@ -211,23 +211,17 @@ def _sweep_plane(grid: Grid, tolerance: float, plane: int, way: int, up: int) ->
         before = np.uint64((s - 1) % rows * width + column - 1)
         after = np.uint64((s + 1) % rows * width + column)
         behind = np.uint64((s - 2 * way + rows) % rows * width + column - (2 if way > 0 else 0))
+        # The planes below and above; without a third axis they are not read.
+        here = s % rows * width + column
+        below, above = np.uint64(here - up * rows * width), np.uint64(here + up * rows * width)
+        beneath = np.uint64(here - 2 * up * rows * width)
         if up == 0:
-            outcome = _relax_2d(time, crossing, at, before, after, behind, count, tolerance)
+            outcome = _relax(
+                time, crossing, at, before, after, behind, below, above, beneath, count, tolerance, False
+            )
         else:
-            one = up * rows * width
-            here = s % rows * width + column
-            outcome = _relax_3d(
-                time,
-                crossing,
-                at,
-                before,
-                after,
-                behind,
-                np.uint64(here - one),
-                np.uint64(here + one),
-                np.uint64(here - 2 * one),
-                count,
-                tolerance,
+            outcome = _relax(
+                time, crossing, at, before, after, behind, below, above, beneath, count, tolerance, True
             )
         first, last, first_behind, last_behind, first_below, last_below, more = outcome
         moved |= more
@@ -254,44 +248,7 @@ def _sweep_plane(grid: Grid, tolerance: float, plane: int, way: int, up: int) ->
 
 
 @kernel(inline="always")
-def _relax_2d(
-    time: Floats,
-    crossing: Floats,
-    at: np.uint64,
-    before: np.uint64,
-    after: np.uint64,
-    behind: np.uint64,
-    count: int,
-    tolerance: float,
-) -> Outcome:
-    """First-order time of ``count`` nodes from the earlier neighbour of each axis (Zhao 2005, equation 2.4).
-
-    Without branches, so that it is vectorised: a difference clamped to the crossing time gives the time along
-    one axis exactly, and where both are infinite the NaN compares as no improvement.
-    """
-    first, last, first_behind, last_behind, moved = NONE, -1, NONE, -1, 0
-    for x in range(np.uint64(count)):
-        a = lower(time[before + x], time[after + x + np.uint64(1)])
-        b = lower(time[before + x + np.uint64(1)], time[after + x])
-        rhs = crossing[at + x]
-        gap = lower(abs(a - b), rhs)
-        new = lower(a, b) + 0.5 * (gap + math.sqrt(2.0 * rhs * rhs - gap * gap))
-        old = time[at + x]
-        changed = new < old
-        # A neighbour that has an earlier time from its other side does not improve.
-        affected = changed & (new < higher(time[behind + x], time[behind + x + np.uint64(2)]))
-        place = int(np.int64(x))
-        first = min(first, place if changed else NONE)
-        last = max(last, place if changed else -1)
-        first_behind = min(first_behind, place if affected else NONE)
-        last_behind = max(last_behind, place if affected else -1)
-        moved |= 1 if old - new > tolerance * rhs else 0
-        time[at + x] = new if changed else old
-    return first, last, first_behind, last_behind, NONE, -1, moved
-
-
-@kernel(inline="always")
-def _relax_3d(
+def _relax(
     time: Floats,
     crossing: Floats,
     at: np.uint64,
@@ -303,38 +260,50 @@ def _relax_3d(
     beneath: np.uint64,
     count: int,
     tolerance: float,
+    three_axes: bool,
 ) -> Outcome:
-    """As ``_relax_2d`` with three axes, added in order of time while they are upwind."""
+    """First-order time of ``count`` nodes from the earlier neighbour of each axis (Zhao 2005, equation 2.4).
+
+    Three axes are added in order of time while they are upwind; ``three_axes`` is a constant. Without
+    branches, so that it is vectorised: a difference clamped to the crossing time gives the time along one
+    axis exactly, and where both are infinite the NaN compares as no improvement.
+    """
     first, last, first_behind, last_behind, moved = NONE, -1, NONE, -1, 0
     first_below, last_below = NONE, -1
     for x in range(np.uint64(count)):
         a = lower(time[before + x], time[after + x + np.uint64(1)])
         b = lower(time[before + x + np.uint64(1)], time[after + x])
-        c = lower(time[below + x], time[above + x])
         rhs = crossing[at + x]
-        less = lower(a, b)
-        more = higher(a, b)
-        low = lower(less, c)
-        high = higher(more, c)
-        middle = higher(less, lower(more, c))
-        square = rhs * rhs
-        near = lower(middle - low, rhs)
-        time_2 = 0.5 * (near + math.sqrt(2.0 * square - near * near))
-        far = high - low
-        total = near + far
-        time_3 = (total + math.sqrt(total * total - 3.0 * (near * near + far * far - square))) / 3.0
-        new = low + (time_3 if time_2 > far else time_2)
+        if three_axes:
+            square = rhs * rhs
+            c = lower(time[below + x], time[above + x])
+            less = lower(a, b)
+            more = higher(a, b)
+            low = lower(less, c)
+            high = higher(more, c)
+            middle = higher(less, lower(more, c))
+            near = lower(middle - low, rhs)
+            time_2 = 0.5 * (near + math.sqrt(2.0 * square - near * near))
+            far = high - low
+            total = near + far
+            time_3 = (total + math.sqrt(total * total - 3.0 * (near * near + far * far - square))) / 3.0
+            new = low + (time_3 if time_2 > far else time_2)
+        else:
+            gap = lower(abs(a - b), rhs)
+            new = lower(a, b) + 0.5 * (gap + math.sqrt(2.0 * rhs * rhs - gap * gap))
         old = time[at + x]
         changed = new < old
+        # A neighbour that has an earlier time from its other side does not improve.
         affected = changed & (new < higher(time[behind + x], time[behind + x + np.uint64(2)]))
-        affected_below = changed & (new < time[beneath + x])
         place = int(np.int64(x))
         first = min(first, place if changed else NONE)
         last = max(last, place if changed else -1)
         first_behind = min(first_behind, place if affected else NONE)
         last_behind = max(last_behind, place if affected else -1)
-        first_below = min(first_below, place if affected_below else NONE)
-        last_below = max(last_below, place if affected_below else -1)
+        if three_axes:
+            affected_below = changed & (new < time[beneath + x])
+            first_below = min(first_below, place if affected_below else NONE)
+            last_below = max(last_below, place if affected_below else -1)
         moved |= 1 if old - new > tolerance * rhs else 0
         time[at + x] = new if changed else old
     return first, last, first_behind, last_behind, first_below, last_below, moved

@@ -37,17 +37,6 @@ def rise(heap: Nodes, keys: Floats, place: Nodes, hole: int, node: int, time: fl
 
 
 @kernel(inline="always")
-def enter(heap: Nodes, keys: Floats, place: Nodes, length: int, node: int, time: float) -> int:
-    """Enter a node, or decrease the time of one that is there."""
-    hole = place[node]
-    if hole == FAR:
-        hole = length
-        length += 1
-    rise(heap, keys, place, hole, node, time)
-    return length
-
-
-@kernel(inline="always")
 def sink(heap: Nodes, keys: Floats, place: Nodes, length: int, hole: int) -> int:
     """Move a hole down to a leaf along the earlier children; returns where it ends."""
     child = 2 * hole + 2

@@ -1,4 +1,4 @@
-"""Finite-frequency rays: the image that determines the time of a band-limited pulse, and the bending."""
+"""Finite-frequency (fat) rays: blurring of the image for travel times and for the bending of rays."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ..arrays import Floats
 from .problem import Problem
 from .settings import Settings
 
-# Rays of a width bend in an image that is blurred so many times as far. With the truth as the image, times of
-# waves (400 kHz, 500 kHz, 1 MHz) were explained best by widths of half a wavelength to one, and bends in what
-# two to three wavelengths leave; see benchmarks/results/raw_trace_experiments.md.
+# Fat rays bend in an image that is blurred by this multiple of their width. With the true image, travel times
+# of waves (400 kHz, 500 kHz, 1 MHz) were explained best by widths of half a wavelength to one, and by bending
+# in an image blurred by two to three wavelengths; see benchmarks/results/raw_trace_experiments.md.
 BENDS_WIDER = 2.0
 
 
@@ -23,7 +23,7 @@ def width_in_nodes(problem: Problem, settings: Settings) -> float:
 
 
 def ray_slowness(problem: Problem, settings: Settings, slowness: Floats) -> Floats:
-    """The image blurred to the width of the rays; integrals along thin lines of it are their times.
+    """The image blurred to the width of the rays; its integrals along the rays are their travel times.
 
     Args:
         slowness: of the region's shape, s/m.
@@ -36,11 +36,11 @@ def ray_slowness(problem: Problem, settings: Settings, slowness: Floats) -> Floa
 
 
 def blurred(change: Floats, width: float) -> Floats:
-    """A change of an image under the Gaussian; linear and its own adjoint, for beyond the grid there is none.
+    """A Gaussian filter for changes of an image, which are 0 beyond the grid; linear and self-adjoint.
 
     Args:
         change: nodes, in any unit.
-        width: standard deviation, nodes; 0: the change as it is.
+        width: standard deviation, nodes; 0: no filter.
     """
     return np.asarray(gaussian_filter(change, width, mode="constant") if width > 0.0 else change)
 
@@ -48,7 +48,7 @@ def blurred(change: Floats, width: float) -> Floats:
 def front_smoothing(problem: Problem, settings: Settings) -> float:
     """Standard deviation, nodes, of the Gaussian on the speed of ``ray_slowness`` in which rays bend.
 
-    As the user has it; else what is missing to ``BENDS_WIDER`` widths.
+    As in the settings; by default so that both Gaussians together have ``BENDS_WIDER`` widths.
     """
     if settings.numerics.front_smoothing_nodes > 0.0:
         return settings.numerics.front_smoothing_nodes

@@ -14,7 +14,7 @@ from .settings import Settings
 
 
 def stages(dataset: Dataset, settings: Settings) -> tuple[Settings, ...]:
-    """The settings of each stage, the coarsest first; each begins with the image of the one before.
+    """The settings of each stage, the coarsest first; each starts from the image of the previous one.
 
     All grids have the same side, and every coarser one half as many nodes. Straight rays come first, on the
     coarsest grid.
@@ -23,19 +23,19 @@ def stages(dataset: Dataset, settings: Settings) -> tuple[Settings, ...]:
     last = settings.changed(coarser_grids=0, straight_iterations=0)
     if coarser and settings.side_m is None:
         last = replace(last, side_m=image_side(dataset, settings.nodes))
-    found = [replace(last, nodes=-(-settings.nodes // 2**k)) for k in range(coarser, -1, -1)]
+    plans = [replace(last, nodes=-(-settings.nodes // 2**k)) for k in range(coarser, -1, -1)]
     if straight and settings.rays != "straight":
-        found.insert(0, replace(found[0], rays="straight", iterations=straight))
-    return tuple(found)
+        plans.insert(0, replace(plans[0], rays="straight", iterations=straight))
+    return tuple(plans)
 
 
 def initial_slowness(problem: Problem, image: Floats | None = None, before: Problem | None = None) -> Floats:
-    """The slowness that a stage begins with, s/m: the image of the stage before, or water everywhere.
+    """The initial slowness of a stage, s/m: the image of the previous stage, or water everywhere.
 
     Args:
         problem: of the stage.
-        image: of the stage before; None: there is none.
-        before: the problem of that stage. Beyond its grid, which may end lower, the outermost nodes go on.
+        image: of the previous stage; None for the first stage.
+        before: the problem of that stage. Beyond its grid its outermost nodes are continued.
     """
     water = 1.0 / problem.water_speed
     shape = problem.region.shape
@@ -47,5 +47,5 @@ def initial_slowness(problem: Problem, image: Floats | None = None, before: Prob
         (low + problem.spacing * np.arange(n) - lowest) / before.spacing
         for n, low, lowest in zip(shape, problem.origin, before.origin, strict=True)
     ]
-    found = map_coordinates(image, np.meshgrid(*places, indexing="ij"), order=1, mode="nearest")
-    return np.where(problem.region, found, water)
+    interpolated = map_coordinates(image, np.meshgrid(*places, indexing="ij"), order=1, mode="nearest")
+    return np.where(problem.region, interpolated, water)

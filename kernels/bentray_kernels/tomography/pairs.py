@@ -1,4 +1,4 @@
-"""Which emitters and receivers of a dataset make one problem: a slice, a ring among rings, or everything."""
+"""Emitters, receivers and data of one problem: a slice, a ring among rings, or the whole array."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Pairs:
     Attributes:
         emitters: (ntx, ndim).
         receivers: (rings, nrx, ndim).
-        ring: (ntx,), which of the rings receives an emitter.
+        ring: (ntx,), index of the ring that receives an emitter.
         delta_tof: (ntx, nrx), s; NaN where there is none.
         log_ratio: as ``delta_tof``, Np, or None.
     """
@@ -52,10 +52,10 @@ def heights(dataset: Dataset) -> Floats | None:
 
 
 def count(dataset: Dataset, settings: Settings) -> int:
-    """How many problems the dataset falls into.
+    """Number of problems of the dataset.
 
     Raises:
-        InvalidInput: as ``heights``, and for a volume where there is but one height.
+        InvalidInput: as ``heights``, and for a volume with a single height.
     """
     z = heights(dataset)
     if settings.decomposition == "slices":
@@ -75,38 +75,39 @@ def of(dataset: Dataset, settings: Settings, index: int) -> Pairs:
         raise InvalidInput("slice", index, f"0 to {count(dataset, settings) - 1}")
     plane = dataset.element_position_m.shape[1] == 2
     if settings.decomposition == "slices":
-        found = _slice(dataset, settings, index) if plane else _ring(dataset, settings, index)
+        pairs = _slice(dataset, settings, index) if plane else _ring(dataset, settings, index)
     elif plane:
-        found = _moved(dataset, settings)
+        pairs = _moved_ring(dataset, settings)
     else:
-        found = _made(dataset, settings, dataset.tx, dataset.rx, np.arange(len(dataset.element_position_m)))
-    if not np.isfinite(found.delta_tof).any():
+        elements = np.arange(len(dataset.element_position_m))
+        pairs = _between(dataset, settings, dataset.tx, dataset.rx, elements)
+    if not np.isfinite(pairs.delta_tof).any():
         where = f" in slice {index}" if count(dataset, settings) > 1 else ""
         raise InvalidInput(
             "traveltime", f"no valid pair{where}", "at least one finite travel time between two elements"
         )
-    return found
+    return pairs
 
 
 def _slice(dataset: Dataset, settings: Settings, index: int) -> Pairs:
     one = dataset.slice(index)
-    return _made(one, settings, one.tx, one.rx, np.arange(len(one.element_position_m)))
+    return _between(one, settings, one.tx, one.rx, np.arange(len(one.element_position_m)))
 
 
 def _ring(dataset: Dataset, settings: Settings, index: int) -> Pairs:
-    """A ring of an array in space, as if it were alone in its plane."""
+    """One ring of a 3-D array, as a 2-D problem."""
     z = heights(dataset)
     height = dataset.element_position_m[:, 2]
-    # Each ring begins at its lowest element, which an uneven one's highest may be far above.
+    # Each ring begins at its lowest element; the highest one of an uneven ring may be far above it.
     ring = np.searchsorted(np.asarray(z), height, side="right") - 1
-    whole = _made(dataset, settings, dataset.tx, dataset.rx, np.flatnonzero(ring == index))
+    whole = _between(dataset, settings, dataset.tx, dataset.rx, np.flatnonzero(ring == index))
     return Pairs(
         whole.emitters[:, :2], whole.receivers[..., :2], whole.ring, whole.delta_tof, whole.log_ratio
     )
 
 
-def _moved(dataset: Dataset, settings: Settings) -> Pairs:
-    """A ring at all its heights, each receiving itself."""
+def _moved_ring(dataset: Dataset, settings: Settings) -> Pairs:
+    """A ring at all its heights; each height receives only its own emitters."""
     z = np.asarray(heights(dataset))
     rings = [_slice(dataset, settings, k) for k in range(len(z))]
 
@@ -124,8 +125,8 @@ def _moved(dataset: Dataset, settings: Settings) -> Pairs:
     )
 
 
-def _made(dataset: Dataset, settings: Settings, tx: Ints, rx: Ints, members: Ints) -> Pairs:
-    """The pairs between some elements, with reverses where the settings want them."""
+def _between(dataset: Dataset, settings: Settings, tx: Ints, rx: Ints, members: Ints) -> Pairs:
+    """The pairs between some elements, with reverse pairs if the settings use reciprocity."""
     delta, ratio = dataset.differential_tof(), dataset.log_ratio_np
     if ratio is not None:
         usable = tx[:, None] != rx[None, :]
@@ -147,10 +148,10 @@ def _made(dataset: Dataset, settings: Settings, tx: Ints, rx: Ints, members: Int
 
 
 def _with_reverses(tx: Ints, rx: Ints, delta: Floats) -> tuple[Ints, Ints, Floats]:
-    """All elements as both emitters and receivers, missing pairs filled by their reverse.
+    """All elements as both emitters and receivers, with missing pairs filled by their reverse.
 
-    Travel times are the same both ways, so a half matrix is as good as a whole one, and every
-    emitter then sees the object from all sides.
+    Travel times are reciprocal, so half of the matrix determines the other half, and every emitter then has
+    receivers on all sides of the object.
     """
     elements = np.union1d(tx, rx)
     full = np.full((len(elements), len(elements)), np.nan)

@@ -23,12 +23,12 @@ RIM_NODES = 2
 
 @dataclass(frozen=True)
 class Problem:
-    """What a reconstruction needs, once; ``ndim`` is 2 for a slice and 3 for a volume.
+    """Geometry and data of a reconstruction; ``ndim`` is 2 for a slice and 3 for a volume.
 
     Attributes:
         emitters: (ntx, ndim), m, node 0 at 0.
-        receivers: (rings, nrx, ndim), as well.
-        ring: (ntx,), which of the rings receives an emitter.
+        receivers: (rings, nrx, ndim), as ``emitters``.
+        ring: (ntx,), index of the ring that receives an emitter.
         delta_tof: (ntx, nrx), s, object minus water; NaN where there is none.
         region: (nodes, nodes[, heights]), nodes that may change.
         spacing: node spacing, m.
@@ -36,8 +36,8 @@ class Problem:
         water_speed: m/s.
         log_ratio: as ``delta_tof``, ln(A_water / A_object), Np; None where no amplitudes were recorded.
         water_attenuation: Np/m.
-        wavelength_m: in water, of the amplitudes; None where their frequency is not known.
-        axial_room: nodes that a ray may leave the heights of its emitter and receivers by; None: any.
+        wavelength_m: in water, of the amplitudes; None if their frequency is unknown.
+        axial_margin: nodes that a ray may go above and below its emitter and receivers; None: any number.
     """
 
     emitters: Floats
@@ -51,7 +51,7 @@ class Problem:
     log_ratio: Floats | None = None
     water_attenuation: float = 0.0
     wavelength_m: float | None = None
-    axial_room: int | None = None
+    axial_margin: int | None = None
 
     @classmethod
     def of(cls, dataset: Dataset, settings: Settings, index: int = 0) -> Problem:
@@ -69,7 +69,7 @@ class Problem:
                 settings.speed_bounds_mps,
                 f"bounds around the speed of the water, {dataset.water_speed_mps:g} m/s",
             )
-        found = pairs.of(dataset, settings, index)
+        data = pairs.of(dataset, settings, index)
         flat = dataset.element_position_m[:, :2]
         centre = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
         reach = float(np.abs(flat - centre).max())
@@ -89,8 +89,8 @@ class Problem:
                 "elements around the object, and nodes (settings nodes, side_m) between them",
             )
         origin = centre - 0.5 * side
-        if found.emitters.shape[1] == 3:
-            z = np.concatenate((found.emitters[:, 2], found.receivers[..., 2].ravel()))
+        if data.emitters.shape[1] == 3:
+            z = np.concatenate((data.emitters[:, 2], data.receivers[..., 2].ravel()))
             count = math.ceil((z.max() - z.min()) / spacing - 1e-6) + 1 + 2 * MARGIN_NODES
             origin = np.append(origin, z.min() - MARGIN_NODES * spacing)
             region = np.repeat(region[:, :, None], count, axis=2)
@@ -100,24 +100,24 @@ class Problem:
             heights = pairs.heights(dataset)
             height = None if heights is None or len(place) == 3 else float(heights[index])
             region &= inside(dataset, region.shape, spacing, place, height)
-            # A slice above or below a region in space stays water; the others are still worth it.
+            # A slice above or below a 3-D region stays water; the other slices are reconstructed.
             if not region.any() and (height is None or dataset.roi is None or dataset.roi.ndim == 2):
                 raise InvalidInput(
                     "mask/roi", "no node of the image", "a region of interest with nodes inside the array"
                 )
         return cls(
-            emitters=found.emitters - origin,
-            receivers=found.receivers - origin,
-            ring=found.ring,
-            delta_tof=found.delta_tof,
+            emitters=data.emitters - origin,
+            receivers=data.receivers - origin,
+            ring=data.ring,
+            delta_tof=data.delta_tof,
             region=region,
             spacing=spacing,
             origin=place,
             water_speed=dataset.water_speed_mps,
-            log_ratio=found.log_ratio,
+            log_ratio=data.log_ratio,
             water_attenuation=dataset.water_attenuation_np_m or 0.0,
             wavelength_m=None if frequency is None else dataset.water_speed_mps / frequency,
-            axial_room=settings.numerics.axial_margin_nodes,
+            axial_margin=settings.numerics.axial_margin_nodes,
         )
 
     @property
@@ -137,23 +137,23 @@ class Problem:
         return max(float(np.linalg.norm(other - at, axis=1).max()) for other, at in pairs_of)
 
     def receivers_of(self, emitter: int) -> Floats:
-        """(nrx, ndim), m: where the emitter's row of the data was received."""
+        """(nrx, ndim), m: receivers of the emitter's row of the data."""
         return np.asarray(self.receivers[self.ring[emitter]])
 
     def slab(self, emitter: int) -> slice:
-        """Heights, as nodes of the last axis, that the emitter's rays need; all there are of a slice."""
+        """Range of heights of the emitter's rays, as nodes of the last axis; of a slice the whole axis."""
         nodes = self.region.shape[-1]
-        if self.region.ndim == 2 or self.axial_room is None:
+        if self.region.ndim == 2 or self.axial_margin is None:
             return slice(0, nodes)
         z = np.append(self.receivers_of(emitter)[:, 2], self.emitters[emitter, 2]) / self.spacing
         # Rounding must not add a node to a height that lies on one.
-        low = max(math.floor(z.min() + 1e-6) - self.axial_room, 0)
-        return slice(low, min(math.ceil(z.max() - 1e-6) + self.axial_room + 1, nodes))
+        low = max(math.floor(z.min() + 1e-6) - self.axial_margin, 0)
+        return slice(low, min(math.ceil(z.max() - 1e-6) + self.axial_margin + 1, nodes))
 
     def each_pair_once(self) -> Problem:
-        """The same problem without reverses, where every element is emitter and receiver: half the rays.
+        """The same problem without reverse pairs, if every element is emitter and receiver: half the rays.
 
-        Pairs measured both ways keep their mean. Each emitter keeps the half of the ring that follows it.
+        Pairs measured both ways have their mean. Each emitter keeps the half of the ring that follows it.
         """
         members = [np.flatnonzero(self.ring == k) for k in range(len(self.receivers))]
         for k, of_ring in enumerate(members):
@@ -162,10 +162,10 @@ class Problem:
                 return self
 
         def once(data: Floats) -> Floats:
-            kept = np.empty_like(data)
+            halves = np.empty_like(data)
             for of_ring in members:
-                kept[of_ring] = _once(data[of_ring])
-            return kept
+                halves[of_ring] = _once(data[of_ring])
+            return halves
 
         ratio = None if self.log_ratio is None else once(self.log_ratio)
         return replace(self, delta_tof=once(self.delta_tof), log_ratio=ratio)
@@ -179,7 +179,7 @@ def image_side(dataset: Dataset, nodes: int) -> float:
 
 
 def _once(data: Floats) -> Floats:
-    """One ring's matrix, each pair in one of its two places, NaN in the other."""
+    """The matrix of one ring with each pair in one of its two places, NaN in the other."""
     count = len(data)
     ahead = (np.arange(count)[None, :] - np.arange(count)[:, None]) % count
     half = (2 * ahead < count) & (ahead > 0)

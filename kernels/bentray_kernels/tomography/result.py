@@ -1,4 +1,4 @@
-"""What a reconstruction gives: the images, how it got there, and what is needed to repeat it."""
+"""Result of a reconstruction: images, history, settings and provenance."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ RESIDUAL_EDGES_S = np.concatenate((-_DECADES[::-1], _DECADES))
 
 
 def residual_counts(residuals: NDArray[np.float64]) -> NDArray[np.int64]:
-    """How many residuals, s, fall between two of ``RESIDUAL_EDGES_S``; those beyond the ends count there."""
+    """Histogram of residuals, s, over ``RESIDUAL_EDGES_S``; the outer bins include all beyond the ends."""
     within = np.clip(residuals, RESIDUAL_EDGES_S[0], RESIDUAL_EDGES_S[-1])
     return np.histogram(within, RESIDUAL_EDGES_S)[0].astype(np.int64)
 
 
 @dataclass(frozen=True)
 class Iteration:
-    """One pass over all emitters of one slice, or of the volume.
+    """One iteration over all emitters of one slice, or of the volume.
 
     Attributes:
         slice: axial index, from 0; 0 for a volume.
-        sweep: number of the pass, from 1.
-        residual_rms_s: root mean square of measured minus predicted travel time, s, before the update: of
-            each emitter as the pass met it (SART), of all at once (Gauss–Newton).
-        emitters: how many emitters had data.
-        stage: from 0: coarser grids and straight rays that come first are stages of their own.
-        given: whether the misfit is that of the image which the stage gave: with SART, as near as a pass
-            comes to it; with Gauss–Newton of the best image, once it is known which.
-        band_hz: of an image that was refined by waveforms, (lower, upper) corner of the band. Its residual is
-            then the shift of a wave in the middle of the band that has the same misfit.
-        misfit: of its waveforms, 0 where they agree and 1 where they are uncorrelated.
+        sweep: number of the iteration, from 1; the name is that of the stored files.
+        residual_rms_s: root mean square of measured minus predicted travel time, s, before the update of each
+            emitter (SART) or of all emitters (Gauss–Newton).
+        emitters: number of emitters with data.
+        stage: from 0; coarser grids and straight rays before the requested ones are stages of their own.
+        given: whether the misfit belongs to the image that the stage returned: every iteration of SART, whose
+            last one is nearest to it; the best image of Gauss–Newton, once it is known.
+        band_hz: of full-waveform refinement, (lower, upper) corner of the band. The residual is then the time
+            shift of a wave in the middle of the band with the same misfit.
+        misfit: of the waveforms, 0 where they agree and 1 where they are uncorrelated.
         held_out_misfit: the same of held-out emitters.
-        of_attenuation: whether waveforms refined that; the residual is then that of the speed, which stays.
+        of_attenuation: whether the attenuation was refined; the residual is then that of the fixed speed.
     """
 
     slice: int
@@ -56,10 +56,10 @@ class Iteration:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a reconstruction is: ``done`` of ``total`` emitter passes, over all slices and sweeps.
+    """Progress of a reconstruction: ``done`` of ``total`` emitter passes, over all slices and iterations.
 
     Attributes:
-        phase: what the passes are of, where there are several such things; each counts its own.
+        phase: name of the current phase, if there are several; each has its own count.
     """
 
     done: int
@@ -70,14 +70,14 @@ class Progress:
 
 @dataclass(frozen=True)
 class Trial:
-    """One way to reconstruct, tried on part of the pairs.
+    """A candidate model, reconstructed from the training pairs.
 
     Attributes:
         settings: changes relative to the requested settings, by name.
-        held_out_rms_s: rms misfit of the pairs that it was not shown, s.
-        shown_rms_s: rms misfit of those that it was shown, s, in its last sweep.
-        held_out_mean_s: mean size of the misfit of the former, s, of which wrong picks are a smaller part;
-            None in files of before it was kept.
+        held_out_rms_s: rms misfit of the held-out pairs, s.
+        shown_rms_s: rms misfit of the training pairs, s, in the last iteration.
+        held_out_mean_s: mean absolute misfit of the held-out pairs, s, less sensitive to wrong picks; None in
+            files of earlier versions.
     """
 
     settings: dict[str, Any]
@@ -92,17 +92,17 @@ class Reconstruction:
 
     Attributes:
         speed: (nx, ny), or (nx, ny, nz) for several slices or a volume, m/s.
-        coverage: as ``speed``: metres of ray through each node in the last sweep that changed the image.
+        coverage: as ``speed``: metres of ray through each node in the last iteration that changed the image.
         attenuation: as ``speed``, Np/m, or None.
-        recovery: as ``speed``: how much of a checkerboard the rays bring back, 1 where all, or None.
+        recovery: as ``speed``: recovered fraction of a checkerboard's contrast, or None.
         spacing_m: node spacing (x, y[, z]), m; z is NaN when the slices are not evenly spaced.
         origin_m: position of node 0 (x, y[, z]), m.
         water_speed_mps: speed of the coupling water, m/s.
-        history: a record per slice, stage and sweep, in order of stage, sweep, slice.
-        residuals: how many residuals of the last sweep fall between two of ``RESIDUAL_EDGES_S``.
+        history: a record per slice, stage and iteration, in order of stage, iteration, slice.
+        residuals: histogram of the residuals of the last iteration over ``RESIDUAL_EDGES_S``.
         settings: the settings that were used; never ``method`` auto.
-        trials: what ``auto`` tried, the best first.
-        provenance: versions of what computed it.
+        trials: the candidate models of ``auto``, the best first.
+        provenance: versions of the software, and automatic decisions.
     """
 
     speed: NDArray[np.float64]
@@ -122,12 +122,12 @@ class Reconstruction:
     def residual_rms_s(self) -> float | None:
         """Root mean square of the misfit over all slices, s; None without a history.
 
-        Of each slice the last misfit that is one of the image given, in its last stage.
+        For each slice the last misfit of the returned image (``given``) in its last stage.
         """
         of_slice: dict[int, tuple[int, float]] = {}
-        for sweep in self.history:
-            if sweep.given and sweep.stage >= of_slice.get(sweep.slice, (0, 0.0))[0]:
-                of_slice[sweep.slice] = sweep.stage, sweep.residual_rms_s
+        for record in self.history:
+            if record.given and record.stage >= of_slice.get(record.slice, (0, 0.0))[0]:
+                of_slice[record.slice] = record.stage, record.residual_rms_s
         if not of_slice:
             return None
         return math.sqrt(sum(rms**2 for _, rms in of_slice.values()) / len(of_slice))

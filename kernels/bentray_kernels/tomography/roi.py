@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import reduce
+
 import numpy as np
 
 from ..acquisition import Dataset
@@ -18,17 +20,17 @@ def inside(
     origin: tuple[float, ...],
     height: float | None = None,
 ) -> Flags:
-    """Nodes whose nearest node of ``mask/roi`` is set; what lies beyond that image is outside.
+    """Mask of the image nodes inside the region of interest, by the nearest node of ``mask/roi``.
 
-    The image of the region lies on the truth's grid.
+    ``mask/roi`` is given on the grid of the truth; nodes beyond that grid are outside.
 
     Args:
         dataset: with ``roi`` and ``truth``.
         shape, spacing, origin: of the image, nodes and m.
-        height: z of a slice, m, for a region in space.
+        height: z of a slice, m, for a 3-D region.
 
     Raises:
-        InvalidInput: without a region or a node in it, or without the grid it lies on.
+        InvalidInput: for a missing or empty region, or one that is not on the grid of the truth.
     """
     roi, truth = dataset.roi, dataset.truth
     if roi is None:
@@ -43,17 +45,13 @@ def inside(
     lines = [o + spacing * np.arange(n) for o, n in zip(origin, shape, strict=True)]
     if roi.ndim == 3 and len(shape) == 2:
         lines.append(np.array([height or 0.0]))
-    found = []
+    nearest, covered = [], []
     for line, axis in zip(lines, order, strict=False):
-        place = np.rint((line - truth.origin_m[axis]) / truth.spacing_m[axis]).astype(np.int64)
-        within = (place >= 0) & (place < roi.shape[axis])
-        found.append((np.clip(place, 0, roi.shape[axis] - 1), within))
-    values = roi.transpose(order)[np.ix_(*(place for place, _ in found))]
-    known = np.ones(values.shape, dtype=np.bool_)
-    for axis, (_, within) in enumerate(found):
-        known &= within.reshape([-1 if a == axis else 1 for a in range(values.ndim)])
-    both = values & known
-    if both.ndim == 3 and len(shape) == 2:
-        return np.asarray(both[..., 0])
-    # A region in a plane holds at all heights of a volume.
-    return np.array(np.broadcast_to(both if both.ndim == len(shape) else both[..., None], shape))
+        node = np.rint((line - truth.origin_m[axis]) / truth.spacing_m[axis]).astype(np.int64)
+        nearest.append(np.clip(node, 0, roi.shape[axis] - 1))
+        covered.append(node == nearest[-1])
+    mask = roi.transpose(order)[np.ix_(*nearest)] & reduce(np.logical_and.outer, covered)
+    if mask.ndim == 3 and len(shape) == 2:
+        return np.asarray(mask[..., 0])
+    # A 2-D region holds at all heights of a volume.
+    return np.array(np.broadcast_to(mask if mask.ndim == len(shape) else mask[..., None], shape))

@@ -26,7 +26,7 @@ BATCH = 16
 
 
 class Scan(Protocol):
-    """Where tasks find their data; it is sent with them, so it holds a path or the dataset itself."""
+    """The data source of tasks; it is sent with them, so it holds a path or the dataset itself."""
 
     def stages(self) -> tuple[Settings, ...]:
         """Settings of each stage, see ``grid_schedule``."""
@@ -62,7 +62,7 @@ class Stage(ABC):
     @property
     def history(self) -> tuple[Iteration, ...]:
         """Of this stage."""
-        return tuple(replace(sweep, stage=self.number) for sweep in self.state.history)
+        return tuple(replace(record, stage=self.number) for record in self.state.history)
 
     @abstractmethod
     def first(self) -> list[Task]: ...
@@ -146,7 +146,7 @@ def update_gauss_newton(
 
 
 def next_batch(batch: int, used: int, seconds: float) -> int:
-    """Emitters that take about ``TASK_S``; unchanged after a batch cut short by the end of its sweep."""
+    """Emitters that take about ``TASK_S``; unchanged after a batch cut short by the end of its iteration."""
     if used != batch or seconds <= 0.0:
         return batch
     return max(1, min(4 * batch, int(batch * TASK_S / seconds)))

@@ -39,25 +39,25 @@ def from_stored(values: Mapping[str, Any], numerics: Mapping[str, Any] | None = 
         TypeError: for a name that no version had.
         InvalidInput: for a value that is not accepted.
     """
-    given: dict[str, Any] = {}
+    current: dict[str, Any] = {}
     flat = not any(isinstance(value, Mapping) for value in values.values())
     for name, value in values.items():
         if isinstance(value, Mapping):
             inner = {name if leaf == "enabled" else leaf: one for leaf, one in value.items()}
-            given |= {leaf: _plain(one) for leaf, one in inner.items()}
+            current |= {leaf: _plain(one) for leaf, one in inner.items()}
         elif name not in REMOVED:
             instead = INSTEAD.get(name, {})
-            given[RENAMED.get(name, name)] = _plain(instead.get(value, value) if instead else value)
+            current[RENAMED.get(name, name)] = _plain(instead.get(value, value) if instead else value)
     if flat:
-        given |= {name: None for name in ZERO_IS_NONE if given.get(name) == 0}
+        current |= {name: None for name in ZERO_IS_NONE if current.get(name) == 0}
         if values.get("speed_update") != "data-driven":
-            given.pop("speed_range_mps", None)
-        if given.get("method") == "waveform":
+            current.pop("speed_range_mps", None)
+        if current.get("method") == "waveform":
             # Only ``auto`` had a budget.
-            given["minutes"] = None
-        if given.get("minutes") is None and given.get("bands") == 4:
-            given["bands"] = None
-    return Settings.of(**given, **(numerics or {}))
+            current["minutes"] = None
+        if current.get("minutes") is None and current.get("bands") == 4:
+            current["bands"] = None
+    return Settings.of(**current, **(numerics or {}))
 
 
 def _plain(value: Any) -> Any:

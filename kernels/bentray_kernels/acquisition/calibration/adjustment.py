@@ -12,6 +12,7 @@ from scipy.linalg import cho_factor, cho_solve
 from ...arrays import Flags, Floats, Ints
 from ...errors import InvalidInput
 from ..dataset import Dataset
+from ..noise import robust_deviation
 from .result import Calibration
 
 # Iterations end when the largest move of an element is below this, m.
@@ -89,19 +90,22 @@ def calibrate(
     value[-1] = 1.0 / dataset.water_speed_mps
     for _ in range(MOST_ITERATIONS):
         rows, residual = _linear(dataset, at, value, emitter, receiver, time)
-        kept = used & _near(residual, used)
-        free = _free(dataset, at, emitter[kept], receiver[kept], fit_speed)
-        step, covariance = _step(dataset, at, rows[kept], residual[kept], free, fit_speed)
+        # The median is the first estimate of the common delay.
+        off = np.abs(residual - np.median(residual[used]))
+        inliers = used & (off <= OUTLYING * robust_deviation(residual[used]) + 1e-12)
+        free = _free(dataset, at, emitter[inliers], receiver[inliers], fit_speed)
+        step, covariance = _step(dataset, at, rows[inliers], residual[inliers], free, fit_speed)
         moved = np.abs(step[: at.emission]).max()
         value[free] += step[free] * min(1.0, LONGEST_STEP_M / max(moved, 1e-30))
         if moved < SETTLED_M:
             break
     _, residual = _linear(dataset, at, value, emitter, receiver, time)
-    spare = int(kept.sum()) - int(free.sum()) + _gauges(fit_speed)
-    noise = sigma_s if sigma_s is not None else math.sqrt(float((residual[kept] ** 2).sum()) / max(spare, 1))
+    residual = residual[inliers]
+    spare = residual.size - int(free.sum()) + _gauges(fit_speed)
+    noise = sigma_s if sigma_s is not None else math.sqrt(float((residual**2).sum()) / max(spare, 1))
     deviation = np.full(at.count, np.nan)
     deviation[free] = noise * np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return _calibration(at, value, deviation, residual[kept], int(used.sum() - kept.sum()), fit_speed)
+    return _calibration(at, value, deviation, residual, int(used.sum()) - residual.size, fit_speed)
 
 
 def _gauges(fit_speed: bool) -> int:
@@ -113,13 +117,13 @@ def _used(dataset: Dataset, emitter: Ints, receiver: Ints) -> Flags:
     """Pairs whose elements are in enough pairs.
 
     Raises:
-        InvalidInput: where hardly any are left.
+        InvalidInput: for too few pairs.
     """
     used = np.ones(len(emitter), dtype=bool)
     for _ in range(len(dataset.element_position_m)):
-        counts = np.bincount(emitter[used], minlength=len(dataset.tx))
-        heard = np.bincount(receiver[used], minlength=len(dataset.rx))
-        enough = used & (counts[emitter] >= FEWEST) & (heard[receiver] >= FEWEST)
+        emitted = np.bincount(emitter[used], minlength=len(dataset.tx))
+        received = np.bincount(receiver[used], minlength=len(dataset.rx))
+        enough = used & (emitted[emitter] >= FEWEST) & (received[receiver] >= FEWEST)
         if (enough == used).all():
             break
         used = enough
@@ -157,13 +161,6 @@ def _linear(
     return rows, np.asarray(time - delay - slowness * distance)
 
 
-def _near(residual: Floats, used: Flags) -> Flags:
-    """Residuals that are not outliers; their median is the first estimate of the common delay."""
-    middle = float(np.median(residual[used]))
-    spread = 1.4826 * float(np.median(np.abs(residual[used] - middle)))
-    return np.asarray(np.abs(residual - middle) <= OUTLYING * spread + 1e-12)
-
-
 def _free(dataset: Dataset, at: _Unknowns, emitter: Ints, receiver: Ints, fit_speed: bool) -> Flags:
     """Unknowns with at least one pair."""
     free = np.zeros(at.count, dtype=bool)
@@ -195,11 +192,11 @@ def _step(
     # Unknowns are in m, s and s/m: scaled to similar size.
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-30))
     normal *= scale[:, None] * scale[None, :]
-    held = fixed * scale[None, :]
-    held /= np.maximum(np.linalg.norm(held, axis=1, keepdims=True), 1e-30)
+    conventions = fixed * scale[None, :]
+    conventions /= np.maximum(np.linalg.norm(conventions, axis=1, keepdims=True), 1e-30)
     # The conventions are met exactly with any weight; a weight similar to the data's keeps the system well
     # posed.
-    normal += held.T @ held * len(scale)
+    normal += conventions.T @ conventions * len(scale)
     try:
         factor = cho_factor(normal)
     except np.linalg.LinAlgError:
@@ -210,7 +207,8 @@ def _step(
     change[free] = scale * cho_solve(factor, scale * (part.T @ residual))
     inverse = cho_solve(factor, np.eye(len(scale)))
     # The contribution of the conventions is not an uncertainty of the data.
-    covariance = inverse - inverse @ held.T @ np.linalg.solve(held @ inverse @ held.T, held @ inverse)
+    weight = np.linalg.solve(conventions @ inverse @ conventions.T, conventions @ inverse)
+    covariance = inverse - inverse @ conventions.T @ weight
     return change, covariance * scale[:, None] * scale[None, :]
 
 

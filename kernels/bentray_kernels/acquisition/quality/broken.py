@@ -24,17 +24,16 @@ def find_broken(dataset: Dataset, measures: Measures, which: str, known: Flags) 
     """
     findings = []
     other = (dataset.tx[:, None] != dataset.rx[None, :]) & ~known
-    for check, flags, found, accepted in (
+    for check, flags, fault, accepted in (
         ("values", measures.broken, "samples that are not finite", "finite samples"),
-        ("constant traces", measures.constant, "one and the same value throughout", "a recording"),
+        ("constant traces", measures.constant, "a constant value", "a recording"),
     ):
         pairs = flags & other
         if pairs.any():
-            words = f"{which}: {int(pairs.sum())} traces with {found}"
+            count = int(pairs.sum())
+            message = f"{which}: {count} traces with {fault}"
             findings.append(
-                Finding(
-                    check, words, accepted, "left out", pairs=pairs, value=float(pairs.sum()), unit="traces"
-                )
+                Finding(check, message, accepted, "left out", pairs=pairs, value=float(count), unit="traces")
             )
     return findings
 
@@ -45,12 +44,12 @@ def find_clipped(dataset: Dataset, measures: Measures, which: str) -> list[Findi
     if not pairs.any():
         return []
     part = float(pairs.sum()) / max(int(measures.detected.sum()), 1)
-    words = f"{which}: {int(pairs.sum())} traces cut off at their highest or lowest value"
-    many = ", a gain set too high" if part > MOST_CLIPPED else ""
+    message = f"{which}: {int(pairs.sum())} traces clipped at their highest or lowest value"
+    message += ", the gain is too high" if part > MOST_CLIPPED else ""
     return [
         Finding(
             "clipping",
-            words + many,
+            message,
             "pulses within the range of the recorder",
             "reported",
             pairs=np.asarray(pairs),

@@ -37,9 +37,9 @@ def find_contradictions(dataset: Dataset, delta: Floats) -> list[Finding]:
     differ = unreciprocal(dataset, np.where(outlying, np.nan, delta), skip)
     allowed = f"within {1e9 * skip:.0f} ns"
     return [
-        *_left_out("cycle jumps", cycles, departure, "whole periods off their neighbours", allowed),
-        *_left_out("outliers", outlying & ~cycles, departure, "off the median of their neighbours", allowed),
-        *_left_out("reciprocity", differ, departure, "that differ when emitter and receiver change", allowed),
+        *_left_out("cycle jumps", cycles, departure, "whole periods from their neighbours", allowed),
+        *_left_out("outliers", outlying & ~cycles, departure, "far from the median of neighbours", allowed),
+        *_left_out("reciprocity", differ, departure, "that differ from their reciprocal pair", allowed),
     ]
 
 
@@ -52,7 +52,7 @@ def _usual(departure: Floats) -> float:
     return OUTLYING * float(np.percentile(size, 90.0)) / NINETY if size.size else math.inf
 
 
-def _left_out(check: str, pairs: Flags, departure: Floats, found: str, accepted: str) -> list[Finding]:
+def _left_out(check: str, pairs: Flags, departure: Floats, fault: str, accepted: str) -> list[Finding]:
     if not pairs.any():
         return []
     off = np.abs(departure[pairs])
@@ -60,7 +60,7 @@ def _left_out(check: str, pairs: Flags, departure: Floats, found: str, accepted:
     return [
         Finding(
             check,
-            f"{int(pairs.sum())} pairs {found}",
+            f"{int(pairs.sum())} pairs {fault}",
             accepted,
             "left out",
             pairs=np.asarray(pairs),

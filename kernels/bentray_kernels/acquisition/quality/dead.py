@@ -11,8 +11,8 @@ from .finding import Finding, Role
 # Fraction of an element's pairs that must have a pulse.
 MIN_DETECTED = 0.1
 
-# Where half of the elements are detected in fewer of theirs than this, pulses drown in noise, and silence
-# tells nothing.
+# If the median element has pulses in a smaller fraction of its pairs, noise hides the pulses and no element
+# is reported as dead.
 USUALLY_DETECTED = 0.5
 
 
@@ -32,20 +32,20 @@ def find_dead(dataset: Dataset, detected: Flags) -> list[Finding]:
         alive = np.asarray(detected.any(axis=1 - axis))
         pairs_counted = other & (alive[None, :] if axis == 1 else alive[:, None])
         part = (detected & pairs_counted).sum(axis=axis) / np.maximum(pairs_counted.sum(axis=axis), 1)
-        at_fault = np.flatnonzero(part < MIN_DETECTED)
-        if at_fault.size and np.median(part) >= USUALLY_DETECTED:
+        dead = np.flatnonzero(part < MIN_DETECTED)
+        if dead.size and np.median(part) >= USUALLY_DETECTED:
             pairs = np.zeros_like(detected)
-            pairs[(at_fault, slice(None)) if axis == 1 else (slice(None), at_fault)] = True
+            pairs[(dead, slice(None)) if axis == 1 else (slice(None), dead)] = True
             findings.append(
                 Finding(
                     "dead elements",
-                    f"{at_fault.size} without a pulse in {role}",
+                    f"{dead.size} without a pulse in {role}",
                     f"a pulse in {100 * MIN_DETECTED:.0f} % of an element's pairs",
                     "left out",
-                    tuple(int(k) for k in element[at_fault]),
+                    tuple(int(k) for k in element[dead]),
                     role,
                     pairs,
-                    float(part[at_fault].max()),
+                    float(part[dead].max()),
                     "of its pairs",
                 )
             )

@@ -86,8 +86,8 @@ def examine_slices(
     picked = None
     if len(whole) == len(parts):
         # A single slice keeps its truth and position; several lose them when sliced.
-        shown = whole[0] if dataset.slice_z_m is None else stacked(dataset, whole)
-        picked = replace(shown, truth=dataset.truth, waveform=None)
+        combined = whole[0] if dataset.slice_z_m is None else stacked(dataset, whole)
+        picked = replace(combined, truth=dataset.truth, waveform=None)
     other = (dataset.tx[:, None] != dataset.rx[None, :]).sum() * dataset.slices
     usable = 0 if picked is None else int(np.isfinite(picked.differential_tof()).sum())
     name = "" if dataset.picked else picker
@@ -127,12 +127,10 @@ def check_times(dataset: Dataset) -> list[Finding]:
     if dataset.waveform is None and dataset.valid is None:
         findings += find_dead(dataset, _detected(dataset, dataset.differential_tof()))
     findings += find_time_shift(dataset, dataset.differential_tof())
-    left = apply(replace(dataset, waveform=None), findings)
-    later = find_contradictions(left, left.differential_tof())
-    if not np.isfinite(apply(left, later).differential_tof()).any():
-        later.append(
-            Finding("travel times", "not one that can be used", "travel times of some pairs", "refused")
-        )
+    corrected = apply(replace(dataset, waveform=None), findings)
+    later = find_contradictions(corrected, corrected.differential_tof())
+    if not np.isfinite(apply(corrected, later).differential_tof()).any():
+        later.append(Finding("travel times", "no usable ones", "travel times of some pairs", "refused"))
     return findings + later
 
 

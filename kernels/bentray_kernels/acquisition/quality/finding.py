@@ -21,7 +21,7 @@ MOST_NAMED = 20
 NOTHING_FOUND = "nothing found"
 
 # Most findings in a summary, and elements of each.
-MOST_TOLD = 8
+MOST_SUMMARISED = 8
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Finding:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, with the number of pairs and the first of them as (emission, reception)."""
-        told: dict[str, Any] = {
+        record: dict[str, Any] = {
             "check": self.check,
             "found": self.found,
             "accepted": self.accepted,
@@ -66,9 +66,9 @@ class Finding:
         }
         if self.pairs is not None:
             where = np.argwhere(self.pairs)
-            told["pair_count"] = len(where)
-            told["first_pairs"] = where[:MOST_NAMED].tolist()
-        return told
+            record["pair_count"] = len(where)
+            record["first_pairs"] = where[:MOST_NAMED].tolist()
+        return record
 
 
 @dataclass(frozen=True)
@@ -123,10 +123,10 @@ def words(findings: Sequence[Finding], *, stacked: bool = False) -> str:
     if not findings:
         return NOTHING_FOUND
     lines = []
-    for finding in findings[:MOST_TOLD]:
+    for finding in findings[:MOST_SUMMARISED]:
         where = f"slice {finding.slice}: " if stacked else ""
-        more = ", …" if len(finding.elements) > MOST_TOLD else ""
-        of = f" ({', '.join(map(str, finding.elements[:MOST_TOLD]))}{more})" if finding.elements else ""
+        more = ", …" if len(finding.elements) > MOST_SUMMARISED else ""
+        of = f" ({', '.join(map(str, finding.elements[:MOST_SUMMARISED]))}{more})" if finding.elements else ""
         lines.append(f"{where}{finding.check}: {finding.found}{of}, {finding.action}")
     others = len(findings) - len(lines)
     return "; ".join(lines) + (f"; and {others} more" if others else "")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...arrays import Flags, Floats
 from ..dataset import Dataset
 
-# Parts of a trace, the quietest of which gives the noise.
+# Parts of a trace; the quietest one gives the noise.
 PARTS = 8
 
 # Lowest ratio of a pulse to the quietest part; the highest sample of pure noise is below.
@@ -44,8 +44,8 @@ class Measures:
     def of(cls, traces: Iterable[NDArray[Any]], dataset: Dataset) -> Measures:
         """Measures of the traces of emissions, (nrx, nt) each; converted to floating point one by one."""
         assert dataset.sampling_rate_hz is not None
-        found = [_emission(np.asarray(emission)) for emission in traces]
-        broken, constant, detected, clipped, strongest = (np.stack(part) for part in zip(*found, strict=True))
+        rows = [_emission(np.asarray(emission)) for emission in traces]
+        broken, constant, detected, clipped, strongest = (np.stack(part) for part in zip(*rows, strict=True))
         time = np.where(detected, dataset.t0_s + strongest / dataset.sampling_rate_hz, np.nan)
         return cls(broken, constant, detected, clipped, time)
 

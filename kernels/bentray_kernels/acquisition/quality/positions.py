@@ -8,6 +8,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ..dataset import Dataset
+from ..noise import robust_deviation
 from .finding import Finding
 from .water_line import WaterLine
 
@@ -40,7 +41,7 @@ def find_displaced(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> li
     both = np.isfinite(there + back)
     if both.sum() < FEWEST:
         return []
-    alike, noise = (_spread(0.5 * (there + sign * back)[both]) for sign in (1.0, -1.0))
+    alike, noise = (robust_deviation(0.5 * (there + sign * back)[both]) for sign in (1.0, -1.0))
     apart = math.sqrt(max(alike**2 - noise**2, 0.0)) * dataset.water_speed_mps
     allowed = LARGEST_OFF * dataset.water_speed_mps / dataset.center_frequency_hz
     if apart <= allowed:
@@ -48,15 +49,11 @@ def find_displaced(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> li
     return [
         Finding(
             "element positions",
-            f"water times {1e3 * apart:.2g} mm off those of the drawn places, alike both ways: positions or "
-            "delays to calibrate",
+            f"water times {1e3 * apart:.2g} mm from those of the positions, equally in both directions: "
+            "positions or delays need calibration",
             f"within {1e3 * allowed:.2g} mm, a twentieth of a wavelength",
             "reported",
             value=apart,
             unit="m",
         )
     ]
-
-
-def _spread(values: Floats) -> float:
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))

@@ -105,26 +105,26 @@ def _of_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], Flo
         findings += find_clipped(dataset, measures, which)
     if measured.water is None:
         return findings, None
-    valid, strongest = apply(dataset, findings).valid, _whole_crests(measured.water)
+    valid, strongest = apply(dataset, findings).valid, _unclipped_maxima(measured.water)
     return findings, strongest if valid is None else np.where(valid, strongest, np.nan)
 
 
-def _whole_crests(water: Measures) -> Floats:
+def _unclipped_maxima(water: Measures) -> Floats:
     """Times of the maxima, (ntx, nrx), s; where most pulses are complete, without clipped ones.
 
     Clipped maxima are off by a fraction of a period, and strong near pairs are clipped: the fit of the line
     would be biased.
     """
-    whole = np.where(water.clipped, np.nan, water.strongest_s)
-    most = 2 * np.isfinite(whole).sum() >= np.isfinite(water.strongest_s).sum()
-    return whole if most else water.strongest_s
+    unclipped = np.where(water.clipped, np.nan, water.strongest_s)
+    most = 2 * np.isfinite(unclipped).sum() >= np.isfinite(water.strongest_s).sum()
+    return unclipped if most else water.strongest_s
 
 
 def _of_water(dataset: Dataset, strongest: Floats) -> list[Finding]:
     """Faults of the water shot with respect to the geometry."""
     line = WaterLine.of(dataset, strongest)
     if line is None:
-        return [Finding("water shot", "hardly a pulse in it", "pulses that crossed the water", "refused")]
+        return [Finding("water shot", "almost no pulses", "pulses that crossed the water", "refused")]
     findings = sampling(dataset, line) + frequency(dataset)
     if findings or dataset.center_frequency_hz is None:
         return findings

@@ -41,12 +41,12 @@ def find_swapped(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list
                 Finding(
                     "swapped channels",
                     f"elements {element[a]} and {element[b]} fit each other's places in {role}",
-                    "water times that fit an element's own place",
+                    "water times that fit an element's own position",
                     "corrected",
                     (int(element[a]), int(element[b])),
                     role,
                     value=before,
-                    unit="s of scatter as they are",
+                    unit="s, present deviation",
                 )
             )
     return findings
@@ -65,14 +65,14 @@ def _exchanged(times: Floats, expected: Floats, period: float) -> list[tuple[int
         return []
     least = max(SUSPECT_PERIODS * period, SUSPECT_TIMES * float(np.median(own[known])))
     suspects = np.flatnonzero(known & (own > least))
-    found = []
+    candidates = []
     for a, b in combinations(suspects.tolist(), 2):
         there, back = _scatter(times[:, a] - expected[:, b]), _scatter(times[:, b] - expected[:, a])
         if max(there, back) < BETTER * min(own[a], own[b]):
-            found.append((max(there, back) / min(own[a], own[b]), a, b))
+            candidates.append((max(there, back) / min(own[a], own[b]), a, b))
     taken: set[int] = set()
     swaps = []
-    for _, a, b in sorted(found):
+    for _, a, b in sorted(candidates):
         if not taken & {a, b}:
             taken |= {a, b}
             swaps.append((a, b, float(max(own[a], own[b]))))

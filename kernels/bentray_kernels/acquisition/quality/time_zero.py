@@ -6,6 +6,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ..dataset import Dataset
+from ..noise import robust_deviation
 from .finding import Finding
 from .water_line import WaterLine
 
@@ -32,7 +33,7 @@ def find_recording_shift(dataset: Dataset, line: WaterLine) -> list[Finding]:
     return [
         Finding(
             RECORDING,
-            f"water pulses {1e6 * line.intercept_s:.3g} µs off their straight time",
+            f"water pulses differ from their straight time by {1e6 * line.intercept_s:.3g} µs",
             f"within {LARGEST_DELAY:g} periods",
             "corrected",
             value=line.intercept_s,
@@ -52,7 +53,7 @@ def find_time_shift(dataset: Dataset, delta: Floats) -> list[Finding]:
     if missing.size < FEWEST:
         return []
     offset = float(np.median(missing))
-    scatter = 1.4826 * float(np.median(np.abs(missing - offset)))
+    scatter = robust_deviation(missing)
     frequency = dataset.center_frequency_hz
     largest = LARGEST_OFFSET_S if frequency is None else LARGEST_OFFSET / frequency
     if abs(offset) <= max(largest, scatter):
@@ -60,7 +61,7 @@ def find_time_shift(dataset: Dataset, delta: Floats) -> list[Finding]:
     return [
         Finding(
             OBJECT,
-            f"pairs beside the object are {1e9 * offset:.0f} ns off water ({missing.size} pairs)",
+            f"pairs that miss the object differ from water by {1e9 * offset:.0f} ns ({missing.size} pairs)",
             f"within {1e9 * largest:.0f} ns",
             "corrected",
             value=offset,

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ..dataset import Dataset
+from ..noise import robust_deviation
 
 # Iterations of a line fit to the points within four robust deviations of the previous line.
 ROUNDS = 6
@@ -16,7 +17,7 @@ FEWEST = 8
 
 @dataclass(frozen=True)
 class WaterLine:
-    """crest of the pulse = intercept + distance / speed.
+    """Time of the maximum of the pulse = intercept + distance / speed.
 
     Attributes:
         speed_mps: apparent speed of the water.
@@ -58,9 +59,8 @@ def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
     intercept = float(np.median(y - slope * x))
     for _ in range(ROUNDS):
         off = y - slope * x - intercept
-        spread = 1.4826 * float(np.median(np.abs(off - np.median(off))))
-        kept = np.abs(off - np.median(off)) <= 4.0 * spread + 1e-12
-        if kept.sum() < FEWEST or np.ptp(x[kept]) == 0.0:
+        inliers = np.abs(off - np.median(off)) <= 4.0 * robust_deviation(off) + 1e-12
+        if inliers.sum() < FEWEST or np.ptp(x[inliers]) == 0.0:
             break
-        slope, intercept = (float(v) for v in np.polyfit(x[kept], y[kept], 1))
+        slope, intercept = (float(v) for v in np.polyfit(x[inliers], y[inliers], 1))
     return slope, intercept

@@ -1,6 +1,6 @@
 """Gauss–Newton with bent rays: all emitters at once, then one linear problem with total variation.
 
-Unlike SART, where every emitter waits for the image of the one before, the emitters of an iteration are
+Unlike in SART, where each emitter needs the image of the previous one, the emitters of an iteration are
 independent: a slice can use as many workers as it has emitters.
 """
 
@@ -22,25 +22,26 @@ from . import huber
 from .linear_problem import Linearised
 from .linearisation import Rows, linearise, ray_density
 
-# A misfit above this part of the best before is no gain, and so many images in a row without one end the
-# iteration; one does not: the first of bent rays may miss as much as straight ones do, and the next far less.
+# A misfit above this part of the previous best is no gain, and ``PATIENCE`` consecutive images without gain
+# end the iteration. One does not: the first image of bent rays may have the misfit of straight rays, the next
+# one a far lower misfit.
 LEAST_GAIN = 0.98
 PATIENCE = 2
 
-# A step that makes the misfit grow is halved so often at most: the linearisation holds only near the image.
+# Most halvings of a step that increases the misfit: the linearisation holds only near the image.
 MOST_HALVINGS = 3
 
 
 @dataclass(frozen=True)
 class Measured:
-    """An image that has been measured.
+    """An image with its misfit.
 
     Attributes:
         slowness: of the region's shape, s/m.
-        sweep: the pass that measured it, from 1; 0 for none.
-        limit: Huber's, s, for its residuals.
+        sweep: number of the iteration that evaluated it, from 1; 0 for none.
+        limit: Huber limit of its residuals, s.
         loss: of its residuals, s; see ``gauss_newton.huber.loss``.
-        residuals: how many of them fall between two of ``RESIDUAL_EDGES_S``.
+        residuals: their histogram over ``RESIDUAL_EDGES_S``.
     """
 
     slowness: Floats
@@ -56,14 +57,14 @@ class Iterate:
 
     Attributes:
         slowness: of the region's shape, s/m.
-        begun: the image that the iteration began with.
+        begun: the initial image.
         dual: (ndim, ...), s, of the last linear problem.
         coverage: as ``slowness``, metres of ray through each node.
-        best: the best image so far: each is compared with the best before it, at the limit of that one.
+        best: the best image so far; each image is compared with it at its Huber limit.
         halvings: of the last step.
-        idle: images in a row, up to the last, that gained nothing.
+        idle: consecutive images without gain.
         done: whether the iteration has ended.
-        history: a record per iteration, of the misfit that it began with.
+        history: a record per iteration, with the misfit of its initial image.
     """
 
     slowness: Floats
@@ -83,17 +84,17 @@ class Iterate:
 
     @property
     def emitter(self) -> int:
-        """Emitters done in the iteration under way: none, for an iteration is one step."""
+        """Emitters done in the current iteration: none, because an iteration is one step."""
         return 0
 
     @property
     def residuals(self) -> Ints:
-        """Of the best image; see ``Measured``."""
+        """Histogram of the residuals of the best image; see ``Measured``."""
         return self.best.residuals
 
 
 def begin(slowness: Floats) -> Iterate:
-    """An image to begin with, of the region's shape, s/m."""
+    """The state that begins with an image, of the region's shape, s/m."""
     best = Measured(slowness, 0, math.inf, math.inf, residual_counts(np.empty(0)))
     return Iterate(
         slowness, slowness, np.zeros((slowness.ndim, *slowness.shape)), np.zeros_like(slowness), best
@@ -103,7 +104,7 @@ def begin(slowness: Floats) -> Iterate:
 def trace_rays(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
     """Rows of some emitters through an image; any split of the emitters gives the same.
 
-    In an image without contrast, as the water that the first iteration begins with, rays are straight.
+    In an image without contrast, such as the initial water, rays are straight.
     """
     rays: RayKind = settings.rays if slowness.min() < slowness.max() else "straight"
     return linearise(
@@ -119,15 +120,14 @@ def trace_rays(problem: Problem, settings: Settings, slowness: Floats, emitters:
 def step(
     problem: Problem, settings: Settings, state: Iterate, parts: Sequence[Rows], slice_index: int = 0
 ) -> Iterate:
-    """The next image from the rows of all emitters, in their order; at the end, the best of those measured.
+    """The next image from the rows of all emitters, in their order; at the end, the best image.
 
-    Of two with about the same misfit the last one is returned, which fulfils the penalty better.
+    Of images with about the same misfit the last one is returned, which fulfils the penalty better. The last
+    iteration only evaluates the misfit, so there is one image less than ``settings.iterations``; a single
+    iteration makes one image without evaluating it.
 
-    There is one image less than ``settings.iterations``, because the last iteration only measures the misfit;
-    a single iteration makes one image without measuring it.
-
-    The strength of the total variation follows the misfit: strong while rays are still wrong, so that their
-    errors do not become structure, and in the end as weak as the data are exact.
+    The strength of the total variation is proportional to the misfit: strong while the rays are inaccurate,
+    so that their errors do not become structure, and finally as weak as the data are accurate.
     """
     residual = np.concatenate([part.residual for part in parts])
     rms = math.sqrt(float((residual**2).mean()))
@@ -135,25 +135,23 @@ def step(
     record = Iteration(slice_index, number, rms, len(problem.active_emitters), given=False)
     history = (*state.history, record)
     best, limit = state.best, huber.limit(residual, settings.numerics.huber_scale)
-    against = huber.loss(residual, best.limit)
-    here = Measured(state.slowness, number, limit, huber.loss(residual, limit), residual_counts(residual))
-    if against < best.loss:
-        best = here
-    worse = against > state.best.loss
-    grown = worse and state.halvings < MOST_HALVINGS
-    # Not even a fraction of the step makes it better.
-    lost = worse and not grown
-    idle = state.idle + (not grown) if against > LEAST_GAIN * state.best.loss else 0
-    stuck = lost or idle == PATIENCE
-    # The last pass only measures what the one before gave.
+    loss = huber.loss(residual, best.limit)
+    current = Measured(state.slowness, number, limit, huber.loss(residual, limit), residual_counts(residual))
+    if loss < best.loss:
+        best = current
+    worse = loss > state.best.loss
+    halve = worse and state.halvings < MOST_HALVINGS
+    idle = state.idle + (not halve) if loss > LEAST_GAIN * state.best.loss else 0
+    stuck = (worse and not halve) or idle == PATIENCE
+    # The last iteration only evaluates the previous image.
     last = number == settings.iterations
     if number > 1 and (stuck or last or settings.numerics.explained(rms)):
-        best = here if against < state.best.loss / LEAST_GAIN else best
-        history = tuple(replace(sweep, given=sweep.sweep == best.sweep) for sweep in history)
+        best = current if loss < state.best.loss / LEAST_GAIN else best
+        history = tuple(replace(record, given=record.sweep == best.sweep) for record in history)
         return replace(state, slowness=best.slowness, best=best, history=history, done=True)
-    if grown:
-        nearer = 0.5 * (best.slowness + state.slowness)
-        return replace(state, slowness=nearer, halvings=state.halvings + 1, history=history)
+    if halve:
+        middle = 0.5 * (best.slowness + state.slowness)
+        return replace(state, slowness=middle, halvings=state.halvings + 1, history=history)
     lowest, highest = settings.speed_bounds_mps
     coverage = ray_density(problem, parts) * problem.spacing
     # Total variation is scaled by the misfit, s; quadratic penalties are relative to the data.

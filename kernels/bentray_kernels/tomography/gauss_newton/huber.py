@@ -1,4 +1,4 @@
-"""Huber's loss: residuals beyond a limit count by their size, so that outliers do not decide."""
+"""Huber loss: linear instead of quadratic beyond a limit, so that outliers have less weight."""
 
 from __future__ import annotations
 
@@ -11,28 +11,29 @@ from ...arrays import Floats
 # The median of |x| over the standard deviation of x, for a normal distribution.
 MEDIAN_PART = 0.6745
 
-# The limit is at least this part of the mean size. Of a small object in exact times most rays pass nothing
-# but water and fit from the start; if only these set the spread, the other rays would have no weight.
+# The limit is at least this part of the mean absolute residual. With exact times of a small object most rays
+# cross only water and fit from the start; if only these determined the spread, the others would have no
+# weight.
 LEAST_PART = 0.7
 
 
 def limit(residual: Floats, spreads: float) -> float:
-    """Beyond which residuals count by their size, in their unit.
+    """The limit of the quadratic part, in the unit of the residuals.
 
     Args:
-        residual: any number of them.
-        spreads: how many of their standard deviations; 0: none is beyond.
+        residual: any number of residuals.
+        spreads: the limit in standard deviations; 0: no limit.
     """
     if spreads == 0.0:
         return math.inf
     size = np.abs(residual)
     spread = float(np.median(size)) / MEDIAN_PART
-    # All residuals zero: none is an outlier.
+    # If all residuals are zero, none is an outlier.
     return max(spreads * spread, LEAST_PART * float(size.mean())) or math.inf
 
 
 def loss(residual: Floats, limit: float) -> float:
-    """As a root mean square, which it is for residuals within the limit; the others add less to it."""
+    """Root mean square, with less weight for residuals beyond the limit."""
     size = np.abs(residual)
     inner = np.minimum(size, limit)
     outer = np.maximum(size - limit, 0.0)
@@ -40,5 +41,5 @@ def loss(residual: Floats, limit: float) -> float:
 
 
 def clipped_rms(residual: Floats, limit: float) -> float:
-    """Root mean square of residuals of which none counts as more than the limit."""
+    """Root mean square of the residuals clipped to the limit."""
     return math.sqrt(float((np.minimum(np.abs(residual), limit) ** 2).mean()))

@@ -1,4 +1,4 @@
-"""The linear problem of a Gauss–Newton step: an image that explains the times and obeys a penalty."""
+"""The linear problem of a Gauss–Newton step: least squares with Huber loss and a penalty."""
 
 from __future__ import annotations
 
@@ -15,26 +15,25 @@ from .linearisation import Rows
 from .penalties import Penalty, adjoint, gradient, laplacian, length, roughness, shrink
 from .ray_matrix import normal_product
 
-# Weight of the split in the alternating direction method, in units of the data's own curvature; on Table 6 a
-# tenth of it ended with a worse image.
+# Weight of the splitting in the alternating direction method, in units of the curvature of the data; on Table
+# 6 a tenth of it gave a worse image.
 SPLIT = 0.75
 
-# Rounds of splitting, and conjugate gradient steps in each, which begin at the last round's image. They do
-# not reach the minimum; the next iteration starts from the dual variable. A strength above every slope of
-# the image acts like one as large as the slopes.
+# Rounds of splitting, and conjugate gradient steps in each, which start from the image of the previous round.
+# They do not reach the minimum; the next iteration starts from the dual variable. A strength above every
+# slope of the image acts like one as large as the slopes.
 ROUNDS = 12
 STEPS = 6
 
-# Conjugate gradient steps of a quadratic penalty: at most so many, fewer once the gradient is so small a part
-# of the first one.
+# Most conjugate gradient steps of a quadratic penalty, and the relative gradient at which they end.
 MOST_STEPS = 300
 TOLERANCE = 1e-5
 
-# The data's own curvature, over the density, at a wavenumber k of 1/node, times k: rays from all sides of a
-# plane blur a point to 1/(π·distance), whose transform is 2/k.
+# Curvature of the data over the density at a wavenumber k of 1/node, times k: rays from all sides of a plane
+# blur a point to 1/(π·distance), whose transform is 2/k.
 CURVATURE = 2.0
 
-# Solutions of a quadratic penalty with Huber's loss, each with weights from the residuals of the one before.
+# Solutions of a quadratic penalty with Huber loss, each with weights from the residuals of the previous one.
 REWEIGHTINGS = 4
 
 
@@ -54,20 +53,19 @@ class Linearised:
     Attributes:
         parts: rows of A, in nodes, and residuals, s.
         image: (nx, ny[, nz]), crossing time of a node: slowness times spacing, s.
-        density: nodes of ray through a node of the region, on average.
+        density: mean nodes of ray through a node of the region.
         region: as the image, nodes that may change.
         bounds: lowest and highest crossing time, s.
-        strength: of the penalty; of total variation in s: about the error of a travel time that an edge less
-            may cost; of the others a plain number: 1 weighs as much as the data do on average.
+        strength: of the penalty; for total variation in s, about the error of a travel time that one edge
+            less may cost; for the others dimensionless: 1 has the mean weight of the data.
         penalty: its name.
         huber: s; rows with larger residuals have less weight.
-        reference: as the image, s, what ``tikhonov`` stays near; None: the image.
-        edge: of total variation, s: slopes count as g·edge·log(1 + |∇u|/edge), so that well above it a higher
-            edge costs hardly more than a low one and keeps its contrast. Iteratively reweighted (Candès,
-            Wakin and Boyd 2008): each ``solve`` weighs the slopes by those of ``image``, so that one call is
-            a convex problem, and an image without slopes gets plain total variation, as ``inf`` does.
-        width: standard deviation, nodes, of the Gaussian under which rays see the image: A·δ above is
-            then A·G·δ.
+        reference: as the image, s, of the ``tikhonov`` penalty; None: the image.
+        edge: of total variation, s: the penalty of a slope is g·edge·log(1 + |∇u|/edge), so that well above
+            ``edge`` the penalty hardly increases and edges keep their contrast. Iteratively reweighted
+            (Candès, Wakin and Boyd 2008): each ``solve`` weighs the slopes by those of ``image``, so that one
+            call is a convex problem; without slopes, and for ``inf``, it is plain total variation.
+        width: standard deviation of the Gaussian G across rays, nodes: A·δ above is then A·G·δ.
     """
 
     parts: Sequence[Rows]
@@ -83,12 +81,10 @@ class Linearised:
     width: float = 0.0
 
     def solve(self, dual: Floats) -> tuple[Floats, Floats]:
-        """An image nearer the minimum, and the dual variable as initial value of a later, similar problem.
-
-        Bounds are kept by clipping.
+        """An image nearer the minimum, clipped to the bounds, and the dual variable for the next problem.
 
         Args:
-            dual: (ndim, nx, ny[, nz]), s; zeros at first. Quadratic penalties hand it back as it is.
+            dual: (ndim, nx, ny[, nz]), s; initially zeros. Quadratic penalties return it unchanged.
         """
         if not self.density > 0.0:
             return self.image, dual
@@ -102,19 +98,17 @@ class Linearised:
     def _split(self, dual: Floats) -> tuple[Floats, Floats]:
         """The alternating direction method of multipliers (Boyd et al. 2011, section 6.4.1).
 
-        In turn, a quadratic problem by conjugate gradients, and every gradient shrunk by itself.
+        Alternates between a quadratic problem, by conjugate gradients, and soft thresholding of the
+        gradients.
         """
-
-        def rough(change: Floats) -> Floats:
-            return SPLIT * adjoint(gradient(change))
-
         image = self.image
         cost = self.strength / (1.0 + length(gradient(image)) / self.edge)
         for _ in range(ROUNDS):
             slope = gradient(image) + dual
             edges = shrink(slope, cost / SPLIT)
             dual = slope - edges
-            image = self._descend(image, SPLIT * adjoint(gradient(image) - edges + dual), rough, STEPS)
+            steepness = SPLIT * adjoint(gradient(image) - edges + dual)
+            image = self._descend(image, steepness, lambda change: SPLIT * adjoint(gradient(change)), STEPS)
         return image, dual
 
     def _penalty_gradient(self, image: Floats) -> Floats:
@@ -162,9 +156,9 @@ class Linearised:
         return np.clip(image + change, *self.bounds)
 
     def _preconditioner(self) -> Callable[[Floats], Floats]:
-        """A preconditioner; the smoother an image is to be, the worse the steps would converge without.
+        """A preconditioner for ``laplacian``: inverse Hessian of full-view data and penalty by wavenumber.
 
-        The inverse, wavenumber by wavenumber, of what data from all sides and a ``laplacian`` weigh.
+        The smoother the image, the slower the convergence without it.
         """
         if self.penalty != "laplacian":
             return lambda image: image
@@ -174,7 +168,7 @@ class Linearised:
         return lambda image: np.where(self.region, idctn(dctn(image) / curvature), 0.0)
 
     def _on_image(self, flat: Floats) -> Floats:
-        """A sum over rows as an image as wide as the rays, over the density, in the region."""
+        """A back-projection as an image, blurred to the ray width, over the density, in the region."""
         return np.where(self.region, blurred(flat.reshape(self.image.shape), self.width) / self.density, 0.0)
 
     def _residuals(self, image: Floats) -> Iterator[Floats]:
@@ -184,7 +178,7 @@ class Linearised:
             yield part.residual - part.project(change)
 
     def _weights(self, residual_part: Floats) -> Floats:
-        """Of rows in Huber's loss: 1, less beyond its limit."""
+        """Weights of rows in the Huber loss: 1, less beyond its limit."""
         if self.huber == math.inf:
             return np.ones_like(residual_part)
         return self.huber / np.maximum(np.abs(residual_part), self.huber)

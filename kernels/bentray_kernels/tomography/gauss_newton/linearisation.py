@@ -30,11 +30,11 @@ class Rows:
     """The rays of some emitters, one row each, as a compressed sparse matrix over the nodes.
 
     Attributes:
-        pointers: (rays + 1,), where each row begins.
+        pointers: (rays + 1,), start of each row.
         columns: (entries,), flat node, C order.
         lengths: (entries,), nodes of ray; multiplied by the spacing they are the sensitivities.
         residual: (rays,), s, measured minus predicted travel time.
-        emitters: how many emitters the rays belong to.
+        emitters: number of emitters of the rays.
     """
 
     pointers: Ints
@@ -67,9 +67,9 @@ def linearise(
 ) -> Rows:
     """Rows of some emitters' rays through an image.
 
-    Curved rays are bent to the stationary path in the image's cubic spline, and their times are the spline's.
-    Times read off unbent rays by linear interpolation are wrong where rays graze an edge, and a Gauss–Newton
-    step that believes them puts the error into the image.
+    Curved rays are bent to the stationary path in the cubic spline of the image, and their times are
+    integrals of the spline. Times along unbent rays by linear interpolation are wrong where rays graze an
+    edge, and a Gauss–Newton step would put this error into the image.
 
     Args:
         problem: the slice or volume.
@@ -77,8 +77,8 @@ def linearise(
         emitters: rows of the problem's data, at least one.
         rays: ``curved`` or ``straight``.
         eikonal: method of the wave front.
-        front: standard deviation, nodes, of the Gaussian on the speed that rays bend in; with one, times are
-            integrals of the image along those rays.
+        front: standard deviation, nodes, of the Gaussian on the speed in which rays bend; if above 0, times
+            are integrals of the image along those rays.
     """
 
     def residual_of(emitter: int, valid: Ints, distance: Floats, predicted: Floats, _: Floats) -> Floats:
@@ -127,10 +127,10 @@ def _trace(
     for emitter in emitters:
         valid = np.flatnonzero(np.isfinite(data[emitter]))
         slab = problem.slab(int(emitter))
-        foot = np.zeros(slowness.ndim)
-        foot[-1] = slab.start * problem.spacing
-        source = problem.emitters[emitter] - foot
-        receivers = problem.receivers_of(int(emitter))[valid] - foot
+        corner = np.zeros(slowness.ndim)
+        corner[-1] = slab.start * problem.spacing
+        source = problem.emitters[emitter] - corner
+        receivers = problem.receivers_of(int(emitter))[valid] - corner
         distance = np.linalg.norm(receivers - source, axis=1)
         inside, tof = np.ascontiguousarray(slowness[..., slab]), np.ascontiguousarray(speed[..., slab])
         spline = np.empty((0,) * slowness.ndim)
@@ -159,7 +159,7 @@ def _trace(
 def _rows(
     fan: Fan, smooth: bool, slowness: Floats, spline: Floats
 ) -> tuple[Ints, NDArray[np.int32], NDArray[np.float32], Floats]:
-    """Entries a ray, flat node and nodes of ray of each entry, and predicted times for a spacing of 1."""
+    """Entries per ray, flat node and nodes of ray of each entry, and predicted times for a spacing of 1."""
     path, scratch = empty_path(fan)
     space = allocate_bending(len(path), fan.shape)
     nodes = np.empty((BENT_PARTS * len(path)) << len(fan.shape), np.int64)
@@ -179,7 +179,7 @@ def _rows(
             parts = BENT_PARTS
         entries = list_entries(fan, path, count, parts, nodes, weights, scratch)
         if smooth or not fan.curved:
-            # The spline is not that of the image.
+            # The spline is not one of the image itself.
             predicted[row] = 0.0
             for k in range(entries):
                 predicted[row] += weights[k] * slowness[nodes[k]]

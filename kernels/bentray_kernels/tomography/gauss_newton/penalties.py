@@ -1,4 +1,4 @@
-"""What an image costs beside its misfit: the differences that the penalties measure, and their adjoints."""
+"""Differential operators of the penalties of an image, and their adjoints."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def adjoint(slope: Floats) -> Floats:
 
 
 def laplacian(image: Floats) -> Floats:
-    """Second differences summed over the axes; none across the edge of the image. Its own adjoint."""
+    """Second differences summed over the axes, without flux across the boundary; self-adjoint."""
     return -adjoint(gradient(image))
 
 
@@ -43,12 +43,12 @@ def roughness(shape: tuple[int, ...]) -> Floats:
 
 
 def length(slope: Floats) -> Floats:
-    """Of each gradient: shape from (ndim, *shape)."""
+    """Magnitude of each gradient: shape from (ndim, *shape)."""
     return np.asarray(np.sqrt((slope**2).sum(axis=0)))
 
 
 def shrink(slope: Floats, by: Floats | float) -> Floats:
-    """Each gradient shortened by ``by``, a number or one for each, none below 0."""
+    """Soft thresholding: each gradient shortened by ``by``, a number or one for each, to no less than 0."""
     return np.asarray(slope * np.maximum(1.0 - by / np.maximum(length(slope), 1e-300), 0.0))
 
 

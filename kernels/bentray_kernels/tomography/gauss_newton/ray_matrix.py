@@ -1,6 +1,6 @@
 """Products with the rays' sparse matrix; see ``gauss_newton.linearisation.Rows``.
 
-Indices are used as unsigned numbers: negative ones would count from the end, and asking costs a third.
+Indices are unsigned: for signed ones numba tests whether they count from the end, which takes a third longer.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def _along(
 ) -> float:
     """One row times an image."""
     first, last = np.uint64(pointers[row]), np.uint64(pointers[row + 1])
-    # Four sums side by side, for one would make every addition wait for the one before.
+    # Four independent sums: with one, every addition waits for the previous one.
     a = b = c = d = 0.0
     k = first
     for _ in range((last - first) // LANES):

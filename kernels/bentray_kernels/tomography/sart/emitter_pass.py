@@ -1,9 +1,9 @@
-"""One emitter's part of SART over a slice: front, rays and back-projection in one compiled call (2-D)."""
+"""SART of one emitter over a slice: wave front, rays and back-projection in one compiled call (2-D)."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,32 +12,31 @@ from ...compiled import kernel
 from ...eikonal.deviation import SweepArrays, allocate_sweep_arrays, deviate
 from ...rays.vectorised import Bundle, allocate_bundle, back_project, interleave, trace_bundle
 
-# The Gaussian of an update ends at so many standard deviations.
+# Standard deviations at which the Gaussian of an update is truncated.
 TRUNCATE = 4.0
 
 
-@dataclass(frozen=True)
-class EmitterPass:
-    """Work arrays for one grid; their content is not kept from one update to the next.
+class EmitterPass(NamedTuple):
+    """Work arrays for one grid; their content is not kept between updates.
 
     Attributes:
         shape: of the grid.
-        sheets, rays: of the wave front and of the rays.
-        fields: slowness of the front and of the image, and u; (3, nodes).
-        readable: what rays read at each node, see ``interleave``.
+        front, rays: of the wave front and of the rays.
+        fields: relative slowness for the front and for the rays, and u; (3, nodes).
+        interleaved: the fields that rays read at each node, see ``interleave``.
         sums: Σ correction·w and Σ w of each node in turn since the last update, (2·nodes,).
     """
 
     shape: tuple[int, int]
-    sheets: SweepArrays
+    front: SweepArrays
     rays: Bundle
     fields: Float32s
-    readable: Float32s
+    interleaved: Float32s
     sums: Float32s
 
     @classmethod
     def for_grid(cls, shape: tuple[int, int], receivers: int) -> EmitterPass:
-        """For up to so many receivers of an emitter."""
+        """Work arrays for up to so many receivers of an emitter."""
         nodes = shape[0] * shape[1]
         return cls(
             shape,
@@ -61,33 +60,20 @@ class EmitterPass:
 
         Args:
             slowness: (nx, ny), of the image, s/m.
-            front: as ``slowness``, what the wave front runs in, s/m; None for straight rays.
+            front: as ``slowness``, for the wave front, s/m; None for straight rays.
             spacing: m.
             source: (2,), m, in the grid.
             receivers: (k, 2), m, in the grid.
             measured: (k,), travel times, s.
 
         Returns:
-            (k,), measured less predicted travel times, s.
+            (k,), measured minus predicted travel times, s.
         """
-        left = np.empty(len(receivers))
-        _look(
-            slowness.ravel(),
-            (slowness if front is None else front).ravel(),
-            front is not None,
-            spacing,
-            source / spacing,
-            receivers / spacing,
-            measured,
-            self.shape,
-            self.sheets,
-            self.rays,
-            self.fields,
-            self.readable,
-            self.sums,
-            left,
-        )
-        return left
+        residual = np.empty(len(receivers))
+        curved, speeds = front is not None, (slowness if front is None else front).ravel()
+        ends = source / spacing, receivers / spacing
+        _trace(self, slowness.ravel(), speeds, curved, spacing, *ends, measured, residual)
+        return residual
 
     def update(
         self,
@@ -110,19 +96,8 @@ class EmitterPass:
             smoothing: standard deviation of the Gaussian, nodes; 0: none.
             bounds: lowest and highest slowness, s/m.
         """
-        _update(
-            self.sums,
-            slowness.reshape(-1),
-            coverage.reshape(-1),
-            region.ravel(),
-            spacing,
-            relaxation,
-            gaussian(smoothing),
-            bounds,
-            self.shape,
-            self.fields[0],
-            self.fields[1],
-        )
+        image = slowness.reshape(-1), coverage.reshape(-1), region.ravel()
+        _update(self, *image, spacing, relaxation, gaussian(smoothing), bounds)
 
 
 def gaussian(deviation: float) -> Float32s:
@@ -135,7 +110,8 @@ def gaussian(deviation: float) -> Float32s:
 
 
 @kernel
-def _look(
+def _trace(
+    work: EmitterPass,
     slowness: Floats,
     front: Floats,
     curved: bool,
@@ -143,14 +119,9 @@ def _look(
     source: Floats,
     receivers: Floats,
     measured: Floats,
-    shape: tuple[int, int],
-    at: SweepArrays,
-    rays: Bundle,
-    fields: Float32s,
-    readable: Float32s,
-    sums: Float32s,
-    left: Floats,
+    residual: Floats,
 ) -> None:
+    shape, rays = work.shape, work.rays
     x, y = source
     i, j = min(int(x), shape[0] - 2), min(int(y), shape[1] - 2)
     node = i * shape[1] + j
@@ -158,16 +129,16 @@ def _look(
     node += shape[1]
     at_source += (x - i) * ((j + 1 - y) * front[node] + (y - j) * front[node + 1])
     scale = 1.0 / at_source
-    ahead, image, later = fields[0], fields[1], fields[2]
+    relative_front, image, deviation = work.fields[0], work.fields[1], work.fields[2]
     for n in range(slowness.size):
         image[n] = np.float32(slowness[n] * scale)
     if curved:
         for n in range(front.size):
-            ahead[n] = np.float32(front[n] * scale)
-        deviate(ahead, x, y, at, later)
+            relative_front[n] = np.float32(front[n] * scale)
+        deviate(relative_front, x, y, work.front, deviation)
     else:
-        later[:] = np.float32(0.0)
-    interleave(later, image, shape, readable)
+        deviation[:] = np.float32(0.0)
+    interleave(deviation, image, shape, work.interleaved)
     count = len(receivers)
     nearness = np.empty(count)
     for r in range(count):
@@ -176,21 +147,21 @@ def _look(
     for k in range(count):
         rays.x[k] = np.float32(receivers[order[k], 0])
         rays.y[k] = np.float32(receivers[order[k], 1])
-    steps = trace_bundle(x, y, readable, shape, count, rays)
-    # A node of the source's slowness takes this long.
+    steps = trace_bundle(x, y, work.interleaved, shape, count, rays)
+    # Crossing time of a node with the slowness of the source, s.
     unit = at_source * spacing
-    worth = np.zeros(count, np.float32)
+    correction = np.zeros(count, np.float32)
     for k in range(count):
         r = order[k]
-        left[r] = measured[r] - rays.time[k] * unit
+        residual[r] = measured[r] - rays.time[k] * unit
         if rays.length[k] > np.float32(0.0):
-            worth[k] = np.float32(left[r] / rays.length[k])
-    back_project(worth, steps, shape, rays, sums)
+            correction[k] = np.float32(residual[r] / rays.length[k])
+    back_project(correction, steps, shape, rays, work.sums)
 
 
 @kernel
 def _update(
-    sums: Float32s,
+    work: EmitterPass,
     slowness: Floats,
     coverage: Floats,
     region: Flags,
@@ -198,10 +169,8 @@ def _update(
     relaxation: float,
     weights: Float32s,
     bounds: tuple[float, float],
-    shape: tuple[int, int],
-    change: Float32s,
-    scratch: Float32s,
 ) -> None:
+    sums, change, scratch = work.sums, work.fields[0], work.fields[1]
     zero = np.float32(0.0)
     for n in range(region.size):
         passed = sums[2 * n + 1]
@@ -209,7 +178,7 @@ def _update(
         change[n] = sums[2 * n] / passed if moves else zero
         coverage[n] += passed * spacing
     sums[:] = zero
-    _smooth(change, weights, shape, scratch)
+    _smooth(change, weights, work.shape, scratch)
     scale = relaxation / spacing
     for n in range(region.size):
         moved = min(max(slowness[n] + scale * change[n], bounds[0]), bounds[1])
@@ -218,7 +187,7 @@ def _update(
 
 @kernel
 def _smooth(image: Float32s, weights: Float32s, shape: tuple[int, int], scratch: Float32s) -> None:
-    """Convolve with a symmetric kernel along both axes, in place; nodes on the rim go on beyond it."""
+    """Convolve with a symmetric kernel along both axes, in place; constant beyond the boundary."""
     nx, ny = shape
     reach = len(weights) - 1
     if reach == 0:

@@ -20,13 +20,13 @@ class State:
 
     Attributes:
         slowness: of the region's shape, s/m.
-        coverage: as ``slowness``, metres of ray in the sweep under way.
-        sweep: passes finished.
-        emitter: emitters done in the pass under way.
-        squares, count: sum of squared residuals, s², and their number, in the pass under way.
-        residuals: how many of them fall between two of ``RESIDUAL_EDGES_S``.
+        coverage: as ``slowness``, metres of ray in the current iteration.
+        sweep: finished iterations.
+        emitter: emitters done in the current iteration.
+        squares, count: sum of squared residuals, s², and their number, in the current iteration.
+        residuals: histogram over ``RESIDUAL_EDGES_S``.
         done: whether all iterations are finished.
-        history: a record per finished pass.
+        history: a record per finished iteration.
     """
 
     slowness: Floats
@@ -41,23 +41,23 @@ class State:
 
 
 def begin(slowness: Floats) -> State:
-    """An image to begin with, of the region's shape, s/m."""
+    """The state that begins with an image, of the region's shape, s/m."""
     return State(slowness, np.zeros_like(slowness))
 
 
 def advance(problem: Problem, settings: Settings, state: State, emitters: int, slice_index: int = 0) -> State:
-    """Use up to ``emitters`` more emitters, ending at the latest with the pass under way.
+    """Update the image by up to ``emitters`` more emitters, at most to the end of the current iteration.
 
-    For each emitter in random order: the travel time through the current image, the rays down it, the
-    slowness integral along each, and one simultaneous update of all nodes from the residuals of
-    ``settings.numerics.subset`` emitters (of one in chapter 6). How the work is cut into calls does not
-    change a bit of the result.
+    For each emitter in random order: the travel time through the current image, the rays along its gradient,
+    the slowness integral along each, and one simultaneous update of all nodes from the residuals of
+    ``settings.numerics.subset`` emitters (of one in chapter 6). The bits of the result do not depend on how
+    the emitters are distributed over calls.
 
     Args:
         problem: the slice or volume.
-        settings: the settings; the emitter order depends on the seed, the slice and the pass.
-        state: where to go on.
-        emitters: at most how many, rounded up to whole subsets.
+        settings: the settings; the emitter order depends on the seed, the slice and the iteration.
+        state: the state to continue from.
+        emitters: largest number, rounded up to whole subsets.
         slice_index: axial index, for the order and the history.
 
     Returns:
@@ -66,43 +66,44 @@ def advance(problem: Problem, settings: Settings, state: State, emitters: int, s
     if state.done:
         return state
     order = emitter_order(problem, settings.seed, slice_index, state.sweep)
-    fresh = state.emitter == 0
+    first_batch = state.emitter == 0
     slowness = np.array(state.slowness, dtype=np.float64, order="C")
-    coverage = np.zeros_like(slowness) if fresh else state.coverage.copy()
-    end = min(state.emitter + -(-emitters // settings.numerics.subset) * settings.numerics.subset, len(order))
-    squares, left = state.squares, []
-    use = update_for(problem, settings)
-    for first in range(state.emitter, end, settings.numerics.subset):
-        subset = order[first : min(first + settings.numerics.subset, end)]
-        left.append(use(problem, settings, slowness, coverage, subset, state.sweep))
-        squares += float((left[-1] * left[-1]).sum())
-    counts = residual_counts(np.concatenate(left))
+    coverage = np.zeros_like(slowness) if first_batch else state.coverage.copy()
+    size = settings.numerics.subset
+    end = min(state.emitter + -(-emitters // size) * size, len(order))
+    squares, residuals = state.squares, []
+    update = update_for(problem, settings)
+    for first in range(state.emitter, end, size):
+        residual = update(slowness, coverage, order[first : min(first + size, end)], state.sweep)
+        residuals.append(residual)
+        squares += float((residual * residual).sum())
+    counts = residual_counts(np.concatenate(residuals))
     state = replace(
         state,
         slowness=slowness,
         coverage=coverage,
         emitter=end,
         squares=squares,
-        count=state.count + sum(part.size for part in left),
-        residuals=counts if fresh else state.residuals + counts,
+        count=state.count + sum(part.size for part in residuals),
+        residuals=counts if first_batch else state.residuals + counts,
     )
-    return state if end < len(order) else _close_sweep(state, settings, slice_index, len(order))
+    return state if end < len(order) else _finish_iteration(state, settings, slice_index, len(order))
 
 
-def emitter_order(problem: Problem, seed: int, slice_index: int, sweep: int) -> Ints:
-    """Emitters with data, in the random order of one pass; the same for every worker and every resume."""
-    return np.random.default_rng((seed, slice_index, sweep)).permutation(problem.active_emitters)
+def emitter_order(problem: Problem, seed: int, slice_index: int, iteration: int) -> Ints:
+    """Emitters with data, in the random order of one iteration; the same on every worker."""
+    return np.random.default_rng((seed, slice_index, iteration)).permutation(problem.active_emitters)
 
 
-def _close_sweep(state: State, settings: Settings, slice_index: int, emitters: int) -> State:
+def _finish_iteration(state: State, settings: Settings, slice_index: int, emitters: int) -> State:
     rms = math.sqrt(state.squares / state.count)
-    sweep = state.sweep + 1
+    number = state.sweep + 1
     return replace(
         state,
-        sweep=sweep,
+        sweep=number,
         emitter=0,
         squares=0.0,
         count=0,
-        done=sweep >= settings.iterations or settings.numerics.explained(rms),
-        history=(*state.history, Iteration(slice_index, sweep, rms, emitters)),
+        done=number >= settings.iterations or settings.numerics.explained(rms),
+        history=(*state.history, Iteration(slice_index, number, rms, emitters)),
     )

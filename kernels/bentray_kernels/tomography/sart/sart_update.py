@@ -1,8 +1,9 @@
-"""One SART update of an image from some emitters: compiled as a whole for slices, traced one by one else."""
+"""One SART update of an image from some emitters: one compiled pass for slices, single rays otherwise."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -17,21 +18,24 @@ from ..settings import Settings
 from ..solver_choice import solver_of
 from .emitter_pass import EmitterPass
 
-# One update in place: problem, settings, slowness, coverage, emitters and sweep in, residuals out.
-Use = Callable[[Problem, Settings, Floats, Floats, Ints, int], Floats]
+# One update of slowness and coverage in place from some emitters; returns their residuals, s. The last
+# argument is the number of finished iterations.
+Update = Callable[[Floats, Floats, Ints, int], Floats]
 
 
-def update_for(problem: Problem, settings: Settings) -> Use:
-    """How images of the problem are updated: compiled where the settings allow it."""
-    return _compiled(problem) if solver_of(settings, problem.region.ndim).compiled else _traced
+def update_for(problem: Problem, settings: Settings) -> Update:
+    """The update for a problem: compiled where the settings allow it."""
+    if solver_of(settings, problem.region.ndim).compiled:
+        return _compiled(problem, settings)
+    return partial(_traced, problem, settings)
 
 
 def propagation_speed(slowness: Floats, region: Flags, settings: Settings, *, warm: bool) -> Floats:
-    """The speed F that the wave front runs in (chapter 6, equations 5 and 6, with k = 1).
+    """The speed F of the wave front (chapter 6, equations 5 and 6, with k = 1).
 
-    Without ``settings.sart.speed_range_mps`` it is the image itself. With it the image's own range is
-    stretched to this range of the object (data-driven speed), so that shapes bend the rays in full before the
-    values have grown; until one pass has made a shape (``warm``) there is nothing to stretch.
+    Without ``settings.sart.speed_range_mps`` it is the image itself. With it the range of the image is
+    stretched to this range of the object (data-driven speed), so that rays bend fully before the contrast of
+    the image has grown; not in the first iteration, before which there is no contrast (``warm``).
     """
     speed = smoothed(1.0 / slowness, settings.numerics.front_smoothing_nodes)
     if settings.sart.speed_range_mps is None or not warm:
@@ -48,77 +52,70 @@ def propagation_speed(slowness: Floats, region: Flags, settings: Settings, *, wa
 
 
 def smoothed(speed: Floats, nodes: float) -> Floats:
-    """The speed as a wave front of finite width meets it: under a Gaussian of that standard deviation.
+    """The speed blurred by a Gaussian of that standard deviation.
 
-    A wave does not feel what is narrower than its Fresnel zone; a ray follows every edge.
+    A wave averages over its Fresnel zone; a ray follows every edge.
     """
     return np.asarray(gaussian_filter(speed, nodes, mode="nearest") if nodes > 0.0 else speed)
 
 
-def _compiled(problem: Problem) -> Use:
+def _compiled(problem: Problem, settings: Settings) -> Update:
     """As ``_traced`` for a slice, several times as fast: see ``EmitterPass``."""
     rows, columns = problem.region.shape
     work = EmitterPass.for_grid((rows, columns), problem.delta_tof.shape[1])
 
-    def use(
-        problem: Problem,
-        settings: Settings,
-        slowness: Floats,
-        coverage: Floats,
-        emitters: Ints,
-        sweep: int,
-    ) -> Floats:
-        left = []
+    def update(slowness: Floats, coverage: Floats, emitters: Ints, iteration: int) -> Floats:
+        residuals = []
         for emitter in emitters:
             source, receivers, measured, _ = _valid_receivers(problem, int(emitter))
             front = None
             if settings.rays == "curved":
                 front = slowness
                 if settings.sart.speed_range_mps is not None or settings.numerics.front_smoothing_nodes > 0.0:
-                    front = 1.0 / propagation_speed(slowness, problem.region, settings, warm=sweep > 0)
-            left.append(work.trace(slowness, front, problem.spacing, source, receivers, measured))
+                    front = 1.0 / propagation_speed(slowness, problem.region, settings, warm=iteration > 0)
+            residuals.append(work.trace(slowness, front, problem.spacing, source, receivers, measured))
         work.update(
             slowness,
             coverage,
             problem.region,
             problem.spacing,
-            _relaxation(settings, sweep),
+            _relaxation(settings, iteration),
             settings.sart.smoothing_nodes,
             _bounds(settings),
         )
-        return np.concatenate(left)
+        return np.concatenate(residuals)
 
-    return use
+    return update
 
 
 def _traced(
-    problem: Problem, settings: Settings, slowness: Floats, coverage: Floats, emitters: Ints, sweep: int
+    problem: Problem, settings: Settings, slowness: Floats, coverage: Floats, emitters: Ints, iteration: int
 ) -> Floats:
-    """One SART update in place, from some emitters; returns their residuals, s."""
+    """See ``Update``."""
     corrections, weights = np.zeros_like(slowness), np.zeros_like(slowness)
-    left = []
+    residuals = []
     for emitter in emitters:
         source, receivers, measured, slab = _valid_receivers(problem, int(emitter))
         inside = np.ascontiguousarray(slowness[..., slab])
         tof = inside  # only the shape counts: straight rays need no travel time
         if settings.rays != "straight":
-            speed = propagation_speed(inside, problem.region[..., slab], settings, warm=sweep > 0)
+            speed = propagation_speed(inside, problem.region[..., slab], settings, warm=iteration > 0)
             tof = solve(speed, problem.spacing, source, settings.ray_eikonal)
         fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays)
-        more, passed, residual = _back_project(fan, inside.ravel() * problem.spacing, measured)
-        corrections[..., slab] += more.reshape(inside.shape)
-        weights[..., slab] += passed.reshape(inside.shape)
-        left.append(residual)
+        correction, weight, residual = _back_project(fan, inside.ravel() * problem.spacing, measured)
+        corrections[..., slab] += correction.reshape(inside.shape)
+        weights[..., slab] += weight.reshape(inside.shape)
+        residuals.append(residual)
     seen = weights > 0.0
     update = np.zeros_like(slowness)
     update[seen] = corrections[seen] / (weights[seen] * problem.spacing)
     update[~problem.region] = 0.0
     if settings.sart.smoothing_nodes > 0.0:
         update = gaussian_filter(update, settings.sart.smoothing_nodes, mode="nearest")
-    moved = slowness + _relaxation(settings, sweep) * update
-    slowness[problem.region] = np.clip(moved, *_bounds(settings))[problem.region]
+    updated = slowness + _relaxation(settings, iteration) * update
+    slowness[problem.region] = np.clip(updated, *_bounds(settings))[problem.region]
     coverage += weights * problem.spacing
-    return np.concatenate(left)
+    return np.concatenate(residuals)
 
 
 def _valid_receivers(problem: Problem, emitter: int) -> tuple[Floats, Floats, Floats, slice]:
@@ -127,17 +124,17 @@ def _valid_receivers(problem: Problem, emitter: int) -> tuple[Floats, Floats, Fl
     delta = problem.delta_tof[emitter]
     valid = np.flatnonzero(np.isfinite(delta))
     source, receivers = problem.emitters[emitter], problem.receivers_of(emitter)[valid]
-    away = receivers - source
-    measured = delta[valid] + np.sqrt((away * away).sum(axis=1)) / problem.water_speed
+    offset = receivers - source
+    measured = delta[valid] + np.sqrt((offset * offset).sum(axis=1)) / problem.water_speed
     if slab.start:
-        foot = np.zeros(source.size)
-        foot[-1] = slab.start * problem.spacing
-        source, receivers = source - foot, receivers - foot
+        corner = np.zeros(source.size)
+        corner[-1] = slab.start * problem.spacing
+        source, receivers = source - corner, receivers - corner
     return source, receivers, measured, slab
 
 
-def _relaxation(settings: Settings, sweep: int) -> float:
-    return settings.sart.relaxation * settings.numerics.relaxation_decay**sweep
+def _relaxation(settings: Settings, iteration: int) -> float:
+    return settings.sart.relaxation * settings.numerics.relaxation_decay**iteration
 
 
 def _bounds(settings: Settings) -> tuple[float, float]:
@@ -147,11 +144,7 @@ def _bounds(settings: Settings) -> tuple[float, float]:
 
 
 @kernel
-def _back_project(
-    fan: Fan,
-    crossing: Floats,
-    measured: Floats,
-) -> tuple[Floats, Floats, Floats]:
+def _back_project(fan: Fan, crossing: Floats, measured: Floats) -> tuple[Floats, Floats, Floats]:
     """Sums of equation 1 over the rays of one emitter.
 
     Args:
