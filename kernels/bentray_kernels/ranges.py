@@ -81,18 +81,18 @@ def ranges_of(kind: Any) -> Mapping[str, Range]:
     return {one.name: one.metadata[RANGE] for one in fields(kind) if RANGE in one.metadata}
 
 
-def check_ranges(given: Any, before: str = "") -> None:
+def check_ranges(record: Any, before: str = "") -> None:
     """Check every number of a dataclass against the range of its field; None is accepted.
 
     Args:
-        given: the dataclass.
+        record: the dataclass.
         before: put before the name of a field in the error.
 
     Raises:
         InvalidInput: naming the first field that is wrong, or the ``place`` in its metadata.
     """
-    for one in fields(given):
+    for one in fields(record):
         within = one.metadata.get(RANGE)
-        value = getattr(given, one.name)
+        value = getattr(record, one.name)
         if within is not None and value is not None:
             within.check(before + one.metadata.get("place", one.name), value)

@@ -15,7 +15,7 @@ MOST_PIXELS = 4096
 MOST_RAYS = MOST_PIXELS**2
 
 
-def asked(
+def setting(
     default: Any,
     description: str,
     within: Range | None = None,
@@ -42,21 +42,21 @@ def asked(
 def choices_of(kind: type) -> Mapping[str, tuple[str, ...]]:
     """The accepted words by field: those of its ``Literal`` type, or ``enum`` of its schema."""
     hints = get_type_hints(kind)
-    found = {}
+    choices = {}
     for one in fields(kind):
         parts = [hints[one.name], *get_args(hints[one.name])]
         words = next((get_args(part) for part in parts if get_origin(part) is Literal), ())
         words = words or (one.metadata.get("json_schema_extra") or {}).get("enum", ())
         if words:
-            found[one.name] = tuple(words)
-    return found
+            choices[one.name] = tuple(words)
+    return choices
 
 
-def check(given: Any, choices: Mapping[str, Sequence[str]] | None = None, place: str = "") -> None:
+def check(record: Any, choices: Mapping[str, Sequence[str]] | None = None, place: str = "") -> None:
     """Check the fields of a request against their choices and ranges.
 
     Args:
-        given: a dataclass.
+        record: a dataclass.
         choices: accepted words by field; None: those of ``choices_of``, and None where it is the default.
         place: the name of the record in the one that holds it, for the error.
 
@@ -64,10 +64,10 @@ def check(given: Any, choices: Mapping[str, Sequence[str]] | None = None, place:
         InvalidInput: naming the first field that is wrong.
     """
     before = f"{place}." if place else ""
-    kind: Any = type(given)
-    optional = {one.name for one in fields(given) if one.default is None} if choices is None else set()
+    kind: Any = type(record)
+    optional = {one.name for one in fields(record) if one.default is None} if choices is None else set()
     for name, words in (choices_of(kind) if choices is None else choices).items():
-        value = getattr(given, name)
+        value = getattr(record, name)
         if value not in words and not (value is None and name in optional):
             raise InvalidInput(before + name, repr(value), "one of " + ", ".join(words))
-    check_ranges(given, before)
+    check_ranges(record, before)

@@ -1,4 +1,4 @@
-"""Fields that are asked for: the first wrong one is named, with what it may be."""
+"""Fields of settings records: the first wrong one is named, with what it may be."""
 
 import math
 from dataclasses import dataclass, fields
@@ -7,13 +7,13 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range
-from bentray_kernels.request_fields import asked, check
+from bentray_kernels.request_fields import check, setting
 
 
 @dataclass(frozen=True)
 class Asked:
-    mode: str = asked("red", "Which one.")
-    size: float = asked(1.0, "How large.", Range(0.5, 2.0))
+    mode: str = setting("red", "Which one.")
+    size: float = setting(1.0, "How large.", Range(0.5, 2.0))
 
 
 def look(given):

@@ -55,19 +55,19 @@ class Emissions:
 
     def __getitem__(self, e: int) -> NDArray[Any]:
         """The traces of one emission, (nrx, nt)."""
-        found = self.read(int(self.emission[e]))
+        traces = self.read(int(self.emission[e]))
         if (self.reception != np.arange(len(self.reception))).any():
-            found = found[self.reception]
-        return negate(found, self.inverted[e]) if self.inverted[e].any() else found
+            traces = traces[self.reception]
+        return negate(traces, self.inverted[e]) if self.inverted[e].any() else traces
 
     def __iter__(self) -> Iterator[NDArray[Any]]:
         return (self[e] for e in range(len(self)))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-        found = np.empty(self.shape, dtype or self.dtype)
+        array = np.empty(self.shape, dtype or self.dtype)
         for e, traces in enumerate(self):
-            found[e] = traces
-        return found
+            array[e] = traces
+        return array
 
 
 def reorder_channels(traces: Any, order: Ints, axis: int) -> Any:
@@ -88,8 +88,8 @@ def invert_polarity(traces: Any, where: Flags) -> Any:
 
 def negate(traces: NDArray[Any], where: Flags) -> NDArray[Any]:
     """A copy with the opposite sign where ``where``, of all axes except the last, is true."""
-    found = traces.copy()
+    inverted = traces.copy()
     # The lowest integer has no opposite.
-    lowest = np.iinfo(found.dtype).min + 1 if found.dtype.kind == "i" else -np.inf
-    found[where] = -np.maximum(found[where], lowest)
-    return found
+    lowest = np.iinfo(inverted.dtype).min + 1 if inverted.dtype.kind == "i" else -np.inf
+    inverted[where] = -np.maximum(inverted[where], lowest)
+    return inverted

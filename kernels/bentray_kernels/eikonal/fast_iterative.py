@@ -79,7 +79,7 @@ def _iterate(
         active[k] = seeds[k]
         listed[seeds[k]] = LISTED
     while length > 0:
-        kept = 0
+        following_length = 0
         for k in range(length):
             node = active[k]
             crossing = spacing * slowness[node]
@@ -87,8 +87,8 @@ def _iterate(
             own = min(old, _updated(node, steps, crossing, time))
             time[node] = own
             if old - own > tolerance * crossing:
-                following[kept] = node
-                kept += 1
+                following[following_length] = node
+                following_length += 1
                 continue
             listed[node] = OUT
             for axis in range(2 if steps[2] == 0 else 3):
@@ -104,8 +104,8 @@ def _iterate(
                         time[neighbour] = after
                         if before - after > tolerance * crossing:
                             listed[neighbour] = LISTED
-                            following[kept] = neighbour
-                            kept += 1
+                            following[following_length] = neighbour
+                            following_length += 1
         active, following = following, active
-        length = kept
+        length = following_length
     return time

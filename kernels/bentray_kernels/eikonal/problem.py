@@ -148,11 +148,11 @@ class PointSource:
         A source on a node gives that node alone, at time 0.
         """
         at_nodes = [self.slowness[node] for node, _ in self._cell]
-        found = straight_times(self._cell, at_nodes, self.spacing, self.source)
+        by_node = straight_times(self._cell, at_nodes, self.spacing, self.source)
         nodes = [
-            sum((i + 1) * stride for i, stride in zip(node, self.strides, strict=True)) for node in found
+            sum((i + 1) * stride for i, stride in zip(node, self.strides, strict=True)) for node in by_node
         ]
-        return np.array(nodes, dtype=np.int64), np.array(list(found.values()))
+        return np.array(nodes, dtype=np.int64), np.array(list(by_node.values()))
 
     def surroundings(self, radius: int, contrast: float) -> tuple[Ints, Floats] | None:
         """As ``seeds``, for the box of nodes up to ``radius`` from the source, all along straight lines.

@@ -58,15 +58,15 @@ def sweep_block(
     if times.shape != slowness.shape:
         raise InvalidInput("times", f"shape {times.shape}", f"the block's shape, {slowness.shape}")
     padded = np.pad(times, 1, constant_values=math.inf)
-    for number, (given, (axis, high)) in enumerate(zip(faces, sides(times.ndim), strict=True)):
-        if given is None:
+    for number, (face, (axis, high)) in enumerate(zip(faces, sides(times.ndim), strict=True)):
+        if face is None:
             continue
         expected = times.shape[:axis] + times.shape[axis + 1 :]
-        if given.shape != expected:
-            raise InvalidInput(f"faces[{number}]", f"shape {given.shape}", f"{expected}")
+        if face.shape != expected:
+            raise InvalidInput(f"faces[{number}]", f"shape {face.shape}", f"{expected}")
         inside: list[slice | int] = [slice(1, -1)] * times.ndim
         inside[axis] = -1 if high else 0
-        padded[tuple(inside)] = given
+        padded[tuple(inside)] = face
     flat = padded.ravel()
     Sweeper(times.shape).settle(
         flat, np.ascontiguousarray(slowness), spacing, tolerance, np.flatnonzero(flat < math.inf)
@@ -115,9 +115,9 @@ def face_of(block: Floats, side: Side) -> Floats:
 
 def neighbours(place: Place, boxes: Mapping[Place, Box]) -> list[tuple[int, Place]]:
     """Numbers of the sides with a neighbouring block, and its position."""
-    found = []
+    adjacent = []
     for side, (axis, high) in enumerate(sides(len(place))):
         beyond = (*place[:axis], place[axis] + (1 if high else -1), *place[axis + 1 :])
         if beyond in boxes:
-            found.append((side, beyond))
-    return found
+            adjacent.append((side, beyond))
+    return adjacent

@@ -89,8 +89,8 @@ def cell_weights(chosen: Filter) -> CellWeights:
         before_knot, after_knot = _substituted(whole, 0.5, 0.5), _substituted(whole, 0.0, 0.5)
         pieces = np.stack([np.vstack([before_knot, none]), np.vstack([none, after_knot])])
     used = np.flatnonzero(np.abs(pieces).max(axis=(0, 2)))
-    kept = pieces[:, used[0] : used[-1] + 1]
-    return CellWeights(int(used[0]) - chosen.before, 0 if chosen.shift else 1, np.ascontiguousarray(kept))
+    nonzero = pieces[:, used[0] : used[-1] + 1]
+    return CellWeights(int(used[0]) - chosen.before, 0 if chosen.shift else 1, np.ascontiguousarray(nonzero))
 
 
 def _substituted(powers: Floats, start: float, width: float) -> Floats:

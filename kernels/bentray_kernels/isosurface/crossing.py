@@ -34,7 +34,7 @@ class Search(NamedTuple):
     """How crossings are found.
 
     Attributes:
-        roots: ``CERTAIN``: no crossing is missed, however close to the next one; found by Newton's method.
+        roots: ``CERTAIN``: no crossing is missed, however close to the next one; Newton's method.
             ``CERTAIN_BRENT``: the same by Brent's, for trilinear values, whose gradients jump. ``BRENT``: a
             cell is searched if the field at its two ends lies on different sides (dissertation, 4.2.3), which
             misses double crossings at grazing rays. ``ANALYTIC``: the cubic of a trilinear cell.
@@ -85,10 +85,10 @@ def leave_interval(
     speed = math.sqrt(ray.along_x**2 + ray.along_y**2 + ray.along_z**2)
     if search.step > 0.0:
         step = search.step / speed
-        found, side, gradient, _, halvings = _scan(
+        root, side, gradient, _, halvings = _scan(
             field, ray, False, speed, start, math.nan, stop, step, 0.0, below, above, halvings
         )
-        return found, side, gradient, halvings
+        return root, side, gradient, halvings
     cells_x, cells_y, cells_z = octree.levels[0, 1], octree.levels[0, 2], octree.levels[0, 3]
     i = min(max(int(ray.x + start * ray.along_x), 0), cells_x - 1)
     j = min(max(int(ray.y + start * ray.along_y), 0), cells_y - 1)
@@ -131,17 +131,17 @@ def leave_interval(
                     s = _turned(s, end, slowest, bend, above - below)
             if s >= end:
                 value = math.nan
-                found, side, gradient = s, 0, UNKNOWN
+                root, side, gradient = s, 0, UNKNOWN
             elif search.roots == ANALYTIC:
-                found, side, gradient = _solve(field, ray, s, end, below, above)
+                root, side, gradient = _solve(field, ray, s, end, below, above)
             else:
                 certain = bend if search.roots != BRENT else 0.0
                 smooth = search.roots == CERTAIN
-                found, side, gradient, value, halvings = _scan(
+                root, side, gradient, value, halvings = _scan(
                     field, ray, smooth, speed, s, value, end, end - s, certain, below, above, halvings
                 )
             if side != 0 or halvings < 0:
-                return found, side, gradient, halvings
+                return root, side, gradient, halvings
         else:
             value, leaving = math.nan, False
         s = out
@@ -235,11 +235,11 @@ def _scan(
             target, side = (above, 1) if value_b >= above else (below, -1)
             # Where the field stays on the bound, Newton's method has no slope to follow.
             if smooth and abs(value_b - value_a) > 4.0 * sag:
-                found, gradient = newton(field, ray, target, a, value_a, b, value_b, bend, TOLERANCE / speed)
+                root, gradient = newton(field, ray, target, a, value_a, b, value_b, bend, TOLERANCE / speed)
             else:
-                found = brent(field, ray, target, a, value_a, b, value_b, TOLERANCE / speed)
+                root = brent(field, ray, target, a, value_a, b, value_b, TOLERANCE / speed)
                 gradient = UNKNOWN
-            return found, side, gradient, target, halvings
+            return root, side, gradient, target, halvings
         else:
             shortest = (b - a) * speed <= SHORTEST
             halvings -= UNPROVED if shortest else 1

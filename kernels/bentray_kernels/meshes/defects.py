@@ -145,10 +145,10 @@ def _turned_alike(faces: Ints) -> tuple[Ints, int]:
     if (labels[:number] == labels[number:]).any():
         raise InvalidInput("faces", "a surface that cannot be oriented", "one with two sides")
     # Of the two labels of a piece, the one with more faces as they are stays.
-    kept = np.bincount(labels[:number], minlength=int(labels.max()) + 1)
-    turned = kept[labels[:number]] < kept[labels[number:]]
+    count = np.bincount(labels[:number], minlength=int(labels.max()) + 1)
+    turned = count[labels[:number]] < count[labels[number:]]
     # Of two as large, the one that holds the piece's first face as it is: the lower label.
-    turned |= (kept[labels[:number]] == kept[labels[number:]]) & (labels[:number] > labels[number:])
+    turned |= (count[labels[:number]] == count[labels[number:]]) & (labels[:number] > labels[number:])
     return np.where(turned[:, np.newaxis], faces[:, ::-1], faces), int(turned.sum())
 
 

@@ -73,7 +73,7 @@ def closest(
         Face, −1 for none; distance; weights of its corners 0 and 1; whether the ray comes from outside.
     """
     over = (_over(direction[0]), _over(direction[1]), _over(direction[2]))
-    found, first, second, outside = -1, 0.0, 0.0, False
+    nearest, first, second, outside = -1, 0.0, 0.0, False
     shear = _shear_of(direction)
     node, depth = root, 0
     while True:
@@ -101,10 +101,10 @@ def closest(
                     continue
                 s, u, v, front = _meet(surface.triangles, face, origin, shear)
                 if begin < s < end:
-                    found, end, first, second, outside = face, s, u, v, front
+                    nearest, end, first, second, outside = face, s, u, v, front
         if node < 0:
             if depth == 0:
-                return found, end, first, second, outside
+                return nearest, end, first, second, outside
             depth -= 1
             node = waiting[depth]
 

@@ -86,12 +86,12 @@ def _triangles(nodes: Ints, inside: Flags) -> Ints:
         inside: (cells, 6, 4) whether they are.
     """
     code = inside @ (1 << np.arange(4))
-    found = []
+    triangles = []
     for number in range(len(TETRAHEDRA)):
         for pattern in range(1, 15):
             which = nodes[code[:, number] == pattern, number]
-            found += [which[:, edges] for edges in _pattern(number, pattern)]
-    return np.concatenate(found)
+            triangles += [which[:, edges] for edges in _pattern(number, pattern)]
+    return np.concatenate(triangles)
 
 
 def _pattern(number: int, pattern: int) -> list[Ints]:

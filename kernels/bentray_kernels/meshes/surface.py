@@ -54,8 +54,8 @@ def surface_of(chart: Chart) -> Surface:
         raise InvalidInput("faces", len(mesh.faces), f"1 to {(1 << 27) - 1} faces")
     corners = mesh.corners.astype(np.float32)
     if not (corners.min() >= -1e-6 and corners.max() <= 1.0 + 1e-6):
-        found = f"{corners.min():.6g} to {corners.max():.6g}"
-        raise InvalidInput("vertices", found, "a mesh in the unit cube (TriangleMesh.in_unit_cube)")
+        value = f"{corners.min():.6g} to {corners.max():.6g}"
+        raise InvalidInput("vertices", value, "a mesh in the unit cube (TriangleMesh.in_unit_cube)")
     order = np.arange(len(corners), dtype=np.int32)
     nodes = np.zeros((max(2 * len(corners), 2), WORDS), dtype=np.float32)
     lows, highs = corners.min(axis=1), corners.max(axis=1)

@@ -97,8 +97,8 @@ def select_devices(devices: Sequence[Device], selection: str | None) -> tuple[De
     fitting = fitting or [device for device in devices if word in device.label.lower()]
     if len(fitting) != 1:
         known = "; ".join(f"{device.index} = {device.label}" for device in devices) or "there is none here"
-        found = f"{selection!r}, which fits {len(fitting)} devices"
-        raise InvalidInput(WISH, found, f"an index or a part of the name of one OpenCL device: {known}")
+        value = f"{selection!r}, which fits {len(fitting)} devices"
+        raise InvalidInput(WISH, value, f"an index or a part of the name of one OpenCL device: {known}")
     return tuple(fitting)
 
 
@@ -116,11 +116,11 @@ def _handles() -> list[Any]:
         return []
     # "No platform" is an error in OpenCL, as is a platform without devices.
     try:
-        found = platforms()
+        available = platforms()
     except cl.Error:
         return []
     handles: list[Any] = []
-    for platform in found:
+    for platform in available:
         with suppress(cl.Error):
             handles += platform.get_devices()
     for handle in handles:

@@ -35,12 +35,12 @@ def library_of(handle: Any) -> str:
         return ""
     table = ctypes.c_void_p.from_address(handle.int_ptr).value
     function = ctypes.c_void_p.from_address(table).value if table else None
-    found = _SymbolInfo()
+    info = _SymbolInfo()
     try:
-        known = function and ctypes.CDLL(None).dladdr(ctypes.c_void_p(function), ctypes.byref(found))
+        known = function and ctypes.CDLL(None).dladdr(ctypes.c_void_p(function), ctypes.byref(info))
     except (OSError, AttributeError):  # a system without dladdr
         return ""
-    return os.fsdecode(found.file) if known and found.file else ""
+    return os.fsdecode(info.file) if known and info.file else ""
 
 
 @cache
@@ -48,8 +48,8 @@ def package_of(library: str) -> str:
     """Name and version of the Python package that contains a library; empty without one."""
     if library:
         for package in PACKAGES:
-            found = files_of(package, Path(library).name)
-            if any(file.resolve() == Path(library).resolve() for file in found):
+            files = files_of(package, Path(library).name)
+            if any(file.resolve() == Path(library).resolve() for file in files):
                 return f"{package} {metadata.version(package)}"
     return ""
 

@@ -49,8 +49,8 @@ def _fault_of_solve(session: Session) -> str:
         crossings = rng.uniform(0.2, 5.0, (2, *shape))
         source = np.ravel_multi_index((4,) * len(shape), shape)
         seeds = [(np.array([source]), np.zeros(1))] * 2
-        for found, crossing in zip(travel_times(session, crossings, seeds), crossings, strict=True):
-            if not np.allclose(found, reference(crossing, (4,) * len(shape)), rtol=1e-10, atol=0.0):
+        for times, crossing in zip(travel_times(session, crossings, seeds), crossings, strict=True):
+            if not np.allclose(times, reference(crossing, (4,) * len(shape)), rtol=1e-10, atol=0.0):
                 return f"wrong travel times in {len(shape)}-D"
     return ""
 

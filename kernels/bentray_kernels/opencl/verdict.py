@@ -51,9 +51,9 @@ def verdict_on(device: Device) -> Verdict:
     """The verdict, from a self-test in a child process or from the cache."""
     if not device.double_precision:
         return Verdict("it has no double precision", (), {})
-    kept = _kept(device)
-    if kept is not None:
-        return kept
+    stored = _kept(device)
+    if stored is not None:
+        return stored
     verdict = examine(device, in_a_child)
     if verdict.usable:
         _keep(device, verdict)

@@ -41,7 +41,7 @@ class MarschnerLobb:
         slope = (
             turn * np.sin(turn * np.cos(0.5 * math.pi * radius)) * 0.25 * math.pi**2 * np.sinc(0.5 * radius)
         )
-        found = np.empty(points.shape)
-        found[..., :2] = self.modulation * slope[..., np.newaxis] * points[..., :2]
-        found[..., 2] = -0.5 * math.pi * np.cos(0.5 * math.pi * points[..., 2])
-        return found / (2.0 * (1.0 + self.modulation))
+        gradient = np.empty(points.shape)
+        gradient[..., :2] = self.modulation * slope[..., np.newaxis] * points[..., :2]
+        gradient[..., 2] = -0.5 * math.pi * np.cos(0.5 * math.pi * points[..., 2])
+        return gradient / (2.0 * (1.0 + self.modulation))

@@ -115,15 +115,15 @@ class OpenCLCaster:
         import pyopencl as cl
 
         camera, places = _towards_the_object(self.scene)
-        found, expected = (allocate_results(TRIED, TRIED_DEPTH, False) for _ in range(2))
+        traced, expected = (allocate_results(TRIED, TRIED_DEPTH, False) for _ in range(2))
         try:
-            self.follow(medium, search, camera, places, TRIED_DEPTH, found)
+            self.follow(medium, search, camera, places, TRIED_DEPTH, traced)
         except cl.Error as error:
             return f"it ends with {str(error).splitlines()[0]}"
         cast(medium, search, camera, places, TRIED_DEPTH, expected)
         far, allowed = TOLERANCES[self.precision]
-        same = (found.fate == expected.fate) & (found.crossed == expected.crossed)
-        same &= np.abs(found.direction - expected.direction).max(axis=1) <= far
+        same = (traced.fate == expected.fate) & (traced.crossed == expected.crossed)
+        same &= np.abs(traced.direction - expected.direction).max(axis=1) <= far
         off = 1.0 - float(same.mean())
         return "" if off <= allowed else f"{off:.0%} of its rays are off, {allowed:.0%} may be"
 

@@ -40,9 +40,9 @@ class Lanes:
         mask = ir.VectorType(BIT, self.width)
         name = f"llvm.masked.load.v{self.width}f{8 * self._size()}.p0"
         load = self._instruction(name, row, [row.as_pointer(), SHORT, mask, row])
-        wanted = ir.Constant(mask, [BIT(int(k < self.taps)) for k in range(self.width)])
+        mask_bits = ir.Constant(mask, [BIT(int(k < self.taps)) for k in range(self.width)])
         place = self.builder.bitcast(start, row.as_pointer())
-        return self.builder.call(load, [place, SHORT(self._size()), wanted, ir.Constant(row, None)])
+        return self.builder.call(load, [place, SHORT(self._size()), mask_bits, ir.Constant(row, None)])
 
     def load(self, start: Any, count: int) -> Any:
         """Load a vector of ``count`` numbers."""
@@ -52,9 +52,9 @@ class Lanes:
 
     def pick(self, vector: Any, places: Sequence[int], other: Any | None = None) -> Any:
         """Select lanes of a vector, or of the concatenation of two."""
-        wanted = ir.Constant(ir.VectorType(SHORT, len(places)), [SHORT(k) for k in places])
+        lanes = ir.Constant(ir.VectorType(SHORT, len(places)), [SHORT(k) for k in places])
         second = ir.Constant(vector.type, ir.Undefined) if other is None else other
-        return self.builder.shuffle_vector(vector, second, wanted)
+        return self.builder.shuffle_vector(vector, second, lanes)
 
     def multiply_add(self, a: Any, b: Any, c: Any | None) -> Any:
         """a·b + c, fused where the processor supports it; without ``c`` the product."""
@@ -235,9 +235,9 @@ def value_and_gradient(lanes: Lanes, axes: Sequence[Axis], start: Any) -> list[A
     else:
         rows = None
         for k, node in _nodes(lanes, axes[0], first):
-            found = plane(node)
-            rows = lanes.multiply_add(axes[0].weight(k, 2 * lanes.width), found, rows)
-            across = lanes.multiply_add(axes[0].slope(k, lanes.width), lanes.pick(found, low), across)
+            of_plane = plane(node)
+            rows = lanes.multiply_add(axes[0].weight(k, 2 * lanes.width), of_plane, rows)
+            across = lanes.multiply_add(axes[0].slope(k, lanes.width), lanes.pick(of_plane, low), across)
     value_row, slope_row = lanes.pick(rows, low), lanes.pick(rows, high)
     weights, slopes = lanes.pick(along, low), lanes.pick(along, high)
     products = [lanes.multiply_add(value_row, weights, None)]

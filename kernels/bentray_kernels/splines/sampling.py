@@ -105,9 +105,9 @@ def _sampled_value_and_gradient(
     returned = types.Tuple((types.float64, gradient))
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        found = value_and_gradient(*_stage(context, builder, signature.args, arguments, slopes=True))
-        slopes = context.make_tuple(builder, gradient, found[1:])
-        return context.make_tuple(builder, returned, [found[0], slopes])
+        results = value_and_gradient(*_stage(context, builder, signature.args, arguments, slopes=True))
+        slopes = context.make_tuple(builder, gradient, results[1:])
+        return context.make_tuple(builder, returned, [results[0], slopes])
 
     return returned(coefficients, places, shift, weights, point), generate
 

@@ -116,5 +116,5 @@ def fault_of(there: OpenCLSpline) -> str:
     points = np.random.default_rng(0).uniform(-0.5, 1.5, (TRIED, len(nodes))) * nodes
     far = TOLERANCES[spline.coefficients.dtype.name] * max(1e-300, float(np.abs(spline.coefficients).max()))
     pairs = zip(there.value_and_gradient(points), spline.value_and_gradient(points), strict=True)
-    off = max(float(np.abs(found - expected).max()) for found, expected in pairs)
+    off = max(float(np.abs(result - expected).max()) for result, expected in pairs)
     return "" if off <= far else f"off by {off:.3g} where {far:.3g} is allowed"

@@ -44,8 +44,8 @@ def noise_of(volume: ArrayLike) -> float:
     finest = nodes.astype(np.float64)
     for axis in range(nodes.ndim):
         finest = np.diff(finest, 2, axis) / math.sqrt(6.0)
-    found = float(np.median(np.abs(finest))) / MEDIAN_DEVIATION
-    return max(found, ROUNDING) if np.issubdtype(nodes.dtype, np.integer) else found
+    sigma = float(np.median(np.abs(finest))) / MEDIAN_DEVIATION
+    return max(sigma, ROUNDING) if np.issubdtype(nodes.dtype, np.integer) else sigma
 
 
 def smoothing_for_noise(volume: ArrayLike, order: int, sigma: float | None = None) -> float:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 from ..errors import InvalidInput
 from ..limits import SPEED_MPS
 from ..ranges import SEED, Range
-from ..request_fields import asked, check
+from ..request_fields import check, setting
 from .numerics import Numerics
 
 # The wave front of the compiled pass over a slice; see ``eikonal.deviation``.
@@ -29,17 +29,17 @@ class SartSettings:
 
     __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
-    relaxation: float = asked(
+    relaxation: float = setting(
         0.1,
         "Relaxation factor λ of an update (chapter 6, equation 1).",
         Range(0.0, 2.0, above=True, below=True),
     )
-    smoothing_nodes: float = asked(
+    smoothing_nodes: float = setting(
         1.0,
         "Standard deviation of the Gaussian filter on each update, nodes; 0 for none.",
         Range(0.0, 32.0),
     )
-    speed_range_mps: tuple[float, float] | None = asked(
+    speed_range_mps: tuple[float, float] | None = setting(
         None,
         "Lowest and highest speed known in the object, m/s. The image is stretched to this range before the "
         "wave front is tracked (data-driven speed, chapter 6, equation 6).",
@@ -58,17 +58,17 @@ class GaussNewtonSettings:
 
     __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
-    penalty: Literal["total-variation", "laplacian", "tikhonov"] = asked(
+    penalty: Literal["total-variation", "laplacian", "tikhonov"] = setting(
         "total-variation",
         "total-variation preserves edges, laplacian prefers smooth images, tikhonov images near the first.",
     )
-    penalty_strength: float = asked(
+    penalty_strength: float = setting(
         0.3,
         "Weight of the penalty relative to the rms residual; 0 for none. The attenuation, by either method, "
         "is regularised by it as well.",
         Range(0.0, 10.0),
     )
-    edge_mps: float = asked(
+    edge_mps: float = setting(
         0.0,
         "With total variation: differences between neighbouring nodes above this cost no more, m/s, for "
         "objects of flat parts with sharp edges, as phantoms; 0: every difference costs.",
@@ -85,10 +85,10 @@ class PickingSettings:
 
     __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
-    picker: Literal["aic", "threshold", "energy-ratio", "sta-lta", "correlation", "matched"] = asked(
+    picker: Literal["aic", "threshold", "energy-ratio", "sta-lta", "correlation", "matched"] = setting(
         "aic", "How the first arrival of a trace is picked."
     )
-    examine: bool = asked(
+    examine: bool = setting(
         True,
         "Check the quality of the scan first: swapped or inverted channels and a wrong time zero are "
         "corrected, dead elements, broken traces and contradicting times are left out, and the result states "
@@ -105,17 +105,17 @@ class AttenuationSettings:
 
     __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
-    enabled: bool = asked(
+    enabled: bool = setting(
         True,
         "Reconstruct the attenuation too, where there are amplitudes; with method waveform from the traces, "
         "which is experimental.",
     )
-    amplitudes: Literal["recorded", "ratio", "spectrum"] = asked(
+    amplitudes: Literal["recorded", "ratio", "spectrum"] = setting(
         "recorded",
         "recorded: amplitudes of the file; read from the traces, ratio: height of the first pulse relative "
         "to water, or spectrum: loss of high frequencies relative to low ones (experimental).",
     )
-    focusing: bool = asked(
+    focusing: bool = setting(
         False,
         "Correct amplitudes for focusing by refraction, by the spreading of ray tubes in the speed image; "
         "needs the frequency of the amplitudes. Experimental.",
@@ -140,44 +140,44 @@ class Settings:
 
     __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
-    method: Literal["sart", "gauss-newton", "auto", "waveform"] = asked(
+    method: Literal["sart", "gauss-newton", "auto", "waveform"] = setting(
         "sart",
         "sart: one emitter after the other; gauss-newton: all emitters at once, regularised; auto: method "
         "and rays are chosen by held-out validation; waveform: full-waveform refinement of the image of "
         "auto, for slices with traces of object and water.",
     )
-    rays: Literal["curved", "straight"] = asked(
+    rays: Literal["curved", "straight"] = setting(
         "curved", "curved: corrected for refraction; straight: without refraction."
     )
     eikonal: Literal["deviation", "fmm", "fmm-untidy", "hafmm", "fsm", "fim", "fim-opencl", "accurate"] = (
-        asked(
+        setting(
             DEVIATION,
             "Eikonal solver for curved rays. deviation: SART on slices; accurate replaces it elsewhere.",
         )
     )
-    decomposition: Literal["slices", "volume"] = asked(
+    decomposition: Literal["slices", "volume"] = setting(
         "slices", "slices: each height of the ring by itself; volume: all heights together, in 3-D."
     )
-    nodes: int = asked(128, "Nodes along each side of the image.", Range(LEAST_NODES, 2048))
-    side_m: float | None = asked(
+    nodes: int = setting(128, "Nodes along each side of the image.", Range(LEAST_NODES, 2048))
+    side_m: float | None = setting(
         None, "Side of the image, m.", Range(1e-4, 100.0, unit="m"), unset="the array and a margin"
     )
-    iterations: int = asked(
+    iterations: int = setting(
         5,
         "Iterations, each over all emitters. gauss-newton stops earlier once nothing is gained.",
         Range(1, 1000),
     )
-    speed_bounds_mps: tuple[float, float] = asked(
+    speed_bounds_mps: tuple[float, float] = setting(
         (1300.0, 1800.0),
         "Lowest and highest speed of a node, m/s.",
         schema={"prefixItems": [SPEED, SPEED]},
     )
-    roi: bool = asked(False, "Only the region of interest of the file may change (mask/roi).")
-    seed: int = asked(0, "Seed of the random order of emitters.", SEED)
-    resolution_check: bool = asked(
+    roi: bool = setting(False, "Only the region of interest of the file may change (mask/roi).")
+    seed: int = setting(0, "Seed of the random order of emitters.", SEED)
+    resolution_check: bool = setting(
         False, "Also reconstruct a checkerboard along the same rays, and report its recovery at each node."
     )
-    minutes: float | None = asked(
+    minutes: float | None = setting(
         None,
         "Time budget of full-waveform refinement, minutes of one processor core: it sets how many bands of "
         "frequency are used and, below that, how many emitters. auto refines its image only within a budget, "
@@ -283,15 +283,15 @@ class FixedSettings(Settings):
 
 
 def _places() -> dict[str, str]:
-    found = {}
+    places = {}
     for one in fields(Settings):
         if is_dataclass(one.default):
             for leaf in fields(one.default):
                 name = one.name if leaf.name == "enabled" else leaf.name
-                found[name] = f"{one.name}.{leaf.name}"
+                places[name] = f"{one.name}.{leaf.name}"
         else:
-            found[one.name] = one.name
-    return found
+            places[one.name] = one.name
+    return places
 
 
 PUBLIC = tuple(one.name for one in fields(Settings))

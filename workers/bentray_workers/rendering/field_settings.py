@@ -10,7 +10,7 @@ from typing import Any
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.tables.cube import MOST_SAMPLES
 from bentray_kernels.ranges import Range
-from bentray_kernels.request_fields import asked, check
+from bentray_kernels.request_fields import check, setting
 
 # Largest mesh for the layout in one task; the time grows slightly faster than linearly.
 MOST_FACES = 300_000
@@ -36,23 +36,23 @@ class FieldSettings:
         InvalidInput: naming the first field that is wrong.
     """
 
-    samples: int = asked(
+    samples: int = setting(
         24,
         "Samples along an edge of the cube for rays from outside, n: the table has 36n⁴ entries.",
         Range(4, MOST_SAMPLES),
     )
-    inner_samples: int = asked(16, "The same for rays that start on the surface.", Range(4, MOST_SAMPLES))
-    divisions: int = asked(
+    inner_samples: int = setting(16, "The same for rays that start on the surface.", Range(4, MOST_SAMPLES))
+    divisions: int = setting(
         16,
         "Cells along an edge of the cube, in each of which points of the surface are merged.",
         Range(1, 64),
     )
-    image_size: int = asked(
+    image_size: int = setting(
         513,
         "Pixels along a side of the geometry image; with a threshold, the largest number.",
         Range(33, 1025),
     )
-    image_threshold: float = asked(
+    image_threshold: float = setting(
         0.0,
         "Largest rms distance of the image from the surface, in edges of the unit cube: the image is halved "
         "as long as it stays below; 0: use image_size.",

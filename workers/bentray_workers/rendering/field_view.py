@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range
-from bentray_kernels.request_fields import MOST_PIXELS, MOST_RAYS, asked, check
+from bentray_kernels.request_fields import MOST_PIXELS, MOST_RAYS, check, setting
 
 # Public names, and those of the kernels.
 LOOKUPS = {"nearest": "nearest", "linear": "linear", "accurate": "walk", "exact": "exact"}
@@ -31,40 +31,40 @@ class FieldView:
         InvalidInput: naming the first field that is wrong.
     """
 
-    scene: Literal["object", "mirror-ball", "two-mirrors"] = asked(
+    scene: Literal["object", "mirror-ball", "two-mirrors"] = setting(
         "object",
         "object: the mesh in a landscape; mirror-ball: two copies and a reflecting ball; two-mirrors: two "
         "copies side by side.",
     )
-    mode: Literal["reflect", "refract", "refract-single", "self", "self-only", "diffuse"] = asked(
+    mode: Literal["reflect", "refract", "refract-single", "self", "self-only", "diffuse"] = setting(
         "reflect",
         "Material of the mesh. reflect: a mirror; self: with self-reflection; self-only: the same before a "
         "dark background; refract: glass; refract-single: glass with a single refraction; diffuse: clay, or "
         "its own colours.",
     )
-    lookup: Literal["nearest", "linear", "accurate", "exact"] = asked(
+    lookup: Literal["nearest", "linear", "accurate", "exact"] = setting(
         "accurate", "Field lookup of reflected and refracted rays; exact intersects the mesh itself."
     )
-    eye: Literal["nearest", "linear", "accurate", "exact"] = asked("exact", "The same for camera rays.")
-    index: float = asked(1.5, "Refractive index of glass.", Range(0.1, 10.0))
-    share: float = asked(
+    eye: Literal["nearest", "linear", "accurate", "exact"] = setting("exact", "The same for camera rays.")
+    index: float = setting(1.5, "Refractive index of glass.", Range(0.1, 10.0))
+    share: float = setting(
         0.85,
         "Share of reflected or refracted light; the rest is the colour of the mesh.",
         Range(0.0, 1.0),
     )
-    camera: Literal["perspective", "orthographic"] = asked("perspective", "Kind of camera.")
-    azimuth_deg: float = asked(
+    camera: Literal["perspective", "orthographic"] = setting("perspective", "Kind of camera.")
+    azimuth_deg: float = setting(
         -60.0, "Azimuth of the camera about the vertical, degrees.", Range(-36000.0, 36000.0)
     )
-    elevation_deg: float = asked(
+    elevation_deg: float = setting(
         15.0, "Elevation of the camera above the horizon, degrees.", Range(-89.0, 89.0)
     )
-    zoom: float = asked(1.0, "1 shows the whole scene, 2 half of it.", Range(0.05, 50.0))
-    up: Literal["z", "y"] = asked("z", "Axis of the mesh that is up.")
-    width: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
-    height: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
-    rays: int = asked(1, "Along each side of a pixel.", Range(1, 8))
-    depth: int = asked(4, "Largest number of surfaces on a ray.", Range(0, 64))
+    zoom: float = setting(1.0, "1 shows the whole scene, 2 half of it.", Range(0.05, 50.0))
+    up: Literal["z", "y"] = setting("z", "Axis of the mesh that is up.")
+    width: int = setting(512, "Pixels.", Range(1, MOST_PIXELS))
+    height: int = setting(512, "Pixels.", Range(1, MOST_PIXELS))
+    rays: int = setting(1, "Along each side of a pixel.", Range(1, 8))
+    depth: int = setting(4, "Largest number of surfaces on a ray.", Range(0, 64))
 
     def __post_init__(self) -> None:
         check(self, CHOICES)

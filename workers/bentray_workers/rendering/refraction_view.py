@@ -10,7 +10,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.isosurface.octree import MOST_ISOS
 from bentray_kernels.ranges import Range
 from bentray_kernels.refraction import Layers
-from bentray_kernels.request_fields import MOST_PIXELS, MOST_RAYS, asked, check
+from bentray_kernels.request_fields import MOST_PIXELS, MOST_RAYS, check, setting
 from bentray_kernels.splines import FILTERS
 from bentray_kernels.splines.prefilter import MOST_SMOOTHING
 
@@ -35,59 +35,59 @@ class RefractionView:
         InvalidInput: naming the first field that is wrong.
     """
 
-    iso: tuple[float, ...] = asked(
+    iso: tuple[float, ...] = setting(
         (),
         "Increasing iso-values, unit of the volume; by default the middle of its range after smoothing.",
         schema={"maxItems": MOST_ISOS},
     )
-    index: tuple[float, ...] = asked(
+    index: tuple[float, ...] = setting(
         (1.5,),
         "Refractive index above each iso-value: one for each, or one.",
         schema={"items": {"type": "number", **INDEX.schema}, "minItems": 1, "maxItems": MOST_ISOS},
     )
-    outside: float = asked(1.0, "Refractive index below the first iso-value.", INDEX)
-    surroundings: int = asked(
+    outside: float = setting(1.0, "Refractive index below the first iso-value.", INDEX)
+    surroundings: int = setting(
         0,
         "Layer that surrounds the volume: 0 the one below the first iso-value, 1 the next, ...",
         schema={"minimum": 0, "maximum": MOST_ISOS},
     )
-    filter: str = asked(
+    filter: str = setting(
         "bspline3",
         "Filter between the nodes: " + ", ".join(FILTERS) + ".",
         schema={"enum": list(FILTERS)},
     )
-    smoothing: float = asked(
+    smoothing: float = setting(
         0.0,
         "Smoothing of a B-spline; 0 interpolates the nodes, 10 to 100 removes the steps of 8-bit data.",
         Range(0.0, MOST_SMOOTHING),
     )
-    camera: Literal["orthographic", "perspective"] = asked("orthographic", "Kind of camera.")
-    azimuth_deg: float = asked(
+    camera: Literal["orthographic", "perspective"] = setting("orthographic", "Kind of camera.")
+    azimuth_deg: float = setting(
         30.0, "Azimuth of the camera about the z axis, degrees.", Range(-36000.0, 36000.0)
     )
-    elevation_deg: float = asked(
+    elevation_deg: float = setting(
         20.0, "Elevation of the camera above the x-y plane, degrees.", Range(-90.0, 90.0)
     )
-    zoom: float = asked(1.0, "1 shows the whole volume, 2 half of it.", Range(0.05, 50.0))
-    backdrop: Literal["checkerboard", "picture"] = asked("checkerboard", "What is behind the volume.")
-    squares: int = asked(
+    zoom: float = setting(1.0, "1 shows the whole volume, 2 half of it.", Range(0.05, 50.0))
+    backdrop: Literal["checkerboard", "picture"] = setting("checkerboard", "What is behind the volume.")
+    squares: int = setting(
         16, "Squares of the checkerboard across the shorter side of the picture.", Range(1, 512)
     )
-    backdrop_distance: float = asked(
+    backdrop_distance: float = setting(
         1.0, "Distance from the centre of the volume, in its diagonals.", Range(0.5, 100.0)
     )
-    supersampling: Literal["none", "prss", "real"] = asked(
+    supersampling: Literal["none", "prss", "real"] = setting(
         "prss",
         "prss: more samples of the backdrop after refraction; real: more rays.",
     )
-    degree: int = asked(
+    degree: int = setting(
         1, "prss: samples between pixels; real: rays along each side of a pixel.", Range(1, 8)
     )
-    fresnel: bool = asked(False, "Attenuate light by the Fresnel reflection at each surface.")
-    mode: Literal["refract", "shaded"] = asked("refract", "refract, or shaded: the first surface, lit.")
-    width: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
-    height: int = asked(512, "Pixels.", Range(1, MOST_PIXELS))
-    depth: int = asked(
+    fresnel: bool = setting(False, "Attenuate light by the Fresnel reflection at each surface.")
+    mode: Literal["refract", "shaded"] = setting("refract", "refract, or shaded: the first surface, lit.")
+    width: int = setting(512, "Pixels.", Range(1, MOST_PIXELS))
+    height: int = setting(512, "Pixels.", Range(1, MOST_PIXELS))
+    depth: int = setting(
         16,
         "Largest number of surfaces on a ray; beyond it the picture is dark grey.",
         Range(1, 256),

@@ -14,7 +14,7 @@ from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range
-from bentray_kernels.request_fields import asked
+from bentray_kernels.request_fields import setting
 from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Progress
 
@@ -51,13 +51,13 @@ class Turntable(RefractionView):
         InvalidInput: naming the first field that is wrong.
     """
 
-    frames: int = asked(36, "Number of frames.", Range(1, MOST_FRAMES))
-    turn_deg: float = asked(
+    frames: int = setting(36, "Number of frames.", Range(1, MOST_FRAMES))
+    turn_deg: float = setting(
         360.0,
         "Rotation of the camera, degrees; the last frame is one step before the end.",
         Range(-3600.0, 3600.0),
     )
-    format: Literal["zip", "apng"] = asked("zip", "zip: one PNG per frame; apng: an animated PNG.")
+    format: Literal["zip", "apng"] = setting("zip", "zip: one PNG per frame; apng: an animated PNG.")
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range, ranges_of
-from bentray_kernels.request_fields import asked, check
+from bentray_kernels.request_fields import check, setting
 
 from .plane import SimulationSettings
 from .volume import VolumeSimulationSettings
@@ -55,42 +55,42 @@ class PhantomScan:
         InvalidInput: naming the first field that is wrong, or belongs to another kind of scan.
     """
 
-    phantom: Literal["table6", "table7"] = asked(
+    phantom: Literal["table6", "table7"] = setting(
         "table6", "The breast of Table 6, in a plane, or that of Table 7, in space."
     )
-    waveform: bool = asked(
+    waveform: bool = setting(
         False, "Simulate waves and record traces of object and water, not travel times; of table7 in space."
     )
-    nodes: int = asked(
+    nodes: int = setting(
         128, "Nodes along a side of the truth, and of the image it is meant for.", range_of("nodes")
     )
-    elements: int = asked(256, "Transducers of a ring; each sends and receives.", range_of("elements"))
-    coupling_mps: float = asked(1500.0, "Speed of the water, m/s.", range_of("coupling_mps"))
-    snr: float | None = asked(None, "Signal over noise, as 10; none without it.", range_of("snr"))
-    seed: int = asked(0, "Of the noise.", range_of("seed"))
-    refinement: int | None = asked(
+    elements: int = setting(256, "Transducers of a ring; each sends and receives.", range_of("elements"))
+    coupling_mps: float = setting(1500.0, "Speed of the water, m/s.", range_of("coupling_mps"))
+    snr: float | None = setting(None, "Signal over noise, as 10; none without it.", range_of("snr"))
+    seed: int = setting(0, "Of the noise.", range_of("seed"))
+    refinement: int | None = setting(
         None,
         "Travel times: how many times finer their grid is, 4 by default; at least 2 in space, else 4.",
         range_of("refinement"),
     )
-    attenuation: bool | None = asked(None, "Travel times: record amplitudes too.")
-    noise_s: float | None = asked(
+    attenuation: bool | None = setting(None, "Travel times: record amplitudes too.")
+    noise_s: float | None = setting(
         None,
         "Travel times of table6: standard deviation of the noise on them, s; 0 by default.",
         range_of("noise_s"),
     )
-    slices: int | None = asked(
+    slices: int | None = setting(
         None, "table7: heights of the ring, one node apart; 40 by default.", range_of("slices")
     )
-    array: Literal["moved", "rings"] | None = asked(
+    array: Literal["moved", "rings"] | None = setting(
         None, "table7: one ring moved (the default), or rings at all heights that receive each other."
     )
-    three_d: bool | None = asked(None, "table7: wave fronts in space, not in each slice by itself.")
-    frequency_hz: float | None = asked(
+    three_d: bool | None = setting(None, "table7: wave fronts in space, not in each slice by itself.")
+    frequency_hz: float | None = setting(
         None, "Waves: middle of the pulse, Hz; 500000 by default, of table7 100000.", range_of("frequency_hz")
     )
-    emissions: int | None = asked(None, "Waves: elements that send; 64 by default.", range_of("emissions"))
-    side_m: float | None = asked(
+    emissions: int | None = setting(None, "Waves: elements that send; 64 by default.", range_of("emissions"))
+    side_m: float | None = setting(
         None, "Waves: side of the square with phantom and ring, m; 0.12 by default.", range_of("side_m")
     )
 

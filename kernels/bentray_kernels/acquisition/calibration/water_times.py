@@ -47,12 +47,12 @@ def water_times(dataset: Dataset) -> Floats:
     begin, end = max(0, ahead - math.ceil(1.5 * period)), min(pulse.size, ahead + math.ceil(1.5 * period))
     times = np.full(crest.shape, np.nan)
     distance = dataset.distance_m()
-    wanted = np.isfinite(crest) & (distance >= NEAREST * distance.max())
+    valid = np.isfinite(crest) & (distance >= NEAREST * distance.max())
     if dataset.valid is not None:
-        wanted &= dataset.valid
-    for e in np.flatnonzero(wanted.any(axis=1)):
+        valid &= dataset.valid
+    for e in np.flatnonzero(valid.any(axis=1)):
         emission = dataset.waveform.water[e]
-        for r in np.flatnonzero(wanted[e]):
+        for r in np.flatnonzero(valid[e]):
             trace = np.asarray(emission[r], dtype=np.float64)
             trace = trace - np.median(trace)
             shift = (crest[e, r] - dataset.t0_s) * rate - ahead

@@ -67,7 +67,7 @@ def read_log_ratios(dataset: Dataset, emissions: Sequence[int], delta_s: Floats,
     gate, rate = Gate.of(dataset), dataset.sampling_rate_hz
     rounding = ROUNDING if traces.object.dtype.kind == "i" else 0.0
     straight = (dataset.distance_m() / dataset.water_speed_mps - dataset.t0_s) * rate
-    found = np.empty((len(emissions), len(dataset.rx)))
+    ratios = np.empty((len(emissions), len(dataset.rx)))
     for row, e in enumerate(emissions):
         water, water_noise = gate.powers(traces.water[e], straight[e], rounding)
         other, other_noise = gate.powers(traces.object[e], straight[e] + rate * delta_s[row], rounding)
@@ -79,9 +79,9 @@ def read_log_ratios(dataset: Dataset, emissions: Sequence[int], delta_s: Floats,
             value, sigma = WAYS[way](powers)
             if way == "ratio":
                 value = value + _gain(traces.water_scale, e) - _gain(traces.object_scale, e)
-        found[row] = np.where(sigma <= MOST_UNSURE_NP, value, np.nan)
-    found[~np.isfinite(found)] = np.nan
-    return found
+        ratios[row] = np.where(sigma <= MOST_UNSURE_NP, value, np.nan)
+    ratios[~np.isfinite(ratios)] = np.nan
+    return ratios
 
 
 def with_log_ratios(dataset: Dataset, way: str) -> Dataset:
@@ -96,8 +96,8 @@ def with_log_ratios(dataset: Dataset, way: str) -> Dataset:
     """
     every = range(len(dataset.tx))
     parts = [dataset.slice(k) for k in range(dataset.slices)]
-    found = [read_log_ratios(one, every, one.differential_tof(), way) for one in parts]
-    ratio = found[0] if dataset.slice_z_m is None else np.stack(found)
+    ratios = [read_log_ratios(one, every, one.differential_tof(), way) for one in parts]
+    ratio = ratios[0] if dataset.slice_z_m is None else np.stack(ratios)
     return replace(dataset, log_ratio_np=ratio, amplitude_frequency_hz=dataset.center_frequency_hz)
 
 

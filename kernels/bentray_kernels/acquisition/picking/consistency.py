@@ -34,9 +34,9 @@ def consistent(dataset: Dataset, delta: Floats, skip_s: float) -> Floats:
         (ntx, nrx), s; a new array.
     """
     outlying, _ = outliers(dataset, delta, skip_s)
-    kept = np.where(outlying, np.nan, delta)
-    kept[unreciprocal(dataset, kept, skip_s)] = np.nan
-    return kept
+    remaining = np.where(outlying, np.nan, delta)
+    remaining[unreciprocal(dataset, remaining, skip_s)] = np.nan
+    return remaining
 
 
 def outliers(dataset: Dataset, delta: Floats, skip_s: float) -> tuple[Flags, Floats]:

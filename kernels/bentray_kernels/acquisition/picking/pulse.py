@@ -48,16 +48,16 @@ def measured_pulse(dataset: Dataset, arrival_s: Floats | None = None) -> Floats:
     least = min(FAR * dataset.water_speed_mps / dataset.center_frequency_hz, 0.5 * float(distance.max()))
     if arrival_s is None:
         arrival_s = distance / dataset.water_speed_mps
-    found: list[Floats] = []
+    pieces: list[Floats] = []
     for e in range(0, len(dataset.tx), max(1, len(dataset.tx) // EMISSIONS)):
         place = (arrival_s[e] - dataset.t0_s) * dataset.sampling_rate_hz
         detected = (distance[e] >= least) & np.isfinite(place)
-        found += _pieces(dataset.waveform.water[e], place, detected, before, length)
-    if not found:
+        pieces += _pieces(dataset.waveform.water[e], place, detected, before, length)
+    if not pieces:
         raise InvalidInput(
             "waveform/water", "no pulse whole in any trace", "traces that hold it about its arrival"
         )
-    return np.asarray(np.median(found, axis=0), dtype=np.float64)
+    return np.asarray(np.median(pieces, axis=0), dtype=np.float64)
 
 
 def _pieces(

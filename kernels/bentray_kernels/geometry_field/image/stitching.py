@@ -161,10 +161,10 @@ def _inner(raster: Raster, seam: Seam) -> tuple[Ints, Flags]:
 def _in_quads(quads: Flags) -> Flags:
     """(n, n) whether a pixel is a corner of a quadrangle."""
     size = len(quads) + 1
-    found = np.zeros((size, size), bool)
+    covered = np.zeros((size, size), bool)
     for i, j in np.ndindex(2, 2):
-        found[i : size - 1 + i, j : size - 1 + j] |= quads
-    return found
+        covered[i : size - 1 + i, j : size - 1 + j] |= quads
+    return covered
 
 
 def _strip(pixels: Ints, quads: Flags, seam: Seam) -> tuple[Ints, Flags]:
@@ -182,8 +182,8 @@ def _strip(pixels: Ints, quads: Flags, seam: Seam) -> tuple[Ints, Flags]:
     faces = np.where((double < 0.0)[:, np.newaxis], faces[:, ::-1], faces)
     middle = corners.mean(axis=1)
     cell = np.clip(middle.astype(np.int64), 0, len(quads) - 1)
-    kept = (np.abs(double) > FLAT) & ~quads[tuple(cell.T)]
-    faces, middle = faces[kept], middle[kept]
+    valid = (np.abs(double) > FLAT) & ~quads[tuple(cell.T)]
+    faces, middle = faces[valid], middle[valid]
     faces = faces[_within(middle, seam.uv, seam.uv[seam.ahead])]
     piece = len(pixels) + np.column_stack((np.arange(len(seam.uv)), seam.ahead))
     starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()

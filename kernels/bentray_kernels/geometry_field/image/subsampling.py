@@ -55,6 +55,6 @@ def fitted_image(
         best = FittedImage(image, error, ())
         size = (size + 1) // 2
     if best is None:
-        found = f"{threshold:g}, where {finest}² pixels have {tried[0][1].rms:.2g}" if tried else finest
-        raise InvalidInput("threshold", found, "an error that the finest image reaches")
+        value = f"{threshold:g}, where {finest}² pixels have {tried[0][1].rms:.2g}" if tried else finest
+        raise InvalidInput("threshold", value, "an error that the finest image reaches")
     return FittedImage(best.image, best.error, tuple(tried))

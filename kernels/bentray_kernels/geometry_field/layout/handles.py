@@ -38,9 +38,9 @@ def handle_cut(topology: Topology, lengths: Floats) -> Flags:
     distances, before = dijkstra(graph, indices=roots, return_predecessors=True)
     best = np.inf
     for distance, parent in zip(distances, before, strict=True):
-        found = _loops(topology, lengths, distance, parent)
-        if lengths[found].sum() < best:
-            best, cut = float(lengths[found].sum()), found
+        candidate = _loops(topology, lengths, distance, parent)
+        if lengths[candidate].sum() < best:
+            best, cut = float(lengths[candidate].sum()), candidate
     return cut
 
 
@@ -74,16 +74,16 @@ def _loops(topology: Topology, lengths: Floats, distance: Floats, parent: Ints) 
     # Two faces may share several edges: the longest loop first, so that it is the one which is kept.
     order = np.argsort(-around, kind="stable")
     pair = np.sort(sides[free[order]], axis=1)
-    _, kept = np.unique(pair[:, 0] * nodes + pair[:, 1], return_index=True)
+    _, unique = np.unique(pair[:, 0] * nodes + pair[:, 1], return_index=True)
     tree = minimum_spanning_tree(
-        csr_array((-around[order[kept]], (pair[kept, 0], pair[kept, 1])), shape=(nodes, nodes))
+        csr_array((-around[order[unique]], (pair[unique, 0], pair[unique, 1])), shape=(nodes, nodes))
     ).tocoo()
     crossed_keys = np.sort(
         np.minimum(tree.row, tree.col).astype(np.int64) * nodes + np.maximum(tree.row, tree.col)
     )
-    keys = pair[kept, 0] * nodes + pair[kept, 1]
+    keys = pair[unique, 0] * nodes + pair[unique, 1]
     crossed = np.zeros(len(edges), bool)
-    crossed[free[order[kept[np.isin(keys, crossed_keys)]]]] = True
+    crossed[free[order[unique[np.isin(keys, crossed_keys)]]]] = True
     cut = np.zeros(len(edges), bool)
     for edge in np.flatnonzero(~in_tree & ~crossed):
         cut[edge] = True
@@ -112,9 +112,9 @@ def _in_one_piece(topology: Topology, cut: Flags) -> Flags:
     keys, first = np.unique(one[apart] * number + other[apart], return_index=True)
     links = csr_array((np.ones(len(keys)), (keys // number, keys % number)), shape=(number, number))
     tree = minimum_spanning_tree(links).tocoo()
-    kept = np.searchsorted(keys, tree.row.astype(np.int64) * number + tree.col)
+    in_tree = np.searchsorted(keys, tree.row.astype(np.int64) * number + tree.col)
     result = cut.copy()
-    result[across[apart[first[kept]]]] = False
+    result[across[apart[first[in_tree]]]] = False
     return result
 
 

@@ -70,15 +70,15 @@ def parameterise(mesh: TriangleMesh) -> Parameterisation:
             layout.
     """
     try:
-        found = _parameterised(mesh.in_unit_cube())
+        layout = _parameterised(mesh.in_unit_cube())
     except RuntimeError as error:
         # SuperLU says so of the matrix of angles that are all 0 or π.
         if "singular" not in str(error):
             raise
         raise _too_thin() from None
-    if not (math.isfinite(found.area_stretch) and np.isfinite(found.quasi_conformal).all()):
+    if not (math.isfinite(layout.area_stretch) and np.isfinite(layout.quasi_conformal).all()):
         raise _too_thin()
-    return found
+    return layout
 
 
 def _too_thin() -> InvalidInput:

@@ -24,13 +24,13 @@ WAYS = {"nearest": NEAREST, "linear": LINEAR, "plane": PLANE, "walk": WALK, "exa
 LEAST = 1e-6
 
 # Face, −1 for none; distance in lengths of the direction; weights of corners 0 and 1.
-Found = tuple[int, float, float, float]
+Hit = tuple[int, float, float, float]
 
 
 @kernel
 def intersect_exactly(
     world: World, shape: int, waiting: Int32s, origin: Vector, direction: Vector, left: int
-) -> Found:
+) -> Hit:
     """The first face of a shape by the exact intersector; ``left`` is the face that the ray leaves, or −1."""
     length = (direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2) ** 0.5
     begin = LEAST / length if left >= 0 else 0.0
@@ -44,7 +44,7 @@ def intersect_exactly(
 @kernel(inline="always")
 def from_outside(
     world: World, shape: int, way: int, waiting: Int32s, origin: Vector, direction: Vector
-) -> Found:
+) -> Hit:
     """The first face of a shape on a ray that leaves another one, or the eye.
 
     Args:
@@ -99,7 +99,7 @@ def from_the_surface(
     direction: Vector,
     left: int,
     side: float,
-) -> Found:
+) -> Hit:
     """The next face of the same shape on a ray that leaves one of its faces.
 
     Args:

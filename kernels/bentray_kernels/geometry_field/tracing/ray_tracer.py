@@ -206,13 +206,11 @@ def _nearest(
         shape = world.instances[k, 0]
         o, d = _to_local(world, k, origin, 1.0), _to_local(world, k, direction, 0.0)
         if k == own:
-            found = from_the_surface(
-                world, shape, way, waiting, o, d, left, 1.0 if within == NOTHING else -1.0
-            )
+            hit = from_the_surface(world, shape, way, waiting, o, d, left, 1.0 if within == NOTHING else -1.0)
         else:
-            found = from_outside(world, shape, way, waiting, o, d)
-        if found[0] >= 0 and found[1] < distance:
-            met, face, distance, first, second = k, found[0], found[1], found[2], found[3]
+            hit = from_outside(world, shape, way, waiting, o, d)
+        if hit[0] >= 0 and hit[1] < distance:
+            met, face, distance, first, second = k, hit[0], hit[1], hit[2], hit[3]
     if world.ground[1] > 0.0 and within == NOTHING and direction[2] != 0.0:
         down = (world.ground[0] - origin[2]) / direction[2]
         x, y = origin[0] + down * direction[0], origin[1] + down * direction[1]

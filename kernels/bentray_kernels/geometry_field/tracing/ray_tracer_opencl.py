@@ -94,10 +94,10 @@ class OpenCLTracer:
 
         settings = TraceSettings(TRIED, TRIED)
         try:
-            found = self.follow(camera, settings)
+            image = self.follow(camera, settings)
         except cl.Error as error:
             return f"it ends with {str(error).splitlines()[0]}"
-        off = np.abs(found.astype(int) - trace(self.world, camera, settings)).max(axis=2) > 1
+        off = np.abs(image.astype(int) - trace(self.world, camera, settings)).max(axis=2) > 1
         allowed = ODD[self.precision]
         return (
             "" if off.mean() <= allowed else f"{off.mean():.0%} of its pixels are off, {allowed:.0%} may be"

@@ -165,11 +165,11 @@ def check_colours(name: str, colours: ArrayLike, dimensions: int) -> None:
     Raises:
         InvalidInput: for other dimensions, no pixels, not 3 channels, or values beyond 0 and 1.
     """
-    found = np.asarray(colours, dtype=np.float64)
-    if found.ndim != dimensions or found.shape[-1] != 3 or found.size == 0:
-        raise InvalidInput(name, found.shape, f"RGB, {dimensions} dimensions, the last of 3")
-    if not ((found >= 0.0) & (found <= 1.0)).all():
-        raise InvalidInput(name, f"{found.min():.6g} to {found.max():.6g}", "values from 0 to 1")
+    values = np.asarray(colours, dtype=np.float64)
+    if values.ndim != dimensions or values.shape[-1] != 3 or values.size == 0:
+        raise InvalidInput(name, values.shape, f"RGB, {dimensions} dimensions, the last of 3")
+    if not ((values >= 0.0) & (values <= 1.0)).all():
+        raise InvalidInput(name, f"{values.min():.6g} to {values.max():.6g}", "values from 0 to 1")
 
 
 def placed(

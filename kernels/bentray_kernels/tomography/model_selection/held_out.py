@@ -31,9 +31,9 @@ def part_of(dataset: Dataset, part: Part) -> Dataset:
     if part == "all":
         return dataset
     held = _views(dataset) if part.endswith("views") else _scattered(dataset)
-    kept = held if part.startswith("held-out") else ~held
-    shape = kept.shape if dataset.slice_z_m is None else (dataset.slices, *kept.shape)
-    valid = np.broadcast_to(kept, shape)
+    selected = held if part.startswith("held-out") else ~held
+    shape = selected.shape if dataset.slice_z_m is None else (dataset.slices, *selected.shape)
+    valid = np.broadcast_to(selected, shape)
     return replace(dataset, valid=valid.copy() if dataset.valid is None else valid & dataset.valid)
 
 

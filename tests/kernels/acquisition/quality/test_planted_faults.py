@@ -100,7 +100,7 @@ def test_all_at_once_are_named_and_survived(sought, elements, roles, seed):
         pairs = [pair for finding in found(examined, check) for pair in np.argwhere(finding.pairs).tolist()]
         assert sorted(map(tuple, pairs)) == sorted(silent)
     assert {f.action for f in found(examined, "clipping")} == {"reported"}
-    assert any("gain set too high" in f.found for f in found(examined, "clipping"))
+    assert any("gain is too high" in f.found for f in found(examined, "clipping"))
     assert examined.picked is not None
     delta = examined.picked.differential_tof()
     assert np.isnan(delta[planted.dead]).all()
