@@ -145,7 +145,7 @@ def test_a_volume_in_space_is_shown_as_glass(page, serve, scan, work, monkeypatc
 
 
 def test_a_turntable_is_shown(page, serve, scan, work, monkeypatch):
-    monkeypatch.setattr(kinds, "draw_turntable", lambda *given: given[3].write_bytes(b"pictures"))
+    monkeypatch.setattr(kinds, "draw_turntable", lambda *args, **control: args[3].write_bytes(b"pictures"))
     address = serve()
     values = io.BytesIO()
     np.save(values, sampled(ONE_HOLE, 12))
@@ -176,7 +176,7 @@ def saved(tmp_path, values):
 
 
 def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, monkeypatch):
-    monkeypatch.setattr(kinds, "draw_turntable", lambda *given: given[3].write_bytes(b"pictures"))
+    monkeypatch.setattr(kinds, "draw_turntable", lambda *args, **control: args[3].write_bytes(b"pictures"))
     page.goto(serve())
     turn = page.get_by_role("button", name="Render a turntable")
     expect(turn).to_be_disabled()
@@ -215,7 +215,7 @@ def test_what_cannot_be_shown_is_told_in_words(page, serve, tmp_path):
 
 def test_a_mesh_is_uploaded_and_its_field_looked_at(page, serve, tmp_path, monkeypatch):
     build = kinds.geometry_field.build_field
-    monkeypatch.setattr(kinds.geometry_field, "build_field", lambda _, *given: build(None, *given))
+    monkeypatch.setattr(kinds.geometry_field, "build_field", lambda _, *args, **control: build(None, *args, **control))
     ring = torus(16, 10)
     content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
     (tmp_path / "ring.ply").write_bytes(content)
@@ -313,7 +313,7 @@ def test_a_simulated_scan_is_there_to_be_reconstructed(page, serve, monkeypatch)
     made |= {"nrx": 16, "slices": 1, "has_traces": False, "has_travel_times": True, "has_truth": True}
     made |= {"water_speed_mps": 1500.0, "bytes": 1, "sha256": "0" * 64}
 
-    def simulate_scan(client, asked, target, *given):
+    def simulate_scan(client, request, target, work_dir, **control):
         target.write_bytes(b"scan")
         return made
 

@@ -48,7 +48,11 @@ def test_no_group_of_tasks_is_kept(cluster: Cluster) -> None:
     # Other tests of this process may have clusters of their own.
     before = {id(one) for one in alive(TaskGroup)}
     run_tasks(cluster)
-    assert [one for one in alive(TaskGroup) if id(one) not in before] == []
+    # The event loop may still handle the last message.
+    deadline = time.monotonic() + FORGET_S
+    while kept := [one for one in alive(TaskGroup) if id(one) not in before]:
+        assert time.monotonic() < deadline, kept
+        time.sleep(0.01)
 
 
 def test_no_message_is_kept(cluster: Cluster) -> None:
