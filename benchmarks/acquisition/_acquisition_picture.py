@@ -15,7 +15,7 @@ from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
 from ..shared._small_png import small_png
 
-SHOWN = ("straight", "bent, wide", "waveform")
+SHOWN = ("straight", "bent, finite frequency", "waveform")
 
 # Width of the gather's panel relative to an image.
 GATHER_WIDTH = 1.9

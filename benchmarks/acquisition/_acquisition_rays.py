@@ -78,14 +78,14 @@ def scan_rows(name: str, dataset: Dataset, nodes: int) -> Iterable[Row]:
     picked = replace(pick(dataset), waveform=None)
     plan = Settings.of(nodes=nodes, attenuation=False)
     all_at_once = {"method": "gauss-newton"}
-    straight_as_waves, bent_as_waves, _ = finite_frequency_candidates(picked, plan)
+    straight_finite_frequency, bent_finite_frequency, _ = finite_frequency_candidates(picked, plan)
     ways: Mapping[str, Mapping[str, Any]] = {
         "straight": {"rays": "straight"},
         "straight, Gauss-Newton": {"rays": "straight", **all_at_once},
-        "straight, wide": straight_as_waves,
+        "straight, finite frequency": straight_finite_frequency,
         "bent": {},
         "bent, Gauss-Newton": all_at_once,
-        "bent, wide": bent_as_waves,
+        "bent, finite frequency": bent_finite_frequency,
     }
     found = {
         way: error(reconstruct(picked, plan.changed(**changes)), dataset) for way, changes in ways.items()
@@ -97,12 +97,12 @@ def scan_rows(name: str, dataset: Dataset, nodes: int) -> Iterable[Row]:
     found["ideal times"] = error(reconstruct(exact, plan.changed(**all_at_once)), dataset)
     detail = ", ".join(f"{way} {rms:.1f} m/s" for way, rms in found.items())
     bent = min(found[way] for way in ways if way.startswith("bent"))
-    fair = min(found[way] for way in ways if way.startswith("straight"))
+    best_straight = min(found[way] for way in ways if way.startswith("straight"))
     yield Row(f"R4 {name}, bent over straight", bent / found["straight"], 0.9, "<=", "", detail)
     yield Row(f"R4 {name}, bent over ideal times", bent / found["ideal times"], 1.15, "<=", "", detail)
     why = explain_trials(advised.trials)
     yield Row(f"R4 {name}, auto over straight", found["auto"] / found["straight"], 1.0, "<=", "", why)
-    yield Row(f"R4 {name}, auto over the best straight", found["auto"] / fair, 1.0, "<=", "", detail)
+    yield Row(f"R4 {name}, auto over the best straight", found["auto"] / best_straight, 1.0, "<=", "", detail)
 
 
 def error(result: Reconstruction, dataset: Dataset) -> float:

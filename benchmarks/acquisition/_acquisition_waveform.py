@@ -84,8 +84,8 @@ def made(name: str, dataset: Dataset, nodes: int, progress: Step) -> dict[str, M
     """The image of each method for one scan; rays share their picks, ``ideal`` has exact times."""
     picked = pick(dataset)
     found = {}
-    _, bent_as_waves, _ = finite_frequency_candidates(picked, Settings(nodes=nodes))
-    for way, changes in {**RAYS, "bent, wide": bent_as_waves}.items():
+    _, bent_finite_frequency, _ = finite_frequency_candidates(picked, Settings(nodes=nodes))
+    for way, changes in {**RAYS, "bent, finite frequency": bent_finite_frequency}.items():
         found[way] = reconstruct_on_workers(
             replace(picked, waveform=None), Settings.of(nodes=nodes, **changes), progress
         )

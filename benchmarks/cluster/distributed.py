@@ -30,7 +30,7 @@ from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 from bentray_workers.reconstruction.subdomains import solve_in_blocks
 
-from ..shared._made_up_scan import made_up_scan
+from ..shared._synthetic_scan import made_up_scan
 
 # Processes and blocks along each axis in the column of Table 8; the machine may have fewer cores.
 PROCESSES: dict[int, tuple[int, int]] = {1: (1, 1), 2: (2, 1), 4: (2, 2), 8: (4, 2)}

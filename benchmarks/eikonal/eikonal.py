@@ -1,4 +1,4 @@
-"""Table 1 of the targets: Eikonal solvers and rays against other packages."""
+"""Goals E1 to E11: Eikonal solvers and rays against other packages."""
 
 from __future__ import annotations
 

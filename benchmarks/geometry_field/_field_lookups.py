@@ -15,7 +15,7 @@ from bentray_kernels.geometry_field.tables.outer_field import OuterField
 from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import Surface, surface_of
 
-from ._field_rays import built, in_rows
+from ._field_rays import as_columns, build_outer_field
 from ._linear_lookup import find_linear
 from ._plane_lookup import PlaneTable, find_by_plane, plane_table
 from ._reference_lookup import linear_uv, nearest_uv, uv_table
@@ -38,13 +38,13 @@ class Lookups:
     def of(cls, chart: Chart, n: int) -> Lookups:
         """Build the field of a chart's mesh, and what the lookups need."""
         surface = surface_of(chart)
-        field = built(surface, n)
+        field = build_outer_field(surface, n)
         table = uv_table(surface, field, np.float32(samples(n)))
         return cls(surface, field, table, agreement(field), plane_table(surface, field))
 
     def runs(self, rays: tuple[np.ndarray, np.ndarray]) -> tuple[dict[str, Callable], dict[str, np.ndarray]]:
         """Name to run, and name to what it found last: distances or (u, v); faces and weights of them all."""
-        o, d = in_rows(rays)
+        o, d = as_columns(rays)
         count, n = o.shape[1], self.field.samples
         found = {name: np.empty(count, np.float32) for name in ("plane", "walk", "linear place")}
         found |= {name: np.empty((count, 2), np.float32) for name in ("nearest uv", "linear uv")}

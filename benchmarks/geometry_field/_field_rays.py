@@ -18,7 +18,7 @@ FACES = 75_408
 THREADS, BATCHES = 2, 64
 
 
-def subject() -> tuple[str, TriangleMesh]:
+def load_mesh() -> tuple[str, TriangleMesh]:
     """The bunny, or where it is absent a bumpy ball of as many faces."""
     if not BUNNY.is_file():
         return f"bumpy ball, {FACES} faces (no bunny here)", bumpy_ball(FACES).in_unit_cube()
@@ -29,14 +29,14 @@ def subject() -> tuple[str, TriangleMesh]:
     return f"bunny, {faces} faces", TriangleMesh(places, corners.astype(np.int32)).in_unit_cube()
 
 
-def built(surface: Surface, n: int) -> OuterField:
+def build_outer_field(surface: Surface, n: int) -> OuterField:
     """The outer field, in two threads."""
     ends = np.linspace(0, 6 * n * n, BATCHES + 1).astype(int)
     with ThreadPoolExecutor(THREADS) as pool:
         return outer_field(n, list(pool.map(lambda a, b: build_rows(surface, n, a, b), ends[:-1], ends[1:])))
 
 
-def incoherent(count: int) -> tuple[np.ndarray, np.ndarray]:
+def incoherent_rays(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Rays from anywhere on one face of the unit cube to anywhere on another."""
     random = np.random.default_rng(0)
     ends = random.random((2, count, 3))
@@ -46,7 +46,7 @@ def incoherent(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.float32(ends[0]), np.float32(ends[1] - ends[0])
 
 
-def of_a_camera(pixels: int) -> tuple[np.ndarray, np.ndarray]:
+def camera_rays(pixels: int) -> tuple[np.ndarray, np.ndarray]:
     """Rays of a picture that the unit cube fills, row by row."""
     camera = perspective((1.1, 0.9, 1.95), (0.5, 0.5, 0.5), (0.0, 1.0, 0.0), 34.0)
     place = (np.arange(pixels) + 0.5) / pixels - 0.5
@@ -56,7 +56,7 @@ def of_a_camera(pixels: int) -> tuple[np.ndarray, np.ndarray]:
     return np.float32(np.broadcast_to(camera.origin[0], ahead.shape)), np.float32(ahead)
 
 
-def in_rows(rays: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def as_columns(rays: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """The same rays as lookups take them: (3, n), one row an axis."""
     origins, directions = (np.ascontiguousarray(a.T, np.float32) for a in rays)
     return origins, directions

@@ -14,7 +14,7 @@ from bentray_kernels.meshes.mesh import Chart, TriangleMesh
 from bentray_kernels.meshes.surface import surface_of
 from bentray_kernels.refraction import Camera, perspective
 
-from ._field_rays import built, subject
+from ._field_rays import build_outer_field, load_mesh
 
 # Samples along an edge of the cube for the outer and the inner field, and divisions for the latter's points.
 OUTER, INNER, DIVISIONS = 24, 16, 16
@@ -30,7 +30,7 @@ def shape_of(mesh: TriangleMesh) -> Shape:
     surface = surface_of(Chart(mesh, mesh.corners[..., :2]))
     points, starts = spread_points(surface, DIVISIONS)
     inner = inner_field(INNER, starts, [build_inner_rows(surface, INNER, points)])
-    return Shape(surface, built(surface, OUTER), inner)
+    return Shape(surface, build_outer_field(surface, OUTER), inner)
 
 
 @cache
@@ -46,7 +46,7 @@ def ring() -> Shape:
 @cache
 def body() -> Shape:
     """The bunny, or what stands in for it, upright."""
-    return shape_of(subject()[1])
+    return shape_of(load_mesh()[1])
 
 
 @cache

@@ -20,7 +20,7 @@ from bentray_workers.files.atomic import write_bytes
 
 from ..shared._contact_sheet import Panel, sheet
 from ._geometry_scenes import SCENES, glass, self_reflection
-from ._looked_up import looked_up
+from ._lookup_figure import lookup_panels
 
 PICTURE = Path(__file__).parents[1] / "results" / "chapter5.png"
 THREADS = len(os.sched_getaffinity(0))
@@ -58,7 +58,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         "Figure 27: self-reflection": [*list(more)[2:], "self-reflection and others"],
     }
     found = [(title, [panels[name] for name in names]) for title, names in groups.items()]
-    write_bytes(PICTURE, sheet([("Figure 25: ways to look up", looked_up(pixels)), *found], 256))
+    write_bytes(PICTURE, sheet([("Figure 25: ways to look up", lookup_panels(pixels)), *found], 256))
 
 
 def drawn(scene: Scene, camera: Camera, pixels: int, way: str = "walk") -> tuple[float, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Table 4 of the targets, G1 to G4 and G6: geometry fields against the fastest exact intersectors."""
+"""Goals G1 to G4 and G6: geometry fields against the fastest exact intersectors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from bentray_service.cli.output.terminal import Step
 from ..eikonal.eikonal import alternate
 from ..shared._available import available
 from ._field_lookups import PIXELS, SAMPLES, Lookups, between_pixels
-from ._field_rays import built, incoherent, of_a_camera, subject
+from ._field_rays import build_outer_field, camera_rays, incoherent_rays, load_mesh
 from ._geometry_frames import rows as frame_rows
 from ._intersectors import PEERS, Ours
 
@@ -31,15 +31,15 @@ BALLS, BALL_RAYS = (5_000, 20_000, 100_000), 200_000
 def rows(quick: bool, progress: Step) -> Iterable[Row]:
     """G1, G2, G3, G4 and G6, and frames a second."""
     progress(0, 6, "laying the mesh out")
-    name, mesh = subject()
+    name, mesh = load_mesh()
     chart = parameterise(mesh).chart
     progress(1, 6, "building the field")
     surface = surface_of(chart)
-    built(surface, 4)
+    build_outer_field(surface, 4)
     seconds = []
     for _ in range(1 if quick else 3):
         start = time.perf_counter()
-        built(surface_of(chart), SAMPLES)
+        build_outer_field(surface_of(chart), SAMPLES)
         seconds.append(time.perf_counter() - start)
     detail = f"{name}, n = {SAMPLES}, two threads, hierarchy included; theirs 420 to 672 s"
     yield Row("G1 outer field", min(seconds), 10.0, "<=", "s", detail)
@@ -77,7 +77,7 @@ def ratio_row(label: str, goal: float, ns: dict, ours: str, exact: dict, missing
 
 def incoherent_rows(lookups: Lookups, exact: dict, missing: str, count: int) -> Iterable[Row]:
     """G2."""
-    rays = incoherent(count)
+    rays = incoherent_rays(count)
     ns = timed(lookups, exact, rays)
     yield ratio_row("G2 nearest entry and plane, speed", 2.0, ns, "plane", exact, missing)
     yield ratio_row("G2 nearest entry and walk, speed", 1.0, ns, "walk", exact, missing)
@@ -105,7 +105,7 @@ def against_exact(lookups: Lookups, rays: tuple, distances: np.ndarray) -> tuple
 
 def coherent_rows(lookups: Lookups, exact: dict, missing: str, pixels: int) -> Iterable[Row]:
     """G3."""
-    ns = timed(lookups, exact, of_a_camera(pixels))
+    ns = timed(lookups, exact, camera_rays(pixels))
     yield ratio_row("G3 nearest (u, v), speed", 15.0, ns, "nearest uv", exact, missing)
     yield ratio_row("G3 4-D linear place, speed", 3.5, ns, "linear place", exact, missing)
     yield ratio_row("G3 4-D linear (u, v), speed", 3.5, ns, "linear uv", exact, missing)
@@ -114,7 +114,7 @@ def coherent_rows(lookups: Lookups, exact: dict, missing: str, pixels: int) -> I
 
 def published_rows(lookups: Lookups, image: GeometryImage, count: int) -> Iterable[Row]:
     """G4: where the geometry image puts the published (u, v), beside our places on the rays."""
-    rays = incoherent(count)
+    rays = incoherent_rays(count)
     faces, exact = Ours(lookups.surface).first(*rays)
     runs, found = lookups.runs(rays)
     errors = {}
@@ -140,7 +140,7 @@ def published_rows(lookups: Lookups, image: GeometryImage, count: int) -> Iterab
 
 def face_rows(n: int) -> Iterable[Row]:
     """G6."""
-    rays = incoherent(BALL_RAYS)
+    rays = incoherent_rays(BALL_RAYS)
     runs: dict = {}
     for faces in BALLS:
         mesh = bumpy_ball(faces).in_unit_cube()

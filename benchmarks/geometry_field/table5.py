@@ -18,7 +18,7 @@ from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.geometry_field import build_field
 
 
-class Theirs(NamedTuple):
+class PublishedTimes(NamedTuple):
     """A row of Table 5: a single 3.6 GHz processor; the last column one field of 24² · 6 samples."""
 
     surface: str
@@ -29,11 +29,11 @@ class Theirs(NamedTuple):
 
 
 TABLE = (
-    Theirs("sphere", 1_922, 15.0, 0.8, 420.0),
-    Theirs("torus", 7_938, 34.0, 2.2, 420.0),
-    Theirs("female face", 50_000, 130.0, 9.5, 432.0),
-    Theirs("male face", 80_072, 200.0, 16.0, 504.0),
-    Theirs("David head", 101_144, 250.0, 20.0, 672.0),
+    PublishedTimes("sphere", 1_922, 15.0, 0.8, 420.0),
+    PublishedTimes("torus", 7_938, 34.0, 2.2, 420.0),
+    PublishedTimes("female face", 50_000, 130.0, 9.5, 432.0),
+    PublishedTimes("male face", 80_072, 200.0, 16.0, 504.0),
+    PublishedTimes("David head", 101_144, 250.0, 20.0, 672.0),
 )
 SETTINGS = FieldSettings(samples=24, image_size=513)
 
@@ -49,7 +49,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
     progress(len(shown), len(shown), "done")
 
 
-def rows_of(theirs: Theirs) -> Iterable[Row]:
+def rows_of(theirs: PublishedTimes) -> Iterable[Row]:
     """Of one surface; a bumpy ball of as many faces stands for the heads, which are not ours to give."""
     mesh = {"sphere": sphere, "torus": torus}.get(theirs.surface, lambda: bumpy_ball(theirs.faces))()
     figures, whole = made(mesh, SETTINGS)

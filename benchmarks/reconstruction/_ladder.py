@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bentray_service.cli.output.terminal import Step
 
-from ._phantom_scan import Found, PhantomScan
+from ._phantom_scan import PhantomScan, ReconstructionError
 
 FAT_MPS, WATER_MPS = 1375.0, 1500.0
 
@@ -31,7 +31,7 @@ BEST: dict[str, object] = {
 }
 
 
-def ladder_step(scan: PhantomScan, name: str, progress: Step) -> Found:
+def ladder_step(scan: PhantomScan, name: str, progress: Step) -> ReconstructionError:
     """One rung of R3, with four sweeps as the dissertation has."""
     changes: dict[str, object] = {"iterations": 4, **{**LADDER, **BESIDE}[name]}
     if name.endswith("data-driven"):

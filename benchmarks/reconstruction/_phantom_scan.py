@@ -25,24 +25,24 @@ from bentray_workers.simulation.simulation_run import simulate
 
 
 @dataclass(frozen=True)
-class Found:
-    """A reconstruction beside the truth.
+class ReconstructionError:
+    """A reconstruction and its errors against the ground truth.
 
     Attributes:
         result: the reconstruction.
-        error: mean absolute error of the speed inside the breast, per cent of its range (chapter 6.4).
-        rms: root mean square error of it, of the range.
-        whole_rms: as ``rms``, over the whole image, which the dissertation reads (section 7.3.1).
-        attenuation_rms: as ``rms`` of the attenuation; NaN without one.
-        seconds: it took.
-        how: in words, for the detail of a row.
+        mae_percent: mean absolute error of the speed inside the breast, per cent of its range (Li 2008, 6.4).
+        rmse_of_range: root mean square error of the speed inside the breast, as a fraction of its range.
+        whole_image_rmse: as ``rmse_of_range``, over the whole image, as in Li 2008, section 7.3.1.
+        attenuation_rmsee: as ``rmse_of_range``, of the attenuation; NaN without one.
+        seconds: computing time.
+        how: summary for the detail of a row.
     """
 
     result: Reconstruction
-    error: float
-    rms: float
-    whole_rms: float
-    attenuation_rms: float
+    mae_percent: float
+    rmse_of_range: float
+    whole_image_rmse: float
+    attenuation_rmsee: float
     seconds: float
     how: str
 
@@ -98,7 +98,7 @@ class PhantomScan:
         """True speed at the nodes of a reconstruction, m/s."""
         return self.scan.phantom.speed(self.scan.nodes, self.scan.side_m)
 
-    def run(self, progress: Step, what: str, **changes: object) -> Found:
+    def run(self, progress: Step, what: str, **changes: object) -> ReconstructionError:
         """Reconstruct with some settings and compare."""
         scan, nodes, elements = self.scan, self.scan.nodes, self.scan.ring.elements
         settings = Settings.of(**{"nodes": nodes, "side_m": scan.side_m, **changes})
@@ -119,7 +119,7 @@ class PhantomScan:
         if result.attenuation is not None:
             known = scan.phantom.attenuation(nodes, scan.side_m)
             losses = rmse(result.attenuation, known, inside) / float(np.ptp(known[inside]))
-        return Found(
+        return ReconstructionError(
             result,
             100.0 * mean_absolute_error(result.speed, truth, inside, high - low),
             rmse(result.speed, truth, inside) / (high - low),

@@ -38,14 +38,16 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         for name, changes in WAYS.items():
             found = scan.run(progress, f"{name}, {where}", **changes)
             noise = "" if snr is None else f", SNR {snr:g}"
-            panels.append(Panel(f"{name}{noise}\n{found.whole_rms:.3f}", found.result.speed))
-            detail = f"whole image; theirs {THEIRS[name]:g}; inside the breast {found.rms:.3f}; {found.how}"
-            yield Row(f"Figure 32 {name}, {where}", found.whole_rms, THEIRS[name], "<=", "of range", detail)
+            panels.append(Panel(f"{name}{noise}\n{found.whole_image_rmse:.3f}", found.result.speed))
+            detail = f"whole image; theirs {THEIRS[name]:g}; inside the breast {found.rmse_of_range:.3f}; {found.how}"
+            yield Row(
+                f"Figure 32 {name}, {where}", found.whole_image_rmse, THEIRS[name], "<=", "of range", detail
+            )
             if name == "default":
                 detail = f"inside the breast; theirs {THEIR_ATTENUATION:g} of the whole image"
                 yield Row(
                     f"Figure 33 attenuation, {where}",
-                    found.attenuation_rms,
+                    found.attenuation_rmse,
                     THEIR_ATTENUATION,
                     "<=",
                     "of range",

@@ -1,4 +1,4 @@
-"""Table 3 of the targets, V2 to V6: refraction against other volume renderers, and chapter 4's tables."""
+"""Goals V2 to V6: refraction against other volume renderers, and the tables of Li 2008, chapter 4."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from bentray_service.cli.output.terminal import Step
 from bentray_service.cli.service_process import running_service
 from bentray_service.client import Client
 
-from ..shared._made_up_scan import made_up_scan
+from ..shared._synthetic_scan import made_up_scan
 from ._http_load import Calls, connect, got, load
 from ._large_upload import TUS, large_scan, room_for, send
 from ._slow_clients import dripping

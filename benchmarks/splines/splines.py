@@ -1,4 +1,4 @@
-"""Table 3 of the targets, V1 and V7: splines against other packages, and the gradient angles of chapter 3."""
+"""Goals V1 and V7: splines against other packages, and the gradient angles of Li 2008, chapter 3."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from bentray_kernels.refraction.supersampling import averaged
 
 from ..shared._contact_sheet import Panel
 from ._field_lookups import PIXELS, SAMPLES, Lookups, between_pixels
-from ._field_rays import subject
+from ._field_rays import load_mesh
 
 EYE, LIGHT = (0.75, 0.75, 2.2), np.array([0.4, 0.5, 0.75])
 CLAY, SKY = np.array([0.85, 0.66, 0.5]), np.array([0.85, 0.9, 0.97])
@@ -23,9 +23,9 @@ NAMES = {
 }
 
 
-def looked_up(pixels: int) -> list[Panel]:
+def lookup_panels(pixels: int) -> list[Panel]:
     """The body in clay, by three lookups."""
-    chart = parameterise(subject()[1]).chart
+    chart = parameterise(load_mesh()[1]).chart
     image, lookups = geometry_image(chart, PIXELS), Lookups.of(chart, SAMPLES)
     camera = perspective(EYE, (0.45, 0.5, 0.5), (0.0, 1.0, 0.0), 38.0)
     place = (np.arange(2 * pixels) + 0.5) / (2 * pixels) - 0.5
