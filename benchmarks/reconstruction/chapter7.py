@@ -39,7 +39,8 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             found = scan.run(progress, f"{name}, {where}", **changes)
             noise = "" if snr is None else f", SNR {snr:g}"
             panels.append(Panel(f"{name}{noise}\n{found.whole_image_rmse:.3f}", found.result.speed))
-            detail = f"whole image; theirs {THEIRS[name]:g}; inside the breast {found.rmse_of_range:.3f}; {found.how}"
+            inside = f"inside the breast {found.rmse_of_range:.3f}"
+            detail = f"whole image; theirs {THEIRS[name]:g}; {inside}; {found.how}"
             yield Row(
                 f"Figure 32 {name}, {where}", found.whole_image_rmse, THEIRS[name], "<=", "of range", detail
             )
