@@ -72,6 +72,7 @@ def test_whatever_is_killed_nothing_is_lost(machine, scan, scan_file):
     assert attempts > len(jobs) + targets.count("service")
 
 
+@pytest.mark.nightly
 def test_a_simulation_goes_on_from_the_emissions_it_has(machine, tmp_path):
     asked = {**WAVES, "emissions": EMISSIONS}
     job = machine.submit(**asked)

@@ -19,6 +19,9 @@ from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.tomography.result import Iteration, Progress, Reconstruction, Trial
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.app import create_app
+from bentray_service.ingest import canonical
+from bentray_service.ingest.child import convert_upload
+from bentray_service.ingest.sandbox import summary_in
 from bentray_service.settings import ServiceSettings
 from bentray_service.web.listening import Listening
 from bentray_service.web.server import Server
@@ -170,6 +173,22 @@ def work(monkeypatch: pytest.MonkeyPatch) -> FakeWork:
 @pytest.fixture
 def cluster() -> FakeCluster:
     return FakeCluster()
+
+
+@pytest.fixture(autouse=True)
+def convert_in_this_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Convert uploads without a process for each: its start takes most of the time of a test.
+
+    With the marker ``ingest_process`` they have one, as in the service.
+    """
+
+    def convert(
+        what: str, source: Path, target: Path, *, given: Any, reserve: Callable[[int], None], **_: Any
+    ) -> dict[str, Any]:
+        return summary_in(convert_upload(what, source, target, dict(given), reserve))
+
+    if request.node.get_closest_marker("ingest_process") is None:
+        monkeypatch.setattr(canonical, "ingest", convert)
 
 
 @pytest.fixture

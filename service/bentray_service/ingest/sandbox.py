@@ -99,6 +99,15 @@ def ingest(
             said = complaint.read(LONGEST_COMPLAINT).decode(errors="replace")
             log.warning("the ingest process ended with %s: %s", process.returncode, said)
             raise InvalidInput("file", _death(process.returncode, memory_bytes), ACCEPTED[what])
+    return summary_in(answer)
+
+
+def summary_in(answer: Mapping[str, Any]) -> dict[str, Any]:
+    """The summary in an answer of ``child.convert_upload``.
+
+    Raises:
+        InvalidInput, StorageFull: that the answer names.
+    """
     if "full" in answer:
         raise StorageFull("body", "no space for the canonical file", "a smaller file, or more disk space")
     if "error" in answer:

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.splines import Spline
+from bentray_kernels.splines import FILTERS, Spline
 
+from ...effort import effort
 from .every_filter import EveryFilter, rough_volume
 
 
@@ -17,6 +18,8 @@ class TestDouble(EveryFilter):
 
 
 class TestSingle(EveryFilter):
+    # Both types are read by the same code; compiling it for all filters takes longer than the tests.
+    filters = effort(("bspline3", "catmull-rom", "trilinear"), tuple(FILTERS))
     tolerance = 2e-6
 
     def made(self, volume, name, **how):

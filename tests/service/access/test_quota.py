@@ -97,6 +97,7 @@ def test_uploads_in_pieces_begun_at_once_do_not_come_together_beyond_it(start):
     assert used(http) == (0, MOST // 3 * 3)
 
 
+@pytest.mark.ingest_process
 @pytest.mark.parametrize("in_pieces", [False, True])
 def test_a_packed_volume_counts_as_it_will_be_stored_before_it_is_written(start, in_pieces):
     http, content = start(max_tenant_bytes=MOST), packed_zeros(11_000_000)

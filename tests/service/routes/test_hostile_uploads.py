@@ -12,6 +12,8 @@ from ...workers.files.datasets import small
 from ..ingest import hostile_datasets, hostile_meshes, hostile_volumes
 from ..ingest.damage import damaged
 
+pytestmark = pytest.mark.ingest_process
+
 STREAM = {"Content-Type": "application/octet-stream"}
 # Resident memory that the service may gain while it refuses some dozens of files.
 MOST_GROWN = 100 * 2**20
