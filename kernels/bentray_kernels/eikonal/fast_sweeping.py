@@ -151,17 +151,17 @@ class Sweeper:
     def _crossing(self, side: int, slowness: Floats, spacing: float) -> Floats:
         """Crossing times of the nodes by diagonals; those of the last solve if they are the same."""
         stored = self._stored[side]
-        if stored is None or stored[1] != spacing or not _same(stored[0], slowness):
+        if (
+            stored is None
+            or stored[1] != spacing
+            or not (stored[0] is slowness or np.array_equal(stored[0], slowness))
+        ):
             self._grid.store(
                 slowness.reshape(-1), self._crossings[side], side == 1, scale=spacing, border=False
             )
         self._stored[side] = slowness, spacing
         crossing: Floats = self._crossings[side]
         return crossing
-
-
-def _same(a: Floats, b: Floats) -> bool:
-    return a is b or np.array_equal(a, b)
 
 
 @kernel

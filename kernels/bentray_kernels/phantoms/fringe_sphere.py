@@ -34,7 +34,8 @@ class FringeSphere:
     holes: tuple[Hole, ...] = ()
 
     def __post_init__(self) -> None:
-        for name, number in (("radius", self.radius), ("fringe", self.fringe), *self._hole_radii()):
+        holes = [("holes", radius) for _, radius in self.holes]
+        for name, number in (("radius", self.radius), ("fringe", self.fringe), *holes):
             if not number > 0.0:
                 raise InvalidInput(name, number, "a number above 0, in half edges of the cube")
 
@@ -70,9 +71,6 @@ class FringeSphere:
         value = np.exp(-0.5 * (outside / self.fringe) ** 2)
         along = -value * outside / (self.fringe**2 * np.maximum(apart, radius))
         return value, along[..., np.newaxis] * offset
-
-    def _hole_radii(self) -> list[tuple[str, float]]:
-        return [("holes", radius) for _, radius in self.holes]
 
 
 # Glass balls as in figures 18 and 19, with one and two holes.

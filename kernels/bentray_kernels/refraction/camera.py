@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats
+from ..arrays import Floats, Vector
+from ..compiled import kernel
 from ..errors import InvalidInput
 
 
@@ -26,6 +27,16 @@ class Camera:
 
     origin: Floats
     direction: Floats
+
+
+@kernel(inline="always")
+def affine(basis: Floats, u: float, v: float) -> Vector:
+    """basis[0] + u·basis[1] + v·basis[2], the origin or direction of a ray; ``basis`` as in ``Camera``."""
+    return (
+        basis[0, 0] + u * basis[1, 0] + v * basis[2, 0],
+        basis[0, 1] + u * basis[1, 1] + v * basis[2, 1],
+        basis[0, 2] + u * basis[1, 2] + v * basis[2, 2],
+    )
 
 
 def orthographic(

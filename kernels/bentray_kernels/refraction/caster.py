@@ -14,6 +14,7 @@ from ..isosurface.crossing import MOST_HALVINGS, Search, leave_interval
 from ..isosurface.octree import Octree
 from ..isosurface.roots import Field, Ray, field_at, point_at, ray_of
 from ..splines.sampling import value_and_gradient_at
+from .camera import affine
 from .optics import refracted
 from .scene import Scene
 
@@ -141,15 +142,6 @@ def cast(
         length = math.sqrt(ahead[0] ** 2 + ahead[1] ** 2 + ahead[2] ** 2)
         ahead = (ahead[0] / length, ahead[1] / length, ahead[2] / length)
         _trace_ray(medium, search, start, ahead, depth, traced, n)
-
-
-@kernel(inline="always")
-def affine(basis: Floats, u: float, v: float) -> Vector:
-    return (
-        basis[0, 0] + u * basis[1, 0] + v * basis[2, 0],
-        basis[0, 1] + u * basis[1, 1] + v * basis[2, 1],
-        basis[0, 2] + u * basis[1, 2] + v * basis[2, 2],
-    )
 
 
 @kernel(inline="always")

@@ -13,10 +13,9 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from ..isosurface.crossing import MOST_HALVINGS, Search, leave_interval
 from .backdrop import Colours
-from .camera import Camera
+from .camera import Camera, affine
 from .caster import (
     RefractiveMedium,
-    affine,
     gradient_at,
     in_nodes,
     layer_at,

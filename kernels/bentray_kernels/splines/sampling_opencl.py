@@ -73,12 +73,9 @@ class OpenCLSpline:
             # Setting an argument does not keep its buffer alive: the names do.
             at = session.upload(places)
             read, turned = session.reserve(values.nbytes), session.reserve(gradients.nbytes)
-            set_arguments(kernel, self._coefficients, self._tables, np.float64(spline.stencil.shift))
-            for position, size in enumerate((*nodes, border), start=3):
-                kernel.set_arg(position, np.int32(size))
-            kernel.set_arg(7, np.uint32(len(places)))
-            for position, buffer in enumerate((at, read, turned), start=8):
-                kernel.set_arg(position, buffer)
+            sizes_there = *map(np.int32, (*nodes, border)), np.uint32(len(places))
+            shift = np.float64(spline.stencil.shift)
+            set_arguments(kernel, self._coefficients, self._tables, shift, *sizes_there, at, read, turned)
             session.launch(kernel, (-(-len(places) // GROUP) * GROUP,), (GROUP,))
             session.download(values, read)
             session.download(gradients, turned)

@@ -28,6 +28,8 @@ def find_swapped(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list
         strongest_s: (ntx, nrx), of the water.
         line: through them.
     """
+    assert dataset.center_frequency_hz is not None
+    period = 1.0 / dataset.center_frequency_hz
     straight = dataset.distance_m() / dataset.water_speed_mps + line.intercept_s
     roles: tuple[tuple[Role, Floats, Floats], ...] = (
         ("reception", strongest_s, straight),
@@ -36,7 +38,7 @@ def find_swapped(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list
     findings = []
     for role, times, expected in roles:
         element = dataset.rx if role == "reception" else dataset.tx
-        for a, b, before in _exchanged(times, expected, _period(dataset)):
+        for a, b, before in _exchanged(times, expected, period):
             findings.append(
                 Finding(
                     "swapped channels",
@@ -50,11 +52,6 @@ def find_swapped(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list
                 )
             )
     return findings
-
-
-def _period(dataset: Dataset) -> float:
-    assert dataset.center_frequency_hz is not None
-    return 1.0 / dataset.center_frequency_hz
 
 
 def _exchanged(times: Floats, expected: Floats, period: float) -> list[tuple[int, int, float]]:

@@ -18,7 +18,7 @@ from ...compiled import kernel
 from ...errors import InvalidInput
 from ...meshes.intersector import WAITING
 from ...refraction.backdrop import Colours
-from ...refraction.camera import Camera
+from ...refraction.camera import Camera, affine
 from ...refraction.optics import refracted
 from .appearance import ground_at, normal_at, shading, sky_at, unit
 from .lookup_scene import WAYS, from_outside, from_the_surface
@@ -111,21 +111,11 @@ def _trace_rows(
     for i in range(len(image)):
         for j in range(columns):
             u, v = (j + 0.5) / columns - 0.5, (first + i + 0.5) / rows - 0.5
-            origin = along(origins, u, v)
-            direction = unit(along(directions, u, v))
+            origin = affine(origins, u, v)
+            direction = unit(affine(directions, u, v))
             colour = colour_of(world, waiting, origin, direction, eye, way, depth)
             for c in range(3):
                 image[i, j, c] = np.uint8(min(max(255.0 * colour[c] + 0.5, 0.0), 255.0))
-
-
-@kernel(inline="always")
-def along(views: Floats, u: float, v: float) -> Vector:
-    """views[0] + u·views[1] + v·views[2]."""
-    return (
-        views[0, 0] + u * views[1, 0] + v * views[2, 0],
-        views[0, 1] + u * views[1, 1] + v * views[2, 1],
-        views[0, 2] + u * views[1, 2] + v * views[2, 2],
-    )
 
 
 @kernel
