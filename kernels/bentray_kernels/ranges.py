@@ -14,7 +14,7 @@ RANGE = "range"
 
 @dataclass(frozen=True)
 class Range:
-    """All numbers between two, which belong to it unless it says otherwise.
+    """All numbers between two bounds, the bounds included unless stated otherwise.
 
     Attributes:
         least, most: the bounds.
@@ -35,7 +35,7 @@ class Range:
         return bool(low and (value < self.most if self.below else value <= self.most))
 
     def check(self, name: str, value: float) -> None:
-        """Refuse a number that is not in it.
+        """Reject a number outside the range.
 
         Raises:
             InvalidInput: naming ``name``.
@@ -45,7 +45,7 @@ class Range:
 
     @property
     def words(self) -> str:
-        """As a refusal and a description say it."""
+        """The range in words, for errors and descriptions."""
         unit = f" {self.unit}" if self.unit else ""
         # Whole numbers in full: 9.0072e+15 is above the highest seed.
         least, most = (str(one) if isinstance(one, int) else f"{one:g}" for one in (self.least, self.most))
@@ -70,7 +70,7 @@ def ranged(default: Any, within: Range, **metadata: Any) -> Any:
 
     Args:
         default: of the field.
-        within: the range; it stands in the JSON schema of the field too.
+        within: the range; also in the JSON schema of the field.
         metadata: of the field, beside.
     """
     return field(default=default, metadata={RANGE: within, "json_schema_extra": within.schema, **metadata})

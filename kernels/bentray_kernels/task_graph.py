@@ -13,7 +13,7 @@ POLL_S = 0.2
 
 
 class Cancelled(Exception):  # noqa: N818 - the word that users and job states have for it
-    """The caller asked to stop; results that are not saved are dropped."""
+    """Raised after a request to stop; results that are not saved are dropped."""
 
 
 class Task(NamedTuple):

@@ -11,7 +11,7 @@ from .bernstein import Length, contract, hull
 # Halvings along each axis: the hull approaches a critical value as the square of the width.
 HALVINGS = 18
 
-# Of the width of the cell's hull; less than float32, in which ranges are kept, can tell.
+# Relative to the width of the cell's hull; below the resolution of float32, in which ranges are stored.
 TOLERANCE = 1e-8
 
 # Of the values: what rounding leaves in a cell where the field is constant.

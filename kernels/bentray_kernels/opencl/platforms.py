@@ -61,7 +61,7 @@ def _register_intel() -> None:
                 cl.get_platforms()
             finally:
                 os.environ[HOME] = home
-    except (OSError, cl.Error):  # no place for a list, or no device at all: the loader's answer stands
+    except (OSError, cl.Error):  # no place for a list, or no device at all: the loader's answer is used
         return
 
 

@@ -25,7 +25,7 @@ class Ellipse:
         angle_rad: turn of the first axis from x towards y.
         speed_mps: sound speed inside, m/s.
         attenuation_np_m: attenuation inside, Np/m.
-        name: what it stands for.
+        name: of the tissue.
     """
 
     centre_m: tuple[float, float]

@@ -6,7 +6,7 @@ from .ellipses import Ellipse, EllipsePhantom
 
 FAT_MPS, TISSUE_MPS, LARGE_MPS, SMALL_MPS = 1375.0, 1475.0, 1560.0, 1530.0
 
-# Table 6 gives attenuation without a unit; here it is taken in Np/m as it stands.
+# Table 6 gives attenuation without a unit; here it is taken as Np/m.
 FAT_NP_M, TISSUE_NP_M, LARGE_NP_M, FAINT_NP_M, SMALL_NP_M = 15.0, 50.0, 60.0, 30.0, 70.0
 
 # One pixel of the dissertation's 128² image, on which the sizes of the lesions are stated (2 to 8 pixels).

@@ -24,7 +24,7 @@ class Part:
         solid: where it is.
         speed_mps: sound speed inside, m/s.
         attenuation_np_m: attenuation inside, Np/m.
-        name: what it stands for.
+        name: of the tissue.
     """
 
     solid: Solid

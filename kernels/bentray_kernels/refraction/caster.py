@@ -168,7 +168,8 @@ def _trace_ray(
             entered = True
             layer = layer_at(medium, ray, start)
             if layer != medium.around and near >= 0.0:
-                # The object is cut by the grid's face, which is flat. (A camera within it sees no face.)
+                # The object is cut by the grid's face, which is flat. (A camera within the grid meets no
+                # face.)
                 origin = _point_at(origin, direction, start)
                 ratio = medium.indices[medium.around] / medium.indices[layer]
                 direction, share, passed = refracted(direction, _axis(face_in), ratio)

@@ -231,7 +231,7 @@ def _way(search: Search) -> str:
 
 
 def _towards_the_object(scene: Scene) -> tuple[tuple[Floats, Floats], Floats]:
-    """A camera that looks at all of the object's box along none of its axes, and places in its image."""
+    """An oblique camera with the whole box of the object in view, and positions in its image."""
     low, high = scene.origin + scene.box * scene.spacing
     middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
     camera = perspective(middle - 1.5 * size * np.array([0.48, 0.6, 0.64]), middle, (0.0, 0.0, 1.0), 40.0)
@@ -243,7 +243,7 @@ def on_the_device(scene: Scene, precision: str | None = None) -> OpenCLCaster | 
     """The scene on the chosen OpenCL device, for ``render``; None where no device passes its self-test.
 
     Args:
-        scene: to look at.
+        scene: to render.
         precision: as in ``OpenCLCaster``.
 
     Raises:

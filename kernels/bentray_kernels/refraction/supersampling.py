@@ -50,8 +50,8 @@ def post_refraction_colours(
     pixel and them (2·degree + 1)² samples fill the square of the pixel evenly, their places interpolated
     bilinearly; the low-pass is their mean. For degree 1 these are the pixel's own place and the 8
     intermediate ones of the dissertation, a third of the way. A neighbour whose ray met another number of
-    interfaces, or ended on another plane, belongs to another piece of the picture: nothing lies between it
-    and the pixel, whose own colour stands in.
+    interfaces, or ended on another plane, belongs to another piece of the picture: its samples are replaced
+    by the pixel's own colour.
 
     Args:
         backdrop, planes, places, weights: as for ``point_colours``.

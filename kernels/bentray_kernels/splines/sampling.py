@@ -58,7 +58,7 @@ def value_at(coefficients: Any, stencil: Stencil, point: Any) -> Any:
         coefficients: (x[, y[, z]]), C order, float64 or float32, with the border of ``border_of``.
         stencil: of the filter, in the same type; the sums are in it too.
         point: (x[, y[, z]]), a tuple of floats, nodes; node 0 is the first one inside the border. Off the
-            grid the outermost cell's polynomial goes on; NaN gives NaN.
+            grid the polynomial of the outermost cell is continued; NaN gives NaN.
 
     Returns:
         float64.

@@ -20,8 +20,8 @@ class Spline:
     """A field between and beyond the nodes of a grid.
 
     Places are in nodes, gradients per node: for metres, divide a place by the spacing before and the gradient
-    after. Off the grid the field goes on as in a mirror at its outer nodes, as scipy's mode "mirror" does;
-    where a place is not a number, so is the answer.
+    after. Off the grid the field is mirrored at its outer nodes, as by scipy's mode "mirror"; at NaN it is
+    NaN.
 
     Args:
         volume: (x[, y[, z]]), at least two nodes along each axis, finite, any unit.
@@ -195,7 +195,7 @@ def _point(coefficients: Any, places: Floats, m: int) -> Any:
 # Not inlined, so that points on the grid do not wait for it.
 @kernel
 def _mirrored(coefficients: Any, stencil: Stencil, point: Any, last: Any) -> Any:
-    """Value and gradient at a point off the grid: those of its image, the slopes turned round with it."""
+    """Value and gradient at a point off the grid: from its mirror image, with reversed slopes."""
     image, signs = point, point
     for axis, place in enumerate(point):
         turned = place - 2.0 * last[axis] * np.floor(place / (2.0 * last[axis]))

@@ -42,7 +42,7 @@ def test_invalid_pairs_are_missing_and_the_dataset_keeps_its_own():
     assert dataset.delta_tof_s[1, 4] == 0.0
 
 
-def test_a_dataset_without_travel_times_says_so():
+def test_a_dataset_without_travel_times_is_not_picked():
     raw = made(delta_tof_s=None)
     assert not raw.picked
     with pytest.raises(InvalidInput, match="run a picker first"):

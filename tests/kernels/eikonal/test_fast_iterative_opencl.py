@@ -67,7 +67,7 @@ def test_tolerance_is_used_and_checked():
         eikonal.solve(speed, 1.0, source, "fim-opencl", tolerance=-1.0)
 
 
-def test_without_a_device_fim_computes_and_a_warning_says_so(monkeypatch):
+def test_without_a_device_fim_runs_with_a_warning(monkeypatch):
     speeds, sources = rough_problems(9, (12, 15), 3)
     expected = eikonal.solve_many(speeds, 1.0, sources, "fim")
     monkeypatch.setattr(

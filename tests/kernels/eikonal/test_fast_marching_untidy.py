@@ -68,7 +68,7 @@ def test_the_bound_falls_with_the_width():
     assert untidy_error_bound(problem, width=0.02) == pytest.approx(0.02 * np.sqrt(2.0))
 
 
-def test_great_contrast_widens_the_buckets_and_the_bound_says_so():
+def test_high_contrast_widens_the_buckets_and_the_error_bound():
     speed = np.ones((6, 6))
     speed[3] = 1e-9
     problem = PointSource.checked(speed, 1.0, (0.0, 0.0))

@@ -35,7 +35,7 @@ def test_a_wish_for_none_or_two_lists_what_there_is(three, selection, fits):
     )
 
 
-def test_a_wish_on_a_machine_without_devices_says_so():
+def test_a_selection_without_devices_is_rejected():
     with pytest.raises(InvalidInput, match="there is none here"):
         select_devices((), "nvidia")
 
@@ -73,7 +73,7 @@ def test_a_found_device_leads_to_its_handle_until_devices_change():
                 handle_of(other)
 
 
-def test_solvers_load_no_opencl_until_it_is_asked_for():
+def test_solvers_import_opencl_only_on_request():
     code = "import sys, bentray_kernels.eikonal as e; e.methods(); print('pyopencl' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"

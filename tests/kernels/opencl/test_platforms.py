@@ -47,7 +47,7 @@ def intel(monkeypatch, tmp_path):
     return library
 
 
-def test_without_the_package_the_loader_is_asked_as_it_is(loader, monkeypatch):
+def test_without_the_package_the_loader_is_used_unchanged(loader, monkeypatch):
     monkeypatch.setattr(platforms, "files_of", lambda package, name: iter(()))
     assert platforms.platforms() == ["a platform"]
     assert loader.lists == [{"pocl.icd": "libpocl-1.so"}]
@@ -88,7 +88,7 @@ def test_another_loader_is_left_alone(loader, intel, monkeypatch):
     assert loader.lists == []
 
 
-def test_without_a_place_for_a_list_the_loader_is_asked_as_it_is(loader, intel, monkeypatch):
+def test_without_a_folder_for_a_list_the_loader_is_used_unchanged(loader, intel, monkeypatch):
     def full(**_):
         raise OSError(28, "No space left on device")
 

@@ -52,7 +52,7 @@ def test_a_fault_in_what_we_need_refuses_the_device(gpu, stage, fault, said):
     assert len(child.calls) <= 2, "what cannot be used is not tried any further"
 
 
-def test_a_child_that_answers_what_was_not_asked_is_not_believed(gpu):
+def test_an_answer_of_a_child_to_another_question_is_ignored(gpu):
     def child(device, stages, time_out_s):
         return {"double32": ""}, "ended with exit code 0"
 
@@ -66,7 +66,7 @@ def test_a_hanging_child_is_stopped(gpu):
     assert ending == "no answer in 0.01 s"
 
 
-def test_a_child_that_fails_says_why(gpu):
+def test_a_failing_child_reports_the_reason(gpu):
     answers, ending = in_a_child(gpu, STAGES, 60.0)
     assert answers == {}
     assert ending.startswith("ended with exit code 1 (Fast Platform:GPU 9000 is no longer")

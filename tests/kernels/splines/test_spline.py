@@ -44,7 +44,7 @@ def test_an_order_may_be_any_kind_of_whole_number():
 
 
 @pytest.mark.parametrize("dtype", [np.float32, "float32", "f4", np.dtype("f4"), "float64", "d", float])
-def test_a_type_may_be_named_in_any_way_that_numpy_knows(dtype):
+def test_types_are_accepted_under_all_names_of_numpy(dtype):
     volume = rough_volume(0, (6, 5, 7))
     points = np.random.default_rng(1).uniform(0.0, 4.0, (9, 3))
     made, expected = Spline(volume, dtype=dtype), Spline(volume, dtype=np.dtype(dtype).type)

@@ -187,7 +187,7 @@ def test_focusing_does_not_ask_which_emitters_come_together(scan):
     assert np.array_equal(alone.residual, together.residual[: alone.residual.size])
 
 
-def test_an_element_that_hears_itself_says_nothing(scan):
+def test_a_pair_of_one_element_is_ignored(scan):
     loud = scan.log_ratio_np.copy()
     np.fill_diagonal(loud, 50.0)
     plain, own = (reconstruct(s, plan(iterations=1)) for s in (scan, replace(scan, log_ratio_np=loud)))

@@ -53,7 +53,7 @@ def test_thin_rays_see_the_image_itself_and_water_stays_water():
     assert (wide - 1.0 / WATER).sum() == pytest.approx((image - 1.0 / WATER).sum(), rel=1e-3)
 
 
-def test_rays_bend_in_what_twice_the_width_leaves_unless_told_otherwise():
+def test_rays_bend_in_an_image_blurred_by_twice_their_width():
     problem = Problem.of(scan(), PLAN)
     width = width_in_nodes(problem, PLAN)
     assert width == pytest.approx(WIDTH / problem.spacing)

@@ -54,7 +54,7 @@ def test_where_no_ray_passes_nothing_comes_back():
     assert recovery[10:14, 20:28].mean() > 0.25
 
 
-def test_it_is_told_only_when_asked(everywhere):
+def test_recovery_is_computed_only_on_request(everywhere):
     plain = reconstruct(scan(), replace(PLAN, resolution_check=False))
     assert plain.recovery is None
     assert np.array_equal(plain.speed, everywhere.speed)

@@ -74,7 +74,7 @@ def test_the_ball_comes_back(scan, method):
     assert rmse(result.speed, speed, inside) < 0.45 * rmse(np.full_like(speed, WATER), speed, inside)
 
 
-def test_between_slices_the_volume_knows_more(scan):
+def test_between_slices_the_volume_is_more_accurate(scan):
     """The same data as slices know nothing of what lies between the rings."""
     dataset, speed = scan
     volume = reconstruct(dataset, replace(PLAN, method="gauss-newton"))

@@ -145,7 +145,7 @@ def test_loss_is_the_given_one_at_every_frequency_and_delays_nothing(centre):
     assert ratio == pytest.approx(10.0 * 0.025, rel=0.02)
 
 
-def test_a_slab_delays_as_the_eikonal_solver_says():
+def test_a_slab_delays_as_in_the_eikonal_solver():
     spacing = 5e-4
     speed = np.full((121, 81), WATER)
     speed[40:80] = 1580.0

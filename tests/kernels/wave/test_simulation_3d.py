@@ -71,7 +71,7 @@ def test_traces_are_those_of_the_green_function(seed):
 
 
 @pytest.mark.parametrize(("order", "other"), [(8, 6), (6, 8)])
-def test_the_order_in_space_is_the_one_asked_for(order, other):
+def test_the_order_in_space_is_the_requested_one(order, other):
     """Waves of 3.5 nodes and more: their speed is that of the stencil, which a test of its own holds."""
     source, receiver = np.array([6e-3, 12e-3, 12e-3]), np.array([30e-3, 12e-3, 12e-3])
     time = np.arange(148) * STEP

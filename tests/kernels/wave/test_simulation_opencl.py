@@ -31,7 +31,7 @@ def test_traces_are_those_of_the_compiled_step(dtype, tolerance):
     assert np.abs(found - expected).max() < tolerance * np.abs(expected).max()
 
 
-def test_without_a_device_the_cpu_computes_and_says_so(monkeypatch):
+def test_without_a_device_the_cpu_computes_with_a_warning(monkeypatch):
     monkeypatch.setattr(choice, "find_devices", list)
     choice._found.cache_clear()
     choice._warn_once.cache_clear()

@@ -68,7 +68,7 @@ def test_noise_has_the_ratio_asked_for(moved):
     assert moved.sigma_s is None
 
 
-def test_amplitudes_are_left_out_unless_asked_for():
+def test_amplitudes_are_simulated_only_on_request():
     assert simulate(replace(SMALL, attenuation=False, slices=2)).log_ratio_np is None
 
 

@@ -39,7 +39,7 @@ def examine(
 ) -> Examined:
     """Check a scan, correct what can be corrected, pick its times where it has none, and check those.
 
-    Every check sees the data as corrected by the previous ones.
+    Every check is applied to the data as corrected by the previous ones.
 
     Args:
         dataset: with traces or travel times.

@@ -32,7 +32,7 @@ class GeometryImage:
 
     @property
     def valid(self) -> Flags:
-        """(n, n) whether a pixel stands for a point of the surface."""
+        """(n, n) whether a pixel represents a point of the surface."""
         valid: Flags = self.raster.kind != OUTSIDE
         return valid
 

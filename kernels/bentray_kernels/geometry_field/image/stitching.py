@@ -136,7 +136,7 @@ def _seam(chart: Chart, sides: Ints, edges: Ints, parts: Ints, scale: int) -> Se
 
 
 def _following(chart: Chart, sides: Ints) -> Ints:
-    """(sides,) the place in ``sides`` of the one that goes on where each ends."""
+    """(sides,) index in ``sides`` of the side that starts where each one ends."""
     topology = topology_of(chart.mesh.faces)
     parted = np.zeros(len(topology.edges), bool)
     parted[topology.side_edge[sides]] = True

@@ -43,7 +43,7 @@ def quasi_conformal_factors(corners: Floats, uv: Floats) -> Floats:
 
 
 def area_stretch(areas: Floats, uv_areas: Floats) -> float:
-    """How much surface a pixel stands for: root mean square over the surface, in units of the least possible.
+    """Area of the surface per pixel: root mean square over the surface, relative to the least possible.
 
     1 where the layout fills the unit square and keeps ratios of areas. Flat pieces between the pixels miss a
     bent surface by its curvature times their area; so the geometric error is about proportional to this.

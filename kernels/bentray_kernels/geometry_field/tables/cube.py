@@ -1,7 +1,7 @@
 """Samples of the unit cube's surface, which index the lines through it, and its intersection with rays.
 
 Face k = 2a + b is the one across axis a at coordinate b; its x and y are the two other axes in their order.
-Each face has n² samples at the middles of its squares. A sample (x, y) of face k stands in a rectangle of
+Each face has n² samples at the middles of its squares. A sample (x, y) of face k is in a rectangle of
 6n × n at x₀ = x + kn, x₁ = y, and has the number 6n·x₁ + x₀ (dissertation, section 5.3.3, figure 24).
 """
 
@@ -17,7 +17,7 @@ from ...float32 import higher, lower, real, whole
 # The dissertation's textures end at 24; at 48 a table has 191 million entries.
 MOST_SAMPLES = 48
 
-# What stands for a direction's 0: its reciprocal is finite in float32, and so are products with it.
+# Replaces a 0 of a direction: its reciprocal is finite in float32, and so are products with it.
 ALMOST_ZERO = real(1e-18)
 # How far outside the cube its faces are for rays, so that one that runs along a face is inside.
 MARGIN = real(1e-7)

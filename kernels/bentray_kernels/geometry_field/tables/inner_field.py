@@ -37,7 +37,7 @@ class InnerField(NamedTuple):
 
 
 def spread_points(surface: Surface, divisions: int) -> tuple[Int32s, Int32s]:
-    """Faces whose middles stand for all of the surface: one for each side of it in each small cube.
+    """Faces whose centres represent the surface: one for each side of it in each small cube.
 
     Args:
         surface: ``surface_of``.
@@ -55,7 +55,7 @@ def spread_points(surface: Surface, divisions: int) -> tuple[Int32s, Int32s]:
     middles = corners.mean(axis=1)
     cell = np.clip((middles * divisions).astype(np.int64), 0, divisions - 1)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # Faces of a fold or a thin sheet look apart: the axis along which the normal is longest tells them.
+    # Faces of a fold or a thin sheet are distinguished by the axis along which the normal is longest.
     axis = np.abs(normals).argmax(axis=1)
     side = 2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] > 0.0)
     key = ((cell[:, 0] * divisions + cell[:, 1]) * divisions + cell[:, 2]) * 6 + side

@@ -24,7 +24,7 @@ class OuterField(NamedTuple):
     Attributes:
         samples: n along an edge of the cube.
         faces: (6n², 6n²) int32 by entry and exit: rows of ``Surface.triangles``; −1 where the ray meets none,
-            and −2 − f where a neighbouring entry meets the face f: ``boundary_face`` tells it.
+            and −2 − f where a neighbouring entry meets the face f: see ``boundary_face``.
         fractions: (6n², 6n²) float32: of the way from entry to exit, 1 where the ray meets none.
     """
 

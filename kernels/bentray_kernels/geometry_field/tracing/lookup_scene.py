@@ -15,8 +15,8 @@ from ..tables.outer_field import boundary_face
 from ..tables.quadrilinear import corner_of, lerp4
 from .packed_scene import World
 
-# Ways to ask: where the entry nearest to the ray ends; its place, averaged where the entries about the ray
-# agree; the plane of its face; a walk from its face; no field at all.
+# Lookup methods: distance of the entry nearest to the ray; the same, averaged where the entries around the
+# ray agree; the plane of its face; a walk from its face; exact intersection without a field.
 NEAREST, LINEAR, PLANE, WALK, EXACT = 0, 1, 2, 3, 4
 WAYS = {"nearest": NEAREST, "linear": LINEAR, "plane": PLANE, "walk": WALK, "exact": EXACT}
 

@@ -56,7 +56,7 @@ class World(NamedTuple):
 
 
 def world_of(scene: Scene) -> World:
-    """All arrays of a scene; those of a shape that stands alone are not copied."""
+    """All arrays of a scene; those of a single shape are not copied."""
     shapes = list({id(instance.shape): instance.shape for instance in scene.instances}.values())
     first_face = np.cumsum([0] + [len(shape.surface.triangles) for shape in shapes])
     first_node = np.cumsum([0] + [len(shape.surface.nodes) for shape in shapes])

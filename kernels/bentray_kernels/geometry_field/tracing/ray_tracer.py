@@ -40,7 +40,7 @@ class TraceSettings:
 
     Attributes:
         rows, columns: pixels.
-        depth: most surfaces at which a ray goes on; the dissertation has 2.
+        depth: most surfaces at which a ray continues; the dissertation has 2.
         way: lookup method: "nearest", "linear", "plane", "walk"; "exact" without fields.
         eye: the same for the first surface.
         threads: number of threads for tiles of rows.
@@ -135,9 +135,9 @@ def colour_of(
     # The instance and face that the ray leaves; within which instance it is.
     own, left, within = NOTHING, -1, NOTHING
     for turn in range(depth + 1):
-        ask = eye if turn == 0 else way
+        lookup = eye if turn == 0 else way
         met, face, distance, first, second = _nearest(
-            world, waiting, origin, direction, ask, own, left, within
+            world, waiting, origin, direction, lookup, own, left, within
         )
         if met == NOTHING:
             break

@@ -145,7 +145,7 @@ def on_the_device(world: World, precision: str | None = None) -> OpenCLTracer | 
     """The world on the chosen OpenCL device; None where no device passes its self-test.
 
     Args:
-        world: to look at.
+        world: to render.
         precision: as in ``OpenCLTracer``.
 
     Raises:

@@ -42,7 +42,7 @@ class Material:
         glass: share that is refracted.
         index: refractive index over that of the surroundings.
         refraction: "full", at both sides of the body; "single", at the first, and straight on from there.
-        self_reflection: whether the surface sees itself.
+        self_reflection: whether the surface is reflected in itself.
 
     Raises:
         InvalidInput: for a number out of range, mirrored and refracted light at once, or another name.

@@ -200,7 +200,7 @@ def link(data: bytes) -> bytes:
 
 
 def main(words: list[str]) -> int:
-    """Link as asked on the command line; 1 and a line on stderr where that cannot be done."""
+    """Link by the command line's arguments; 1 and a line on stderr where that is not possible."""
     output, objects, ahead = "", [], iter(words)
     for word in ahead:
         if word == "-o":

@@ -51,7 +51,7 @@ def heard(loss_np, way, *, height=1.0, noise=0.0, seed=0, **changes):
     seed=st.integers(0, 2**31),
 )
 @pytest.mark.parametrize("way", SPECTRA)
-def test_the_spectrum_tells_the_loss_whatever_the_height(way, loss, height, seed):
+def test_the_spectral_ratio_gives_the_loss_at_any_height(way, loss, height, seed):
     """Each pair of another height, as if focused, or as if its transducers were unlike."""
     heights = height * np.exp(np.random.default_rng(seed).normal(0.0, 0.7, APART.shape))[..., None]
     found = heard(loss, way, height=heights)
@@ -96,7 +96,7 @@ def test_louder_noise_leaves_out_and_never_lies(way):
 
 
 @pytest.mark.parametrize("way", SPECTRA)
-def test_the_deviation_that_is_told_is_the_one_that_noise_makes(way):
+def test_the_reported_deviation_is_that_of_the_noise(way):
     """White noise on the values of a spectrum, independent of each other: many draws against the estimate."""
     random = np.random.default_rng(11)
     frequency = np.linspace(0.6, 1.4, 24)

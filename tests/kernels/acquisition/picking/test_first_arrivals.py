@@ -36,7 +36,7 @@ def test_known_delays_come_back_to_a_hundredth_of_a_sample(picker, largest, seed
 
 
 @every_picker
-def test_noise_is_told_by_sigma(picker):
+def test_sigma_is_the_error_in_noise(picker):
     delay = smooth_delay(48, 1.0e-6)
     dataset = scan(delay, elements=48, noise=0.1)
     picked = pick(dataset, picker)
@@ -216,7 +216,7 @@ def test_a_prediction_leads_past_an_earlier_pulse(picker):
     assert not (np.abs(alone - 8.0e-7) < 2.0e-7).any()
 
 
-def test_a_prediction_says_nothing_where_it_is_missing_and_must_fit():
+def test_missing_predictions_are_ignored_and_shapes_are_checked():
     dataset = scan(3.0e-7, elements=16)
     wide = far(dataset)
     nothing = np.full(wide.shape, np.nan)

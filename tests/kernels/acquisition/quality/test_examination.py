@@ -76,7 +76,7 @@ def test_a_recording_that_starts_at_the_wrong_time_is_moved():
     assert_survived(examined, atol=4e-9)
 
 
-def test_outliers_and_cycle_jumps_are_told_apart_and_left_out():
+def test_outliers_and_cycle_jumps_are_distinguished_and_left_out():
     random = np.random.default_rng(2)
     delta = np.array(sought())
     known = np.argwhere(np.isfinite(delta))

@@ -25,7 +25,7 @@ def test_uniform_medium_is_exact(ndim):
     assert delta[0, 2] == ratio[1, 0] == 0.0
 
 
-def test_amplitudes_are_left_out_unless_asked_for():
+def test_amplitudes_are_simulated_only_on_request():
     medium = FineMedium(np.full((21, 21), 1450.0), 0.005, 1500.0)
     assert medium.arrivals(ELEMENTS[2], np.array([1]))[1] is None
 

@@ -94,7 +94,7 @@ def test_two_faces_back_to_back():
     check(parameterise(pillow), pillow)
 
 
-def test_needles_get_a_layout_that_says_that_it_keeps_no_angles():
+def test_needles_get_a_layout_that_reports_its_distortion():
     ball = bumpy_ball(3000)
     needles = mesh(ball.vertices * (1.0, 1.0, 80.0), ball.faces)
     found = parameterise(needles)

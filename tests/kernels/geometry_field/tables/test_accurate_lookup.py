@@ -71,7 +71,7 @@ def test_the_walk_ends_in_the_face_that_the_exact_intersector_meets():
     np.testing.assert_allclose(weights.T[both & inside], exact[both & inside], atol=2e-3)
 
 
-def test_the_entry_itself_is_told_exactly():
+def test_the_entry_itself_is_exact():
     from bentray_kernels.geometry_field.tables.cube import samples
 
     n, surface = 6, ball(3)
@@ -97,7 +97,7 @@ def test_rays_that_start_before_the_cube_are_the_same_rays():
     np.testing.assert_allclose(later[same] - 1.0, distances[same], atol=1e-5)
 
 
-def test_places_lie_on_the_faces_told():
+def test_positions_lie_on_the_returned_faces():
     surface = surface_of(over_the_poles(dented(4)))
     field = field_of(surface, 10)
     origins, directions = rays_through_the_cube(5000, 4)

@@ -40,7 +40,7 @@ def test_every_entry_is_what_the_ray_between_its_samples_meets():
     assert met > 500
 
 
-def test_a_ray_that_touches_two_faces_tells_one_of_them():
+def test_a_ray_that_touches_two_faces_returns_one_of_them():
     n, surface = 4, ball(1)
     field = field_of(surface, n)
     places = samples(n)

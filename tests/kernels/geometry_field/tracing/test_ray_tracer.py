@@ -114,7 +114,7 @@ def test_a_glass_ball_turns_the_surroundings_upside_down():
 
 
 @pytest.mark.parametrize("index", [1.3, 1.5, 2.0])
-def test_rays_through_a_ball_bend_as_snell_says(index):
+def test_rays_through_a_ball_obey_snells_law(index):
     surface = surface_of(over_the_poles(turned(octahedron(6))))
     ramp = np.repeat(np.linspace(0.0, 1.0, 512)[:, None, None], 8, axis=1) * np.ones(3)
     material = Material(glass=1.0, index=index)
@@ -153,7 +153,7 @@ def test_light_is_held_in_glass_that_it_meets_too_flatly():
     assert picture(scene, camera, depth=8).max() == 0
 
 
-def test_bodies_see_themselves_only_where_asked():
+def test_self_reflection_only_on_request():
     seeing = Material(mirror=1.0)
     camera = perspective((0.2, -1.2, 2.2), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 35.0)
 

@@ -177,7 +177,7 @@ def test_bent_rays_must_be_clearly_better():
     assert choose([trial("straight", 110e-9), straight, bent]) is straight
 
 
-def test_noise_says_where_to_stop():
+def test_the_reconstruction_stops_at_the_noise():
     chosen = trial("straight", 100e-9)
     assert stop_at_noise(PLAN, chosen, 90e-9).numerics.stop_rms_s == pytest.approx(99e-9)
     # What predicts better than the noise estimate shows that there is less of it.
@@ -186,7 +186,7 @@ def test_noise_says_where_to_stop():
     assert stop_at_noise(asked, chosen, 90e-9) == asked
 
 
-def test_the_noise_is_told_or_estimated(scan):
+def test_the_noise_is_stated_or_estimated(scan):
     clean = travel_time_noise(scan)
     random = np.random.default_rng(3)
     noisy = replace(scan, delta_tof_s=scan.delta_tof_s + random.normal(0.0, 3e-7, scan.delta_tof_s.shape))
@@ -208,7 +208,7 @@ def test_trials_are_coarser_and_speed_alone():
     assert {plan.nodes for plan in candidate_settings(PLAN)} == {48}
 
 
-def test_what_is_told_of_a_result_are_rays_and_waves(scan):
+def test_the_advice_combines_rays_and_waves(scan):
     result = reconstruct(scan, replace(PLAN, method="sart", iterations=1))
     assert advice_of(result) == ""
     chosen = replace(result, trials=(trial("straight", 1e-7), trial("curved", 2e-7)))

@@ -42,7 +42,7 @@ def first(problem):
     return step(problem, SETTINGS, state, told(problem, 1.0, 1.0))
 
 
-def test_the_first_step_has_the_asked_size_and_goes_downhill(problem):
+def test_the_first_step_has_the_set_size_and_reduces_the_misfit(problem):
     state = first(problem)
     way = state.image - WATER
     assert np.sqrt((way[problem.region] ** 2).mean()) == pytest.approx(SETTINGS.first_step_mps)
@@ -62,7 +62,7 @@ def test_a_step_that_makes_it_worse_is_shortened_and_then_given_up(problem):
     assert not state.skipped
 
 
-def test_it_stops_and_says_so_when_held_out_emitters_are_predicted_worse(problem):
+def test_it_stops_when_the_held_out_misfit_rises(problem):
     state = step(problem, SETTINGS, first(problem), told(problem, 0.9, 0.9, 1))
     liked = state.base
     for k in range(PATIENCE):

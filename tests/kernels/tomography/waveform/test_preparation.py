@@ -38,7 +38,7 @@ def test_a_wrong_speed_of_water_is_found():
     assert 1503.0 / (1.0 - problem.water.lead) == pytest.approx(1500.0, abs=1.0)
 
 
-def test_emitters_that_judge_are_the_same_in_every_band_and_make_no_image():
+def test_held_out_emitters_are_the_same_in_every_band_and_not_used():
     first, second = (prepare(scan(), SETTINGS, number) for number in (0, 1))
     assert np.array_equal(first.held, second.held)
     assert not np.array_equal(first.used, second.used)

@@ -51,7 +51,7 @@ def test_auto_goes_on_with_waves_where_it_may_and_they_predict_better(rays):
     assert again.history == found.history
 
 
-def test_without_leave_it_only_says_so(rays):
+def test_without_a_budget_there_is_only_advice(rays):
     assert rays.settings.method in ("sart", "gauss-newton")
     assert rays.provenance["waveform"].startswith("method waveform ")
     assert rays.provenance["waveform"].endswith("it takes about a minute of a core")

@@ -59,7 +59,7 @@ def test_nothing_stands_before_the_first_band():
     assert graph.history == ()
 
 
-def test_progress_rises_to_its_end_and_history_tells_the_bands():
+def test_progress_is_monotonic_and_history_records_the_bands():
     graph = RefinementGraph(
         MemoryWaveScan(scan(), SETTINGS),
         water(),

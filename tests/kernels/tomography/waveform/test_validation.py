@@ -75,7 +75,7 @@ def test_few_emitters_are_read(heard):
     assert [band.of for band in plan.bands] == ["speed"]
 
 
-def test_a_judge_goes_on_from_its_checkpoint(heard):
+def test_validation_resumes_from_its_checkpoint(heard):
     judge = ValidationGraph(heard, images()[1], ())
     (task,) = judge.first()
     assert (judge.done, judge.checkpoint.milestone) == (0, (False,))
