@@ -10,7 +10,6 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
-from .finite_frequency import front_smoothing, ray_slowness
 from .focusing import focusing
 from .gauss_newton import huber
 from .gauss_newton.linear_problem import Linearised, smoothing
@@ -50,14 +49,7 @@ def trace_rays(problem: Problem, settings: Settings, slowness: Floats, emitters:
     """
     if settings.attenuation.focusing:
         problem = _without_focusing(problem, settings, slowness, emitters)
-    return linearise_losses(
-        problem,
-        ray_slowness(problem, settings, slowness),
-        emitters,
-        rays=settings.rays,
-        eikonal=settings.ray_eikonal,
-        front=front_smoothing(problem, settings),
-    )
+    return linearise_losses(problem, settings, slowness, emitters)
 
 
 def _without_focusing(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Problem:

@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import Floats, Ints
-from ...rays.fan import RayKind
-from ..finite_frequency import front_smoothing, ray_slowness, width_in_nodes
+from ..finite_frequency import width_in_nodes
 from ..problem import Problem
 from ..result import Iteration, residual_counts
 from ..settings import Settings
@@ -102,19 +101,10 @@ def begin(slowness: Floats) -> Iterate:
 
 
 def trace_rays(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
-    """Rows of some emitters through an image; any split of the emitters gives the same.
-
-    In an image without contrast, such as the initial water, rays are straight.
-    """
-    rays: RayKind = settings.rays if slowness.min() < slowness.max() else "straight"
-    return linearise(
-        problem,
-        ray_slowness(problem, settings, slowness),
-        emitters,
-        rays=rays,
-        eikonal=settings.ray_eikonal,
-        front=front_smoothing(problem, settings),
-    )
+    """As ``linearise``; in an image without contrast, such as the initial water, rays are straight."""
+    if not slowness.min() < slowness.max():
+        settings = replace(settings, rays="straight")
+    return linearise(problem, settings, slowness, emitters)
 
 
 def step(

@@ -14,11 +14,13 @@ from ...compiled import kernel
 from ...eikonal import solve
 from ...rays.bending import STRIDE, bend
 from ...rays.descent import PARTS, empty_path, list_entries, merge_entries, trace_ray
-from ...rays.fan import Fan, RayKind
+from ...rays.fan import Fan
 from ...rays.newton_step import allocate_bending
 from ...splines import coefficients
+from ..finite_frequency import front_smoothing, ray_slowness
 from ..problem import Problem
 from ..sart.sart_update import smoothed
+from ..settings import Settings
 from .ray_matrix import back_project, project
 
 # A piece of a bent ray is STRIDE nodes long; its parts are as short as those of other rays.
@@ -62,35 +64,31 @@ def ray_density(problem: Problem, parts: Sequence[Rows]) -> Floats:
     return density.reshape(problem.region.shape)
 
 
-def linearise(
-    problem: Problem, slowness: Floats, emitters: Ints, *, rays: RayKind, eikonal: str, front: float = 0.0
-) -> Rows:
-    """Rows of some emitters' rays through an image.
+def linearise(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
+    """Rows of some emitters' rays through an image; any split of the emitters gives the same.
 
     Curved rays are bent to the stationary path in the cubic spline of the image, and their times are
     integrals of the spline. Times along unbent rays by linear interpolation are wrong where rays graze an
     edge, and a Gauss–Newton step would put this error into the image.
 
+    Rays bend in the image blurred as by ``finite_frequency``; if it is blurred, times are integrals of
+    ``ray_slowness`` along those rays.
+
     Args:
         problem: the slice or volume.
+        settings: with the rays and the method of the wave front.
         slowness: of the region's shape, s/m.
         emitters: rows of the problem's data, at least one.
-        rays: ``curved`` or ``straight``.
-        eikonal: method of the wave front.
-        front: standard deviation, nodes, of the Gaussian on the speed in which rays bend; if above 0, times
-            are integrals of the image along those rays.
     """
 
     def residual_of(emitter: int, valid: Ints, distance: Floats, predicted: Floats, _: Floats) -> Floats:
         water = distance / problem.water_speed
         return np.asarray(problem.delta_tof[emitter, valid] + water - predicted)
 
-    return _trace(problem, slowness, emitters, problem.delta_tof, residual_of, rays, eikonal, front)
+    return _trace(problem, settings, slowness, emitters, problem.delta_tof, residual_of)
 
 
-def linearise_losses(
-    problem: Problem, slowness: Floats, emitters: Ints, *, rays: RayKind, eikonal: str, front: float = 0.0
-) -> Rows:
+def linearise_losses(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
     """As ``linearise`` for the amplitudes: the residual, Np, is the log ratio minus that of water on the ray.
 
     Raises:
@@ -103,18 +101,16 @@ def linearise_losses(
     def residual_of(emitter: int, valid: Ints, distance: Floats, _: Floats, length: Floats) -> Floats:
         return np.asarray(ratio[emitter, valid] + water * (distance - length))
 
-    return _trace(problem, slowness, emitters, ratio, residual_of, rays, eikonal, front)
+    return _trace(problem, settings, slowness, emitters, ratio, residual_of)
 
 
 def _trace(
     problem: Problem,
+    settings: Settings,
     slowness: Floats,
     emitters: Ints,
     data: Floats,
     residual_of: Callable[[int, Ints, Floats, Floats, Floats], Floats],
-    rays: RayKind,
-    eikonal: str,
-    front: float,
 ) -> Rows:
     """Rows of the pairs that have data.
 
@@ -122,6 +118,7 @@ def _trace(
         residual_of: residual from the emitter, the valid receivers, their distances, m, predicted times, s,
             and the lengths of the rays, m.
     """
+    slowness, front = ray_slowness(problem, settings, slowness), front_smoothing(problem, settings)
     speed = smoothed(1.0 / slowness, front)
     parts, splines = [], {}
     for emitter in emitters:
@@ -134,13 +131,13 @@ def _trace(
         distance = np.linalg.norm(receivers - source, axis=1)
         inside, tof = np.ascontiguousarray(slowness[..., slab]), np.ascontiguousarray(speed[..., slab])
         spline = np.empty((0,) * slowness.ndim)
-        if rays == "curved":
+        if settings.rays == "curved":
             # Emitters of one height share a slab.
             if (slab.start, slab.stop) not in splines:
                 splines = {(slab.start, slab.stop): coefficients(-np.log(tof))}
             spline = splines[slab.start, slab.stop]
-            tof = solve(tof, problem.spacing, source, eikonal)
-        fan = Fan.checked(tof, problem.spacing, receivers, source, rays)
+            tof = solve(tof, problem.spacing, source, settings.ray_eikonal)
+        fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays)
         counts, columns, lengths, predicted = _rows(fan, front > 0.0, inside.ravel(), spline)
         if inside.shape != slowness.shape:
             column, height = np.divmod(columns, inside.shape[-1])
