@@ -19,14 +19,13 @@ from .out_of_order import (
     RESETS,
     SEED,
     WAIT,
-    Front,
     accept_earlier,
     correct,
     empty_waiting,
     wait,
 )
 from .problem import PointSource, SlownessGrid
-from .updates import TIE, factored_update
+from .updates import TIE, Front, factored_update
 
 # First-order times only give the order of arrival; they need not converge to rounding.
 ORDER_TOLERANCE = 1e-3
@@ -146,7 +145,7 @@ def _pass(
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
     settled = np.full(slowness.size, math.inf)
     tau = np.ones(slowness.size)
-    front = Front(steps, spacing, slowness, squares, tau, settled, limit, least)
+    front = Front(steps, spacing, slowness, squares, limit, least, tau, settled)
     waiting = empty_waiting(slowness.size)
     place, numbers = waiting.place, waiting.numbers
     for k in range(seeds.size):
@@ -157,7 +156,7 @@ def _pass(
     for node in order:
         if settled[node] < math.inf or (numbers[WAIT] > 0 and place[node] > DONE):
             continue
-        time = factored_update(node, steps, spacing, slowness, squares, tau, settled, limit, least)
+        time = factored_update(node, front)
         if numbers[LENGTH] > 0:
             time = accept_earlier(node, time, front, waiting)
         if time == math.inf:

@@ -11,7 +11,7 @@ from ..compiled import kernel
 from ..errors import InvalidInput
 from .heap import DONE, FAR, Nodes, change, take
 from .problem import PointSource
-from .updates import TIE, factored_update, plain_update
+from .updates import TIE, Front, factored_update, plain_update
 
 
 def fast_marching(problem: PointSource, *, order: int = 2) -> Floats:
@@ -129,6 +129,7 @@ def _march_factored(
     steps = (strides[0], strides[1], strides[2] if len(strides) == 3 else 0)
     settled = np.full(slowness.size, math.inf)
     tau = np.ones(slowness.size)
+    front = Front(steps, spacing, slowness, squares, limit, least, tau, settled)
     heap = np.empty(slowness.size, np.int32)
     keys = np.empty(slowness.size)
     group = np.empty(slowness.size, np.int32)
@@ -150,9 +151,7 @@ def _march_factored(
                     if place[neighbour] == DONE:
                         continue
                     # A neighbour more can make the time later: it replaces what fewer neighbours gave.
-                    trial = factored_update(
-                        neighbour, steps, spacing, slowness, squares, tau, settled, limit, least
-                    )
+                    trial = factored_update(neighbour, front)
                     length = change(heap, keys, place, length, neighbour, trial)
         # Nodes that tie are accepted together, or the second differences would depend on their order.
         latest = keys[0] * (1.0 + TIE)

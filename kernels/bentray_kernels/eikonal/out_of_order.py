@@ -16,26 +16,13 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from .heap import DONE, FAR, Nodes, change, take
-from .updates import TIE, factored_update
+from .updates import TIE, Front, factored_update
 
 # The place of nodes of the source's cell, whose times are final.
 SEED = -3
 
 # Entries of ``Waiting.numbers``.
 LENGTH, WAIT, RESETS = 0, 1, 2
-
-
-class Front(NamedTuple):
-    """Arguments of ``factored_update``, flat and padded; ``settled`` and ``tau`` are filled node by node."""
-
-    strides: tuple[int, int, int]
-    spacing: float
-    slowness: Floats
-    squares: Floats
-    tau: Floats
-    settled: Floats
-    limit: float
-    least: float
 
 
 class Waiting(NamedTuple):
@@ -91,7 +78,7 @@ def accept_earlier(node: int, time: float, front: Front, waiting: Waiting) -> fl
         numbers[WAIT] -= 1
         correct(first, front, waiting)
         if node >= 0:
-            time = _updated(node, front)
+            time = factored_update(node, front)
     return time
 
 
@@ -157,23 +144,7 @@ def _enter_neighbours(node: int, front: Front, waiting: Waiting) -> None:
 @kernel
 def _enter(node: int, front: Front, waiting: Waiting) -> None:
     """Update the time of a waiting node from its accepted neighbours; infinite if all of them were reset."""
-    time = _updated(node, front)
+    time = factored_update(node, front)
     if time < math.inf or waiting.place[node] != FAR:
         heap, keys, place, _, numbers = waiting
         numbers[LENGTH] = change(heap, keys, place, numbers[LENGTH], node, time)
-
-
-@kernel(inline="always")
-def _updated(node: int, front: Front) -> float:
-    """Travel time of a node from its accepted neighbours, s."""
-    return factored_update(
-        node,
-        front.strides,
-        front.spacing,
-        front.slowness,
-        front.squares,
-        front.tau,
-        front.settled,
-        front.limit,
-        front.least,
-    )

@@ -8,6 +8,7 @@ the final times and infinity elsewhere, so an unknown neighbour drops out of eve
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from ..arrays import Floats
 from ..compiled import kernel
@@ -30,6 +31,28 @@ PlainAxis = tuple[float, float, float]
 # An axis of the factored scheme: slope and shift of ∂T/∂x = slope·τ + shift, time of the nearest
 # neighbour, offset to it.
 FactoredAxis = tuple[float, float, float, int]
+
+
+class Front(NamedTuple):
+    """A factored solution T = T0·τ, flat and padded; ``tau`` and ``settled`` are filled node by node.
+
+    Attributes:
+        strides, spacing, slowness: of the grid.
+        squares: T0² of every node, border included, s².
+        limit: 4·(source slowness·spacing)²; a source nearer than the spacing differs by less.
+        least: lowest slowness of the grid over that at the source, which is the least possible τ.
+        tau: τ of settled nodes.
+        settled: final times, s; infinity elsewhere.
+    """
+
+    strides: tuple[int, int, int]
+    spacing: float
+    slowness: Floats
+    squares: Floats
+    limit: float
+    least: float
+    tau: Floats
+    settled: Floats
 
 
 @kernel(inline="always")
@@ -92,22 +115,21 @@ def plain_update(
 
 
 @kernel(inline="always")
-def factored_axis(
-    node: int, stride: int, curl: float, squares: Floats, tau: Floats, settled: Floats, limit: float
-) -> FactoredAxis:
+def factored_axis(node: int, stride: int, curl: float, front: Front) -> FactoredAxis:
     """One axis of the factored difference, taken positive away from its neighbour, over T0/h.
 
     Where no neighbour is settled the time is infinite and the offset 0. The slope is then that of T0 if
     the source lies beside the node, between two node lines (the minimum along the axis is at no node,
     so ∂T/∂x is not 0 there), and else 0. ``curl`` is 1/(4·T0²).
     """
+    squares, tau, settled = front.squares, front.tau, front.settled
     left = settled[node - stride]
     right = settled[node + stride]
     first = min(left, right)
     # h·s0²·x from the squares of T0 either side, exactly: no coordinates need to be kept.
     difference = squares[node + stride] - squares[node - stride]
     if first == math.inf:
-        return _across(abs(difference), curl, limit), 0.0, math.inf, 0
+        return _across(abs(difference), curl, front.limit), 0.0, math.inf, 0
     offset = -stride if left <= right else stride
     along = difference if left <= right else -difference
     second = settled[node + 2 * offset]
@@ -125,40 +147,26 @@ def _across(difference: float, curl: float, limit: float) -> float:
 
 
 @kernel(inline="always")
-def factored_update(
-    node: int,
-    strides: tuple[int, int, int],
-    spacing: float,
-    slowness: Floats,
-    squares: Floats,
-    tau: Floats,
-    settled: Floats,
-    limit: float,
-    least: float,
-) -> float:
+def factored_update(node: int, front: Front) -> float:
     """Travel time of one node with T = T0·τ, T0 the time in the source's own slowness.
 
     Only the smooth factor τ is differenced, so the source's singularity costs no accuracy (Fomel, Luo &
     Zhao 2009; Treister & Haber 2016). With derivatives in units of T0/h, Σ (slope·τ + shift)² =
     (h·slowness/T0)² is solved for the downwind root; an axis that is later than the root, or not
     upwind, is dropped, the latest first.
-
-    Args:
-        squares: T0² of every node, border included, s².
-        limit: 4·(source slowness·spacing)²; a source nearer than the spacing differs by less.
-        least: lowest slowness of the grid over that at the source, which is the least possible τ.
     """
-    square = squares[node]
+    strides, spacing, slowness = front.strides, front.spacing, front.slowness
+    square = front.squares[node]
     inverse = 1.0 / square
     curl = 0.25 * inverse
     base = math.sqrt(square)
     local = spacing * slowness[node]
     rhs = local * local * inverse
-    a = factored_axis(node, strides[0], curl, squares, tau, settled, limit)
-    b = factored_axis(node, strides[1], curl, squares, tau, settled, limit)
+    a = factored_axis(node, strides[0], curl, front)
+    b = factored_axis(node, strides[1], curl, front)
     c = (0.0, 0.0, math.inf, 0)
     if strides[2] != 0:
-        c = factored_axis(node, strides[2], curl, squares, tau, settled, limit)
+        c = factored_axis(node, strides[2], curl, front)
     # Nearly every node: all axes have a neighbour, and the root is downwind of them.
     slopes = a[0] * a[0] + b[0] * b[0] + c[0] * c[0]
     mixed = a[0] * a[1] + b[0] * b[1] + c[0] * c[1]
@@ -178,10 +186,8 @@ def factored_update(
             first = a if a[2] <= b[2] else b
             first = c if c[2] < first[2] else first
             beside = spacing * slowness[node + first[3]]
-            return _possible(base * factor, first[2], local, beside, strides[2] != 0, base * least)
-    return _factored_fewer(
-        a, b, c, node, spacing, slowness, squares, base, local, rhs, limit, strides[2] != 0, least
-    )
+            return _possible(base * factor, first[2], local, beside, strides[2] != 0, base * front.least)
+    return _factored_fewer(a, b, c, node, base, local, rhs, front)
 
 
 @kernel(inline="always")
@@ -190,17 +196,13 @@ def _factored_fewer(
     b: FactoredAxis,
     c: FactoredAxis,
     node: int,
-    spacing: float,
-    slowness: Floats,
-    squares: Floats,
     base: float,
     local: float,
     rhs: float,
-    limit: float,
-    space: bool,
-    least: float,
+    front: Front,
 ) -> float:
     """The update where an axis has no neighbour or must be dropped, which comes to the same."""
+    squares, limit = front.squares, front.limit
     if b[2] < a[2]:
         a, b = b, a
     if c[2] < b[2]:
@@ -242,10 +244,10 @@ def _factored_fewer(
         factor = factored_root(slopes, mixed, shifts, a[2], base)
         if a[0] * factor + a[1] < 0.0:
             factor = -1.0
-    beside = spacing * slowness[node + a[3]]
+    beside = front.spacing * front.slowness[node + a[3]]
     if factor < 0.0:
         return float(a[2] + 0.5 * (local + beside))
-    return _possible(base * factor, a[2], local, beside, space, base * least)
+    return _possible(base * factor, a[2], local, beside, front.strides[2] != 0, base * front.least)
 
 
 @kernel(inline="always")

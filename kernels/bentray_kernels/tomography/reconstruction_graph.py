@@ -77,12 +77,13 @@ class ReconstructionGraph:
     def _evaluated(self) -> list[Evaluation]:
         """What is computed along the rays of the finished image."""
         settings, problem = self._plans[-1], self._scan.problem(self._index)
+        at = self._scan, self._index
         evaluations = []
         if settings.attenuation.enabled and problem.log_ratio is not None:
             emitters = attenuation.active_emitters(problem)
-            evaluations.append(Evaluation(trace_attenuation_rays, solve_attenuation, emitters))
+            evaluations.append(Evaluation(at, trace_attenuation_rays, solve_attenuation, emitters))
         if settings.resolution_check:
-            evaluations.append(Evaluation(trace_final_rays, check_resolution, problem.active_emitters))
+            evaluations.append(Evaluation(at, trace_final_rays, check_resolution, problem.active_emitters))
         return evaluations
 
     @property
@@ -137,7 +138,7 @@ class ReconstructionGraph:
         image, number = self._stage.state.slowness, self._stage.number + 1
         if number == len(self._plans):
             pending = [one for one in self._evaluations if one.value is None]
-            return [task for one in pending for task in one.first(self._scan, self._index, image)]
+            return [task for one in pending for task in one.first(image)]
         self._history = self.history
         self._passes_before += self._stage.total
         earlier, problem = (self._scan.problem(self._index, k) for k in (number - 1, number))
@@ -152,14 +153,21 @@ class ReconstructionGraph:
 class Evaluation:
     """Rays of all emitters through the finished image, then one task that uses all of them.
 
-    Attributes:
+    Args:
+        at: the scan and the index of the slice.
         trace, evaluate: the functions of the two kinds of task.
+        emitters: whose rays are used.
+
+    Attributes:
+        trace, evaluate: as above.
         sizes: emitters of each batch.
         value: result of ``evaluate``.
     """
 
-    def __init__(self, trace: Callable[..., Rows], evaluate: Callable[..., Any], emitters: Ints) -> None:
-        self.trace, self.evaluate = trace, evaluate
+    def __init__(
+        self, at: tuple[Scan, int], trace: Callable[..., Rows], evaluate: Callable[..., Any], emitters: Ints
+    ) -> None:
+        self._at, self.trace, self.evaluate = at, trace, evaluate
         self.sizes = [len(batch) for batch in batches_of(emitters)]
         self.value: Any = None
         self._rows: dict[int, Any] = {}
@@ -169,12 +177,12 @@ class Evaluation:
         """Emitters whose rays are traced."""
         return sum(self.sizes) if self.value is not None else sum(self.sizes[batch] for batch in self._rows)
 
-    def first(self, scan: Scan, index: int, image: Floats) -> list[Task]:
-        """Tasks to start with; without emitters the one that uses their rows, which are none."""
+    def first(self, image: Floats) -> list[Task]:
+        """Tasks to start with; without emitters the evaluation of no rows."""
         if not self.sizes:
-            return [Task(self.evaluate, (scan, index, []))]
+            return [Task(self.evaluate, (*self._at, []))]
         return [
-            Task(self.trace, (scan, index, image, batch), keep_on_worker=True)
+            Task(self.trace, (*self._at, image, batch), keep_on_worker=True)
             for batch in range(len(self.sizes))
         ]
 
@@ -183,11 +191,10 @@ class Evaluation:
         if task.function is self.evaluate:
             self.value, self._rows = result, {}
             return []
-        scan, index, _, batch = task.arguments
-        self._rows[batch] = result
+        self._rows[task.arguments[-1]] = result
         if len(self._rows) < len(self.sizes):
             return []
-        return [Task(self.evaluate, (scan, index, [rows for _, rows in sorted(self._rows.items())]))]
+        return [Task(self.evaluate, (*self._at, [rows for _, rows in sorted(self._rows.items())]))]
 
 
 def trace_attenuation_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...arrays import Floats
-from ...task_graph import Task
 from ..gauss_newton.linearisation import Rows
 from ..reconstruction_graph import Evaluation, ReconstructionGraph, trace_final_rays
 from ..stage_graphs import Scan
@@ -28,7 +27,8 @@ class CandidateGraph(ReconstructionGraph):
         super().__init__(scan, index)
 
     def _evaluated(self) -> list[Evaluation]:
-        return [HeldOutMisfit(self._held_out, self._index)]
+        at, emitters = (self._held_out, self._index), self._held_out.problem(self._index).active_emitters
+        return [Evaluation(at, trace_final_rays, misfit, emitters)]
 
     @property
     def held_out_rms_s(self) -> float:
@@ -39,17 +39,6 @@ class CandidateGraph(ReconstructionGraph):
     def held_out_mean_s(self) -> float:
         """Mean absolute misfit of the held-out pairs, s."""
         return float(self.value_of(misfit)[1])
-
-
-class HeldOutMisfit(Evaluation):
-    """Evaluation of the misfit along the rays of the held-out pairs."""
-
-    def __init__(self, scan: Scan, index: int) -> None:
-        self._scan = scan
-        super().__init__(trace_final_rays, misfit, scan.problem(index).active_emitters)
-
-    def first(self, scan: Scan, index: int, image: Floats) -> list[Task]:
-        return super().first(self._scan, index, image)
 
 
 def misfit(_scan: Scan, _index: int, rows: Sequence[Rows]) -> Floats:
