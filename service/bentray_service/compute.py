@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from bentray_kernels.tomography.settings import Settings
-from bentray_workers.cluster.capacities import capacities_of, probed_capacities
+from bentray_workers.cluster.capacities import WorkerCapacity, capacities_of, probed_capacities
 from bentray_workers.files.dataset.counts import DatasetCounts
 from bentray_workers.files.dataset.summary import counts_in
 from bentray_workers.reconstruction import planning
@@ -45,7 +45,7 @@ class Compute:
     def __init__(self, cluster: Cluster, fetch: Callable[[Path], Path]) -> None:
         """Args:
         cluster: with the pool.
-        bring: lets what a task is to read lie at its path; see ``Store.fetch``.
+        fetch: makes an input file available at its path; see ``Store.fetch``.
         """
         self._cluster = cluster
         self._fetch = fetch
@@ -73,21 +73,13 @@ class Compute:
         Raises:
             InvalidInput: when no worker has enough memory or the required resource.
         """
-        try:
-            offers = probed_capacities(self.client, settings)
-        except (OSError, TimeoutError):
-            # Without scheduler, the job waits; its workers are unknown.
-            offers = ()
+        capacities = self._known(lambda client: probed_capacities(client, settings))
         known = counts_in(self._fetch(path)) if counts is None else DatasetCounts(**counts)
-        return planning.plan(known.summary(settings), settings, offers).to_dict()
+        return planning.plan(known.summary(settings), settings, capacities).to_dict()
 
-    def plan_simulation(self, asked: PhantomScan) -> dict[str, Any]:
+    def plan_simulation(self, request: PhantomScan) -> dict[str, Any]:
         """Plan a simulation in the same way."""
-        try:
-            offers = capacities_of(self.client)
-        except (OSError, TimeoutError):
-            offers = ()
-        return simulation_planning.plan_simulation(asked, offers).to_dict()
+        return simulation_planning.plan_simulation(request, self._known(capacities_of)).to_dict()
 
     def check_turntable(self, shape: Sequence[int], view: RefractionView) -> None:
         """Reject a turntable whose images no connected worker has enough memory for.
@@ -95,9 +87,12 @@ class Compute:
         Raises:
             InvalidInput: naming ``volume``, with the bytes found and accepted.
         """
-        try:
-            offers = capacities_of(self.client)
-        except (OSError, TimeoutError):
-            offers = ()
         cost = picture_cost.Cost(0.0, picture_cost.refraction_bytes(shape, view))
-        picture_cost.check_memory("volume", f"shape {tuple(shape)}", cost, offers)
+        picture_cost.check_memory("volume", f"shape {tuple(shape)}", cost, self._known(capacities_of))
+
+    def _known(self, capacities: Callable[[Any], tuple[WorkerCapacity, ...]]) -> tuple[WorkerCapacity, ...]:
+        """Capacities of the connected workers; none without scheduler, for which a job waits."""
+        try:
+            return capacities(self.client)
+        except (OSError, TimeoutError):
+            return ()

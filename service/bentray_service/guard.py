@@ -45,11 +45,11 @@ class Guard:
         except InvalidInput as error:
             await problem_response(error, scope["path"])(scope, receive, seen.sending(send))
         else:
-            given = scope, seen.receiving(receive), seen.sending(send)
+            arguments = scope, seen.receiving(receive), seen.sending(send)
             if caller is not None and caller.how == "key":
-                await answer_while_valid(self.app, *given, _parts(scope).key_watch, caller.who)
+                await answer_while_valid(self.app, *arguments, _parts(scope).key_watch, caller.who)
             else:
-                await self.app(*given)
+                await self.app(*arguments)
         finally:
             seen.log_request()
 

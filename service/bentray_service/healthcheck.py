@@ -36,11 +36,11 @@ def check(url: str) -> str | None:
         connection = kind(parts.hostname or "", parts.port, timeout=SECONDS)
         try:
             connection.request("GET", f"{parts.path.rstrip('/')}/health/ready")
-            answer = connection.getresponse()
-            body = answer.read()
+            response = connection.getresponse()
+            body = response.read()
         finally:
             connection.close()
-        return None if answer.status == http.client.OK else str(json.loads(body)["detail"])
+        return None if response.status == http.client.OK else str(json.loads(body)["detail"])
     except (OSError, http.client.HTTPException, ValueError, KeyError, TypeError) as error:
         return f"no answer from a service at {url}: {error}"
 

@@ -10,11 +10,11 @@ from collections.abc import Callable
 from sqlalchemy.exc import SQLAlchemyError
 
 from .access.quota import Quota
+from .errors import DatabaseUnavailable, InUse, Locked, StorageUnavailable, UnknownId
 from .files.data_folder import Files
 from .files.deletion import Deletion, StoredItem
 from .files.orphans import Orphans
 from .ingest.append import UploadLocks, remove
-from .refusals import DatabaseUnavailable, InUse, Locked, StorageUnavailable, UnknownId
 from .rows.ages import ExpiredItem, ExpiryMarks
 from .rows.observed_time import ObservedTime
 from .rows.records import UploadRow

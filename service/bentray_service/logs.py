@@ -59,12 +59,12 @@ class TextFormatter(logging.Formatter):
         )
 
     def format(self, record: logging.LogRecord) -> str:
-        said = super().format(record)
+        text = super().format(record)
         named = ", ".join(f"{name} {value}" for name, value in _ABOUT.get({}).items())
         if named:
-            first, line, rest = said.partition("\n")
-            said = f"{first} ({named}){line}{rest}"
-        return without_secrets(said)
+            first, line, rest = text.partition("\n")
+            text = f"{first} ({named}){line}{rest}"
+        return without_secrets(text)
 
 
 class JsonFormatter(logging.Formatter):

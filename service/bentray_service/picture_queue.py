@@ -13,7 +13,7 @@ from itertools import count
 
 from bentray_workers.cluster.capacities import WorkerCapacity
 
-from .refusals import RateLimited
+from .errors import RateLimited
 from .rows.tenants import Tenant
 
 # Maximum estimated waiting time of a new image, s.
@@ -144,10 +144,10 @@ class PictureQueue:
 
     def _assign(self) -> None:
         """Assign free workers to waiting tasks, first of the tenant served least recently."""
-        given = True
-        while given:
+        assigned = True
+        while assigned:
             in_turn = sorted(self._waiting, key=lambda tenant: self._served.get(tenant, 0))
-            given = any(self._give(tenant) for tenant in in_turn)
+            assigned = any(self._give(tenant) for tenant in in_turn)
 
     def _give(self, tenant: Tenant) -> bool:
         for waiter in self._waiting[tenant]:

@@ -27,8 +27,8 @@ from bentray_workers.rendering.refraction_view import RefractionView
 from bentray_workers.rendering.tiles import PictureTasks
 
 from .compute import Cluster
+from .errors import Busy, StorageFull
 from .picture_queue import LONG_S, PictureQueue
-from .refusals import Busy, StorageFull
 from .rows.records import DatasetRow, FieldRow, VolumeRow
 from .rows.tenants import Tenant
 
@@ -58,7 +58,7 @@ class Pictures:
     def __init__(self, cluster: Cluster, fetch: Callable[[Path], Path]) -> None:
         """Args:
         cluster: with the workers.
-        bring: lets what a task is to read lie at its path; see ``Store.fetch``.
+        fetch: makes an input file available at its path; see ``Store.fetch``.
         """
         self._cluster = cluster
         self._fetch = fetch
@@ -74,7 +74,7 @@ class Pictures:
             tenant: owner.
             volume: its row.
             path: of its file.
-            how: arguments of ``bentray_workers.images.slice``, or ``volume_slice`` for an upload.
+            how: arguments of the functions in ``bentray_workers.images.slice``.
         """
         cost = picture_cost.slice_cost(VolumeFile.of(volume), how.get("size"))
         draw = drawing_tasks.slice_png if "job_id" in volume else drawing_tasks.volume_slice_png

@@ -13,10 +13,10 @@ from sqlalchemy.exc import SQLAlchemyError
 from bentray_kernels.errors import InvalidInput
 
 from .compute import Compute
+from .errors import NotReady
 from .files.data_folder import Files
 from .ingest.reader import UploadIngest
 from .jobs.runner import Runner
-from .refusals import NotReady
 from .rows.database import Database
 
 # Time limit of the check, s.

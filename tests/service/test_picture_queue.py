@@ -6,8 +6,8 @@ from contextlib import suppress
 import pytest
 
 from bentray_service import picture_queue
+from bentray_service.errors import RateLimited
 from bentray_service.picture_queue import LATEST_S, MOST_IN_ALL, MOST_OF_TENANT, PictureQueue
-from bentray_service.refusals import RateLimited
 from bentray_service.rows.tenants import Tenant
 from bentray_workers.cluster.capacities import WorkerCapacity
 

@@ -56,9 +56,9 @@ def checked_scopes(words: str) -> tuple[str, ...]:
     Raises:
         InvalidInput: naming an unknown scope.
     """
-    found = tuple(dict.fromkeys(word.strip() for word in words.split(",")))
-    for scope in found:
+    scopes = tuple(dict.fromkeys(word.strip() for word in words.split(",")))
+    for scope in scopes:
         if scope not in SCOPES:
             accepted = "; ".join(f"{name}: {meaning}" for name, meaning in SCOPES.items())
             raise InvalidInput("scopes", repr(scope[:40]), accepted)
-    return found
+    return scopes

@@ -11,7 +11,7 @@ import anyio
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ..refusals import DatabaseUnavailable, NotAuthenticated
+from ..errors import DatabaseUnavailable, NotAuthenticated
 from ..rows.keys import Keys
 from ..web.errors import problem_response
 

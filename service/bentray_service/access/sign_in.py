@@ -10,7 +10,7 @@ from starlette.datastructures import Headers
 
 from bentray_kernels.errors import InvalidInput
 
-from ..refusals import Forbidden, NotAuthenticated, RateLimited
+from ..errors import Forbidden, NotAuthenticated, RateLimited
 from ..rows.api_key import PREFIX, ApiKey
 from ..rows.keys import Keys
 from ..rows.tenants import LOCAL, tenant_of_user
@@ -62,10 +62,10 @@ class SignIn:
             return False
         if time.monotonic() < self._no_keys_until:
             return True
-        found = self._keys.any()
+        any_key = self._keys.any()
         # Once a key existed, authentication stays required, even if all keys are revoked.
-        self._no_keys_until = math.inf if found else time.monotonic() + NO_KEYS_S
-        return not found
+        self._no_keys_until = math.inf if any_key else time.monotonic() + NO_KEYS_S
+        return not any_key
 
     def caller(self, headers: Headers, address: str) -> Caller:
         """Authenticate a request by its headers and client address.
@@ -76,9 +76,9 @@ class SignIn:
         """
         if self.open():
             return self._local_caller(headers)
-        scheme, _, given = headers.get("authorization", "").partition(" ")
-        if scheme.lower() == "bearer" and given.strip().startswith(PREFIX):
-            return self._caller_with_key(given.strip())
+        scheme, _, credentials = headers.get("authorization", "").partition(" ")
+        if scheme.lower() == "bearer" and credentials.strip().startswith(PREFIX):
+            return self._caller_with_key(credentials.strip())
         users = headers.getlist(self._user_header) if within(address, self._trusted) else []
         if len(users) == 1 and users[0].strip():
             user = users[0].strip()
@@ -117,14 +117,14 @@ class SignIn:
         # A page of another site can send requests from a browser on this machine, with DNS rebinding or a
         # form; its Host or Origin is not a loopback address.
         for name in ("host", "origin"):
-            given = headers.get(name)
-            if given is not None and not names_loopback(given):
+            value = headers.get(name)
+            if value is not None and not names_loopback(value):
                 accepted = "localhost or 127.0.0.1; other names require a key (`bentray keys create`)"
-                raise Forbidden(name.title(), repr(given[:80]), accepted)
+                raise Forbidden(name.title(), repr(value[:80]), accepted)
         return ANYONE
 
-    def _caller_with_key(self, given: str) -> Caller:
-        token = ApiKey.of(given)
+    def _caller_with_key(self, text: str) -> Caller:
+        token = ApiKey.of(text)
         row = None if token is None else self._keys.owner(token)
         if row is None:
             raise NotAuthenticated(

@@ -61,11 +61,11 @@ def audit(
             if str(entry.get("time", "")) >= first:
                 yield entry
 
-    found = deque(wanted(), maxlen=last)
+    rows = deque(wanted(), maxlen=last)
     if as_json:
-        print_json(list(found))
+        print_json(list(rows))
         return
-    print_table("Audit", COLUMNS, [tuple(_cell(entry.get(name)) for name in COLUMNS) for entry in found])
+    print_table("Audit", COLUMNS, [tuple(_cell(entry.get(name)) for name in COLUMNS) for entry in rows])
 
 
 def _day(text: str | None) -> str:

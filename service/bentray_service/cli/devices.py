@@ -23,27 +23,27 @@ def devices(as_json: AsJson = False) -> None:
     """
     from bentray_kernels.opencl import choose, find_devices, verdict_on
 
-    found = find_devices()
+    records = find_devices()
     verdicts: list[Verdict] = []
     with progress_bar("Testing OpenCL devices") as step:
-        for device in found:
-            step(len(verdicts), len(found), device.name)
+        for device in records:
+            step(len(verdicts), len(records), device.name)
             verdicts.append(verdict_on(device))
     choice = choose()
     chosen = choice.device.index if choice.device is not None else None
     if as_json:
-        rows = [_figures(device, verdict) for device, verdict in zip(found, verdicts, strict=True)]
+        rows = [_figures(device, verdict) for device, verdict in zip(records, verdicts, strict=True)]
         print_json({"chosen": chosen, "reason": choice.reason, "help": help_of(choice), "devices": rows})
         return
-    if found:
+    if records:
         columns = ("index", "platform", "device", "kind", "driver", "verdict", "remarks")
         cells = [
             (d.index, d.platform, d.name, d.kind, d.driver, "usable" if v.usable else "refused", _remarks(v))
-            for d, v in zip(found, verdicts, strict=True)
+            for d, v in zip(records, verdicts, strict=True)
         ]
         print_table("OpenCL devices", columns, cells)
-        print_lines(f"device {device.index} comes from {_source(device)}" for device in found)
-    print_lines(_summary(choice, bool(found)))
+        print_lines(f"device {device.index} comes from {_source(device)}" for device in records)
+    print_lines(_summary(choice, bool(records)))
 
 
 def _figures(device: Device, verdict: Verdict) -> dict[str, object]:

@@ -59,7 +59,7 @@ def geometry_field(
         def show(progress: Progress) -> None:
             step(progress.done, progress.total, "" if progress.total else "parameterising the mesh")
 
-        figures = build_field(None, work / "mesh.h5", settings, target, work, show)
+        figures = build_field(None, work / "mesh.h5", settings, target, work, on_progress=show)
     shutil.rmtree(work)
     made = time.perf_counter()
     with progress_bar("Drawing") as step:

@@ -107,11 +107,11 @@ def revoke(
     Example:  bentray keys revoke 0f3a5c7e9b1d
     """
     with _opened(data) as store:
-        found = _shown(store.revoke(key_id))
+        row = _shown(store.revoke(key_id))
     if as_json:
-        print_json(found)
+        print_json(row)
     else:
-        print_lines([f"{found['id']} of {found['tenant']} revoked"])
+        print_lines([f"{row['id']} of {row['tenant']} revoked"])
 
 
 @contextmanager
@@ -133,10 +133,10 @@ def _opened(data: Path | None) -> Iterator[Keys]:
 
 
 def _seconds(text: str) -> float:
-    found = re.fullmatch(r"([1-9][0-9]{0,4})([hdw])", text)
-    if found is None:
+    match = re.fullmatch(r"([1-9][0-9]{0,4})([hdw])", text)
+    if match is None:
         raise InvalidInput("expires", repr(text[:40]), ACCEPTED_AGES)
-    return int(found[1]) * SECONDS[found[2]]
+    return int(match[1]) * SECONDS[match[2]]
 
 
 def _shown(row: KeyRow) -> dict[str, Any]:

@@ -149,7 +149,7 @@ def _drawn(
 ) -> list[Tile]:
     from bentray_workers.rendering.refraction import draw_tile
 
-    found: list[Tile] = []
+    tiles: list[Tile] = []
     rows = min(ROWS, max(1, RAYS // (view.width * view.times**2)))
     pool = ThreadPoolExecutor(len(os.sched_getaffinity(0)))
     try:
@@ -158,12 +158,12 @@ def _drawn(
             for first in range(0, view.height, rows)
         ]
         for future in drawn:
-            found.append(future.result())
-            step(len(found), len(drawn))
+            tiles.append(future.result())
+            step(len(tiles), len(drawn))
     finally:
         # After Ctrl-C no further tiles are started.
         pool.shutdown(cancel_futures=True)
-    return found
+    return tiles
 
 
 def _joined(strips: list[Tile]) -> tuple[Colours, Any]:

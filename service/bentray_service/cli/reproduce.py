@@ -49,7 +49,7 @@ def reproduce(
             step(progress.done, progress.total, residual_note(rms) or progress.phase)
 
         after = run(source, dataset, before.settings, workers, show)
-    found = compared(before, after)
+    differences = compared(before, after)
     here = provenance()
     other = {
         name: {"then": then, "now": here[name]}
@@ -57,16 +57,18 @@ def reproduce(
         if name in here and then != here[name]
     }
     if as_json:
-        print_json({"result": str(record), "scan": str(source), "differences": found, "versions": other})
+        print_json(
+            {"result": str(record), "scan": str(source), "differences": differences, "versions": other}
+        )
     else:
         print_table(
             f"{record.name}, made again",
             ("array", "difference"),
-            [(k, difference_text(v)) for k, v in found.items()],
+            [(k, difference_text(v)) for k, v in differences.items()],
         )
         print_lines(f"{name}: {was['then']} then, {was['now']} now" for name, was in other.items())
-    if any(found.values()):
-        raise WorkFailed(f"{record.name} was not reproduced" + _reason(found, bool(other)))
+    if any(differences.values()):
+        raise WorkFailed(f"{record.name} was not reproduced" + _reason(differences, bool(other)))
 
 
 def compared(before: Reconstruction, after: Reconstruction) -> dict[str, Any]:
@@ -75,22 +77,22 @@ def compared(before: Reconstruction, after: Reconstruction) -> dict[str, Any]:
 
     from bentray_workers.files.reconstruction import IMAGES
 
-    found: dict[str, Any] = {}
+    differences: dict[str, Any] = {}
     for name, place in {**IMAGES, "residuals": "residuals"}.items():
         old, new = getattr(before, name), getattr(after, name)
         if old is None and new is None:
             continue
         if old is None or new is None:
-            found[place] = "only then" if new is None else "only now"
+            differences[place] = "only then" if new is None else "only now"
         elif old.shape != new.shape:
-            found[place] = f"shape {old.shape} then, {new.shape} now"
+            differences[place] = f"shape {old.shape} then, {new.shape} now"
         elif np.array_equal(old, new, equal_nan=True):
-            found[place] = None
+            differences[place] = None
         else:
-            found[place] = float(np.nanmax(np.abs(old - new), initial=0.0)) or "NaN at other nodes"
+            differences[place] = float(np.nanmax(np.abs(old - new), initial=0.0)) or "NaN at other nodes"
     old_rms, new_rms = ([sweep.residual_rms_s for sweep in one.history] for one in (before, after))
-    found["history"] = None if old_rms == new_rms else "different residuals"
-    return found
+    differences["history"] = None if old_rms == new_rms else "different residuals"
+    return differences
 
 
 def difference_text(difference: float | str | None) -> str:

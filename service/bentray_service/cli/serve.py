@@ -106,7 +106,7 @@ def _listen(host: str, port: int) -> socket.socket:
 def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> None:
     from .. import logs
     from ..app import create_app
-    from ..arenas import limit_arenas
+    from ..malloc_arenas import limit_arenas
     from ..web.server import Server
 
     host, port = listening.getsockname()[:2]

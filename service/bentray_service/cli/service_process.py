@@ -53,8 +53,8 @@ def _url(process: subprocess.Popen[bytes], log: Path) -> str:
             raise WorkFailed(f"the service did not start within {START_S:g} s; its log is {log}")
     line = process.stdout.readline()
     if not line:
-        said = log.read_text(errors="replace").strip().splitlines()
-        raise WorkFailed(f"the service exited at once: {said[-1] if said else 'no output'} (log: {log})")
+        lines = log.read_text(errors="replace").strip().splitlines()
+        raise WorkFailed(f"the service exited at once: {lines[-1] if lines else 'no output'} (log: {log})")
     return str(json.loads(line)["url"])
 
 

@@ -51,14 +51,14 @@ def verify(
         if remove_orphans:
             with closing(lock(files.root)):
                 orphans.accept()
-        found = list(scrub(files, checksums, orphans))
-    counts = Counter(one.state for one in found)
+        findings = list(scrub(files, checksums, orphans))
+    counts = Counter(one.state for one in findings)
     if as_json:
-        print_json({"counts": counts, "things": [one._asdict() for one in found]})
+        print_json({"counts": counts, "things": [one._asdict() for one in findings]})
     else:
-        listed = [one for one in found if one.state in LISTED]
+        listed = [one for one in findings if one.state in LISTED]
         print_lines([f"{one.state}: {one.tenant} {one.path} {one.found}".rstrip() for one in listed])
         words = ", ".join(f"{count} {state}" for state, count in sorted(counts.items()))
         remark(words or "no stored files")
     if counts["damaged"]:
-        raise WorkFailed(f"{counts['damaged']} of {len(found)} stored items are damaged")
+        raise WorkFailed(f"{counts['damaged']} of {len(findings)} stored items are damaged")

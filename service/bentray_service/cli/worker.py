@@ -87,7 +87,7 @@ def worker(
                 "memory_limit", repr(memory_limit), "a size, e.g. 4GiB; 0: unlimited"
             ) from error
     count = workers if workers is not None else len(os.sched_getaffinity(0))
-    asked = JoinRequest(
+    request = JoinRequest(
         scheduler=scheduler,
         workers=count,
         resources={**OFFERED, **(OPENCL if opencl and _has_device() else {})},
@@ -98,9 +98,14 @@ def worker(
         security=security_of(tls),
     )
     if as_json:
-        about = {"scheduler": scheduler, "workers": count, "lanes": dict(asked.resources), "pid": os.getpid()}
+        about = {
+            "scheduler": scheduler,
+            "workers": count,
+            "lanes": dict(request.resources),
+            "pid": os.getpid(),
+        }
         print_lines([json.dumps(about)])
-    join(asked, remark)
+    join(request, remark)
 
 
 def _has_device() -> bool:

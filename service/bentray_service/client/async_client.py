@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager
-from types import TracebackType
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 import anyio
@@ -14,7 +13,7 @@ from . import flows
 from .connection import Connection, document
 from .errors import ClientError, from_response, no_answer
 from .saving import saving
-from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, PauseStep, RequestStep, Step
+from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, FlowRun, PauseStep, RequestStep, Step
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -23,8 +22,8 @@ T = TypeVar("T")
 def _method(
     flow: Callable[Concatenate[Connection, P], Flow[T]],
 ) -> Callable[Concatenate[AsyncClient, P], Coroutine[Any, Any, T]]:
-    async def method(client: AsyncClient, /, *given: P.args, **named: P.kwargs) -> T:
-        return await client._run(flow(client, *given, **named))
+    async def method(client: AsyncClient, /, *args: P.args, **kwargs: P.kwargs) -> T:
+        return await client._run(flow(client, *args, **kwargs))
 
     document(method, flow)
     return method
@@ -40,9 +39,7 @@ class AsyncClient(Connection):
     async def __aenter__(self) -> Self:
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         await self.close()
 
     async def close(self) -> None:
@@ -63,32 +60,27 @@ class AsyncClient(Connection):
     delete = _method(flows.delete)
 
     async def _run(self, flow: Flow[T]) -> T:
-        flow = self._patience.through(flow)
-        answer: Any = None
-        error: ClientError | None = None
+        run = FlowRun(self._retries.through(flow))
+        outcome: Any = None
         async with AsyncExitStack() as streams:
             listening: dict[str, AsyncIterator[str]] = {}
-            while True:
+            while (step := run.next(outcome)) is not None:
                 try:
-                    step = flow.send(answer) if error is None else flow.throw(error)
-                except StopIteration as end:
-                    value: T = end.value
-                    return value
-                try:
-                    answer, error = await self._do(step, streams, listening), None
-                except ClientError as failure:
-                    answer, error = None, failure
+                    outcome = await self._do(step, streams, listening)
+                except ClientError as error:
+                    outcome = error
+        return run.result
 
     async def _do(self, step: Step, streams: AsyncExitStack, listening: dict[str, AsyncIterator[str]]) -> Any:
         if isinstance(step, PauseStep):
             return await anyio.sleep(step.seconds)
         if isinstance(step, RequestStep):
             content = None if step.body is None else _awaited(step.body())
-            async with self._answer(step.method, step.path, content=content, **step.options) as response:
+            async with self._respond(step.method, step.path, content=content, **step.options) as response:
                 await response.aread()
                 return response
         if isinstance(step, DownloadStep):
-            async with self._answer("GET", step.path, **step.options) as response:
+            async with self._respond("GET", step.path, **step.options) as response:
                 with saving(step, response) as save:
                     async for chunk in response.aiter_bytes(CHUNK_BYTES):
                         await anyio.to_thread.run_sync(save, chunk)
@@ -99,8 +91,8 @@ class AsyncClient(Connection):
         self, step: EventStep, streams: AsyncExitStack, listening: dict[str, AsyncIterator[str]]
     ) -> str | None:
         if step.path not in listening:
-            answer = self._answer("GET", step.path, timeout=step.seconds)
-            listening[step.path] = (await streams.enter_async_context(answer)).aiter_lines()
+            response = self._respond("GET", step.path, timeout=step.seconds)
+            listening[step.path] = (await streams.enter_async_context(response)).aiter_lines()
         try:
             line = await anext(listening[step.path], None)
         except httpx.TransportError as error:
@@ -111,7 +103,7 @@ class AsyncClient(Connection):
         return line
 
     @asynccontextmanager
-    async def _answer(self, method: str, path: str, **request: Any) -> AsyncIterator[httpx.Response]:
+    async def _respond(self, method: str, path: str, **request: Any) -> AsyncIterator[httpx.Response]:
         try:
             async with self._http.stream(method, path, **request) as response:
                 if not response.is_success:

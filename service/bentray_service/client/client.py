@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from types import TracebackType
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 import httpx
@@ -14,15 +13,15 @@ from . import flows
 from .connection import Connection, document
 from .errors import ClientError, from_response, no_answer
 from .saving import saving
-from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, PauseStep, RequestStep, Step
+from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, FlowRun, PauseStep, RequestStep, Step
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 
 def _method(flow: Callable[Concatenate[Connection, P], Flow[T]]) -> Callable[Concatenate[Client, P], T]:
-    def method(client: Client, /, *given: P.args, **named: P.kwargs) -> T:
-        return client._run(flow(client, *given, **named))
+    def method(client: Client, /, *args: P.args, **kwargs: P.kwargs) -> T:
+        return client._run(flow(client, *args, **kwargs))
 
     document(method, flow)
     return method
@@ -38,9 +37,7 @@ class Client(Connection):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -61,32 +58,27 @@ class Client(Connection):
     delete = _method(flows.delete)
 
     def _run(self, flow: Flow[T]) -> T:
-        flow = self._patience.through(flow)
-        answer: Any = None
-        error: ClientError | None = None
+        run = FlowRun(self._retries.through(flow))
+        outcome: Any = None
         with ExitStack() as streams:
             listening: dict[str, Iterator[str]] = {}
-            while True:
+            while (step := run.next(outcome)) is not None:
                 try:
-                    step = flow.send(answer) if error is None else flow.throw(error)
-                except StopIteration as end:
-                    value: T = end.value
-                    return value
-                try:
-                    answer, error = self._do(step, streams, listening), None
-                except ClientError as failure:
-                    answer, error = None, failure
+                    outcome = self._do(step, streams, listening)
+                except ClientError as error:
+                    outcome = error
+        return run.result
 
     def _do(self, step: Step, streams: ExitStack, listening: dict[str, Iterator[str]]) -> Any:
         if isinstance(step, PauseStep):
             return time.sleep(step.seconds)
         if isinstance(step, RequestStep):
             content = None if step.body is None else step.body()
-            with self._answer(step.method, step.path, content=content, **step.options) as response:
+            with self._respond(step.method, step.path, content=content, **step.options) as response:
                 response.read()
                 return response
         if isinstance(step, DownloadStep):
-            with self._answer("GET", step.path, **step.options) as response, saving(step, response) as save:
+            with self._respond("GET", step.path, **step.options) as response, saving(step, response) as save:
                 for chunk in response.iter_bytes(CHUNK_BYTES):
                     save(chunk)
             return None
@@ -94,7 +86,7 @@ class Client(Connection):
 
     def _listen(self, step: EventStep, streams: ExitStack, listening: dict[str, Iterator[str]]) -> str | None:
         if step.path not in listening:
-            response = streams.enter_context(self._answer("GET", step.path, timeout=step.seconds))
+            response = streams.enter_context(self._respond("GET", step.path, timeout=step.seconds))
             listening[step.path] = response.iter_lines()
         try:
             line = next(listening[step.path], None)
@@ -106,7 +98,7 @@ class Client(Connection):
         return line
 
     @contextmanager
-    def _answer(self, method: str, path: str, **request: Any) -> Iterator[httpx.Response]:
+    def _respond(self, method: str, path: str, **request: Any) -> Iterator[httpx.Response]:
         try:
             with self._http.stream(method, path, **request) as response:
                 if not response.is_success:

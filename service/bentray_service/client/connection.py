@@ -12,7 +12,7 @@ import httpx
 
 from bentray_kernels.errors import InvalidInput
 
-from .patience import PATIENCE_S, Retries
+from .retries import PATIENCE_S, Retries
 
 CONNECT_S = 10.0
 
@@ -28,8 +28,8 @@ class Connection:
         timeout_s: time limit for a response.
         poll_s: interval between polls of a job without event stream.
         patience_s: time for which requests are retried while the service is unavailable, e.g. during a
-            restart. Only
-            idempotent requests are retried: reading, downloading, uploading, and starting a job with a key.
+            restart. Only idempotent requests are retried: reading, downloading, uploading, and starting a job
+            with a key.
             0: no retries.
         on_wait: called with a message when retries begin and when they end.
 
@@ -55,7 +55,7 @@ class Connection:
             raise InvalidInput("url", repr(url), "a web address, such as http://127.0.0.1:8000")
         self.url = url.rstrip("/")
         self.poll_s = poll_s
-        self._patience = Retries(patience_s, on_wait)
+        self._retries = Retries(patience_s, on_wait)
         key = key or os.environ.get("BENTRAY_KEY")
         self._options: dict[str, Any] = {
             "base_url": self.url,
@@ -72,5 +72,5 @@ def document(method: Callable[..., Any], flow: Callable[..., Any]) -> None:
     first, *others = signature.parameters.values()
     result = str(signature.return_annotation).removeprefix("Flow[").removesuffix("]")
     parameters = [first.replace(name="self", annotation=first.empty, kind=others[0].kind), *others]
-    found = signature.replace(parameters=parameters, return_annotation=result)
-    method.__signature__ = found  # type: ignore[attr-defined]
+    documented = signature.replace(parameters=parameters, return_annotation=result)
+    method.__signature__ = documented  # type: ignore[attr-defined]

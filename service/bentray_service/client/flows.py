@@ -50,8 +50,8 @@ def upload(
     Returns:
         the record of the dataset, volume or mesh.
     """
-    answer = yield from send_file(Path(path), on_progress, kind, resume, metadata)
-    return RECORDS[kind].model_validate_json(answer.content)
+    response = yield from send_file(Path(path), on_progress, kind, resume, metadata)
+    return RECORDS[kind].model_validate_json(response.content)
 
 
 def submit(
@@ -134,12 +134,12 @@ def delete(connection: Connection, stored_id: str) -> Flow[None]:
 
 
 def _record(model: type[Record], method: str, path: str) -> Flow[Record]:
-    answer = yield RequestStep(method, path, repeatable=method == "GET")
-    return model.model_validate_json(answer.content)
+    response = yield RequestStep(method, path, repeatable=method == "GET")
+    return model.model_validate_json(response.content)
 
 
 def _start(request: dict[str, Any]) -> Flow[JobRecord]:
     """Start a job with an idempotency key, so that retries start no second job."""
     options = {"json": request, "headers": {"Idempotency-Key": str(uuid.uuid4())}}
-    answer = yield RequestStep("POST", "/v1/jobs", options, repeatable=True)
-    return JobRecord.model_validate_json(answer.content)
+    response = yield RequestStep("POST", "/v1/jobs", options, repeatable=True)
+    return JobRecord.model_validate_json(response.content)

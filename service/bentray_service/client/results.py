@@ -75,11 +75,13 @@ def read_result(path: Path, record: VolumeRecord) -> Result:
         values, units = {"value": volume.values}, {"value": record.unit}
         spacing, origin = volume.spacing_m, volume.origin_m
     else:
-        found = read_reconstruction(path)
-        values = {name: getattr(found, name) for name in UNITS if getattr(found, name) is not None}
+        reconstruction = read_reconstruction(path)
+        values = {
+            name: getattr(reconstruction, name) for name in UNITS if getattr(reconstruction, name) is not None
+        }
         units = {name: UNITS[name] for name in values}
-        spacing, origin = found.spacing_m, found.origin_m
-        attributes |= {**found.provenance, "settings": str(found.settings.to_dict())}
+        spacing, origin = reconstruction.spacing_m, reconstruction.origin_m
+        attributes |= {**reconstruction.provenance, "settings": str(reconstruction.settings.to_dict())}
     shape = next(iter(values.values())).shape
     axes = tuple(record.axes.split(","))
     coordinates = {

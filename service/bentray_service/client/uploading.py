@@ -32,7 +32,7 @@ PIECE = {"Content-Type": "application/offset+octet-stream"}
 
 
 def send_file(
-    path: Path, on_progress: OnBytes | None, kind: UploadKind, resume: str | None, said: Mapping[str, str]
+    path: Path, on_progress: OnBytes | None, kind: UploadKind, resume: str | None, metadata: Mapping[str, str]
 ) -> Flow[httpx.Response]:
     """Upload a file; the result is the response with the record of the stored item."""
     if kind not in PLACES:
@@ -42,7 +42,7 @@ def send_file(
     except OSError as error:
         raise _unreadable(path, error) from error
     if resume is None:
-        place = yield from _begin(total, {"filename": path.name, **said, "kind": kind})
+        place = yield from _begin(total, {"filename": path.name, **metadata, "kind": kind})
     else:
         place = f"/v1/uploads/{resume}"
     try:
@@ -57,8 +57,8 @@ def _begin(total: int, said: Mapping[str, str]) -> Flow[str]:
     metadata = ",".join(f"{name} {base64.b64encode(text.encode()).decode()}" for name, text in said.items())
     headers = {**TUS, "Upload-Length": str(total), "Upload-Metadata": metadata}
     # An unused upload expires.
-    answer = yield RequestStep("POST", "/v1/uploads", {"headers": headers}, repeatable=True)
-    return httpx.URL(answer.headers["Location"]).path
+    response = yield RequestStep("POST", "/v1/uploads", {"headers": headers}, repeatable=True)
+    return httpx.URL(response.headers["Location"]).path
 
 
 def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Flow[None]:

@@ -22,8 +22,8 @@ def wait_for(
     deadline = None if timeout_s is None else time.monotonic() + timeout_s
     place, broken = f"/v1/jobs/{job_id}", 0
     while True:
-        answer = yield RequestStep("GET", place, repeatable=True, until=deadline)
-        job = JobRecord.model_validate_json(answer.content)
+        response = yield RequestStep("GET", place, repeatable=True, until=deadline)
+        job = JobRecord.model_validate_json(response.content)
         if on_progress is not None:
             on_progress(job)
         if job.state == "succeeded":

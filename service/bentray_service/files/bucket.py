@@ -15,7 +15,7 @@ import aiohttp
 from botocore.exceptions import BotoCoreError, ClientError
 from s3fs import S3FileSystem
 
-from ..refusals import StorageUnavailable
+from ..errors import StorageUnavailable
 
 log = logging.getLogger("bentray.storage")
 
@@ -87,10 +87,10 @@ class Bucket:
         """Metadata of an object, with its ``size``; None if it does not exist."""
         try:
             with self._watched(may_miss=True):
-                found = self._call("head_object", Key=self._prefix + key)
+                head = self._call("head_object", Key=self._prefix + key)
         except FileNotFoundError:
             return None
-        return {**found["Metadata"], "size": str(found["ContentLength"])}
+        return {**head["Metadata"], "size": str(head["ContentLength"])}
 
     def listed(self, under: str = "") -> Iterator[BucketObject]:
         """All objects whose keys start with ``under``."""
@@ -111,8 +111,8 @@ class Bucket:
         while left:
             batch, left = left[:MOST_REMOVED], left[MOST_REMOVED:]
             with self._watched():
-                answer = self._call("delete_objects", Delete={"Objects": batch, "Quiet": True})
-                for failure in answer.get("Errors", ()):
+                response = self._call("delete_objects", Delete={"Objects": batch, "Quiet": True})
+                for failure in response.get("Errors", ()):
                     raise PermissionError(failure.get("Code"))
 
     @contextmanager

@@ -11,11 +11,10 @@ from collections.abc import Callable, Collection
 from concurrent.futures import Future
 from pathlib import Path
 
-from ..refusals import StorageUnavailable
+from ..errors import StorageUnavailable
 from ..rows.live_ids import LiveIds, Name
 from .bucket import Bucket
 from .cache import Cache
-from .disk import bytes_in
 from .packing import metadata_of, packed, unpack
 from .tenant_files import KEPT
 
@@ -23,9 +22,8 @@ log = logging.getLogger("bentray.storage")
 
 # The object with the id of the database that uses the bucket.
 MARK = "bentray-database"
-# Caching times of the availability of the bucket and of the usage of tenants, s.
+# Caching time of the availability of the bucket, s.
 FRESH_S = 5.0
-SUM_S = 60.0
 # Minimum age of orphaned objects and cached files before deletion, s; the clocks of buckets differ.
 FORGOTTEN_S = 86400.0
 LEFT_S = 3600.0
@@ -53,7 +51,6 @@ class BucketStore:
         self._cache = Cache(root, cache_bytes)
         self._lock = threading.Lock()
         self._coming: dict[Path, Future[None]] = {}
-        self._sums: dict[Path, tuple[float, int]] = {}
         self._asking = threading.Lock()
         self._asked = -FRESH_S
         self._fault: str | None = None
@@ -65,7 +62,6 @@ class BucketStore:
             held = self._bucket.metadata(key)
             if held is None or held.get("sha256") != metadata["sha256"]:
                 self._bucket.put(whole, key, metadata)
-                self._count(path, whole.stat().st_size)
         self._cache.use(path)
         self._make_room(0)
 
@@ -104,19 +100,6 @@ class BucketStore:
         # Cache first, so that a concurrent publication notices the deletion.
         self._cache.clear(paths)
         self._bucket.remove([self._key(path) for path in paths])
-        with self._lock:
-            for path in paths:
-                self._sums.pop(path.parents[1], None)
-
-    def bytes_used(self, folder: Path) -> int:
-        now = time.monotonic()
-        with self._lock:
-            asked, kept = self._sums.get(folder, (-SUM_S, 0))
-        if now - asked >= SUM_S:
-            kept = sum(one.size for one in self._bucket.listed(f"{self._key(folder)}/"))
-            with self._lock:
-                self._sums[folder] = now, kept
-        return kept + sum(bytes_in(inside) for inside in folder.iterdir() if inside.name not in KEPT)
 
     def fault(self) -> str | None:
         with self._asking:
@@ -168,15 +151,10 @@ class BucketStore:
             whole.unlink(missing_ok=True)
         self._cache.use(path)
 
-    def _make_room(self, wanted: int) -> None:
+    def _make_room(self, size: int) -> None:
         self._cache.make_room(
-            wanted, self._known.needed, lambda path: self._bucket.metadata(self._key(path)) is not None
+            size, self._known.needed, lambda path: self._bucket.metadata(self._key(path)) is not None
         )
-
-    def _count(self, path: Path, size: int) -> None:
-        with self._lock:
-            if (found := self._sums.get(path.parents[1])) is not None:
-                self._sums[path.parents[1]] = found[0], found[1] + size
 
     def _probe(self) -> str | None:
         try:

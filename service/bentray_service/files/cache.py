@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 import secrets
-import shutil
 import threading
 import time
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .disk import bytes_in
+from .disk import bytes_in, remove_path
 from .tenant_files import KEPT
 
 # Exports are evicted together with their volume.
@@ -51,24 +50,26 @@ class Cache:
             return True
 
     def make_room(
-        self, wanted: int, needed: Callable[[], Collection[str]], kept: Callable[[Path], bool]
+        self, size: int, needed: Callable[[], Collection[str]], restorable: Callable[[Path], bool]
     ) -> None:
-        """Evict the least recently used items until ``wanted`` bytes fit.
+        """Evict the least recently used items until ``size`` bytes fit.
 
         Args:
-            wanted: size of a new item, bytes.
+            size: size of a new item, bytes.
             needed: returns the ids that unfinished jobs need; called only if something must be evicted.
-            kept: whether an item can be downloaded again.
+            restorable: whether an item can be downloaded again.
         """
         things = self._things()
-        total = sum(thing.size for thing in things.values()) + wanted
+        total = sum(thing.size for thing in things.values()) + size
         if total <= self._most_bytes:
             return
         needing = needed()
         for (_, name), thing in sorted(things.items(), key=lambda one: one[1].used):
             if total <= self._most_bytes or thing.used > time.time() - RECENT_S:
                 return
-            if name in needing or not all(kept(path) for path in thing.paths if path.parent.name in KEPT):
+            if name in needing or not all(
+                restorable(path) for path in thing.paths if path.parent.name in KEPT
+            ):
                 continue
             if self._drop(thing):
                 total -= thing.size
@@ -81,10 +82,7 @@ class Cache:
                 path.replace(gone)
             except FileNotFoundError:
                 continue
-            if gone.is_dir():
-                shutil.rmtree(gone)
-            else:
-                gone.unlink()
+            remove_path(gone)
 
     def stored_paths(self) -> Iterator[Path]:
         """All complete files and folders."""
@@ -103,14 +101,14 @@ class Cache:
 
     def _things(self) -> dict[tuple[str, str], CachedItem]:
         """Cached items by tenant and id."""
-        found: dict[tuple[str, str], CachedItem] = {}
+        items: dict[tuple[str, str], CachedItem] = {}
         for path in self.stored_paths():
             try:
                 state = path.stat()
             except FileNotFoundError:
                 continue
-            thing = found.setdefault((path.parts[-3], path.name.partition(".")[0]), CachedItem())
+            thing = items.setdefault((path.parts[-3], path.name.partition(".")[0]), CachedItem())
             thing.paths.append(path)
             thing.size += bytes_in(path) if path.is_dir() else state.st_size
             thing.used = max(thing.used, state.st_atime)
-        return found
+        return items

@@ -12,7 +12,7 @@ from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 
-from ..refusals import Damaged, DatabaseFull, DatabaseUnavailable, Deleted
+from ..errors import Damaged, DatabaseFull, DatabaseUnavailable, Deleted
 from ..rows.checksums import Checksums
 from ..rows.digests import Digest, digest_of, stamp_of
 from ..rows.records import ChecksumRow
@@ -89,9 +89,6 @@ class CheckedStore:
     def refetch(self, path: Path) -> bool:
         return self._inner.refetch(path)
 
-    def bytes_used(self, folder: Path) -> int:
-        return self._inner.bytes_used(folder)
-
     def fault(self) -> str | None:
         return self._inner.fault()
 
@@ -116,9 +113,9 @@ class CheckedStore:
             Deleted: when it is being deleted.
         """
         with self._alone(path):
-            stamp, found = stamp_of(path), digest_of(path)
-            self._compared[path] = found.sha256, stamp
-        if not self._checksums.record_first_seen(tenant, name, place, found):
+            stamp, digest = stamp_of(path), digest_of(path)
+            self._compared[path] = digest.sha256, stamp
+        if not self._checksums.record_first_seen(tenant, name, place, digest):
             self._compared.pop(path, None)
             raise Deleted(name)
         log.info("stored the first checksum of %s of %s", name, tenant)
@@ -132,9 +129,9 @@ class CheckedStore:
         self._compared.pop(path, None)
         whole = self._is_sound(path, row) or (self._inner.refetch(path) and self._is_sound(path, row))
         if not whole:
-            found = digest_of(path)
-            other = f"{found.bytes} bytes instead of {row['bytes']}"
-            raise self._damaged(row, other if found.bytes != row["bytes"] else "different content")
+            digest = digest_of(path)
+            other = f"{digest.bytes} bytes instead of {row['bytes']}"
+            raise self._damaged(row, other if digest.bytes != row["bytes"] else "different content")
         if row["damaged"] is not None:
             self._checksums.damaged(row["tenant"], row["id"], None)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import fcntl
 import logging
-import shutil
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import IO
@@ -13,6 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.atomic import sync
 
 from ..rows.tenants import LOCAL, Tenant, checked_tenant
+from .disk import remove_path
 from .local_store import LocalStore
 from .private import close_to_others
 from .store import Store
@@ -58,9 +58,9 @@ class Files:
         Raises:
             InvalidInput: for an invalid tenant name.
         """
-        found = TenantFiles(self._tenants / checked_tenant(tenant), self.store)
-        found.prepare()
-        return found
+        files = TenantFiles(self._tenants / checked_tenant(tenant), self.store)
+        files.prepare()
+        return files
 
     def give_to_local(self) -> None:
         """Move data of versions without tenants to the tenant ``local``; the folder must be locked."""
@@ -80,10 +80,7 @@ class Files:
         for files in self._all():
             files.drop_leftovers()
         for left in self.scratch.iterdir():
-            if left.is_dir():
-                shutil.rmtree(left)
-            else:
-                left.unlink()
+            remove_path(left)
 
     def keep_work(self, job_ids: Collection[str]) -> None:
         """Delete the work folders of all other jobs."""

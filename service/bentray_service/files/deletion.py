@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from sqlalchemy import ColumnElement, Connection, Table, and_, delete, or_, select, update
 
-from ..refusals import DatabaseUnavailable, InUse, StorageUnavailable, UnknownId
+from ..errors import DatabaseUnavailable, InUse, StorageUnavailable, UnknownId
 from ..rows import usage
 from ..rows.checksums import delete_checksums
 from ..rows.database import Database
@@ -89,8 +89,8 @@ class Deletion:
                 old = _ended_with_nothing(time) if table is jobs else table.c.created < time
                 query = select(table.c.tenant, table.c.id).where(old)
                 with self._database.read() as connection:
-                    found = connection.execute(query).all()
-                yield from (StoredItem(Tenant(tenant), what, name) for tenant, name in found)
+                    rows = connection.execute(query).all()
+                yield from (StoredItem(Tenant(tenant), what, name) for tenant, name in rows)
 
     def _refuse_unfinished(self, connection: Connection, stored: StoredItem, gone: Collection[str]) -> None:
         needing = jobs.c.id.in_(gone), jobs.c.state.not_in(ENDED)
@@ -131,13 +131,13 @@ def _ended_with_nothing(time: float) -> ColumnElement[bool]:
 def _fields(connection: Connection, tenant: Tenant, mesh: str, gone: Collection[str]) -> set[str]:
     """The geometry fields to delete with a mesh; a field used by another mesh is assigned to that one."""
     mine = geometry_fields.c.tenant == tenant
-    found = connection.execute(
+    rows = connection.execute(
         select(geometry_fields.c.id).where(
             mine, or_(geometry_fields.c.mesh_id == mesh, geometry_fields.c.job_id.in_(gone))
         )
     )
     going = set()
-    for field in found.scalars().all():
+    for field in rows.scalars().all():
         sharing = jobs.c.tenant == tenant, jobs.c.field_id == field, jobs.c.id.not_in(gone)
         heir = connection.execute(
             select(jobs.c.id, jobs.c.mesh_id).where(*sharing, jobs.c.state == "succeeded").limit(1)

@@ -1,8 +1,9 @@
-"""Disk usage of a folder."""
+"""Disk usage and removal of files and folders."""
 
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 
@@ -20,3 +21,11 @@ def bytes_in(folder: Path) -> int:
     except FileNotFoundError:
         return 0
     return total
+
+
+def remove_path(path: Path) -> None:
+    """Remove a file or a folder with its content; a missing one is ignored."""
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
 from collections.abc import Callable, Collection
 from pathlib import Path
 
 from bentray_workers.files.atomic import sync
 
-from .disk import bytes_in
+from .disk import remove_path
 
 
 class LocalStore:
@@ -30,13 +29,7 @@ class LocalStore:
 
     def remove(self, paths: Collection[Path]) -> None:
         for path in paths:
-            if path.is_dir():
-                shutil.rmtree(path)
-            else:
-                path.unlink(missing_ok=True)
-
-    def bytes_used(self, folder: Path) -> int:
-        return bytes_in(folder)
+            remove_path(path)
 
     def fault(self) -> str | None:
         return None

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from bentray_kernels.errors import InvalidInput
 
-from ..refusals import StorageUnavailable
+from ..errors import StorageUnavailable
 from ..rows.database import Database
 from ..rows.database_id import mark_of
 from ..rows.live_ids import LiveIds

@@ -63,17 +63,17 @@ class Orphans:
 
     def begin(self) -> None:
         """Remove orphans of a dead service; the folder must be locked, before anything is written."""
-        found = self.found()
-        if found and not self._used_together():
+        orphans = self.found()
+        if orphans and not self._used_together():
             log.warning(
                 "%d files in %s have no row in this database and are kept, since the folder was last "
                 "used with another database or a later state of it; remove them with "
                 "`bentray verify --remove-orphans`",
-                len(found),
+                len(orphans),
                 self._files.root,
             )
             return
-        self.remove(found)
+        self.remove(orphans)
         self._stamp()
 
     def accept(self) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from ..refusals import Damaged, Deleted
+from ..errors import Damaged, Deleted
 from ..rows.checksums import Checksums
 from ..rows.tenants import Tenant
 from .checked_store import CheckedStore

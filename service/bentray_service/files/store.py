@@ -42,13 +42,6 @@ class Store(Protocol):
             StorageUnavailable: when they cannot be deleted now.
         """
 
-    def bytes_used(self, folder: Path) -> int:
-        """Storage used by a tenant, at most about a minute old.
-
-        Raises:
-            StorageUnavailable: when it cannot be determined now.
-        """
-
     def fault(self) -> str | None:
         """Why the store is unavailable, or None."""
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..rows.ids import PREFIXES, checked
-from .disk import bytes_in
+from .disk import bytes_in, remove_path
 from .store import Store
 
 # The folders of a tenant.
@@ -32,10 +32,6 @@ class TenantFiles:
     def __init__(self, root: Path, store: Store) -> None:
         self.root = root
         self._store = store
-        self._incoming, self._datasets, self._volumes = root / "incoming", root / "datasets", root / "volumes"
-        self._uploads = root / "uploads"
-        self._exports, self._animations = root / "exports", root / "animations"
-        self._meshes, self._fields, self._work = root / "meshes", root / "fields", root / "work"
 
     def prepare(self) -> None:
         """Create the folders."""
@@ -46,19 +42,15 @@ class TenantFiles:
 
     def drop_leftovers(self) -> None:
         """Delete incomplete files of a dead process."""
-        for left in self._incoming.iterdir():
-            if left.is_dir():
-                shutil.rmtree(left)
-            else:
-                left.unlink()
-        single = self._datasets, self._volumes, self._exports, self._animations, self._meshes, self._uploads
-        for folder in single:
-            for left in folder.glob("*.partial"):
+        for left in (self.root / "incoming").iterdir():
+            remove_path(left)
+        for name in ("datasets", "volumes", "exports", "animations", "meshes", "uploads"):
+            for left in (self.root / name).glob("*.partial"):
                 left.unlink()
 
     def incoming(self, upload_id: str) -> Path:
         """Path of a one-shot upload before ingestion."""
-        return self._incoming / f"{self._canonical(upload_id).stem}.upload"
+        return self.root / "incoming" / f"{self._canonical(upload_id).stem}.upload"
 
     def candidate(self, upload_id: str) -> Path:
         """Path of a new canonical file, in its own folder, which is created."""
@@ -68,49 +60,49 @@ class TenantFiles:
 
     def upload(self, upload_id: str) -> Path:
         """Path of the data of a resumable upload."""
-        return self._uploads / checked("upload", upload_id)
+        return self.root / "uploads" / checked("upload", upload_id)
 
     def dataset(self, dataset_id: str) -> Path:
         """The canonical file of a dataset."""
-        return self._datasets / f"{checked('dataset', dataset_id)}.h5"
+        return self.root / "datasets" / f"{checked('dataset', dataset_id)}.h5"
 
     def volume(self, volume_id: str) -> Path:
         """The canonical file of a volume, reconstructed or uploaded."""
-        return self._volumes / f"{checked('volume', volume_id)}.h5"
+        return self.root / "volumes" / f"{checked('volume', volume_id)}.h5"
 
     def export(self, volume_id: str, extension: str) -> Path:
         """Path of a volume in another format."""
-        return self._exports / f"{checked('volume', volume_id)}.{extension}"
+        return self.root / "exports" / f"{checked('volume', volume_id)}.{extension}"
 
     def animation(self, job_id: str, extension: str) -> Path:
         """Path of a turntable animation."""
-        return self._animations / f"{checked('job', job_id)}.{extension}"
+        return self.root / "animations" / f"{checked('job', job_id)}.{extension}"
 
     def mesh(self, mesh_id: str) -> Path:
         """The canonical file of a mesh."""
-        return self._meshes / f"{checked('mesh', mesh_id)}.h5"
+        return self.root / "meshes" / f"{checked('mesh', mesh_id)}.h5"
 
     def field(self, field_id: str) -> Path:
         """The folder of a geometry field; it is complete or absent."""
-        return self._fields / checked("field", field_id)
+        return self.root / "fields" / checked("field", field_id)
 
     def work(self, job_id: str) -> Path:
         """The work folder of a job; created if needed."""
-        folder = self._work / checked("job", job_id)
+        folder = self.root / "work" / checked("job", job_id)
         folder.mkdir(exist_ok=True)
         return folder
 
     def drop_work(self, job_id: str) -> None:
         """Delete the work folder of a job, even if its tasks are still running."""
-        ended = self._work / f"{checked('job', job_id)}.ended"
+        ended = self.root / "work" / f"{checked('job', job_id)}.ended"
         with suppress(FileNotFoundError):
             # Running tasks can no longer write to the old path.
-            (self._work / job_id).rename(ended)
+            (self.root / "work" / job_id).rename(ended)
         shutil.rmtree(ended, ignore_errors=True)
 
     def keep_work(self, job_ids: Collection[str]) -> None:
         """Delete the work folders of all other jobs."""
-        for folder in self._work.iterdir():
+        for folder in (self.root / "work").iterdir():
             if folder.name not in job_ids:
                 shutil.rmtree(folder, ignore_errors=True)
 
@@ -143,10 +135,7 @@ class TenantFiles:
         for one in stored_ids:
             for folder in KINDS:
                 for path in (self.root / folder).glob(f"{one}*"):
-                    if path.is_dir():
-                        shutil.rmtree(path)
-                    else:
-                        path.unlink(missing_ok=True)
+                    remove_path(path)
 
     def drop(self, path: Path) -> None:
         """Delete one file or folder of the tenant.
@@ -161,16 +150,12 @@ class TenantFiles:
 
     def sizes(self) -> dict[str, int]:
         """Sizes of the stored items in this folder, bytes by id, or by file name for exports."""
-        found = {}
+        sizes = {}
         for name in (*KEPT, "exports"):
             for path in (self.root / name).iterdir():
                 key = path.name if name == "exports" else path.name.partition(".")[0]
-                found[key] = bytes_in(path) if path.is_dir() else path.stat().st_size
-        return found
-
-    def bytes_used(self) -> int:
-        """Storage used by the tenant, bytes; raises StorageUnavailable."""
-        return self._store.bytes_used(self.root)
+                sizes[key] = bytes_in(path) if path.is_dir() else path.stat().st_size
+        return sizes
 
     def _kept(self, stored_id: str) -> list[Path]:
         """Paths where a store may have files of an id."""
@@ -181,7 +166,7 @@ class TenantFiles:
         return [place.get(prefix, self.dataset)(stored_id)]
 
     def _reading(self, upload_id: str) -> Path:
-        return self._incoming / f"{self._canonical(upload_id).stem}.reading"
+        return self.root / "incoming" / f"{self._canonical(upload_id).stem}.reading"
 
     def _canonical(self, upload_id: str) -> Path:
         place = {PREFIXES["volume"]: self.volume, PREFIXES["mesh"]: self.mesh}

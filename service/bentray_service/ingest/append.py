@@ -20,7 +20,7 @@ from starlette.concurrency import run_in_threadpool
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.atomic import sync, write_bytes
 
-from ..refusals import Locked, UnknownChecksum, WrongChecksum
+from ..errors import Locked, UnknownChecksum, WrongChecksum
 from .receive import write_body
 
 # Algorithms, with the format of the digest in base 64.

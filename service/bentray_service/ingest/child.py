@@ -46,10 +46,12 @@ def main() -> None:
     parser.add_argument("--memory", type=int, required=True)
     parser.add_argument("--seconds", type=float, required=True)
     parser.add_argument("--given", type=json.loads, required=True, help="metadata of the file")
-    asked = parser.parse_args()
-    limit_resources(asked.memory, asked.seconds, PACKING * asked.source.stat().st_size)
-    answer = convert_upload(asked.what, asked.source, asked.target, asked.given, request_space)
-    sys.stdout.write(json.dumps(answer) + "\n")
+    arguments = parser.parse_args()
+    limit_resources(arguments.memory, arguments.seconds, PACKING * arguments.source.stat().st_size)
+    outcome = convert_upload(
+        arguments.what, arguments.source, arguments.target, arguments.given, request_space
+    )
+    sys.stdout.write(json.dumps(outcome) + "\n")
 
 
 def limit_resources(memory_bytes: int, seconds: float, file_bytes: int = 0) -> None:
@@ -129,11 +131,11 @@ def _mesh(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) ->
     from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
     from bentray_workers.files.mesh_formats import read_mesh
 
-    found = read_mesh(source.read_bytes())
-    stored = StoredMesh(found.surface.mesh, found.colours)
+    mesh = read_mesh(source.read_bytes())
+    stored = StoredMesh(mesh.surface.mesh, mesh.colours)
     on_size(stored.nbytes)
     write_mesh(target, stored)
-    return summary_of(stored, found.surface, found.format) | {"title": text(given["title"])}
+    return summary_of(stored, mesh.surface, mesh.format) | {"title": text(given["title"])}
 
 
 CONVERTED = {"dataset": _dataset, "volume": _volume, "mesh": _mesh}

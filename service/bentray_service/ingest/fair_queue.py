@@ -102,11 +102,11 @@ class FairQueue:
     def _loop(self) -> None:
         while True:
             with self._changed:
-                while (found := self._take()) is None and not self._leaving:
+                while (taken := self._take()) is None and not self._leaving:
                     self._changed.wait()
-            if found is None:
+            if taken is None:
                 return
-            tenant, task = found
+            tenant, task = taken
             if task.future.set_running_or_notify_cancel():
                 try:
                     result = task.work()

@@ -20,8 +20,8 @@ from sqlalchemy.exc import SQLAlchemyError
 from bentray_kernels.errors import InvalidInput
 
 from ..access.quota import Quota
+from ..errors import StorageFull, StorageUnavailable, UnknownId
 from ..files.data_folder import Files
-from ..refusals import StorageFull, StorageUnavailable, UnknownId
 from ..rows.digests import digest_of
 from ..rows.records import UploadRow
 from ..rows.stored_tables import UploadedTable

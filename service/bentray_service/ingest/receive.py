@@ -13,7 +13,7 @@ from pathlib import Path
 
 from starlette.concurrency import run_in_threadpool
 
-from ..refusals import EmptyBody, QuotaExceeded, StorageFull, TooLarge
+from ..errors import EmptyBody, QuotaExceeded, StorageFull, TooLarge
 
 # Size of a batch; chunks are written without copying them together.
 BATCH_BYTES, BATCH_CHUNKS = 4 * 1024 * 1024, 1024
@@ -129,14 +129,14 @@ class _GrowingReservation:
         """Reserve at least ``size`` bytes."""
         if size <= self._reserved:
             return
-        for wanted in (min(2 * size, self._limit), size):
+        for reservation in (min(2 * size, self._limit), size):
             try:
-                self._reserve(wanted)
+                self._reserve(reservation)
             except QuotaExceeded:
-                if wanted == size:
+                if reservation == size:
                     raise
             else:
-                self._reserved = wanted
+                self._reserved = reservation
                 return
 
 

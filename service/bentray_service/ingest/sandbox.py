@@ -18,7 +18,7 @@ from typing import Any
 
 from bentray_kernels.errors import InvalidInput
 
-from ..refusals import StorageFull
+from ..errors import StorageFull
 from .child import ACCEPTED
 
 log = logging.getLogger("bentray.ingest")
@@ -89,30 +89,30 @@ def ingest(
         )
         try:
             started(process.pid)
-            answer = _answer(process, seconds, reserve)
+            outcome = _answer(process, seconds, reserve)
         finally:
             _kill(process)
-        if answer is None:
+        if outcome is None:
             raise InvalidInput("file", f"a file that takes longer than {seconds:g} s to read", ACCEPTED[what])
         if process.returncode != 0:
             complaint.seek(0)
-            said = complaint.read(LONGEST_COMPLAINT).decode(errors="replace")
-            log.warning("the ingest process ended with %s: %s", process.returncode, said)
+            output = complaint.read(LONGEST_COMPLAINT).decode(errors="replace")
+            log.warning("the ingest process ended with %s: %s", process.returncode, output)
             raise InvalidInput("file", _death(process.returncode, memory_bytes), ACCEPTED[what])
-    return summary_in(answer)
+    return summary_in(outcome)
 
 
-def summary_in(answer: Mapping[str, Any]) -> dict[str, Any]:
-    """The summary in an answer of ``child.convert_upload``.
+def summary_in(outcome: Mapping[str, Any]) -> dict[str, Any]:
+    """The summary in an outcome of ``child.convert_upload``.
 
     Raises:
-        InvalidInput, StorageFull: that the answer names.
+        InvalidInput, StorageFull: that the outcome names.
     """
-    if "full" in answer:
+    if "full" in outcome:
         raise StorageFull("body", "no space for the canonical file", "a smaller file, or more disk space")
-    if "error" in answer:
-        raise InvalidInput(answer["error"]["field"], answer["error"]["found"], answer["error"]["accepted"])
-    return dict(answer["ok"])
+    if "error" in outcome:
+        raise InvalidInput(outcome["error"]["field"], outcome["error"]["found"], outcome["error"]["accepted"])
+    return dict(outcome["ok"])
 
 
 def _answer(
@@ -127,7 +127,7 @@ def _answer(
         late.set()
         _kill_group(process)
 
-    answer: dict[str, Any] = {}
+    outcome: dict[str, Any] = {}
     watch = threading.Timer(seconds, end)
     watch.start()
     try:
@@ -135,9 +135,9 @@ def _answer(
             if not line.endswith(b"\n"):
                 # The process died while it wrote.
                 break
-            answer = json.loads(line)
-            if "reserve" in answer:
-                reserve(int(answer["reserve"]))
+            outcome = json.loads(line)
+            if "reserve" in outcome:
+                reserve(int(outcome["reserve"]))
                 # The exit code of a dead process is evaluated later.
                 with contextlib.suppress(BrokenPipeError):
                     process.stdin.write(b"go\n")
@@ -146,7 +146,7 @@ def _answer(
     finally:
         watch.cancel()
         watch.join()
-    return None if late.is_set() else answer
+    return None if late.is_set() else outcome
 
 
 def _kill_group(process: subprocess.Popen[bytes]) -> None:

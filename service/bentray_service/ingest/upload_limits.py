@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from ..access.request_rates import RequestRates
-from ..refusals import Busy, RateLimited
+from ..errors import Busy, RateLimited
 from ..rows.tenants import Tenant
 
 # Each upload has a connection and a reservation; only few are ingested at a time.

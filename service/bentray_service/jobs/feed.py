@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 import anyio
 from sqlalchemy.exc import SQLAlchemyError
 
-from ..refusals import DatabaseUnavailable, TooManyStreams
+from ..errors import DatabaseUnavailable, TooManyStreams
 from ..rows.jobs import Jobs
 from ..rows.records import EventRow, JobProgress
 from ..rows.tenants import Tenant
@@ -118,12 +118,14 @@ class EventFeed:
                     job_id: one.events[-1]["number"] if one.events else 0 for job_id, one in watched.items()
                 }
                 try:
-                    found, events = await anyio.to_thread.run_sync(self._jobs.updates, known, limiter=limiter)
+                    progress, events = await anyio.to_thread.run_sync(
+                        self._jobs.updates, known, limiter=limiter
+                    )
                 except (SQLAlchemyError, DatabaseUnavailable) as error:
                     log.warning("watched jobs could not be read: %s", error)
                 else:
                     for job_id, one in watched.items():
-                        one.update(found.get(job_id), events.get(job_id, []))
+                        one.update(progress.get(job_id), events.get(job_id, []))
                 if self.leaving():
                     for one in self._watched.values():
                         one.notify()

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from fastapi.openapi.models import Example
-from pydantic import BaseModel, ConfigDict, TypeAdapter
+from pydantic import BaseModel, ConfigDict, TypeAdapter, field_validator
 
-from bentray_kernels.tomography.result import Progress
-from bentray_workers.cluster.fair_shares import Share
+from bentray_workers.cluster.task_pool import JobControl
 
 from ..compute import Compute
 from ..files.data_folder import Files
@@ -20,6 +18,7 @@ from ..files.tenant_files import TenantFiles
 from ..rows.records import JobRow, Plain
 from ..rows.stored_tables import Datasets, Meshes, Volumes
 from ..rows.tenants import Tenant
+from ..settings_request import check_setting_names
 
 
 class JobRequest(BaseModel):
@@ -28,6 +27,13 @@ class JobRequest(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     kind: str
+
+    @field_validator("settings", mode="before", check_fields=False)
+    @classmethod
+    def check_names(cls, settings: Any) -> Any:
+        """Reject unknown settings by name, with the accepted ones."""
+        kind: Any = cls.model_fields["settings"].annotation
+        return check_setting_names(settings, kind)
 
 
 R = TypeVar("R", bound=JobRequest)
@@ -79,10 +85,8 @@ class JobRun:
         settings: as stored with the job.
         target: output file, see ``Kind.target``; written atomically.
         work_dir: folder of the job, shared with all workers; it keeps checkpoints.
-        on_progress: called with the progress, often.
-        on_saved: called after each checkpoint.
-        stop: returns True after a cancellation; then ``run`` raises ``Cancelled``.
-        share: of the workers; limits the number of tasks in flight.
+        control: progress, cancellation and share of the workers; after a cancellation ``run`` raises
+            ``Cancelled``.
     """
 
     client: Any
@@ -90,16 +94,7 @@ class JobRun:
     settings: Plain
     target: Path
     work_dir: Path
-    on_progress: Callable[[Progress], None]
-    on_saved: Callable[[], None]
-    stop: Callable[[], bool]
-    share: Share
-
-    @property
-    def control(self) -> dict[str, Any]:
-        """The keyword arguments that every pipeline takes for progress, cancellation and its share."""
-        names = "on_progress", "on_saved", "stop", "share"
-        return {name: getattr(self, name) for name in names}
+    control: JobControl
 
 
 class Kind(ABC, Generic[R]):

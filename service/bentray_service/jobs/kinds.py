@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from fastapi.openapi.models import Example
-from pydantic import BeforeValidator, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.model_selection.selection import advice_of
@@ -26,7 +25,6 @@ from bentray_workers.rendering.turntable import Turntable, draw_turntable
 from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_run import simulate_to_file
 
-from ..asked_settings import known_only
 from ..compute import check_renderable
 from ..files.tenant_files import TenantFiles
 from ..rows import schema
@@ -43,9 +41,7 @@ class ReconstructionRequest(JobRequest):
 
     kind: Literal["reconstruction"]
     dataset: str = Field(description="Id of an uploaded dataset.")
-    settings: Annotated[Settings, BeforeValidator(known_only)] = Field(
-        default_factory=Settings, description=DEFAULTS
-    )
+    settings: Settings = Field(default_factory=Settings, description=DEFAULTS)
 
 
 class ReconstructionKind(Kind[ReconstructionRequest]):
@@ -97,9 +93,7 @@ class SimulationRequest(JobRequest):
     """Simulate a scan of a phantom; the result is a dataset with the ground truth."""
 
     kind: Literal["simulation"]
-    settings: Annotated[PhantomScan, BeforeValidator(partial(known_only, of=PhantomScan))] = Field(
-        default_factory=PhantomScan, description=DEFAULTS
-    )
+    settings: PhantomScan = Field(default_factory=PhantomScan, description=DEFAULTS)
 
 
 class SimulationKind(Kind[SimulationRequest]):
@@ -124,9 +118,9 @@ class SimulationKind(Kind[SimulationRequest]):
         return files.dataset(dataset_of(job["id"]))
 
     def run(self, run: JobRun) -> Plain | None:
-        asked = self.settings.validate_python(run.settings)
-        found = simulate_to_file(run.client, asked.chosen(), run.target, run.work_dir, **run.control)
-        return {"id": run.target.stem, **found}
+        request = self.settings.validate_python(run.settings)
+        record = simulate_to_file(run.client, request.chosen(), run.target, run.work_dir, **run.control)
+        return {"id": run.target.stem, **record}
 
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
         dataset = dataset_of(job["id"])
@@ -138,9 +132,7 @@ class RefractionRequest(JobRequest):
 
     kind: Literal["refraction"]
     volume: str = Field(description="Id of a 3-D volume with uniform spacing.")
-    settings: Annotated[Turntable, BeforeValidator(partial(known_only, of=Turntable))] = Field(
-        default_factory=Turntable, description=DEFAULTS
-    )
+    settings: Turntable = Field(default_factory=Turntable, description=DEFAULTS)
 
 
 class RefractionKind(Kind[RefractionRequest]):
@@ -180,9 +172,7 @@ class GeometryFieldRequest(JobRequest):
 
     kind: Literal["geometry-field"]
     mesh: str = Field(description="Id of a mesh.")
-    settings: Annotated[FieldSettings, BeforeValidator(partial(known_only, of=FieldSettings))] = Field(
-        default_factory=FieldSettings, description=DEFAULTS
-    )
+    settings: FieldSettings = Field(default_factory=FieldSettings, description=DEFAULTS)
 
 
 class GeometryFieldKind(Kind[GeometryFieldRequest]):
@@ -212,8 +202,8 @@ class GeometryFieldKind(Kind[GeometryFieldRequest]):
         paths = run.source, settings, run.target, run.work_dir
         figures = geometry_field.build_field(run.client, *paths, **run.control)
         size = geometry_field.bytes_of(run.target)
-        found = {"id": run.target.name, "mesh_id": run.source.stem, "bytes": size}
-        return {**found, "settings": settings.plain(), "figures": figures}
+        row = {"id": run.target.name, "mesh_id": run.source.stem, "bytes": size}
+        return {**row, "settings": settings.plain(), "figures": figures}
 
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
         field = job["field_id"] or ""

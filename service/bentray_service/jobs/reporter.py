@@ -12,7 +12,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.tomography.result import Iteration, Progress
 
-from ..refusals import DatabaseUnavailable
+from ..errors import DatabaseUnavailable
 from ..rows.job_queue import Queue
 from .kinds import finite
 
@@ -76,13 +76,13 @@ class Reporter:
         """Store the last progress; called at the end, too."""
         if self._pending is None:
             return
-        kept = self._pending
+        progress = self._pending
         self._written = self._clock()
         history: list[dict[str, Any]] = [
             {**asdict(sweep), "residual_rms_s": finite(sweep.residual_rms_s)}
-            for sweep in thin_history(kept.history)
+            for sweep in thin_history(progress.history)
         ]
-        self._queue.progress(self._job_id, kept.done, kept.total, history, kept.phase)
+        self._queue.progress(self._job_id, progress.done, progress.total, history, progress.phase)
         self._pending = None
 
     def saved(self) -> None:

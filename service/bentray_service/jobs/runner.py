@@ -19,13 +19,14 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.task_graph import Cancelled
 from bentray_workers.cluster.fair_shares import Shares
+from bentray_workers.cluster.task_pool import JobControl
 
 from ..compute import Compute
+from ..errors import Damaged, DatabaseFull, DatabaseUnavailable, StorageUnavailable
 from ..files.data_folder import Files
 from ..files.disk import bytes_in
 from ..files.tenant_files import TenantFiles
 from ..logs import about
-from ..refusals import Damaged, DatabaseFull, DatabaseUnavailable, StorageUnavailable
 from ..rows.job_queue import LEASE_S, Queue
 from ..rows.records import JobRow
 from ..rows.schema import ENDED
@@ -216,19 +217,11 @@ class Runner:
                 self._files.store.remove([target])
             client = self._compute.client
             with self._shares.of(job["tenant"], kind.lane, client) as share:
-                result = kind.run(
-                    JobRun(
-                        client=client,
-                        source=source,
-                        settings=job["settings"],
-                        target=target,
-                        work_dir=files.work(job_id),
-                        on_progress=reporter.report,
-                        on_saved=reporter.saved,
-                        stop=reporter.stop,
-                        share=share,
-                    )
+                control = JobControl(
+                    on_progress=reporter.report, on_saved=reporter.saved, stop=reporter.stop, share=share
                 )
+                work_dir = files.work(job_id)
+                result = kind.run(JobRun(client, source, job["settings"], target, work_dir, control))
             self._keep(target, reporter)
         except Cancelled:
             if not reporter.lost:

@@ -9,7 +9,7 @@ from fastapi import Query, Request, Response
 from fastapi.routing import APIRoute
 from starlette.types import Message
 
-from ..refusals import TooLarge, WrongMediaType
+from ..errors import TooLarge, WrongMediaType
 
 # Parameter of all lists.
 Limit = Annotated[int, Query(ge=1, le=1000, description="Maximum number of records.")]
@@ -36,7 +36,7 @@ class SmallBody(APIRoute):
     """A route that reads at most ``LONGEST_JSON`` bytes of the body."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        answer = super().get_route_handler()
+        handler = super().get_route_handler()
 
         async def read_then_answer(request: Request) -> Response:
             body = bytearray()
@@ -48,6 +48,6 @@ class SmallBody(APIRoute):
             async def again() -> Message:
                 return {"type": "http.request", "body": bytes(body), "more_body": False}
 
-            return await answer(Request(request.scope, again))
+            return await handler(Request(request.scope, again))
 
         return read_then_answer

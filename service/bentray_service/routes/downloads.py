@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -12,7 +13,7 @@ from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from starlette.types import Receive, Scope, Send
 
-from ..refusals import Deleted, RangeNotSatisfiable
+from ..errors import Deleted, RangeNotSatisfiable
 from ..web.errors import problems
 
 # A single range; for several ranges or other forms the whole file is sent, as RFC 9110 allows.
@@ -52,33 +53,28 @@ def download(
         file = path.open("rb")
     except FileNotFoundError as error:
         raise Deleted(path.name.partition(".")[0]) from error
-    answer: Response | None = None
-    try:
+    with ExitStack() as stack:
+        stack.enter_context(file)
         state = os.fstat(file.fileno())
         tag = tag or _tag_of(state, path, seed)
-        if (known := unchanged(request, tag)) is not None:
-            return known
-        headers = headers_of(tag)
-        whole = not _part_asked_for(request, tag, state.st_size)
-        answer = OpenFile(file, whole, headers, media_type, name or path.name)
-        return answer
-    finally:
-        if answer is None:
-            file.close()
+        if (response := unchanged(request, tag)) is not None:
+            return response
+        whole = not _wants_range(request, tag, state.st_size)
+        response = OpenFile(file, whole, headers_of(tag), media_type, name or path.name)
+        # The response closes the file.
+        stack.pop_all()
+        return response
 
 
 def tag_of(path: Path, seed: str) -> str:
     """The ETag of a file, or of a file generated from it; arguments and errors as of ``download``."""
-    try:
-        return _tag_of(path.stat(), path, seed)
-    except FileNotFoundError as error:
-        raise Deleted(path.name.partition(".")[0]) from error
+    return _tag_of(file_status(path), path, seed)
 
 
-def file_bytes(path: Path) -> int:
-    """Size of a file; raises Deleted when it no longer exists."""
+def file_status(path: Path) -> os.stat_result:
+    """Status of a file; raises Deleted when it no longer exists."""
     try:
-        return path.stat().st_size
+        return path.stat()
     except FileNotFoundError as error:
         raise Deleted(path.name.partition(".")[0]) from error
 
@@ -86,9 +82,17 @@ def file_bytes(path: Path) -> int:
 def unchanged(request: Request, tag: str) -> Response | None:
     """A 304 response if the client has the current version, else None."""
     known = request.headers.get("if-none-match")
+    # "*" matches any version.
     if known is not None and (tag in known or known.strip() == "*"):
         return Response(status_code=304, headers=headers_of(tag))
     return None
+
+
+def without_length(media_type: str, headers: dict[str, str]) -> Response:
+    """The response to HEAD for content that has not been generated, so its length is unknown."""
+    response = Response(media_type=media_type, headers=headers)
+    del response.headers["content-length"]
+    return response
 
 
 def headers_of(tag: str) -> dict[str, str]:
@@ -124,18 +128,18 @@ class OpenFile(FileResponse):
             await super().__call__({**scope, "headers": headers}, receive, send)
 
 
-def _part_asked_for(request: Request, tag: str, size: int) -> bool:
+def _wants_range(request: Request, tag: str, size: int) -> bool:
     """Whether to send a range; raises RangeNotSatisfiable."""
-    found = ONE_PART.fullmatch(request.headers.get("range", ""))
-    if found is None or found.groups() == ("", ""):
+    part = ONE_PART.fullmatch(request.headers.get("range", ""))
+    if part is None or part.groups() == ("", ""):
         return False
     # Without a matching ETag the whole file is sent.
     if request.headers.get("if-range", tag) != tag:
         return False
-    first, last = found.groups()
+    first, last = part.groups()
     if first and last and int(last) < int(first):
         return False
     begins_inside = int(first) < size if first else int(last) > 0
     if not begins_inside:
-        raise RangeNotSatisfiable(found.group(), size)
+        raise RangeNotSatisfiable(part.group(), size)
     return True

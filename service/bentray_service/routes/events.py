@@ -71,24 +71,24 @@ async def _generate(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterato
     sent: dict[str, Any] = {}
     spoken = time.monotonic()
     while not feed.leaving() and not job.gone:
-        said = []
+        messages = []
         for event in job.events:
             if event["number"] > last:
                 last = event["number"]
                 at = datetime.fromtimestamp(event["time"], UTC).isoformat()
-                said.append(
+                messages.append(
                     _event("state", {"state": event["state"], "note": event["note"], "time": at}, last)
                 )
         row = job.row or {"state": "", "done": 0, "total": 0, "phase": ""}
         progress = {"done": row["done"], "total": row["total"], "phase": row["phase"] or ""}
         if row["state"] == "running" and row["total"] and progress != sent:
-            said.append(_event("progress", progress))
+            messages.append(_event("progress", progress))
             sent = progress
-        if not said and time.monotonic() - spoken > SILENCE_SECONDS:
-            said.append(": keep-alive\n\n")
-        if said:
+        if not messages and time.monotonic() - spoken > SILENCE_SECONDS:
+            messages.append(": keep-alive\n\n")
+        if messages:
             spoken = time.monotonic()
-            yield "".join(said)
+            yield "".join(messages)
         elif row["state"] in ENDED:
             return
         else:

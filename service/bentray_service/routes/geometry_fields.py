@@ -5,8 +5,8 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from ..asked_view import FieldViewParameters
 from ..rows.tenants import Tenant
+from ..view_parameters import FieldViewParameters
 from ..web.errors import problems
 from ..wiring import CallerTenant, Parts, Service
 from .bodies import Limit

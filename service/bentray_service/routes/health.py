@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from pydantic import BaseModel, Field
 
-from ..refusals import NotReady
+from ..errors import NotReady
 from ..web.errors import problems
 from ..wiring import parts_of
 

@@ -8,8 +8,8 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, status
 
+from ..errors import NoAnimation
 from ..jobs.kinds import KINDS
-from ..refusals import NoAnimation
 from ..web.errors import problems
 from ..wiring import CallerTenant, Service
 from .bodies import Limit, SmallBody, accept_media_types
@@ -45,7 +45,7 @@ else:
     responses=problems(400, 404, 409, 413, 415, 422, 429, 503, 507),
 )
 def start_job(
-    asked: JobRequest,
+    job_request: JobRequest,
     response: Response,
     service: Service,
     tenant: CallerTenant,
@@ -59,8 +59,8 @@ def start_job(
     ] = None,
 ) -> JobRecord:
     """Queue a job. It is stored before the response and survives a restart of the service."""
-    kind: str = asked.kind
-    order = KINDS[kind].plan(asked, tenant, service)
+    kind: str = job_request.kind
+    order = KINDS[kind].plan(job_request, tenant, service)
     row = service.jobs.add(
         tenant,
         kind,
@@ -92,9 +92,9 @@ def list_jobs(
     shown = [job_record(row) for row in rows[:limit]]
     if len(rows) == len(shown):
         return JobList(jobs=shown, next=None)
-    asked = {"limit": limit, "state": state, "kind": kind, "before": shown[-1].id}
-    given = urlencode({name: value for name, value in asked.items() if value is not None})
-    return JobList(jobs=shown, next=f"/v1/jobs?{given}")
+    filters = {"limit": limit, "state": state, "kind": kind, "before": shown[-1].id}
+    query = urlencode({name: value for name, value in filters.items() if value is not None})
+    return JobList(jobs=shown, next=f"/v1/jobs?{query}")
 
 
 @router.get("/{job_id}", responses=problems(404))

@@ -13,6 +13,7 @@ from starlette.requests import ClientDisconnect
 from .. import __version__
 from ..web.errors import problems
 from ..wiring import caller_of, parts_of
+from .downloads import headers_of, unchanged, without_length
 
 Made = TypeVar("Made")
 
@@ -35,20 +36,14 @@ async def picture(
         how: all other parameters of the image.
         draw: renders the image; cancelled when the client disconnects.
     """
-    known = request.headers.get("if-none-match")
     seed = repr((__version__, volume["id"], volume["created"], sorted(how.items())))
     tag = f'"{hashlib.sha256(seed.encode()).hexdigest()[:32]}"'
-    headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
-    # "*" matches any version.
-    if known is not None and (tag in known or known.strip() == "*"):
-        return Response(status_code=304, headers=headers)
+    if (response := unchanged(request, tag)) is not None:
+        return response
     if request.method == "HEAD":
-        answer = Response(media_type="image/png", headers=headers)
-        # The length of the image is unknown before it is rendered.
-        del answer.headers["content-length"]
-        return answer
+        return without_length("image/png", headers_of(tag))
     parts_of(request).sign_in.check_render(caller_of(request))
-    return Response(await while_connected(request, draw()), media_type="image/png", headers=headers)
+    return Response(await while_connected(request, draw()), media_type="image/png", headers=headers_of(tag))
 
 
 async def while_connected(request: Request, work: Awaitable[Made]) -> Made:

@@ -39,8 +39,8 @@ def job_record(row: JobRow) -> JobRecord:
         links["cancel"] = f"{here}/cancel"
     started, progress = row["started"], {**row, "phase": row["phase"] or ""}
     seconds = None if started is None else (row["finished"] or time.time()) - started
-    found = {**row, **reads, "field": None, **made, "progress": progress, "seconds": seconds, "links": links}
-    return JobRecord.model_validate(found)
+    record = {**row, **reads, "field": None, **made, "progress": progress, "seconds": seconds, "links": links}
+    return JobRecord.model_validate(record)
 
 
 def volume_record(row: VolumeRow) -> VolumeRecord:

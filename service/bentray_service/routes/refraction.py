@@ -5,8 +5,8 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from ..asked_view import ViewParameters
 from ..compute import check_renderable
+from ..view_parameters import ViewParameters
 from ..wiring import CallerTenant, Service
 from .pictures import PICTURE, picture
 

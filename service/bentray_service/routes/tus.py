@@ -14,8 +14,8 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Request, Response, status
 from starlette.concurrency import run_in_threadpool
 
+from ..errors import StorageFull, TooLarge, WrongOffset, WrongProtocol
 from ..ingest.append import ALGORITHMS, CHECKSUM, Checksum, append, received_bytes
-from ..refusals import StorageFull, TooLarge, WrongOffset, WrongProtocol
 from ..rows.records import UploadRow
 from ..rows.tenants import Tenant
 from ..web.errors import problems

@@ -42,25 +42,27 @@ def read_metadata(header: str) -> tuple[str, dict[str, Any]]:
     """
     if not re.fullmatch(METADATA, header):
         raise InvalidInput("Upload-Metadata", repr(header[:80]), FORM)
-    found = {}
+    metadata = {}
     for pair in header.split(","):
         name, _, value = pair.strip().partition(" ")
         if name not in KNOWN:
             continue
         try:
-            found[name] = base64.b64decode(value).decode()
+            metadata[name] = base64.b64decode(value).decode()
         except UnicodeDecodeError:
             raise InvalidInput(
                 "Upload-Metadata", repr(pair[:80]), f"{FORM}; the value of {name} is text"
             ) from None
-    what = found.get("kind", "dataset")
+    what = metadata.get("kind", "dataset")
     if what not in ACCEPTED:
         raise InvalidInput("Upload-Metadata kind", repr(what[:80]), " or ".join(ACCEPTED))
-    title = found.get("title", "")[:LONGEST_TITLE]
+    title = metadata.get("title", "")[:LONGEST_TITLE]
     if what == "mesh":
         return what, {"title": title}
     if what == "volume":
-        return what, volume_given(title, found.get("spacing_m"), found.get("shape"), found.get("dtype"))
+        return what, volume_given(
+            title, metadata.get("spacing_m"), metadata.get("shape"), metadata.get("dtype")
+        )
     return what, {}
 
 
@@ -88,7 +90,7 @@ def _numbers(
         return None
     if not re.fullmatch(form, text):
         raise InvalidInput(field, repr(text[:80]), accepted)
-    found = [kind(part) for part in text.split(",")]
-    for number in found:
+    numbers = [kind(part) for part in text.split(",")]
+    for number in numbers:
         within.check(field, number)
-    return found
+    return numbers

@@ -11,11 +11,11 @@ from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
+from ..errors import Busy
 from ..ingest.canonical import IngestLimits, make_canonical
 from ..ingest.child import ACCEPTED
 from ..ingest.fair_queue import FairQueue
 from ..ingest.receive import Received, receive
-from ..refusals import Busy
 from ..rows.ids import new_id
 from ..rows.stored_tables import UploadedTable
 from ..rows.tenants import Tenant
@@ -53,7 +53,7 @@ async def receive_upload(
     """
     what, upload_id = table.what, new_id(table.what)
     announced = request.headers.get("content-length")
-    wanted = int(announced) if announced else None
+    length = int(announced) if announced else None
     files, settings, quota = service.files.of(tenant), service.settings, service.quota
     path = files.incoming(upload_id)
     resize = partial(quota.resize, tenant, upload_id)
@@ -64,10 +64,10 @@ async def receive_upload(
         return table.add(tenant, upload_id, size=received.size, sha256=received.sha256, summary=summary)
 
     with service.upload_limits(tenant):
-        async with quota.reserved(tenant, upload_id, wanted or 1):
+        async with quota.reserved(tenant, upload_id, length or 1):
             try:
                 received = await receive(
-                    request.stream(), wanted, path, settings.max_upload_bytes, ACCEPTED[what], resize
+                    request.stream(), length, path, settings.max_upload_bytes, ACCEPTED[what], resize
                 )
                 work = partial(check_and_store, received)
                 return await run_in_turn(request, service.ingest_queue, tenant, work)

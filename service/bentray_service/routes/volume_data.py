@@ -11,10 +11,10 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.volume_export import FORMATS, largest_bytes
 
 from .. import __version__
-from ..refusals import UnknownId
+from ..errors import UnknownId
 from ..web.errors import problems
 from ..wiring import CallerTenant, Service, caller_of, parts_of
-from .downloads import download, download_of, file_bytes, headers_of, tag_of, unchanged
+from .downloads import download, download_of, file_status, headers_of, tag_of, unchanged, without_length
 from .pictures import while_connected
 
 HDF5 = "application/x-hdf5"
@@ -60,13 +60,14 @@ async def volume_data(
     chosen = FORMATS[format]
     # Exports are deterministic, so the ETag is computed from the volume.
     tag = tag_of(path, repr((__version__, seed)))
-    if (answer := unchanged(request, tag)) is not None:
-        return answer
+    if (response := unchanged(request, tag)) is not None:
+        return response
     name = f"{volume['id']}-{'speed' if 'job_id' in volume else 'values'}.{chosen.extension}"
     made = files.export(volume["id"], chosen.extension)
     if not made.exists():
         if request.method == "HEAD":
-            return _not_made(tag, chosen.media_type, name)
+            headers = {"Accept-Ranges": "bytes", "Content-Disposition": f'attachment; filename="{name}"'}
+            return without_length(chosen.media_type, headers_of(tag) | headers)
         parts_of(request).sign_in.check_render(caller_of(request))
         most = largest_bytes(volume["shape"], uploaded="job_id" not in volume)
         async with service.quota.reserved(tenant, made.name, most):
@@ -76,8 +77,8 @@ async def volume_data(
                 # Report a volume that was deleted in the meantime as unknown.
                 await run_in_threadpool(service.volumes.get, tenant, volume["id"])
                 raise
-            await run_in_threadpool(service.quota.stored, tenant, made.name, file_bytes(made))
-    answer = download(request, made, seed, chosen.media_type, name, tag)
+            await run_in_threadpool(service.quota.stored, tenant, made.name, file_status(made).st_size)
+    response = download(request, made, seed, chosen.media_type, name, tag)
     try:
         await run_in_threadpool(service.volumes.get, tenant, volume["id"])
     except UnknownId:
@@ -85,14 +86,4 @@ async def volume_data(
         made.unlink(missing_ok=True)
         await run_in_threadpool(service.quota.gone, tenant, made.name)
         raise
-    return answer
-
-
-def _not_made(tag: str, media_type: str, name: str) -> Response:
-    """The response to HEAD for a format that has not been exported."""
-    headers = {**headers_of(tag), "Accept-Ranges": "bytes"}
-    answer = Response(media_type=media_type, headers=headers)
-    answer.headers["Content-Disposition"] = f'attachment; filename="{name}"'
-    # The length of the file is unknown.
-    del answer.headers["content-length"]
-    return answer
+    return response

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from ..refusals import DatabaseUnavailable
+from ..errors import DatabaseUnavailable
 
 # The service answers requests with 40 threads; the rest stays free for requests without the database.
 MOST_AT_ONCE = 32

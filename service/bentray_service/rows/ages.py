@@ -30,17 +30,17 @@ class ExpiryMarks:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def mark(self, found: Collection[ExpiredItem], observed_s: float) -> dict[ExpiredItem, float]:
+    def mark(self, expired: Collection[ExpiredItem], observed_s: float) -> dict[ExpiredItem, float]:
         """Mark all items that are expired now, and remove the marks of items that are not.
 
         Args:
-            found: all expired items.
+            expired: all expired items.
             observed_s: current observed time, s.
 
         Returns:
             for each item, for how long it has been found expired, s.
         """
-        now = set(found)
+        now = set(expired)
         with self._database.write() as connection:
             rows = connection.execute(select(too_old)).all()
             marked = {ExpiredItem(Tenant(row.tenant), row.what, row.id): row.noticed_s for row in rows}

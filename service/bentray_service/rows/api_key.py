@@ -35,8 +35,8 @@ class ApiKey:
     @classmethod
     def of(cls, text: str) -> ApiKey | None:
         """Parse ``text``; None if it does not have the format of a key."""
-        found = PATTERN.fullmatch(text)
-        return None if found is None else cls(found[1], found[2])
+        match = PATTERN.fullmatch(text)
+        return None if match is None else cls(match[1], match[2])
 
     @classmethod
     def given(cls, field: str, text: str) -> ApiKey:
@@ -45,10 +45,10 @@ class ApiKey:
         Raises:
             InvalidInput: naming ``field``; the text itself is not shown, since it may contain a secret.
         """
-        found = cls.of(text)
-        if found is None:
+        key = cls.of(text)
+        if key is None:
             raise InvalidInput(field, f"{len(text)} characters that are not a key", ACCEPTED)
-        return found
+        return key
 
     def digest(self) -> str:
         """Digest to store, hexadecimal.

@@ -24,20 +24,20 @@ class Checksums:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def record(self, tenant: Tenant, name: str, path: str, found: Digest, *, as_written: bool) -> None:
+    def record(self, tenant: Tenant, name: str, path: str, digest: Digest, *, as_written: bool) -> None:
         """Insert or replace the checksum of an item.
 
         Args:
             tenant: owner.
             name: id of the item.
             path: below the folder of the tenant, e.g. ``volumes/vol-0123456789abcdef0123.h5``.
-            found: the checksum.
+            digest: the checksum.
             as_written: whether it was computed when the file was written.
         """
         with self._database.write() as connection:
-            _record(connection, tenant, name, path, found, as_written)
+            _record(connection, tenant, name, path, digest, as_written)
 
-    def record_first_seen(self, tenant: Tenant, name: str, path: str, found: Digest) -> bool:
+    def record_first_seen(self, tenant: Tenant, name: str, path: str, digest: Digest) -> bool:
         """Insert the checksum of an item stored before version 4.
 
         Returns:
@@ -52,14 +52,14 @@ class Checksums:
                 for table in STORED
             )
             if known:
-                _record(connection, tenant, name, path, found, as_written=False)
+                _record(connection, tenant, name, path, digest, as_written=False)
             return known
 
     def get(self, tenant: Tenant, name: str) -> ChecksumRow | None:
         """The checksum of an item; None if it was stored before version 4 or has been deleted."""
         mine = select(checksums).where(checksums.c.tenant == tenant, checksums.c.id == name)
-        found = self._database.rows(mine)
-        return cast(ChecksumRow, found[0]) if found else None
+        rows = self._database.rows(mine)
+        return cast(ChecksumRow, rows[0]) if rows else None
 
     def all(self) -> list[ChecksumRow]:
         """The checksums of all tenants."""
@@ -79,9 +79,9 @@ class Checksums:
 
 
 def _record(
-    connection: Connection, tenant: Tenant, name: str, path: str, found: Digest, as_written: bool
+    connection: Connection, tenant: Tenant, name: str, path: str, digest: Digest, as_written: bool
 ) -> None:
-    now: Plain = {"path": path, "bytes": found.bytes, "sha256": found.sha256, "noted": time.time()}
+    now: Plain = {"path": path, "bytes": digest.bytes, "sha256": digest.sha256, "noted": time.time()}
     now |= {"as_written": as_written, "damaged": None}
     mine = checksums.c.tenant == tenant, checksums.c.id == name
     if not connection.execute(update(checksums).where(*mine).values(**now)).rowcount:

@@ -15,7 +15,7 @@ from sqlalchemy.engine import make_url
 
 from bentray_kernels.errors import InvalidInput
 
-from ..refusals import DatabaseFull, DatabaseUnavailable
+from ..errors import DatabaseFull, DatabaseUnavailable
 from . import schema
 from .admission import MOST_AT_ONCE, Admission
 from .migration import SQLITE_PRAGMAS, STEPS, migrate
@@ -178,7 +178,7 @@ def _finite(value: Any) -> Any:
 
 
 def _connect_patiently(_dialect: object, _record: object, words: list[Any], how: dict[str, Any]) -> Any:
-    from .postgresql_patience import TimeoutConnection
+    from .postgresql_timeouts import TimeoutConnection
 
     connection = TimeoutConnection.connect(*words, **how)
     connection.execute(f"SET lock_timeout = '{BUSY_SECONDS:g}s'")
@@ -199,14 +199,14 @@ def _make_or_check(connection: Connection, shown: str) -> bool:
         schema.metadata.create_all(connection)
         connection.execute(insert(schema.about).values(version=schema.VERSION, probed=time.time()))
         return True
-    found = _version(connection)
-    if found != schema.VERSION and found not in STEPS:
+    version = _version(connection)
+    if version != schema.VERSION and version not in STEPS:
         raise InvalidInput(
             "database_url",
-            f"{shown} with schema version {found}",
+            f"{shown} with schema version {version}",
             f"{min(STEPS)} to {schema.VERSION}: use the Bentray version that created it, or another database",
         )
-    return found == schema.VERSION
+    return version == schema.VERSION
 
 
 def _update(address: str, shown: str) -> None:
@@ -215,9 +215,9 @@ def _update(address: str, shown: str) -> None:
     engine = _engine(address, SQLITE_PRAGMAS, patient=False)
     try:
         with engine.begin() as connection:
-            found = _version(connection)
-            log.warning("migrating %s from schema version %d to %d", shown, found, schema.VERSION)
-            migrate(connection, found)
+            version = _version(connection)
+            log.warning("migrating %s from schema version %d to %d", shown, version, schema.VERSION)
+            migrate(connection, version)
     finally:
         engine.dispose()
 

@@ -13,8 +13,8 @@ from .schema import bucket_mark
 def mark_of(database: Database) -> str:
     """The id of a database, created on first use."""
     with database.write() as connection:
-        found = connection.execute(select(bucket_mark.c.database)).scalar_one_or_none()
-        if found is None:
-            found = secrets.token_hex(16)
-            connection.execute(insert(bucket_mark).values(database=found))
-        return str(found)
+        database_id = connection.execute(select(bucket_mark.c.database)).scalar_one_or_none()
+        if database_id is None:
+            database_id = secrets.token_hex(16)
+            connection.execute(insert(bucket_mark).values(database=database_id))
+        return str(database_id)

@@ -27,8 +27,8 @@ def digest_of(path: Path) -> Digest:
     """
     if not path.is_dir():
         with path.open("rb") as file:
-            found = hashlib.file_digest(file, "sha256").hexdigest()
-            return Digest(file.tell(), found)
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+            return Digest(file.tell(), digest)
     whole, size = hashlib.sha256(), 0
     for inside in sorted(path.iterdir()):
         one = digest_of(inside)

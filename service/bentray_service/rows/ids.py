@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import secrets
 
-from ..refusals import UnknownId
+from ..errors import UnknownId
 
 PREFIXES = {"dataset": "ds", "job": "job", "volume": "vol", "mesh": "mesh", "field": "field", "upload": "up"}
 _RANDOM = re.compile(r"[0-9a-f]{20}")

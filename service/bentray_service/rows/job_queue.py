@@ -49,9 +49,9 @@ class Queue:
         """The number of jobs in each state, and the creation time of the oldest queued job."""
         with self._database.read() as connection:
             counts = connection.execute(select(jobs.c.state, func.count()).group_by(jobs.c.state))
-            found = {state: int(count) for state, count in counts}
+            by_state = {state: int(count) for state, count in counts}
             waiting = select(func.min(jobs.c.created)).where(jobs.c.state == "queued")
-            return found, connection.execute(waiting).scalar_one()
+            return by_state, connection.execute(waiting).scalar_one()
 
     def unfinished(self) -> set[str]:
         """The ids of all jobs that have not ended."""

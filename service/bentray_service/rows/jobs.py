@@ -12,7 +12,7 @@ from typing import cast
 from sqlalchemy import Connection, func, insert, select
 from sqlalchemy.exc import IntegrityError
 
-from ..refusals import JobFinished, KeyReused, QueueFull, UnknownId
+from ..errors import JobFinished, KeyReused, QueueFull, UnknownId
 from . import schema, usage
 from .ids import checked, new_id
 from .job_states import append_event, change
@@ -66,8 +66,8 @@ class Jobs(TenantTable[JobRow]):
             UnknownId: when the dataset has been deleted in the meantime.
         """
         job_id = new_id("job")
-        asked = json.dumps([kind, settings, dataset_id, volume_id, mesh_id], sort_keys=True)
-        digest = hashlib.sha256(asked.encode()).hexdigest()
+        request = json.dumps([kind, settings, dataset_id, volume_id, mesh_id], sort_keys=True)
+        digest = hashlib.sha256(request.encode()).hexdigest()
         with _still_there(dataset_id), self._database.write() as connection:
             if key is not None and connection.dialect.name != "sqlite":
                 # Write transactions of SQLite are serialised; this lock serialises those of PostgreSQL.
@@ -156,7 +156,7 @@ class Jobs(TenantTable[JobRow]):
         Returns:
             progress by job id; new events by job id, oldest first.
         """
-        found: dict[str, JobProgress] = {}
+        progress: dict[str, JobProgress] = {}
         events: dict[str, list[EventRow]] = {}
         table = schema.events
         # Jobs before events: an event in between is returned next time, and none is lost at the end.
@@ -164,7 +164,7 @@ class Jobs(TenantTable[JobRow]):
             with self._database.read() as connection:
                 columns = jobs.c.id, jobs.c.state, jobs.c.done, jobs.c.total, jobs.c.phase
                 rows = connection.execute(select(*columns).where(jobs.c.id.in_(ids))).mappings()
-                found.update({row["id"]: cast(JobProgress, dict(row)) for row in rows})
+                progress.update({row["id"]: cast(JobProgress, dict(row)) for row in rows})
                 last = (
                     select(table.c.job_id, func.max(table.c.number))
                     .where(table.c.job_id.in_(ids))
@@ -178,7 +178,7 @@ class Jobs(TenantTable[JobRow]):
                 for row in connection.execute(query.order_by(table.c.number)).mappings():
                     if row["number"] > known[row["job_id"]]:
                         events.setdefault(row["job_id"], []).append(cast(EventRow, dict(row)))
-        return found, events
+        return progress, events
 
     def request_cancel(self, tenant: Tenant, job_id: str) -> JobRow:
         """Cancel a job: a queued one ends at once, a running one after its next poll.
@@ -209,8 +209,8 @@ def _batches(ids: list[str]) -> Iterator[list[str]]:
 def _of_key(connection: Connection, tenant: Tenant, key: str) -> JobRow | None:
     """The job that was submitted with an idempotency key."""
     mine = select(jobs).where(jobs.c.tenant == tenant, jobs.c.idempotency_key == key)
-    found = connection.execute(mine).mappings().one_or_none()
-    return None if found is None else cast(JobRow, dict(found))
+    row = connection.execute(mine).mappings().one_or_none()
+    return None if row is None else cast(JobRow, dict(row))
 
 
 @contextmanager

@@ -100,8 +100,8 @@ class Keys:
         return row
 
     def _find(self, key_id: str) -> KeyRow | None:
-        found = self._database.rows(select(keys).where(keys.c.id == key_id))
-        return cast(KeyRow, found[0]) if found else None
+        rows = self._database.rows(select(keys).where(keys.c.id == key_id))
+        return cast(KeyRow, rows[0]) if rows else None
 
     def _note(self, key_id: str, now: float) -> None:
         try:

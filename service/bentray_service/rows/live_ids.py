@@ -21,14 +21,14 @@ class LiveIds:
     def names(self) -> set[Name]:
         """All ids that may have files, including those of uploads and jobs in progress."""
         with self._database.read() as connection:
-            found = self._of_jobs(connection)
+            names = self._of_jobs(connection)
             for table in (datasets, uploaded_volumes, volumes, meshes, geometry_fields, jobs):
                 rows = connection.execute(select(table.c.tenant, table.c.id))
-                found |= {(row.tenant, row.id) for row in rows}
+                names |= {(row.tenant, row.id) for row in rows}
             coming = select(uploads.c.tenant, uploads.c.id)
-            found |= {(row.tenant, row.id) for row in connection.execute(coming)}
+            names |= {(row.tenant, row.id) for row in connection.execute(coming)}
             coming = select(uploads.c.tenant, uploads.c.result_id).where(uploads.c.state == "reading")
-            return found | {(row.tenant, row.result_id) for row in connection.execute(coming)}
+            return names | {(row.tenant, row.result_id) for row in connection.execute(coming)}
 
     def needed(self) -> set[str]:
         """The ids of inputs and outputs of unfinished jobs."""
@@ -37,11 +37,11 @@ class LiveIds:
 
     def _of_jobs(self, connection: Connection) -> set[Name]:
         reads = jobs.c.dataset_id, jobs.c.volume_id, jobs.c.mesh_id, jobs.c.field_id
-        found: set[Name] = set()
+        names: set[Name] = set()
         unfinished = select(jobs.c.tenant, jobs.c.id, *reads).where(jobs.c.state.not_in(ENDED))
         for row in connection.execute(unfinished):
             # The result of a job has the id of the job with another prefix.
             own = row.id.removeprefix(PREFIXES["job"])
             made = (prefix + own for prefix in PREFIXES.values())
-            found |= {(row.tenant, name) for name in (*row[2:], *made) if name is not None}
-        return found
+            names |= {(row.tenant, name) for name in (*row[2:], *made) if name is not None}
+        return names

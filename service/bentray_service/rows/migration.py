@@ -6,19 +6,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from sqlalchemy import (
-    JSON,
-    BigInteger,
-    Column,
-    Connection,
-    Float,
-    Integer,
-    MetaData,
-    String,
-    Table,
-    text,
-    update,
-)
+from sqlalchemy import JSON, Column, Connection, MetaData, Table, text, update
 
 from . import schema
 
@@ -43,12 +31,7 @@ STORED_IN_VERSION_3 = ("datasets", "uploaded_volumes", "volumes", "meshes", "geo
 UPLOADED_VOLUMES_OF_VERSION_2 = Table(
     "uploaded_volumes",
     MetaData(),
-    Column("number", Integer, primary_key=True, autoincrement=True),
-    Column("id", String(32), nullable=False, unique=True),
-    Column("created", Float, nullable=False),
-    Column("bytes", BigInteger, nullable=False),
-    Column("sha256", String(64), nullable=False),
-    Column("title", String(200), nullable=False),
+    *schema.uploaded_columns(),
     Column("shape", JSON, nullable=False),
     Column("spacing_m", JSON, nullable=False),
     Column("origin_m", JSON, nullable=False),
@@ -57,8 +40,7 @@ UPLOADED_VOLUMES_OF_VERSION_2 = Table(
 
 
 def migrate(connection: Connection, found: int) -> None:
-    """
-    Migrate the tables from version ``found``, a key of ``STEPS`` or later, to ``rows.schema.VERSION``.
+    """Migrate the tables from version ``found``, a key of ``STEPS`` or later, to ``rows.schema.VERSION``.
 
     Args:
         connection: in a transaction of the caller; with SQLite under ``SQLITE_PRAGMAS``.
@@ -77,14 +59,13 @@ def migrate(connection: Connection, found: int) -> None:
 
 
 def _to_2(connection: Connection) -> None:
-    """
-    Version 2: jobs with volumes as inputs; a table of uploaded volumes."""
+    """Version 2: jobs with volumes as inputs; a table of uploaded volumes."""
     UPLOADED_VOLUMES_OF_VERSION_2.create(connection)
     if connection.dialect.name != "sqlite":
         connection.execute(text("ALTER TABLE jobs ALTER COLUMN dataset_id DROP NOT NULL"))
         connection.execute(text("ALTER TABLE jobs ADD COLUMN volume_id VARCHAR(32)"))
         return
-    kept = (
+    columns = (
         "number, id, kind, dataset_id, settings, state, attempts, done, total, history, error, created, "
         "started, finished"
     )
@@ -92,7 +73,7 @@ def _to_2(connection: Connection) -> None:
     connection.execute(text("ALTER TABLE jobs RENAME TO jobs_of_version_1"))
     connection.execute(text(JOBS_OF_VERSION_2))
     connection.execute(text("CREATE INDEX jobs_by_state ON jobs (state, number)"))
-    connection.execute(text(f"INSERT INTO jobs ({kept}) SELECT {kept} FROM jobs_of_version_1"))  # noqa: S608
+    connection.execute(text(f"INSERT INTO jobs ({columns}) SELECT {columns} FROM jobs_of_version_1"))  # noqa: S608
     connection.execute(text("DROP TABLE jobs_of_version_1"))
 
 

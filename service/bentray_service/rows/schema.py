@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from sqlalchemy import (
     JSON,
     BigInteger,
@@ -31,6 +33,19 @@ def _tenant() -> Column[str]:
     return Column("tenant", String(64), nullable=False, server_default="local")
 
 
+def uploaded_columns() -> list[Column[Any]]:
+    """The first columns of a table of uploaded items."""
+    return [
+        Column("number", Integer, primary_key=True, autoincrement=True),
+        Column("id", String(32), nullable=False, unique=True),
+        Column("created", Float, nullable=False),
+        Column("bytes", BigInteger, nullable=False),
+        # Of the uploaded file, or of the file created by a job or from a volume.
+        Column("sha256", String(64), nullable=False),
+        Column("title", String(200), nullable=False),
+    ]
+
+
 # Times are seconds since 1970 UTC: SQLite has no type with a time zone.
 about = Table(
     "about",
@@ -47,12 +62,7 @@ about = Table(
 datasets = Table(
     "datasets",
     metadata,
-    Column("number", Integer, primary_key=True, autoincrement=True),
-    Column("id", String(32), nullable=False, unique=True),
-    Column("created", Float, nullable=False),
-    Column("bytes", BigInteger, nullable=False),
-    Column("sha256", String(64), nullable=False),
-    Column("title", String(200), nullable=False),
+    *uploaded_columns(),
     Column("source", String(200), nullable=False),
     Column("license", String(200), nullable=False),
     Column("dimension", Integer, nullable=False),
@@ -148,12 +158,7 @@ volumes = Table(
 uploaded_volumes = Table(
     "uploaded_volumes",
     metadata,
-    Column("number", Integer, primary_key=True, autoincrement=True),
-    Column("id", String(32), nullable=False, unique=True),
-    Column("created", Float, nullable=False),
-    Column("bytes", BigInteger, nullable=False),
-    Column("sha256", String(64), nullable=False),
-    Column("title", String(200), nullable=False),
+    *uploaded_columns(),
     Column("shape", JSON, nullable=False),
     Column("spacing_m", JSON, nullable=False),
     Column("origin_m", JSON, nullable=False),
@@ -165,13 +170,7 @@ uploaded_volumes = Table(
 meshes = Table(
     "meshes",
     metadata,
-    Column("number", Integer, primary_key=True, autoincrement=True),
-    Column("id", String(32), nullable=False, unique=True),
-    Column("created", Float, nullable=False),
-    Column("bytes", BigInteger, nullable=False),
-    # Of the uploaded file, or of the file created from a volume.
-    Column("sha256", String(64), nullable=False),
-    Column("title", String(200), nullable=False),
+    *uploaded_columns(),
     Column("format", String(16), nullable=False),
     # Source of an iso-surface.
     Column("volume_id", String(32)),

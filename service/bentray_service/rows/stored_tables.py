@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Generic, TypeVar, cast
 
 from sqlalchemy import Table, insert, select
 
-from ..refusals import UnknownId
+from ..errors import UnknownId
 from . import schema
 from .database import Database
 from .ids import checked
@@ -39,10 +39,10 @@ class TenantTable(Generic[Record]):
         Raises:
             UnknownId: when the tenant has no such item.
         """
-        found = self._select(tenant, 1, checked(self.what, name))
-        if not found:
+        rows = self._select(tenant, 1, checked(self.what, name))
+        if not rows:
             raise UnknownId(self.what, name)
-        return cast(Record, found[0])
+        return cast(Record, rows[0])
 
     def newest(self, tenant: Tenant, limit: int) -> list[Record]:
         """Up to ``limit`` rows of this tenant, newest first."""
@@ -97,17 +97,17 @@ class Volumes(UploadedTable[VolumeRow]):
             .join(jobs, jobs.c.id == volumes.c.job_id)
             .join(datasets, datasets.c.id == jobs.c.dataset_id)
         )
-        found: list[Plain] = []
+        rows: list[Plain] = []
         for table, query in ((volumes, reconstructed), (uploaded_volumes, select(uploaded_volumes))):
             mine = query.where(table.c.tenant == tenant)
             if name is not None:
                 mine = mine.where(table.c.id == name)
-            found += self._database.rows(mine.order_by(table.c.created.desc()).limit(limit))
-        for row in found:
+            rows += self._database.rows(mine.order_by(table.c.created.desc()).limit(limit))
+        for row in rows:
             made = "job_id" in row
             row |= (
                 {"unit": "m/s", "value_range": row["speed_range_mps"]}
                 if made
                 else {"unit": "", "axes": "x,y,z"}
             )
-        return sorted(found, key=lambda row: float(row["created"]), reverse=True)[:limit]
+        return sorted(rows, key=lambda row: float(row["created"]), reverse=True)[:limit]

@@ -8,7 +8,7 @@ from typing import Any, cast
 from sqlalchemy import ColumnElement, Connection, func, insert, select, update
 from sqlalchemy import delete as delete_from
 
-from ..refusals import RateLimited
+from ..errors import RateLimited
 from . import usage
 from .ids import new_id
 from .records import Plain, UploadRow

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import ColumnElement, Connection, delete, func, insert, not_, or_, select, update
 
-from ..refusals import QuotaExceeded
+from ..errors import QuotaExceeded
 from .schema import storage
 from .tenants import Tenant
 
@@ -40,8 +40,8 @@ def usage_of(connection: Connection, tenant: Tenant, besides: str = "") -> Usage
     """
     mine = storage.c.tenant == tenant, storage.c.name != besides, _believed()
     query = select(storage.c.reserved, func.sum(storage.c.bytes)).where(*mine).group_by(storage.c.reserved)
-    found = {bool(reserved): int(size) for reserved, size in connection.execute(query)}
-    return Usage(found.get(False, 0), found.get(True, 0))
+    sizes = {bool(reserved): int(size) for reserved, size in connection.execute(query)}
+    return Usage(sizes.get(False, 0), sizes.get(True, 0))
 
 
 def reserve(

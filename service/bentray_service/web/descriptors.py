@@ -21,11 +21,11 @@ def raise_limit() -> int:
         InvalidInput: when it is below ``LEAST``.
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = WANTED if hard == resource.RLIM_INFINITY else min(hard, WANTED)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
+    target = WANTED if hard == resource.RLIM_INFINITY else min(hard, WANTED)
+    if soft != resource.RLIM_INFINITY and soft < target:
         with suppress(OSError, ValueError):
-            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
-            soft = wanted
+            resource.setrlimit(resource.RLIMIT_NOFILE, (target, hard))
+            soft = target
     found = WANTED if soft == resource.RLIM_INFINITY else soft
     if found < LEAST:
         accepted = f"at least {LEAST}; raise the hard limit (ulimit -Hn, LimitNOFILE= of systemd)"

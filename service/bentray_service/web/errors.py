@@ -21,7 +21,7 @@ from starlette.routing import Match, Mount
 
 from bentray_kernels.errors import InvalidInput
 
-from .. import refusals
+from .. import errors
 from .headers import HEADERS as SECURITY
 from .problem import Fault, Problem
 from .request_id import REQUEST_ID
@@ -46,49 +46,49 @@ class ProblemType:
 
 PROBLEMS: Mapping[type[Exception], ProblemType] = {
     InvalidInput: ProblemType(422, "invalid-input", "Invalid value"),
-    refusals.UnknownId: ProblemType(404, "unknown-id", "Unknown id"),
-    refusals.Deleted: ProblemType(404, "deleted", "Deleted"),
-    refusals.Damaged: ProblemType(500, "stored-data-damaged", "Stored data is damaged"),
-    refusals.WrongMediaType: ProblemType(415, "wrong-media-type", "Unsupported media type"),
-    refusals.EmptyBody: ProblemType(422, "empty-body", "Empty body"),
-    refusals.TooLarge: ProblemType(413, "too-large", "Body too large"),
-    refusals.BodyTimeout: ProblemType(408, "too-slow", "Body received too slowly"),
-    refusals.TinyChunks: ProblemType(400, "tiny-chunks", "Too many small chunks"),
-    refusals.MalformedRequest: ProblemType(400, "malformed-request", "Malformed request"),
-    refusals.UnknownMethod: ProblemType(501, "unknown-method", "Unknown method"),
-    refusals.HeadersTooLarge: ProblemType(431, "head-too-large", "Request headers too long"),
-    refusals.TooManyConnections: ProblemType(503, "too-many-connections", "Too many connections"),
-    refusals.WrongProtocol: ProblemType(412, "wrong-protocol", "Unsupported version of the upload protocol"),
-    refusals.WrongOffset: ProblemType(409, "wrong-offset", "Wrong offset of the upload"),
-    refusals.Locked: ProblemType(423, "locked", "Upload in use by another request"),
+    errors.UnknownId: ProblemType(404, "unknown-id", "Unknown id"),
+    errors.Deleted: ProblemType(404, "deleted", "Deleted"),
+    errors.Damaged: ProblemType(500, "stored-data-damaged", "Stored data is damaged"),
+    errors.WrongMediaType: ProblemType(415, "wrong-media-type", "Unsupported media type"),
+    errors.EmptyBody: ProblemType(422, "empty-body", "Empty body"),
+    errors.TooLarge: ProblemType(413, "too-large", "Body too large"),
+    errors.BodyTimeout: ProblemType(408, "too-slow", "Body received too slowly"),
+    errors.TinyChunks: ProblemType(400, "tiny-chunks", "Too many small chunks"),
+    errors.MalformedRequest: ProblemType(400, "malformed-request", "Malformed request"),
+    errors.UnknownMethod: ProblemType(501, "unknown-method", "Unknown method"),
+    errors.HeadersTooLarge: ProblemType(431, "head-too-large", "Request headers too long"),
+    errors.TooManyConnections: ProblemType(503, "too-many-connections", "Too many connections"),
+    errors.WrongProtocol: ProblemType(412, "wrong-protocol", "Unsupported version of the upload protocol"),
+    errors.WrongOffset: ProblemType(409, "wrong-offset", "Wrong offset of the upload"),
+    errors.Locked: ProblemType(423, "locked", "Upload in use by another request"),
     # Status code of tus, not of HTTP.
-    refusals.WrongChecksum: ProblemType(460, "wrong-checksum", "Checksum mismatch"),
-    refusals.UnknownChecksum: ProblemType(400, "unknown-checksum", "Unknown checksum algorithm"),
-    refusals.InUse: ProblemType(409, "in-use", "Needed by an unfinished job"),
-    refusals.JobFinished: ProblemType(409, "job-finished", "The job has ended"),
-    refusals.KeyReused: ProblemType(409, "key-reused", "Idempotency key used with another request"),
-    refusals.QueueFull: ProblemType(429, "queue-full", "Too many queued jobs"),
-    refusals.NotAuthenticated: ProblemType(401, "not-let-in", "Authentication required"),
-    refusals.Forbidden: ProblemType(403, "not-allowed", "Permission denied"),
-    refusals.RateLimited: ProblemType(429, "too-often", "Too many requests"),
-    refusals.TooManyStreams: ProblemType(429, "too-many-streams", "Too many event streams"),
-    refusals.QuotaExceeded: ProblemType(507, "quota-used-up", "Storage quota exceeded"),
-    refusals.RangeNotSatisfiable: ProblemType(416, "no-such-part", "Range not satisfiable"),
-    refusals.NoAnimation: ProblemType(409, "no-animation", "No animation"),
-    refusals.StorageFull: ProblemType(507, "storage-full", "Disk full"),
-    refusals.StorageUnavailable: ProblemType(503, "storage-away", "Storage unavailable"),
-    refusals.DatabaseUnavailable: ProblemType(503, "database-away", "Database unavailable"),
-    refusals.Busy: ProblemType(503, "busy", "No worker available in time"),
-    refusals.NotReady: ProblemType(503, "not-ready", "Service not ready"),
+    errors.WrongChecksum: ProblemType(460, "wrong-checksum", "Checksum mismatch"),
+    errors.UnknownChecksum: ProblemType(400, "unknown-checksum", "Unknown checksum algorithm"),
+    errors.InUse: ProblemType(409, "in-use", "Needed by an unfinished job"),
+    errors.JobFinished: ProblemType(409, "job-finished", "The job has ended"),
+    errors.KeyReused: ProblemType(409, "key-reused", "Idempotency key used with another request"),
+    errors.QueueFull: ProblemType(429, "queue-full", "Too many queued jobs"),
+    errors.NotAuthenticated: ProblemType(401, "not-let-in", "Authentication required"),
+    errors.Forbidden: ProblemType(403, "not-allowed", "Permission denied"),
+    errors.RateLimited: ProblemType(429, "too-often", "Too many requests"),
+    errors.TooManyStreams: ProblemType(429, "too-many-streams", "Too many event streams"),
+    errors.QuotaExceeded: ProblemType(507, "quota-used-up", "Storage quota exceeded"),
+    errors.RangeNotSatisfiable: ProblemType(416, "no-such-part", "Range not satisfiable"),
+    errors.NoAnimation: ProblemType(409, "no-animation", "No animation"),
+    errors.StorageFull: ProblemType(507, "storage-full", "Disk full"),
+    errors.StorageUnavailable: ProblemType(503, "storage-away", "Storage unavailable"),
+    errors.DatabaseUnavailable: ProblemType(503, "database-away", "Database unavailable"),
+    errors.Busy: ProblemType(503, "busy", "No worker available in time"),
+    errors.NotReady: ProblemType(503, "not-ready", "Service not ready"),
 }
 # Temporary problems; the response has Retry-After.
 LATER = (
-    refusals.Busy,
-    refusals.DatabaseUnavailable,
-    refusals.QueueFull,
-    refusals.StorageUnavailable,
-    refusals.TooManyConnections,
-    refusals.TooManyStreams,
+    errors.Busy,
+    errors.DatabaseUnavailable,
+    errors.QueueFull,
+    errors.StorageUnavailable,
+    errors.TooManyConnections,
+    errors.TooManyStreams,
 )
 INVALID_REQUEST = ProblemType(422, "invalid-request", "Invalid request")
 UNREADABLE = ProblemType(400, "unreadable-body", "Unreadable body")
@@ -148,8 +148,8 @@ def fault_of(error: Mapping[str, Any], job_kinds: Sequence[str] = ()) -> Fault:
         return Fault(field=".".join(where), found="nothing", accepted="a value; it is required")
     if error["type"] == "extra_forbidden":
         return Fault(field=".".join(where), found=_short(error["input"]), accepted="no such field; see /docs")
-    said = error["msg"].removeprefix("Input should be ").partition(", unable to parse")[0]
-    accepted = str(context.get("expected") or said)
+    message = error["msg"].removeprefix("Input should be ").partition(", unable to parse")[0]
+    accepted = str(context.get("expected") or message)
     return Fault(field=".".join(where), found=_short(error["input"]), accepted=accepted)
 
 
@@ -165,7 +165,7 @@ def install_handlers(app: FastAPI, job_kinds: Sequence[str] = ()) -> None:
         )
 
     app.add_exception_handler(InvalidInput, _refused)
-    app.add_exception_handler(refusals.NotReady, _not_ready)
+    app.add_exception_handler(errors.NotReady, _not_ready)
     app.add_exception_handler(RequestValidationError, invalid_request)
     app.add_exception_handler(ClientDisconnect, _disconnected)
     app.add_exception_handler(HTTPException, _http)
@@ -189,11 +189,11 @@ def problem_response(error: InvalidInput, path: str | None) -> Response:
     headers: dict[str, str] = {}
     if isinstance(error, LATER):
         headers["Retry-After"] = RETRY_AFTER
-    if isinstance(error, refusals.RateLimited):
+    if isinstance(error, errors.RateLimited):
         headers["Retry-After"] = str(math.ceil(error.wait_s))
-    if isinstance(error, refusals.NotAuthenticated):
+    if isinstance(error, errors.NotAuthenticated):
         headers["WWW-Authenticate"] = 'Bearer realm="bentray"'
-    if isinstance(error, refusals.RangeNotSatisfiable):
+    if isinstance(error, errors.RangeNotSatisfiable):
         headers["Content-Range"] = f"bytes */{error.size}"
     return _respond(problem_of(error, path), headers)
 
@@ -201,16 +201,16 @@ def problem_response(error: InvalidInput, path: str | None) -> Response:
 def _system_error(request: Request, error: Exception) -> Response:
     """A full disk; all other errors are unexpected."""
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        full = refusals.StorageFull("disk", "no space left", "a later request, when there is free space")
+        full = errors.StorageFull("disk", "no space left", "a later request, when there is free space")
         return problem_response(full, request.url.path)
     raise error
 
 
 def _not_ready(request: Request, error: Exception) -> Response:
-    assert isinstance(error, refusals.NotReady)
+    assert isinstance(error, errors.NotReady)
     faults = [Fault(field=part, found=found, accepted=needed) for part, found, needed in error.faults]
     problem = make_problem(
-        PROBLEMS[refusals.NotReady], str(error), faults, errors=faults, instance=request.url.path
+        PROBLEMS[errors.NotReady], str(error), faults, errors=faults, instance=request.url.path
     )
     return _respond(problem, {"Retry-After": "5"})
 
@@ -241,12 +241,12 @@ def _methods(request: Request) -> list[str]:
     """The allowed methods of an address; the router only reports those of the first route."""
     # Mounts match every method; they contain static files, which are read-only.
     routes = [route for route in request.app.routes if not isinstance(route, Mount)]
-    found = [
+    allowed = [
         method
         for method in METHODS
         if any(route.matches({**request.scope, "method": method})[0] is Match.FULL for route in routes)
     ]
-    return found or ["GET", "HEAD"]
+    return allowed or ["GET", "HEAD"]
 
 
 def _disconnected(request: Request, error: Exception) -> Response:

@@ -7,7 +7,7 @@ from typing import Any
 
 from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
 
-from ..refusals import TooManyConnections
+from ..errors import TooManyConnections
 from .connections import Connections
 from .errors import problem_response
 from .unread_bodies import UnreadBodies, last

@@ -87,19 +87,19 @@ def _operation(operation: tuple[str, str, Node]) -> str:
         parts.append("<h3>Body</h3>")
         bodies = [(media, type_words(content["schema"])) for media, content in body["content"].items()]
         parts.append(_table(("Media type", "Content"), bodies))
-    answers = [
-        (code, _answer(answer), "" if answer["description"] == UNSAID else answer["description"])
-        for code, answer in what["responses"].items()
+    responses = [
+        (code, _answer(response), "" if response["description"] == UNSAID else response["description"])
+        for code, response in what["responses"].items()
         if code != "default"
     ]
-    parts.append("<h3>Answers</h3>" + _table(("Status", "Content", "Meaning"), answers))
+    parts.append("<h3>Answers</h3>" + _table(("Status", "Content", "Meaning"), responses))
     return "".join(parts) + "</section>"
 
 
-def _answer(answer: Node) -> str:
+def _answer(response: Node) -> str:
     return "; ".join(
         type_words(content.get("schema", {})) if media.endswith("json") else media
-        for media, content in answer.get("content", {}).items()
+        for media, content in response.get("content", {}).items()
     )
 
 

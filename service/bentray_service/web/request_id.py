@@ -25,8 +25,8 @@ class RequestIds:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        given = Headers(scope=scope).get(REQUEST_ID, "")
-        number = given if _FORM.fullmatch(given) else secrets.token_hex(8)
+        sent = Headers(scope=scope).get(REQUEST_ID, "")
+        number = sent if _FORM.fullmatch(sent) else secrets.token_hex(8)
         scope.setdefault("state", {})["request_id"] = number
 
         async def send_with_id(message: Message) -> None:

@@ -6,7 +6,7 @@ import asyncio
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ..refusals import BodyTimeout
+from ..errors import BodyTimeout
 
 # Bytes of the body that must arrive within the time limit.
 LEAST_BYTES = 64 * 1024

@@ -11,7 +11,7 @@ from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
 from bentray_kernels.errors import InvalidInput
 
-from ..refusals import HeadersTooLarge, MalformedRequest, UnknownMethod
+from ..errors import HeadersTooLarge, MalformedRequest, UnknownMethod
 from .errors import METHODS, problem_response
 
 # Time limit for all headers of a request, s.

@@ -10,7 +10,7 @@ from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
 
 from bentray_kernels.errors import InvalidInput
 
-from ..refusals import TinyChunks
+from ..errors import TinyChunks
 from .slow_headers import HeaderTimeout
 
 # The application is woken after this many bytes, or after this time.

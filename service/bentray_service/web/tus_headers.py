@@ -19,10 +19,10 @@ class TusHeaders:
         if scope["type"] != "http" or not scope["path"].startswith(PLACE):
             await self.app(scope, receive, send)
             return
-        wanted = Headers(scope=scope).get("x-http-method-override", "").upper()
-        if scope["method"] == "POST" and wanted in ("PATCH", "DELETE"):
+        method = Headers(scope=scope).get("x-http-method-override", "").upper()
+        if scope["method"] == "POST" and method in ("PATCH", "DELETE"):
             # In place, so that the outer middleware logs the actual method.
-            scope["method"] = wanted
+            scope["method"] = method
 
         async def send_with_version(message: Message) -> None:
             if message["type"] == "http.response.start":

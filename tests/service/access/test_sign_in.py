@@ -5,7 +5,7 @@ from starlette.datastructures import Headers
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.access.sign_in import SignIn
-from bentray_service.refusals import Forbidden, NotAuthenticated, RateLimited
+from bentray_service.errors import Forbidden, NotAuthenticated, RateLimited
 from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.database import open_database
 from bentray_service.rows.keys import Keys

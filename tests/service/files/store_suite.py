@@ -84,16 +84,6 @@ class StoreSuite:
         files.store.remove([path])
         assert elsewhere.store.fetch(self.there(elsewhere, path, OTHER)).read_bytes() == b"theirs"
 
-    def test_all_of_a_tenant_is_counted(self, files):
-        kept = self.file(files, bytes(1000))
-        self.file(files, bytes(50), OTHER)
-        (files.of(LOCAL).work(new_id("job")) / "checkpoint").write_bytes(bytes(200))
-        assert files.of(LOCAL).bytes_used() == 1200
-        self.file(files, bytes(30))
-        assert files.of(LOCAL).bytes_used() == 1230
-        files.store.remove([kept])
-        assert (files.of(LOCAL).bytes_used(), files.of(OTHER).bytes_used()) == (230, 50)
-
     def test_nothing_is_wrong_with_it(self, files):
         assert files.store.fault() is None
         path = self.file(files)

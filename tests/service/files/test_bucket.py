@@ -2,9 +2,9 @@
 
 import pytest
 
+from bentray_service.errors import StorageUnavailable
 from bentray_service.files import bucket as module
 from bentray_service.files.bucket import Bucket
-from bentray_service.refusals import StorageUnavailable
 
 
 def test_lists_and_removals_go_beyond_a_page(bucket_url, monkeypatch):

@@ -3,8 +3,8 @@
 import pytest
 
 from bentray_kernels.errors import InvalidInput
+from bentray_service.errors import UnknownId
 from bentray_service.files.data_folder import Files, lock
-from bentray_service.refusals import UnknownId
 from bentray_service.rows.ids import new_id
 from bentray_service.rows.tenants import LOCAL, Tenant
 
@@ -93,7 +93,7 @@ def test_tenants_have_nothing_in_common_on_the_disk(tmp_path):
     mine.field(field).mkdir()
     (mine.field(field) / "a").write_bytes(bytes(1000))
     assert not theirs.field(field).exists()
-    assert (mine.bytes_used(), theirs.bytes_used()) == (1000, 0)
+    assert (mine.sizes(), theirs.sizes()) == ({field: 1000}, {})
 
 
 def test_the_folder_of_an_older_version_goes_to_the_local_tenant(tmp_path):

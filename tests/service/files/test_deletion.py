@@ -6,12 +6,12 @@ import pytest
 from sqlalchemy import func, insert, select, update
 
 from bentray_service.access.quota import Quota
+from bentray_service.errors import InUse, UnknownId
 from bentray_service.files.data_folder import Files
 from bentray_service.files.deletion import Deletion, StoredItem
 from bentray_service.files.orphans import Orphans
 from bentray_service.housekeeping import DAY_S, Housekeeper
 from bentray_service.ingest.append import UploadLocks
-from bentray_service.refusals import InUse, UnknownId
 from bentray_service.rows import schema
 from bentray_service.rows.ages import ExpiryMarks
 from bentray_service.rows.database import open_database

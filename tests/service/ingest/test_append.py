@@ -10,9 +10,9 @@ import sys
 import pytest
 
 from bentray_kernels.errors import InvalidInput
+from bentray_service.errors import Locked, TooLarge, UnknownChecksum, WrongChecksum
 from bentray_service.ingest import receive as receiving
 from bentray_service.ingest.append import Checksum, UploadLocks, append, discard_unverified, received_bytes
-from bentray_service.refusals import Locked, TooLarge, UnknownChecksum, WrongChecksum
 
 BEGIN = b"begin "
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bentray_service.errors import EmptyBody, StorageFull, TooLarge
 from bentray_service.ingest import receive as receiving
 from bentray_service.ingest.receive import receive
-from bentray_service.refusals import EmptyBody, StorageFull, TooLarge
 
 from ...effort import effort
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from bentray_kernels.errors import InvalidInput
+from bentray_service.errors import QuotaExceeded, StorageFull
 from bentray_service.ingest import sandbox
-from bentray_service.refusals import QuotaExceeded, StorageFull
 
 LIMITS = {"memory_bytes": 4 * 1024**3, "seconds": 60.0}
 

@@ -4,8 +4,8 @@ from contextlib import ExitStack
 
 import pytest
 
+from bentray_service.errors import Busy, RateLimited
 from bentray_service.ingest.upload_limits import UploadLimits
-from bentray_service.refusals import Busy, RateLimited
 from bentray_service.rows.tenants import Tenant
 
 ONE, OTHER, THIRD = Tenant("one"), Tenant("other"), Tenant("third")

@@ -7,9 +7,9 @@ from contextlib import ExitStack
 import pytest
 from starlette.requests import ClientDisconnect, Request
 
+from bentray_service.errors import Busy
 from bentray_service.ingest.fair_queue import FairQueue
 from bentray_service.ingest.upload_limits import MOST_OF_TENANT
-from bentray_service.refusals import Busy
 from bentray_service.routes import uploads
 from bentray_service.routes.uploads import run_in_turn
 from bentray_service.rows.tenants import LOCAL, Tenant

@@ -5,7 +5,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from bentray_service.refusals import DatabaseUnavailable
+from bentray_service.errors import DatabaseUnavailable
 from bentray_service.rows import admission
 from bentray_service.rows.admission import MOST_AT_ONCE, MOST_WHILE_SLOW, Admission
 

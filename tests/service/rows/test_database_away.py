@@ -11,8 +11,8 @@ from contextlib import closing, contextmanager
 import pytest
 from sqlalchemy import select
 
-from bentray_service.refusals import DatabaseFull, DatabaseUnavailable
-from bentray_service.rows import admission, database, postgresql_patience, schema
+from bentray_service.errors import DatabaseFull, DatabaseUnavailable
+from bentray_service.rows import admission, database, postgresql_timeouts, schema
 from bentray_service.rows.database import open_database
 from bentray_service.rows.jobs import Jobs
 from bentray_service.rows.tenants import LOCAL
@@ -106,7 +106,7 @@ def test_postgresql_that_is_killed(postgresql_server):
 
 def test_postgresql_that_stands_still(postgresql_server, monkeypatch):
     monkeypatch.setattr(database, "BUSY_SECONDS", 2.0)
-    monkeypatch.setattr(postgresql_patience, "ANSWER_SECONDS", 0.5)
+    monkeypatch.setattr(postgresql_timeouts, "ANSWER_SECONDS", 0.5)
     address = postgresql_server.new_database()
     with closing(open_database(address)) as opened:
         assert ask(opened) == schema.VERSION

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bentray_service.refusals import UnknownId
+from bentray_service.errors import UnknownId
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import field_of, new_id
 from bentray_service.rows.job_queue import Queue

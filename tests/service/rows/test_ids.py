@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bentray_service.refusals import UnknownId
+from bentray_service.errors import UnknownId
 from bentray_service.rows.ids import PREFIXES, checked, field_of, new_id, volume_of
 
 

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from bentray_service.refusals import UnknownId
+from bentray_service.errors import UnknownId
 from bentray_service.rows.ids import volume_of
 from bentray_service.rows.job_queue import LEASE_S, Queue
 from bentray_service.rows.stored_tables import Volumes

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from bentray_service.refusals import JobFinished, KeyReused, QueueFull, UnknownId
+from bentray_service.errors import JobFinished, KeyReused, QueueFull, UnknownId
 from bentray_service.rows.tenants import LOCAL, Tenant
 
 

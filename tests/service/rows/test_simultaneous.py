@@ -6,9 +6,9 @@ from threading import Barrier
 
 import pytest
 
+from bentray_service.errors import InUse, JobFinished, KeyReused, UnknownId
 from bentray_service.files.data_folder import Files
 from bentray_service.files.deletion import Deletion, StoredItem
-from bentray_service.refusals import InUse, JobFinished, KeyReused, UnknownId
 from bentray_service.rows import admission
 from bentray_service.rows.tenants import LOCAL
 

@@ -8,9 +8,9 @@ from threading import Barrier
 import pytest
 
 from bentray_service.access.quota import LEASE_S, Quota
+from bentray_service.errors import DatabaseUnavailable, QuotaExceeded, RateLimited
 from bentray_service.files.data_folder import Files
 from bentray_service.files.deletion import Deletion, StoredItem
-from bentray_service.refusals import DatabaseUnavailable, QuotaExceeded, RateLimited
 from bentray_service.rows import uploads as uploading
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import new_id

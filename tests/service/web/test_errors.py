@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 from starlette.requests import ClientDisconnect
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service import refusals
+from bentray_service.errors import StorageFull
 from bentray_service.web import errors
 
 
@@ -25,7 +25,7 @@ def http():
 
     @app.get("/full")
     def full():
-        raise refusals.StorageFull("body", "no space", "less")
+        raise StorageFull("body", "no space", "less")
 
     @app.post("/refused")
     def sent(body: dict[str, int]):

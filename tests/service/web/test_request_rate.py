@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from bentray_service.refusals import BodyTimeout
+from bentray_service.errors import BodyTimeout
 from bentray_service.web.request_rate import LEAST_BYTES, RequestRate
 
 HTTP = {"type": "http"}

@@ -35,17 +35,17 @@ def reconstruction(client, folder, work, on_progress):
 
 
 def simulation(client, folder, work, on_progress):
-    simulate_to_file(client, SCAN.chosen(), work / "made.h5", work, on_progress)
+    simulate_to_file(client, SCAN.chosen(), work / "made.h5", work, on_progress=on_progress)
     return (work / "made.h5").read_bytes()
 
 
 def turntable(client, folder, work, on_progress):
-    draw_turntable(client, folder / "volume.h5", TURNTABLE, work / "made.zip", work, on_progress)
+    draw_turntable(client, folder / "volume.h5", TURNTABLE, work / "made.zip", work, on_progress=on_progress)
     return (work / "made.zip").read_bytes()
 
 
 def geometry_field(client, folder, work, on_progress):
-    build_field(client, folder / "mesh.h5", FIELD, work / "made", work, on_progress)
+    build_field(client, folder / "mesh.h5", FIELD, work / "made", work, on_progress=on_progress)
     return [path.read_bytes() for path in sorted((work / "made").glob("*.npy"))]
 
 

@@ -8,12 +8,14 @@ from hypothesis.extra import numpy as arrays
 from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.images.png import colours_of, png_of, read_picture
+from bentray_workers.images.png import png_of, read_picture
+
+from ..pixels import pixels_of
 
 
 @given(arrays.arrays(np.uint8, st.tuples(st.integers(1, 9), st.integers(1, 9), st.just(3))))
 def test_a_picture_survives(image):
-    np.testing.assert_array_equal(colours_of(png_of(image)), image)
+    np.testing.assert_array_equal(pixels_of(png_of(image)), image)
     assert png_of(image) == png_of(image[::-1][::-1])
 
 

@@ -103,7 +103,7 @@ def test_the_recovery_is_drawn_from_0_to_1_unless_told_otherwise(file, drawn):
     for given, limits in (({}, (0.0, 1.0)), ({"low": 0.5}, (0.5, 1.0)), ({"high": 0.6}, (0.0, 0.6))):
         slice_png(file, quantity="recovery", **given)
         assert drawn[-1].axes[0].images[0].get_clim() == limits
-    assert "part of a checkerboard recovered" in drawn.words()
+    assert "recovered fraction of a checkerboard" in drawn.words()
 
 
 def test_pictures_drawn_in_threads_are_those_drawn_alone(file):

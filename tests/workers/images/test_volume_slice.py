@@ -5,7 +5,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.volume import Volume, write_volume
-from bentray_workers.images.volume_slice import volume_slice_png
+from bentray_workers.images.slice import volume_slice_png
 
 
 @pytest.fixture

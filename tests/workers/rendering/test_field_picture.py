@@ -10,13 +10,13 @@ from PIL import Image
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, torus
 from bentray_workers.files.geometry_image import GeometryMaps, read_geometry_image, write_geometry_image
-from bentray_workers.images.png import colours_of
 from bentray_workers.rendering import field_cache, tiles
 from bentray_workers.rendering.field_cache import world_at
 from bentray_workers.rendering.field_picture import map_png, picture_png, tasks_of, tile_image
 from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.field_view import CHOICES, LOOKUPS, FieldView
 
+from ..pixels import pixels_of
 from .field_folders import field_of
 
 SIZE = {"width": 48, "height": 40}
@@ -30,7 +30,7 @@ def folder(tmp_path_factory):
 
 
 def drawn(folder, **how):
-    return colours_of(picture_png(folder, FieldView(**{**SIZE, **how}))).astype(int)
+    return pixels_of(picture_png(folder, FieldView(**{**SIZE, **how}))).astype(int)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_strips_are_parts_of_the_whole(folder, cluster, monkeypatch):
     view = FieldView(**SIZE, rays=2)
     whole = picture_png(folder, view)
     parts = [tile_image(folder, view, first, first + 8) for first in range(0, 40, 8)]
-    off = np.abs(np.concatenate(parts).astype(int) - colours_of(whole)).max(axis=2)
+    off = np.abs(np.concatenate(parts).astype(int) - pixels_of(whole)).max(axis=2)
     assert (off > 2).mean() < 0.002
     monkeypatch.setattr(tiles, "TASK_RAYS", 8 * 48 * 4)
     assert len(tiles.tile_rows(view)) == 5

@@ -31,7 +31,9 @@ def small_batches(monkeypatch):
 
 def made(path, tmp_path, name="field", on_progress=None, stop=None, settings=SMALL, client=None):
     """The figures of the field, built into a folder of that name."""
-    return build_field(client, path, settings, tmp_path / name, tmp_path / "work", on_progress, stop=stop)
+    return build_field(
+        client, path, settings, tmp_path / name, tmp_path / "work", on_progress=on_progress, stop=stop
+    )
 
 
 def test_the_tables_are_those_of_the_kernels(path, tmp_path, small_batches):
@@ -106,7 +108,7 @@ def test_what_is_there_is_taken(path, tmp_path, monkeypatch):
 def test_two_at_once_make_one(path, tmp_path):
     made(path, tmp_path)
     before = FieldFiles(tmp_path / "field").figures.read_bytes()
-    geometry_field._move(FieldFiles(tmp_path / "field").folder, tmp_path / "field")
+    geometry_field._move(tmp_path / "field", tmp_path / "field")
     (tmp_path / "late").mkdir()
     (tmp_path / "late" / "figures.json").write_text("late")
     geometry_field._move(tmp_path / "late", tmp_path / "field")

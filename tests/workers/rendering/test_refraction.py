@@ -10,12 +10,13 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import ONE_HOLE, FringeSphere, sampled
 from bentray_workers.cluster.resources import RECONSTRUCTION
 from bentray_workers.files.volume import Volume, write_volume
-from bentray_workers.images.png import colours_of
 from bentray_workers.rendering import refraction, tiles
 from bentray_workers.rendering.refraction import draw_tile, frame_of, picture_png, tile_image
 from bentray_workers.rendering.refraction_view import RefractionView
 from bentray_workers.rendering.scene_cache import scene_at
 from bentray_workers.rendering.tiles import stack_png, tile_rows
+
+from ..pixels import pixels_of
 
 SMALL = RefractionView(iso=(0.5,), width=48, height=32)
 
@@ -93,11 +94,11 @@ def test_strips_make_the_whole(path, how):
     view = replace(SMALL, **how)
     image = whole(path, view).image
     parts = [tile_image(path, view, first, min(first + 7, 32)) for first in range(0, 32, 7)]
-    joined = colours_of(stack_png(parts))
+    joined = pixels_of(stack_png(parts))
     assert joined.shape == (32, 48, 3)
     # The same rays but for the last digit, which may move a pixel over the border of a square.
     assert (joined != image).any(axis=-1).mean() < 0.005
-    np.testing.assert_array_equal(colours_of(picture_png(path, view)), image)
+    np.testing.assert_array_equal(pixels_of(picture_png(path, view)), image)
 
 
 def test_real_supersampling_smooths(path):
@@ -140,7 +141,7 @@ def test_on_a_cluster(cluster, path, rays, monkeypatch):
     monkeypatch.setattr(tiles, "TASK_RAYS", rays)
     png = tiles.submit(cluster.client, refraction.tasks_of(path, SMALL), 0).result(timeout=60)
     image = whole(path, SMALL).image
-    assert (colours_of(png) != image).any(axis=-1).mean() < 0.005
+    assert (pixels_of(png) != image).any(axis=-1).mean() < 0.005
 
 
 def test_a_picture_does_not_wait_for_reconstructions(cluster, path):

@@ -11,10 +11,11 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TWO_HOLES, sampled
 from bentray_kernels.task_graph import Cancelled
 from bentray_workers.files.volume import Volume, write_volume
-from bentray_workers.images.png import colours_of
 from bentray_workers.rendering.refraction import picture_png
 from bentray_workers.rendering.refraction_view import RefractionView
 from bentray_workers.rendering.turntable import Turntable, draw_turntable
+
+from ..pixels import pixels_of
 
 SMALL = {"iso": (0.5,), "width": 32, "height": 24}
 
@@ -60,7 +61,7 @@ def test_what_is_refused(given, field):
 
 def test_a_zip_holds_each_picture(cluster, path, folder, tmp_path):
     table, told = Turntable(**SMALL, frames=3, turn_deg=90.0), []
-    draw_turntable(cluster.client, path, table, tmp_path / "t.zip", folder, told.append)
+    draw_turntable(cluster.client, path, table, tmp_path / "t.zip", folder, on_progress=told.append)
     with zipfile.ZipFile(tmp_path / "t.zip") as archive:
         assert archive.namelist() == ["0000.png", "0001.png", "0002.png"]
         pictures = [archive.read(name) for name in archive.namelist()]
@@ -72,7 +73,7 @@ def test_a_zip_holds_each_picture(cluster, path, folder, tmp_path):
     # As a service that died half-way leaves it: one picture missing, the others not drawn again.
     (folder / "0000.png").unlink()
     before = {frame.name: frame.stat().st_mtime_ns for frame in folder.iterdir()}
-    draw_turntable(cluster.client, path, table, tmp_path / "u.zip", folder, told.append)
+    draw_turntable(cluster.client, path, table, tmp_path / "u.zip", folder, on_progress=told.append)
     assert list(dict.fromkeys((one.done, one.total) for one in told)) == [(2, 3), (3, 3)]
     assert before.items() <= {frame.name: frame.stat().st_mtime_ns for frame in folder.iterdir()}.items()
     assert (tmp_path / "u.zip").read_bytes() == (tmp_path / "t.zip").read_bytes()
@@ -87,7 +88,7 @@ def test_an_apng_shows_each_picture(cluster, path, folder, tmp_path):
         assert (found.format, found.n_frames) == ("PNG", 3)
         for k in range(3):
             found.seek(k)
-            expected = colours_of(picture_png(path, table.frame(k)))
+            expected = pixels_of(picture_png(path, table.frame(k)))
             np.testing.assert_array_equal(np.asarray(found.convert("RGB")), expected)
             assert found.info["duration"] == 80
 
@@ -101,7 +102,7 @@ def test_it_stops_between_pictures(cluster, path, folder, tmp_path):
             Turntable(**SMALL, frames=200),
             tmp_path / "t.zip",
             folder,
-            told.append,
+            on_progress=told.append,
             stop=lambda: len(told) > 2,
         )
     assert told[-1].done < 200

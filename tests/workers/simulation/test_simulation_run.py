@@ -29,7 +29,9 @@ def run(cluster, tmp_path):
         work = tmp_path / "work"
         work.mkdir(exist_ok=True)
         scan = tmp_path / "scan.h5"
-        return simulate_to_file(cluster.client, asked.chosen(), scan, work, on_progress, stop=stop)
+        return simulate_to_file(
+            cluster.client, asked.chosen(), scan, work, on_progress=on_progress, stop=stop
+        )
 
     return go
 

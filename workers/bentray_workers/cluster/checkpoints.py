@@ -102,8 +102,8 @@ def _kernels() -> str:
 
 
 def _read(path: Path) -> Checkpoint:
-    with PARSING, np.load(path, allow_pickle=False) as found:
-        content = json.loads(bytes(found["json"]))
+    with PARSING, np.load(path, allow_pickle=False) as archive:
+        content = json.loads(bytes(archive["json"]))
         if content["kernels"] != _kernels():
             raise ValueError("it is of another version of the kernels")
-        return unpack(content["state"], [found[str(k)] for k in range(len(found.files) - 1)], TYPES)
+        return unpack(content["state"], [archive[str(k)] for k in range(len(archive.files) - 1)], TYPES)

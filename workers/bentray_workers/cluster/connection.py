@@ -6,7 +6,6 @@ import asyncio
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import dask
@@ -79,9 +78,7 @@ class Cluster:
     def __enter__(self) -> Cluster:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
@@ -150,5 +147,5 @@ async def identity(address: str, security: Security, timeout_s: float, workers: 
     async with asyncio.timeout(timeout_s):
         secrets = security.get_connection_args("client")
         async with rpc(address, connection_args=secrets, timeout=timeout_s) as scheduler:
-            found: dict[str, Any] = await scheduler.identity(n_workers=workers)
-            return found
+            record: dict[str, Any] = await scheduler.identity(n_workers=workers)
+            return record

@@ -162,13 +162,13 @@ class Shares:
         if len(jobs) == 1:
             return IN_FLIGHT * workers
         had = self._had[share.lane, share.tenant]
-        equal, kept = workers // len(jobs), 0
+        equal, reserved = workers // len(jobs), 0
         for tenant, of_it in jobs.items():
             if tenant != share.tenant:
                 # The remainder of the division goes to tenants that have used less.
                 part = equal + (self._had[share.lane, tenant] < had and workers % len(jobs) > 0)
-                kept += min(part, held[tenant] + max(1, sum(one.ready for one in of_it)))
-        return max(1, equal, workers - kept)
+                reserved += min(part, held[tenant] + max(1, sum(one.ready for one in of_it)))
+        return max(1, equal, workers - reserved)
 
     def _has_turn(
         self, share: Share, jobs: dict[str, list[Share]], held: dict[str, int], workers: int

@@ -58,31 +58,31 @@ class JoinRequest:
     security: Security
 
 
-def join(asked: JoinRequest, say: Callable[[str], None], connect_timeout_s: float = 10.0) -> None:
+def join(request: JoinRequest, say: Callable[[str], None], connect_timeout_s: float = 10.0) -> None:
     """Run workers for a scheduler until SIGTERM, SIGHUP or Ctrl-C; reconnect when it returns.
 
     Args:
-        asked: the workers and the scheduler.
+        request: the workers and the scheduler.
         say: called with a line about each change.
         connect_timeout_s: how long to try the address at first, s.
 
     Raises:
         InvalidInput: when no scheduler answers at first.
     """
-    identity_of(asked.scheduler, asked.security, connect_timeout_s)
+    identity_of(request.scheduler, request.security, connect_timeout_s)
     with ours():
-        asyncio.run(_serve(asked, say))
+        asyncio.run(_serve(request, say))
 
 
-async def _serve(asked: JoinRequest, say: Callable[[str], None]) -> None:
+async def _serve(request: JoinRequest, say: Callable[[str], None]) -> None:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         loop.add_signal_handler(number, stop.set)
     stopped = asyncio.create_task(stop.wait())
     while not stop.is_set():
-        nannies = [_nanny(asked, number) for number in range(asked.workers)]
-        working = asyncio.create_task(_work(asked, nannies, say))
+        nannies = [_nanny(request, number) for number in range(request.workers)]
+        working = asyncio.create_task(_work(request, nannies, say))
         await asyncio.wait([working, stopped], return_when=asyncio.FIRST_COMPLETED)
         working.cancel()
         try:
@@ -91,19 +91,19 @@ async def _serve(asked: JoinRequest, say: Callable[[str], None]) -> None:
             pass
         except (OSError, TimeoutError, RuntimeError) as error:
             # Dask raises the last for any failed start of a nanny, as when the scheduler stops meanwhile.
-            say(f"could not join {asked.scheduler}: {error}")
+            say(f"could not join {request.scheduler}: {error}")
         finally:
             await _close(nannies)
         if not stop.is_set():
-            say(f"{asked.scheduler} is gone; trying again.")
+            say(f"{request.scheduler} is gone; trying again.")
             await asyncio.wait([stopped], timeout=AGAIN_S)
 
 
-async def _work(asked: JoinRequest, nannies: list[Any], say: Callable[[str], None]) -> None:
+async def _work(request: JoinRequest, nannies: list[Any], say: Callable[[str], None]) -> None:
     """Start the workers and replace lost ones, in the list too; returns once the scheduler is gone."""
     await asyncio.gather(*nannies)
-    scheduler = await _scheduler(asked)
-    say(f"{asked.workers} workers joined {asked.scheduler}; Ctrl-C stops them.")
+    scheduler = await _scheduler(request)
+    say(f"{request.workers} workers joined {request.scheduler}; Ctrl-C stops them.")
     losses, pause = Losses(), FIRST_PAUSE_S
     while True:
         await asyncio.sleep(CHECK_S)
@@ -112,12 +112,12 @@ async def _work(asked: JoinRequest, nannies: list[Any], say: Callable[[str], Non
             pause = FIRST_PAUSE_S
             continue
         # Workers that lose their scheduler end; they are not replaced.
-        if scheduler is None or await _scheduler(asked) != scheduler:
+        if scheduler is None or await _scheduler(request) != scheduler:
             return
-        say(f"{len(lost)} of {asked.workers} workers are lost; starting others.")
+        say(f"{len(lost)} of {request.workers} workers are lost; starting others.")
         await _close([nannies[number] for number in lost])
         for number in lost:
-            nannies[number] = _nanny(asked, number)
+            nannies[number] = _nanny(request, number)
         begun = await asyncio.gather(*(nannies[number] for number in lost), return_exceptions=True)
         if any(isinstance(one, Exception) for one in begun):
             say(f"not all of them could be started; trying again in {pause:g} s.")
@@ -125,26 +125,26 @@ async def _work(asked: JoinRequest, nannies: list[Any], say: Callable[[str], Non
             pause = min(2.0 * pause, LONGEST_PAUSE_S)
 
 
-async def _scheduler(asked: JoinRequest) -> str | None:
+async def _scheduler(request: JoinRequest) -> str | None:
     """Identity of the scheduler at the address; None without one."""
     with suppress(*NO_SCHEDULER):
-        return str((await identity(asked.scheduler, asked.security, AGAIN_S, 0))["id"])
+        return str((await identity(request.scheduler, request.security, AGAIN_S, 0))["id"])
     return None
 
 
-def _nanny(asked: JoinRequest, number: int) -> Any:
-    name = asked.name if asked.name is None or asked.workers == 1 else f"{asked.name}-{number}"
+def _nanny(request: JoinRequest, number: int) -> Any:
+    name = request.name if request.name is None or request.workers == 1 else f"{request.name}-{number}"
     return Nanny(
-        asked.scheduler,
+        request.scheduler,
         nthreads=THREADS,
-        resources=dict(asked.resources),
+        resources=dict(request.resources),
         # Dask takes a number up to 1 as a part of the memory of the machine or container.
-        memory_limit=asked.memory_limit if asked.memory_limit is not None else 1.0 / asked.workers,
-        local_directory=None if asked.local_directory is None else str(asked.local_directory),
+        memory_limit=request.memory_limit if request.memory_limit is not None else 1.0 / request.workers,
+        local_directory=None if request.local_directory is None else str(request.local_directory),
         # Dask would listen on every interface; anyone who reaches a worker can run code on it.
-        host=asked.host or own_address(asked.scheduler),
+        host=request.host or own_address(request.scheduler),
         name=name,
-        security=asked.security,
+        security=request.security,
         preload=PRELOADS,
         dashboard=False,
         dashboard_address=NO_DASHBOARD,

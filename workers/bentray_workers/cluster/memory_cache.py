@@ -51,9 +51,9 @@ class MemoryCache:
         """
         with _LOCK:
             if key in self._values:
-                found = self._values.pop(key)
-                self._values[key] = found._replace(used=next(_CLOCK))
-                return found.value
+                cached = self._values.pop(key)
+                self._values[key] = cached._replace(used=next(_CLOCK))
+                return cached.value
             while self._values and self.held() + size > self._most:
                 self._values.popitem(last=False)
             evict_to(_LIMITS.task_bytes - max(size, making))

@@ -143,13 +143,13 @@ def _template(request: ClusterRequest) -> dict[str, Any]:
     if request.template is None:
         return {}
     try:
-        found = yaml.safe_load(request.template.read_text())
+        template = yaml.safe_load(request.template.read_text())
     except (OSError, ValueError, yaml.YAMLError) as error:
         reason = str(error).splitlines()[0]
         raise InvalidInput("cluster_template", f"{request.template} ({reason})", "a YAML file") from error
-    if not isinstance(found, dict):
-        raise InvalidInput("cluster_template", f"{request.template} ({found!r})", "a YAML mapping")
-    return found
+    if not isinstance(template, dict):
+        raise InvalidInput("cluster_template", f"{request.template} ({template!r})", "a YAML mapping")
+    return template
 
 
 def _library(name: str, extra: str) -> Any:

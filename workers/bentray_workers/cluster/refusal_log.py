@@ -9,9 +9,9 @@ from bentray_kernels.errors import InvalidInput
 
 def shorten(record: logging.LogRecord) -> bool:
     """A logging filter that shortens the report of Dask on InvalidInput to one line, and drops no record."""
-    message, given = str(record.msg), record.args
-    if message.startswith("Compute Failed") and isinstance(given, tuple) and len(given) == 5:
-        key, refused = given[0], str(given[3])
+    message, arguments = str(record.msg), record.args
+    if message.startswith("Compute Failed") and isinstance(arguments, tuple) and len(arguments) == 5:
+        key, refused = arguments[0], str(arguments[3])
         if refused.startswith(InvalidInput.__name__):
             record.levelno, record.levelname = logging.WARNING, "WARNING"
             record.msg, record.args = "Rejected: %s in %s", (refused, key)

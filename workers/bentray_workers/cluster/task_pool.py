@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from distributed import Client, Future, wait
 
@@ -17,6 +17,22 @@ from .resources import RECONSTRUCTION
 
 # Where a task may run: keyword arguments ``resources`` and ``workers`` of ``Client.submit``.
 Placement = Mapping[str, Any]
+
+
+class JobControl(TypedDict, total=False):
+    """Keyword arguments that every job takes.
+
+    Attributes:
+        on_progress: called at the start and after each task; the total is 0 while it is unknown.
+        on_saved: called after each task.
+        stop: polled several times a second; true raises ``Cancelled``, without waiting for tasks on workers.
+        share: of the workers; None: all of them.
+    """
+
+    on_progress: Callable[[Progress], None] | None
+    on_saved: Callable[[], None] | None
+    stop: Callable[[], bool] | None
+    share: Share | None
 
 
 class ClusterPool:
@@ -82,21 +98,28 @@ def open_pool(
 
 
 def run_job(
+    client: Client | None,
     graph: TaskGraph,
-    pool: Pool,
-    on_progress: Callable[[Progress], None] | None = None,
-    on_saved: Callable[[], None] | None = None,
-    stop: Callable[[], bool] | None = None,
+    folder: Path,
+    *,
+    lane: str = "recon",
+    placement: Callable[[], Placement] = lambda: {"resources": RECONSTRUCTION},
+    priority: int = 0,
+    **control: Unpack[JobControl],
 ) -> None:
     """Run a task graph whose finished tasks leave files, from which a later run resumes.
 
     Args:
+        client, folder, lane, placement, priority: see ``open_pool``.
         graph: to run.
-        pool: where tasks run.
-        on_progress: called at the start and after each task.
-        on_saved: called after each task.
-        stop: polled several times a second; true raises ``Cancelled``, without waiting for tasks on workers.
+        control: see ``JobControl``.
+
+    Raises:
+        Cancelled: when ``stop`` returned true.
+        KilledWorker: for a task that kills its workers.
     """
+    on_progress, on_saved = control.get("on_progress"), control.get("on_saved")
+    pool = open_pool(client, folder, control.get("share"), lane=lane, placement=placement, priority=priority)
 
     def report() -> None:
         if on_progress is not None:
@@ -108,7 +131,7 @@ def run_job(
         report()
 
     report()
-    run({"job": graph}, pool, save, stop)
+    run({"job": graph}, pool, save, control.get("stop"))
 
 
 def finished(client: Client, running: list[Future]) -> list[Future]:

@@ -49,12 +49,7 @@ def security_of(folder: Path | None) -> Security:
         raise InvalidInput(
             "tls", f"{folder} ({error.strerror or error})", "a certificate, its key and its authority"
         ) from error
-    roles = {
-        f"tls_{role}_{part}": str(paths[name])
-        for role in ("scheduler", "worker", "client")
-        for part, name in (("cert", CERTIFICATE), ("key", KEY))
-    }
-    return Security(tls_ca_file=str(paths[AUTHORITY]), require_encryption=True, **roles)
+    return _mutual(*(str(paths[name]) for name in (AUTHORITY, CERTIFICATE, KEY)))
 
 
 def own_security() -> Security:
@@ -71,9 +66,11 @@ def own_security() -> Security:
     )
     certificate = made.public_bytes(Encoding.PEM).decode()
     secret = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()).decode()
-    roles = {
-        f"tls_{role}_{part}": content
-        for role in ("scheduler", "worker", "client")
-        for part, content in (("cert", certificate), ("key", secret))
-    }
-    return Security(tls_ca_file=certificate, require_encryption=True, **roles)
+    return _mutual(certificate, certificate, secret)
+
+
+def _mutual(authority: str, certificate: str, key: str) -> Security:
+    """The same certificate and key for every role."""
+    roles = "scheduler", "worker", "client"
+    pairs = {f"tls_{role}_cert": certificate for role in roles} | {f"tls_{role}_key": key for role in roles}
+    return Security(tls_ca_file=authority, require_encryption=True, **pairs)

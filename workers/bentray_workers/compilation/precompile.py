@@ -100,14 +100,14 @@ def digitised(scan: Dataset) -> Dataset:
 def compile_rays(folder: Path) -> None:
     """Reconstruct from travel times and amplitudes; ``folder`` is for files."""
     warmup.warm_up()
-    for number, (scan, wanted) in enumerate(
+    for number, (scan, settings) in enumerate(
         (
             (simulate(TIMES), time_settings()),
             (simulate(HEIGHTS), slice_settings()),
             (simulate(SPACE), slice_settings()),
         )
     ):
-        _reconstruct(folder / f"times-{number}.h5", scan, wanted)
+        _reconstruct(folder / f"times-{number}.h5", scan, settings)
 
 
 def compile_pictures(folder: Path) -> None:
@@ -168,12 +168,12 @@ def compiled_in(part: Callable[[Path], None], folder: Path) -> int:
 
 def marker() -> Path:
     """The file that says that all is compiled, beside what was: named for sources and processor."""
-    found = hashlib.sha256(Path(__file__).read_bytes())
+    key = hashlib.sha256(Path(__file__).read_bytes())
     processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
     for part in (digest(__name__), sys.version, *processor):
-        found.update(part.encode())
+        key.update(part.encode())
     folder = os.environ.get("NUMBA_CACHE_DIR") or ROOT / "__pycache__"
-    return Path(folder) / f"compiled-{found.hexdigest()[:16]}"
+    return Path(folder) / f"compiled-{key.hexdigest()[:16]}"
 
 
 def main() -> None:

@@ -44,18 +44,18 @@ class ScanFindings(NamedTuple):
         return words(self.findings, stacked=stacked)
 
 
-def write_findings(path: Path, found: ScanFindings, picked: Path | None = None) -> None:
+def write_findings(path: Path, findings: ScanFindings, picked: Path | None = None) -> None:
     """Write findings; ``path`` is replaced atomically.
 
     Args:
         path: of the file.
-        found: the findings.
+        findings: the findings.
         picked: the picked dataset, if it differs from the scan; its SHA-256 is stored.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
-    content = {**found._asdict(), "findings": [_plain(finding) for finding in found.findings]}
+    content = {**findings._asdict(), "findings": [_plain(finding) for finding in findings.findings]}
     content["picked_sha256"] = None if picked is None else _digest_of(picked)
     write_bytes(path, json.dumps({"sha256": _digest(content), "content": content}, allow_nan=False).encode())
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.mesh import Chart, TriangleMesh
 
 from .atomic import atomic_replace, write_bytes
@@ -19,47 +18,21 @@ from .hdf5_writing import atomic_hdf5
 from .npy_headers import PARSING
 
 
-class FieldFiles(NamedTuple):
+class FieldFiles:
     """Paths in one folder.
 
-    ``layout`` is written when all files have their sizes, ``figures`` when all are filled.
+    Attributes:
+        layout, figures: written when all files have their sizes, and when all are filled.
+        outer: faces and fractions, (6n², 6n²) by entry and exit.
+        inner: faces, (points, 6n²) by point and exit.
     """
 
-    folder: Path
-
-    @property
-    def chart(self) -> Path:
-        return self.folder / "chart.h5"
-
-    @property
-    def image(self) -> Path:
-        return self.folder / "geometry-image.h5"
-
-    @property
-    def layout(self) -> Path:
-        return self.folder / "layout.json"
-
-    @property
-    def figures(self) -> Path:
-        return self.folder / "figures.json"
-
-    @property
-    def starts(self) -> Path:
-        return self.folder / "inner-starts.npy"
-
-    @property
-    def points(self) -> Path:
-        return self.folder / "inner-points.npy"
-
-    @property
-    def outer(self) -> tuple[Path, Path]:
-        """Faces and fractions, (6n², 6n²) by entry and exit."""
-        return self.folder / "outer-faces.npy", self.folder / "outer-fractions.npy"
-
-    @property
-    def inner(self) -> Path:
-        """Faces, (points, 6n²) by point and exit."""
-        return self.folder / "inner-faces.npy"
+    def __init__(self, folder: Path) -> None:
+        self.chart, self.image = folder / "chart.h5", folder / "geometry-image.h5"
+        self.layout, self.figures = folder / "layout.json", folder / "figures.json"
+        self.points, self.starts = folder / "inner-points.npy", folder / "inner-starts.npy"
+        self.outer = folder / "outer-faces.npy", folder / "outer-fractions.npy"
+        self.inner = folder / "inner-faces.npy"
 
 
 def write_chart(path: Path, chart: Chart) -> None:
@@ -80,11 +53,10 @@ def read_chart(path: Path) -> Chart:
         InvalidInput: naming the missing array.
     """
     with opened(path, Limits()) as reader:
-        found = {name: reader.array(name, "fi", "an array") for name in ("vertices", "faces", "uv")}
-    for name, values in found.items():
-        if values is None:
-            raise InvalidInput(name, "nothing", "an array")
-    return Chart(TriangleMesh(found["vertices"], found["faces"]), found["uv"])  # type: ignore[arg-type]
+        vertices, faces, uv = (
+            reader.required(name, "fi", "an array") for name in ("vertices", "faces", "uv")
+        )
+    return Chart(TriangleMesh(vertices, faces), uv)
 
 
 def write_array(path: Path, values: NDArray[Any]) -> None:
@@ -126,5 +98,5 @@ def write_json(path: Path, content: dict[str, Any]) -> None:
 
 def read_json(path: Path) -> dict[str, Any]:
     """Read figures."""
-    found: dict[str, Any] = json.loads(path.read_text())
-    return found
+    content: dict[str, Any] = json.loads(path.read_text())
+    return content

@@ -70,15 +70,13 @@ def read_geometry_image(path: Path, limits: Limits | None = None) -> GeometryMap
         InvalidInput: naming the first field that is missing or wrong.
     """
     with opened(path, limits or Limits()) as reader:
-        for name, wanted in (("format", FORMAT), ("format_version", VERSION)):
-            if (found := reader.text("", name)) != wanted:
-                raise InvalidInput(f"@{name}", repr(found), f'"{wanted}"')
+        reader.check_format(FORMAT, VERSION)
         positions = _map(reader, "positions")
         normals = _map(reader, "normals")
-        valid = reader.array("valid", "u", "(n, n) bytes, 0 or 1")
+        valid = reader.required("valid", "u", "(n, n) bytes, 0 or 1")
         colours = _map(reader, "colours") if reader.has("colours") else None
-    if valid is None or valid.ndim != 2 or valid.shape[0] != valid.shape[1]:
-        raise InvalidInput("valid", "nothing" if valid is None else f"shape {valid.shape}", "(n, n)")
+    if valid.ndim != 2 or valid.shape[0] != valid.shape[1]:
+        raise InvalidInput("valid", f"shape {valid.shape}", "(n, n)")
     for name, values in (("positions", positions), ("normals", normals), ("colours", colours)):
         if values is not None and values.shape != (*valid.shape, 3):
             raise InvalidInput(name, f"shape {values.shape}", f"{(*valid.shape, 3)}, as valid has it")
@@ -95,9 +93,9 @@ def _named(maps: GeometryMaps) -> dict[str, NDArray[np.generic]]:
 
 
 def _map(reader: Reader, name: str) -> Pixels:
-    values = reader.array(name, "f", "(n, n, 3) numbers")
-    if values is None or not np.isfinite(values).all():
-        raise InvalidInput(name, "nothing" if values is None else "not finite", "(n, n, 3) finite numbers")
+    values = reader.required(name, "f", "(n, n, 3) numbers")
+    if not np.isfinite(values).all():
+        raise InvalidInput(name, "not finite", "(n, n, 3) finite numbers")
     return values.astype(np.float32)
 
 

@@ -50,21 +50,21 @@ def check_gltf(scene: Any, data_bytes: int, most_faces: int) -> None:
 
 
 def _objects(scene: Json, name: str) -> Sequence[Json]:
-    found = scene.get(name, [])
-    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+    objects = scene.get(name, [])
+    if not isinstance(objects, list) or not all(isinstance(one, dict) for one in objects):
         raise InvalidInput(name, "no list of objects", "a list, as glTF 2.0 has it")
-    if len(found) > MOST_PARTS:
-        raise InvalidInput(name, len(found), f"at most {MOST_PARTS}")
-    return found
+    if len(objects) > MOST_PARTS:
+        raise InvalidInput(name, len(objects), f"at most {MOST_PARTS}")
+    return objects
 
 
 def _count(place: str, one: Json, key: str, default: int | None = None, most: float = math.inf) -> int:
     """A whole number from 0 to ``most``."""
-    found = one.get(key, default)
-    if isinstance(found, bool) or not isinstance(found, int) or not 0 <= found <= most:
+    value = one.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
         accepted = "a whole number of 0 or more" if most == math.inf else f"a whole number from 0 to {most:g}"
-        raise InvalidInput(f"{place}/{key}", "nothing" if found is None else repr(found)[:40], accepted)
-    return found
+        raise InvalidInput(f"{place}/{key}", "nothing" if value is None else repr(value)[:40], accepted)
+    return value
 
 
 def _member(place: str, one: Json, key: str, many: Sequence[Any]) -> Any:
@@ -161,10 +161,10 @@ def _check_tree(nodes: Sequence[Json], faces: Sequence[int], most_faces: int) ->
 
 def _check_transform(place: str, node: Json) -> None:
     for key, count in (("matrix", 16), ("translation", 3), ("rotation", 4), ("scale", 3)):
-        found = node.get(key)
-        if found is None:
+        values = node.get(key)
+        if values is None:
             continue
-        plain = isinstance(found, list) and len(found) == count
+        plain = isinstance(values, list) and len(values) == count
         # Integers of many digits can be compared, but not converted to floats.
-        if not plain or not all(isinstance(one, int | float) and -1e30 <= one <= 1e30 for one in found):
-            raise InvalidInput(f"{place}/{key}", repr(found)[:80], f"{count} numbers from -1e30 to 1e30")
+        if not plain or not all(isinstance(one, int | float) and -1e30 <= one <= 1e30 for one in values):
+            raise InvalidInput(f"{place}/{key}", repr(values)[:80], f"{count} numbers from -1e30 to 1e30")

@@ -50,12 +50,12 @@ class Limits:
     text: int = 100_000
 
 
-def check_storage(path: str, found: h5py.Dataset, accepted: str, limits: Limits, read_bytes: int) -> None:
+def check_storage(path: str, stored: h5py.Dataset, accepted: str, limits: Limits, read_bytes: int) -> None:
     """Reject an array that is not plain numbers stored in this file within the limits.
 
     Args:
         path: of the array.
-        found: the array, opened but not read.
+        stored: the array, opened but not read.
         accepted: the accepted array, in words.
         limits: of reading.
         read_bytes: of the arrays already read from the file.
@@ -63,14 +63,14 @@ def check_storage(path: str, found: h5py.Dataset, accepted: str, limits: Limits,
     Raises:
         InvalidInput: naming ``path``.
     """
-    kind = found.id.get_type().get_class()
+    kind = stored.id.get_type().get_class()
     if kind not in TYPES:
         raise InvalidInput(path, OTHER_TYPES.get(kind, "an unknown type"), accepted)
-    if kind == h5py.h5t.ENUM and found.dtype.kind != "b":
+    if kind == h5py.h5t.ENUM and stored.dtype.kind != "b":
         raise InvalidInput(path, "names of numbers", accepted)
-    if found.shape is None:
+    if stored.shape is None:
         raise InvalidInput(path, "an array without a shape", accepted)
-    how = found.id.get_create_plist()
+    how = stored.id.get_create_plist()
     if how.get_layout() not in (h5py.h5d.COMPACT, h5py.h5d.CONTIGUOUS, h5py.h5d.CHUNKED):
         raise InvalidInput(path, "a virtual dataset", "data in this file")
     if how.get_layout() != h5py.h5d.CHUNKED and how.get_external_count():
@@ -79,20 +79,20 @@ def check_storage(path: str, found: h5py.Dataset, accepted: str, limits: Limits,
         code = how.get_filter(k)[0]
         if code not in FILTERS:
             raise InvalidInput(path, f"filter {code}", "the filters " + ", ".join(FILTERS.values()))
-    _check_sizes(path, found, limits, read_bytes)
+    _check_sizes(path, stored, limits, read_bytes)
 
 
-def _check_sizes(path: str, found: h5py.Dataset, limits: Limits, read_bytes: int) -> None:
-    size = math.prod(found.shape) * found.dtype.itemsize
+def _check_sizes(path: str, array: h5py.Dataset, limits: Limits, read_bytes: int) -> None:
+    size = math.prod(array.shape) * array.dtype.itemsize
     if size + read_bytes > limits.total_bytes:
         raise InvalidInput(path, f"{size} bytes unpacked", f"at most {limits.total_bytes} bytes in a file")
-    stored = found.id.get_storage_size()
-    if found.chunks is not None:
-        chunk = math.prod(found.chunks) * found.dtype.itemsize
+    stored = array.id.get_storage_size()
+    if array.chunks is not None:
+        chunk = math.prod(array.chunks) * array.dtype.itemsize
         if chunk > limits.chunk_bytes:
             raise InvalidInput(path, f"chunks of {chunk} bytes", f"at most {limits.chunk_bytes} bytes")
         # Compression makes data hardly larger: chunks that store more would expand beyond their size.
-        chunks = math.prod(-(-n // c) for n, c in zip(found.shape, found.chunks, strict=True))
+        chunks = math.prod(-(-n // c) for n, c in zip(array.shape, array.chunks, strict=True))
         if stored > chunks * (GROWN * chunk + 64):
             raise InvalidInput(path, f"{stored} bytes in {chunks} chunks of {chunk}", "no more than these")
     if size > limits.small_bytes and size > limits.packing * stored:

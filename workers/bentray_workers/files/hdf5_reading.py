@@ -68,6 +68,16 @@ class Reader:
         """Whether a group or array of that path exists."""
         return self._object(path) is not None
 
+    def check_format(self, name: str, version: str) -> None:
+        """Check the attributes ``format`` and ``format_version`` of the file.
+
+        Raises:
+            InvalidInput: naming the first that differs.
+        """
+        for attribute, accepted in (("format", name), ("format_version", version)):
+            if (found := self.text("", attribute)) != accepted:
+                raise InvalidInput(f"@{attribute}", repr(found), f'"{accepted}"')
+
     def names(self) -> tuple[str, ...]:
         """Names in the root group."""
         with rejecting_damage("file", "a whole HDF5 file"):
@@ -84,12 +94,19 @@ class Reader:
         Raises:
             InvalidInput: for anything else of that path.
         """
-        found = self.checked(path, kinds, accepted)
-        if found is None:
+        stored = self.checked(path, kinds, accepted)
+        if stored is None:
             return None
-        self._read_bytes += found.size * found.dtype.itemsize
+        self._read_bytes += stored.size * stored.dtype.itemsize
         with rejecting_damage(path, accepted):
-            return np.asarray(found[()])
+            return np.asarray(stored[()])
+
+    def required(self, path: str, kinds: str, accepted: str) -> NDArray[Any]:
+        """As ``array``, and raises for an absent array."""
+        array = self.array(path, kinds, accepted)
+        if array is None:
+            raise InvalidInput(path, "nothing", accepted)
+        return array
 
     def checked(self, path: str, kinds: str, accepted: str) -> h5py.Dataset | None:
         """As ``array``: checked, but not read."""

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from bentray_kernels.arrays import Floats
-from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.defects import SoundMesh
 from bentray_kernels.meshes.mesh import TriangleMesh
 
@@ -100,12 +99,8 @@ def load_mesh(path: Path) -> StoredMesh:
         InvalidInput: naming the first field that is missing or wrong.
     """
     with opened(path, Limits()) as reader:
-        for name, wanted in (("format", FORMAT), ("format_version", VERSION)):
-            if (found := reader.text("", name)) != wanted:
-                raise InvalidInput(f"@{name}", repr(found), f'"{wanted}"')
-        vertices = reader.array("vertices", "f", "(vertices, 3) numbers")
-        faces = reader.array("faces", "i", "(faces, 3) rows of the vertices")
-        colours = reader.array("colours", "f", "(vertices, 3) numbers") if reader.has("colours") else None
-    if vertices is None or faces is None:
-        raise InvalidInput("vertices" if vertices is None else "faces", "nothing", "an array")
+        reader.check_format(FORMAT, VERSION)
+        vertices = reader.required("vertices", "f", "(vertices, 3) numbers")
+        faces = reader.required("faces", "i", "(faces, 3) rows of the vertices")
+        colours = reader.array("colours", "f", "(vertices, 3) numbers")
     return StoredMesh(TriangleMesh(vertices.astype(np.float64), faces.astype(np.int32)), colours)

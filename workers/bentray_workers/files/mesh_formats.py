@@ -147,12 +147,12 @@ def _without_materials(data: bytes, kind: str) -> bytes:
             # The name may be that of any file of this machine; it is not repeated.
             raise InvalidInput("buffers/uri", "data in another file", "data within the file")
         check_gltf(scene, len(data), MOST_FACES)
-        kept = json.dumps(_stripped(scene)).encode()
+        stripped = json.dumps(_stripped(scene)).encode()
     if kind == "gltf":
-        return kept
-    kept += b" " * (-len(kept) % 4)
-    total = GLB_HEADER.size + GLB_CHUNK.size + len(kept) + len(rest)
-    return GLB_HEADER.pack(b"glTF", 2, total) + GLB_CHUNK.pack(len(kept), b"JSON") + kept + rest
+        return stripped
+    stripped += b" " * (-len(stripped) % 4)
+    total = GLB_HEADER.size + GLB_CHUNK.size + len(stripped) + len(rest)
+    return GLB_HEADER.pack(b"glTF", 2, total) + GLB_CHUNK.pack(len(stripped), b"JSON") + stripped + rest
 
 
 def _inside(buffer: dict[str, Any]) -> bool:

@@ -29,8 +29,8 @@ def check_obj(data: bytes) -> None:
         ("vertices", SHORT_VERTEX, "three numbers, x y z"),
         ("faces", SHORT_FACE, "three corners or more"),
     ):
-        found = pattern.search(text)
-        if found is not None:
-            line = text.count(b"\n", 0, found.start()) + 1
-            shown = found[0].strip()[:SHOWN].decode(errors="replace")
+        match = pattern.search(text)
+        if match is not None:
+            line = text.count(b"\n", 0, match.start()) + 1
+            shown = match[0].strip()[:SHOWN].decode(errors="replace")
             raise InvalidInput(field, f"{shown!r} in line {line}", accepted)

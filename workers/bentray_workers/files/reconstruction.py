@@ -85,9 +85,7 @@ def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstr
         InvalidInput: naming the first field that is missing or wrong, as ``read_dataset`` does.
     """
     with opened(Path(path), limits or Limits()) as reader:
-        for name, expected in (("format", FORMAT), ("format_version", VERSION)):
-            if (found := reader.text("", name)) != expected:
-                raise InvalidInput(f"@{name}", repr(found), f'"{expected}"')
+        reader.check_format(FORMAT, VERSION)
         speed = _image(reader, "speed_mps", None)
         coverage = _image(reader, "coverage_m", speed.shape)
         extra = {
@@ -115,9 +113,7 @@ def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstr
 
 def _image(reader: Reader, place: str, shape: tuple[int, ...] | None) -> NDArray[np.float64]:
     accepted = "(nx, ny) or (nx, ny, nz) numbers" if shape is None else f"numbers of shape {shape}"
-    image = reader.array(place, "f", accepted)
-    if image is None:
-        raise InvalidInput(place, "nothing", accepted)
+    image = reader.required(place, "f", accepted)
     if image.ndim not in (2, 3) or 0 in image.shape or (shape is not None and image.shape != shape):
         raise InvalidInput(place, f"shape {image.shape}", accepted)
     return np.asarray(image, dtype=np.float64)
@@ -131,14 +127,7 @@ def _per_axis(reader: Reader, name: str, ndim: int) -> tuple[float, ...]:
 
 
 def _history(reader: Reader) -> tuple[Iteration, ...]:
-    columns = {}
-    for column, dtype in HISTORY.items():
-        found = reader.array(f"history/{column}", np.dtype(dtype).kind, "a column of numbers")
-        if found is None or found.ndim != 1:
-            raise InvalidInput(
-                f"history/{column}", "nothing" if found is None else f"shape {found.shape}", "a column"
-            )
-        columns[column] = found.tolist()
+    columns = {name: _column(reader, name, np.dtype(dtype).kind) for name, dtype in HISTORY.items()}
     rows = [dict(zip(columns, row, strict=False)) for row in zip(*columns.values(), strict=False)]
     waves = [[None if math.isnan(value) else value for value in column] for column in _wave_columns(reader)]
     if len({len(column) for column in (*columns.values(), *waves)}) != 1:
@@ -159,38 +148,37 @@ def _history(reader: Reader) -> tuple[Iteration, ...]:
 
 def _waves(sweep: Iteration) -> tuple[float, ...]:
     """What is in ``WAVES`` of one sweep."""
-    found = (*(sweep.band_hz or (None, None)), sweep.misfit, sweep.held_out_misfit, sweep.of_attenuation)
-    return tuple(math.nan if value is None else value for value in found)
+    values = (*(sweep.band_hz or (None, None)), sweep.misfit, sweep.held_out_misfit, sweep.of_attenuation)
+    return tuple(math.nan if value is None else value for value in values)
 
 
 def _wave_columns(reader: Reader) -> list[list[float]]:
     """None in a file without them."""
     if not reader.has(f"history/{WAVES[0]}"):
         return []
-    found = [reader.array(f"history/{column}", "f", "a column of numbers") for column in WAVES]
-    for column, values in zip(WAVES, found, strict=True):
-        if values is None or values.ndim != 1:
-            raise InvalidInput(
-                f"history/{column}", "nothing" if values is None else f"shape {values.shape}", "a column"
-            )
-    return [values.tolist() for values in found if values is not None]
+    return [_column(reader, name, "f") for name in WAVES]
+
+
+def _column(reader: Reader, name: str, kind: str) -> list[Any]:
+    values = reader.required(f"history/{name}", kind, "a column of numbers")
+    if values.ndim != 1:
+        raise InvalidInput(f"history/{name}", f"shape {values.shape}", "a column of numbers")
+    return list(values.tolist())
 
 
 def _residuals(reader: Reader) -> NDArray[np.int64] | None:
     if not reader.has("residuals/count"):
         return None
     accepted = f"{len(RESIDUAL_EDGES_S) - 1} counts"
-    found = reader.array("residuals/count", "i", accepted)
-    if found is None or found.shape != (len(RESIDUAL_EDGES_S) - 1,):
-        raise InvalidInput(
-            "residuals/count", "nothing" if found is None else f"shape {found.shape}", accepted
-        )
-    return np.asarray(found, dtype=np.int64)
+    counts = reader.required("residuals/count", "i", accepted)
+    if counts.shape != (len(RESIDUAL_EDGES_S) - 1,):
+        raise InvalidInput("residuals/count", f"shape {counts.shape}", accepted)
+    return np.asarray(counts, dtype=np.int64)
 
 
 def _trials(reader: Reader) -> tuple[Trial, ...]:
     try:
-        found = json.loads(reader.text("", "trials") or "[]")
+        trials = json.loads(reader.text("", "trials") or "[]")
         return tuple(
             Trial(
                 dict(one["settings"]),
@@ -198,7 +186,7 @@ def _trials(reader: Reader) -> tuple[Trial, ...]:
                 float(one["shown_rms_s"]),
                 None if one.get("held_out_mean_s") is None else float(one["held_out_mean_s"]),
             )
-            for one in found
+            for one in trials
         )
     except (ValueError, TypeError, KeyError, RecursionError):
         accepted = "a JSON list of trials by this version"
@@ -208,12 +196,12 @@ def _trials(reader: Reader) -> tuple[Trial, ...]:
 def _json(reader: Reader, name: str) -> dict[str, Any]:
     text = reader.text("", name)
     try:
-        found = json.loads(text or "")
+        content = json.loads(text or "")
     except (ValueError, RecursionError):
-        found = None
-    if not isinstance(found, dict):
+        content = None
+    if not isinstance(content, dict):
         raise InvalidInput(f"@{name}", repr((text or "")[:60]), "a JSON object")
-    return found
+    return content
 
 
 def _settings(values: dict[str, Any], provenance: dict[str, str]) -> Settings:

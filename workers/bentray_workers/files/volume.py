@@ -76,11 +76,11 @@ class Volume:
         Raises:
             InvalidInput: as ``Volume``, and for values that float32 cannot represent or distinguish.
         """
-        given = np.asarray(values)
-        check_type("values", given.dtype)
-        check_shape("values", given.shape)
-        kept = given.dtype.newbyteorder("=")
-        stored = np.ascontiguousarray(given, dtype=kept) if kept in KEPT else _as_float32(given)
+        array = np.asarray(values)
+        check_type("values", array.dtype)
+        check_shape("values", array.shape)
+        native = array.dtype.newbyteorder("=")
+        stored = np.ascontiguousarray(array, dtype=native) if native in KEPT else _as_float32(array)
         return cls(
             stored,
             tuple(float(step) for step in spacing_m),  # type: ignore[arg-type]
@@ -93,9 +93,9 @@ class Volume:
         return float(self.values.min()), float(self.values.max())
 
 
-def _as_float32(given: NDArray[Any]) -> NDArray[np.float32]:
+def _as_float32(values: NDArray[Any]) -> NDArray[np.float32]:
     """Convert to float32; raises InvalidInput if values become indistinguishable."""
-    low, high = given.min().item(), given.max().item()
+    low, high = values.min().item(), values.max().item()
     biggest = max(abs(low), abs(high))
     if MOST_FLOAT32 < biggest < math.inf:
         found = low if abs(low) == biggest else high
@@ -104,13 +104,13 @@ def _as_float32(given: NDArray[Any]) -> NDArray[np.float32]:
         )
     # Infinite values are rejected with the volume.
     with np.errstate(over="ignore"):
-        stored = np.ascontiguousarray(given, dtype=np.float32)
+        stored = np.ascontiguousarray(values, dtype=np.float32)
     if not math.isfinite(biggest) or not 0 < high - low < LEVELS * np.spacing(np.float32(biggest)):
         return stored
     # The steps of float32 are coarse here; values that are exact in float32 are accepted.
     lost = max(
         float(np.abs(np.subtract(mine, theirs, dtype=np.longdouble)).max())
-        for mine, theirs in zip(given, stored, strict=True)
+        for mine, theirs in zip(values, stored, strict=True)
     )
     if lost > (high - low) / LEVELS:
         found = f"{low} to {high}, values that float32 cannot distinguish"
@@ -152,11 +152,8 @@ def write_volume(path: Path, volume: Volume) -> None:
 
 def volume_in(reader: Reader) -> Volume:
     """The volume in an open file of this format; raises InvalidInput as ``read_volume``."""
-    if (version := reader.text("", "format_version")) != VERSION:
-        raise InvalidInput("@format_version", repr(version), f'"{VERSION}"')
-    values = reader.array("values", "buif", "(nx, ny, nz) numbers")
-    if values is None:
-        raise InvalidInput("values", "nothing", "(nx, ny, nz) numbers")
+    reader.check_format(FORMAT, VERSION)
+    values = reader.required("values", "buif", "(nx, ny, nz) numbers")
     spacing, origin = (reader.numbers("", name, "m") or () for name in ("spacing_m", "origin_m"))
     return Volume.of(values, spacing, origin, reader.text("", "title") or "")
 
@@ -168,6 +165,4 @@ def read_volume(path: Path, limits: Limits | None = None) -> Volume:
         InvalidInput: naming the first field that is missing or wrong, as ``read_dataset`` does.
     """
     with opened(Path(path), limits or Limits()) as reader:
-        if (found := reader.text("", "format")) != FORMAT:
-            raise InvalidInput("@format", repr(found), f'"{FORMAT}"')
         return volume_in(reader)

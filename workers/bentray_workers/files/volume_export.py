@@ -100,12 +100,11 @@ def _npy(target: Path, content: Content) -> None:
         np.save(file, np.ascontiguousarray(content.values), allow_pickle=False)
 
 
-def _nifti(target: Path, content: Content) -> None:
-    write_nifti(target, content.values, content.spacing_m, content.origin_m, content.title)
-
-
-def _metaimage(target: Path, content: Content) -> None:
-    write_metaimage(target, content.values, content.spacing_m, content.origin_m, content.title)
+def _on_grid(write: Callable[..., None]) -> Callable[[Path, Content], None]:
+    """Use a writer that takes values and grid."""
+    return lambda target, content: write(
+        target, content.values, content.spacing_m, content.origin_m, content.title
+    )
 
 
 def _mat(target: Path, content: Content) -> None:
@@ -117,8 +116,8 @@ def _mat(target: Path, content: Content) -> None:
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
         "npy": Format("npy", "application/octet-stream", _npy),
-        "nifti": Format("nii", "application/octet-stream", _nifti),
-        "metaimage": Format("mha", "application/octet-stream", _metaimage),
+        "nifti": Format("nii", "application/octet-stream", _on_grid(write_nifti)),
+        "metaimage": Format("mha", "application/octet-stream", _on_grid(write_metaimage)),
         "mat": Format("mat", "application/x-matlab-data", _mat),
     }
 )

@@ -62,10 +62,10 @@ def read_small(arrays: Arrays, name: str, accepted: str) -> NDArray[Any] | None:
     Raises:
         InvalidInput: naming it, for other content than numbers, or too large an array.
     """
-    found = arrays.declared(name)
-    if found is None:
+    declaration = arrays.declared(name)
+    if declaration is None:
         return None
-    shape, dtype = found
+    shape, dtype = declaration
     check_size(PLACES.get(name, name), shape[::-1] if arrays.reversed_axes else shape, name)
     size = math.prod(shape) * dtype.itemsize
     if size > LARGEST_WHOLE:

@@ -64,10 +64,10 @@ def required(arrays: Arrays, name: str, accepted: str) -> NDArray[np.float64]:
 
 def declared(arrays: Arrays, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
     """Shape and type of an array that must be present."""
-    found = arrays.declared(name)
-    if found is None:
+    declaration = arrays.declared(name)
+    if declaration is None:
         raise InvalidInput(name, "nothing", "an array")
-    return found
+    return declaration
 
 
 def indices(arrays: Arrays, name: str) -> NDArray[np.int64]:
@@ -84,10 +84,10 @@ def indices(arrays: Arrays, name: str) -> NDArray[np.int64]:
 def number(arrays: Arrays, place: str) -> float | None:
     """A finite number, or None."""
     name = name_in_file(arrays, place)
-    found = arrays.declared(name)
+    declaration = arrays.declared(name)
     # Checked before reading, since it may be large.
-    if found is not None and math.prod(found[0]) != 1:
-        raise InvalidInput(name, f"shape {found[0]}", "one finite number")
+    if declaration is not None and math.prod(declaration[0]) != 1:
+        raise InvalidInput(name, f"shape {declaration[0]}", "one finite number")
     array = read_small(arrays, name, "one number")
     if array is None:
         return None

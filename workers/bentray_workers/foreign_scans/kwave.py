@@ -97,33 +97,33 @@ class KWave:
     def rows(self, name: str) -> Iterator[NDArray[Any]]:
         for output in self._outputs[name]:
             with self._output(output) as reader:
-                found = self._pressure(output, reader)
+                pressure = self._pressure(output, reader)
                 step = self._time_step(output, reader)
-                if found.shape[::-1] != self._shape or abs(step - self._step) > SAME_STEP * self._step:
+                if pressure.shape[::-1] != self._shape or abs(step - self._step) > SAME_STEP * self._step:
                     raise InvalidInput(
                         output,
-                        f"shape {found.shape}, steps of {step:g} s",
+                        f"shape {pressure.shape}, steps of {step:g} s",
                         f"shape {self._shape[::-1]}, steps of {self._step:g} s, as the first output",
                     )
             with np.errstate(over="ignore", invalid="ignore"):
-                yield np.ascontiguousarray(found.T, dtype=np.float32)
+                yield np.ascontiguousarray(pressure.T, dtype=np.float32)
 
     def _pressure(self, output: str, reader: Reader) -> NDArray[Any]:
         """(Nt, receivers)."""
         with _of(output):
-            found = reader.array("p", "f", PRESSURE)
-            if found is None or found.ndim != 3 or found.shape[0] != 1 or 0 in found.shape:
-                shown = "nothing" if found is None else f"shape {found.shape}"
+            pressure = reader.array("p", "f", PRESSURE)
+            if pressure is None or pressure.ndim != 3 or pressure.shape[0] != 1 or 0 in pressure.shape:
+                shown = "nothing" if pressure is None else f"shape {pressure.shape}"
                 raise InvalidInput("p", shown, PRESSURE)
-        return np.asarray(found[0])
+        return np.asarray(pressure[0])
 
     def _time_step(self, output: str, reader: Reader) -> float:
         with _of(output):
-            found = reader.array("dt", "f", "the time step in s")
-            if found is None or found.size != 1 or not 0.0 < float(found.ravel()[0]) < 1.0:
-                shown = "nothing" if found is None else f"{found.ravel()[:3]}"
+            step = reader.array("dt", "f", "the time step in s")
+            if step is None or step.size != 1 or not 0.0 < float(step.ravel()[0]) < 1.0:
+                shown = "nothing" if step is None else f"{step.ravel()[:3]}"
                 raise InvalidInput("dt", shown, "the time step in s")
-            return float(found.ravel()[0])
+            return float(step.ravel()[0])
 
     @contextmanager
     def _output(self, name: str) -> Iterator[Reader]:

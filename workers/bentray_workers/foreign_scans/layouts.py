@@ -106,8 +106,7 @@ def _named(arrays: Arrays) -> Layout:
     tx, rx = (indices(arrays, name_in_file(arrays, f"acquisition/{name}")) for name in ("tx", "rx"))
     fields: dict[str, Any] = {}
     for place, name in (*PAIR_ARRAYS.items(), *FURTHER.items()):
-        array = read_small(arrays, name_in_file(arrays, place), "numbers")
-        fields[name] = None if array is None else np.asarray(array, dtype=np.float64)
+        fields[name] = _floats(arrays, place)
     for place, name in FLAGS.items():
         array = read_small(arrays, name_in_file(arrays, place), "booleans")
         fields[name] = None if array is None else np.asarray(array != 0)
@@ -120,6 +119,11 @@ def _named(arrays: Arrays) -> Layout:
         raise InvalidInput("traveltime", "neither travel times nor traces", "delta_tof_s, tof_s or object")
     fields["t0_s"] = number(arrays, "acquisition/t0_s") or 0.0
     return Layout(_dataset(arrays, position, tx, rx, fields, traces), traces)
+
+
+def _floats(arrays: Arrays, place: str) -> NDArray[np.float64] | None:
+    array = read_small(arrays, name_in_file(arrays, place), "numbers")
+    return None if array is None else np.asarray(array, dtype=np.float64)
 
 
 FURTHER = {
@@ -157,12 +161,7 @@ def _dataset(
             empty["object"],
             empty.get("water"),
             1.0 if scale is None else scale,
-            *(
-                None
-                if (found := read_small(arrays, name_in_file(arrays, f"waveform/{name}"), "numbers")) is None
-                else np.asarray(found, dtype=np.float64)
-                for name in ("object_scale", "water_scale")
-            ),
+            *(_floats(arrays, f"waveform/{name}") for name in ("object_scale", "water_scale")),
         )
     known = numbers | fields
     dataset = Dataset(

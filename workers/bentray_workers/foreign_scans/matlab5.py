@@ -115,10 +115,10 @@ class Matlab5:
             yield part.reshape(shape[1:])
 
     def _known(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
-        found = self.declared(name)
-        if found is None:
+        declaration = self.declared(name)
+        if declaration is None:
             raise InvalidInput(name, "nothing", "an array")
-        return found
+        return declaration
 
     def _parts(self, name: str, count: int, size: int) -> Iterator[NDArray[Any]]:
         """Read parts of equal size, one after the other."""

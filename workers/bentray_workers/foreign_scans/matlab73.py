@@ -29,26 +29,23 @@ class Matlab73:
         return self._reader.names()
 
     def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
-        found = self._reader.checked(name, "iuf", NUMBERS)
-        if found is None:
+        stored = self._reader.checked(name, "iuf", NUMBERS)
+        if stored is None:
             return None
         # MATLAB marks empty arrays and stores their shape as numbers.
         if self._reader.attribute(name, "MATLAB_empty") is not None:
             raise InvalidInput(name, "an empty array", NUMBERS)
-        return found.shape, found.dtype
+        return stored.shape, stored.dtype
 
     def whole(self, name: str) -> NDArray[Any]:
-        array = self._reader.array(name, "iuf", NUMBERS)
-        if array is None:
-            raise InvalidInput(name, "nothing", NUMBERS)
-        return array
+        return self._reader.required(name, "iuf", NUMBERS)
 
     def rows(self, name: str) -> Iterator[NDArray[Any]]:
-        found = self._reader.checked(name, "iuf", NUMBERS)
-        if found is None:
+        stored = self._reader.checked(name, "iuf", NUMBERS)
+        if stored is None:
             raise InvalidInput(name, "nothing", NUMBERS)
-        check_row(name, found.shape, found.dtype)
-        for k in range(found.shape[0]):
+        check_row(name, stored.shape, stored.dtype)
+        for k in range(stored.shape[0]):
             with rejecting_damage(name, NUMBERS):
-                row = np.asarray(found[k])
+                row = np.asarray(stored[k])
             yield row

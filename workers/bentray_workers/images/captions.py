@@ -12,7 +12,7 @@ LABELS = {
     "speed": "sound speed (m/s)",
     "coverage": "ray length per node (m)",
     "attenuation": "attenuation (Np/m)",
-    "recovery": "part of a checkerboard recovered",
+    "recovery": "recovered fraction of a checkerboard",
 }
 NAMES = {
     "speed": "Sound speed",
@@ -36,18 +36,18 @@ def facts(result: Reconstruction) -> str:
     """Rays, method, iterations, size, water and residual in one line."""
     settings = _of_rays(result)
     size = " by ".join(str(n) for n in result.speed.shape)
-    found = [
+    parts = [
         _rays(settings),
         {"sart": "SART", "gauss-newton": "Gauss-Newton"}[settings.method],
         f"{size} nodes of {1e3 * result.spacing_m[0]:.2g} mm",
         f"water {result.water_speed_mps:.1f} m/s",
     ]
     if result.settings.method == "waveform":
-        found.insert(2, "then waveforms")
+        parts.insert(2, "then waveforms")
     if result.residual_rms_s is not None:
-        found.insert(-2, _iterations(result))
-        found.append(f"residual {1e9 * result.residual_rms_s:.0f} ns")
-    return "  ·  ".join(found)
+        parts.insert(-2, _iterations(result))
+        parts.append(f"residual {1e9 * result.residual_rms_s:.0f} ns")
+    return "  ·  ".join(parts)
 
 
 def _of_rays(result: Reconstruction) -> Settings:

@@ -41,12 +41,12 @@ def comparison_png(truth: Truth, results: Mapping[str, Reconstruction], roi: Boo
     """
     if not results:
         raise InvalidInput("results", "none", "at least one reconstruction")
-    found = {name: _compare(name, result, truth, roi) for name, result in results.items()}
-    limits = robust_limits([one.true_speed_mps[one.region] for one in found.values()])
+    comparisons = {name: _compare(name, result, truth, roi) for name, result in results.items()}
+    limits = robust_limits([one.true_speed_mps[one.region] for one in comparisons.values()])
     spread = symmetric_limits(
-        [(results[name].speed - one.true_speed_mps)[one.region] for name, one in found.items()]
+        [(results[name].speed - one.true_speed_mps)[one.region] for name, one in comparisons.items()]
     )
-    first, compared = next(iter(results.values())), next(iter(found.values()))
+    first, compared = next(iter(results.values())), next(iter(comparisons.values()))
     with drawing():
         columns = 1 + len(results)
         figure = new_figure(PANEL_IN[0] * columns + 0.6, 2.0 * PANEL_IN[1] + 0.6)
@@ -58,12 +58,10 @@ def comparison_png(truth: Truth, results: Mapping[str, Reconstruction], roi: Boo
         speeds, differences = [phantom], []
         draw_history(bottom[0], {name: result.history for name, result in results.items()})
         for upper, lower, (name, result) in zip(top[1:], bottom[1:], results.items(), strict=True):
-            one, shown = found[name], name.capitalize()
+            one, shown = comparisons[name], name.capitalize()
             off = result.speed - one.true_speed_mps
             speeds.append(_panel(upper, result, one, result.speed, limits, SPEED, f"{shown}: {one}"))
             differences.append(_panel(lower, result, one, off, spread, DIFFERENCE, f"{shown} minus phantom"))
-        for axes in (*top[1:], *bottom[2:]):
-            axes.set_ylabel("")
         draw_bar(speeds, LABELS["speed"])
         draw_bar(differences, "difference (m/s)")
         return to_png(figure)

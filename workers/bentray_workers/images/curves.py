@@ -53,7 +53,13 @@ def draw_history(
     _scale(axes, every, margin=bool(stages))
     _dress(axes)
     if len(histories) > 1:
-        axes.legend()
+        legend_below(axes)
+
+
+def legend_below(axes: Axes, markerscale: float = 1.0) -> None:
+    """A legend below the label of the x axis, outside the data."""
+    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13), "ncol": 2}
+    axes.legend(**place, handletextpad=0.4, markerscale=markerscale)
 
 
 def _courses(history: tuple[Iteration, ...]) -> list[list[float]]:
@@ -62,7 +68,7 @@ def _courses(history: tuple[Iteration, ...]) -> list[list[float]]:
     for s in history:
         squares.setdefault(s.stage, {}).setdefault(s.sweep, []).append(s.residual_rms_s**2)
     return [
-        [1e9 * float(np.sqrt(np.mean(found))) for _, found in sorted(of_stage.items())]
+        [1e9 * float(np.sqrt(np.mean(values))) for _, values in sorted(of_stage.items())]
         for _, of_stage in sorted(squares.items())
     ]
 
@@ -103,7 +109,7 @@ def draw_profiles(axes: Axes, place_m: Floats, profiles: Mapping[str, Floats], t
     axes.set_ylabel("sound speed (m/s)", labelpad=1)
     axes.margins(x=0.0)
     _dress(axes)
-    axes.legend()
+    legend_below(axes)
 
 
 def _dress(axes: Axes) -> None:

@@ -14,7 +14,7 @@ def slice_png(path: Path, **how: Any) -> bytes:
 
 
 def volume_slice_png(path: Path, **how: Any) -> bytes:
-    """As ``bentray_workers.images.volume_slice.volume_slice_png``."""
-    from .volume_slice import volume_slice_png as draw
+    """As ``bentray_workers.images.slice.volume_slice_png``."""
+    from .slice import volume_slice_png as draw
 
     return draw(path, **how)

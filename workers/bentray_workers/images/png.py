@@ -24,12 +24,6 @@ def png_of(image: Colours) -> bytes:
     return buffer.getvalue()
 
 
-def colours_of(png: bytes) -> Colours:
-    """The picture in a PNG, (rows, columns, 3)."""
-    with Image.open(io.BytesIO(png), formats=["PNG"]) as image:
-        return np.asarray(image.convert("RGB"))
-
-
 def read_picture(path: Path) -> Colours:
     """Read a picture file of any format of Pillow, (rows, columns, 3) 8-bit RGB.
 

@@ -16,7 +16,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.quality import Examined, Finding
 
 from .canvas import drawing, new_figure, to_png
-from .curves import LINES
+from .curves import LINES, legend_below
 from .maps import DIFFERENCE, MISSING, draw_bar, symmetric_limits
 
 # Size of the page, inches, and line length of the list of findings.
@@ -89,9 +89,9 @@ def _gather(axes: Axes, dataset: Dataset, picked: Dataset | None, emission: int,
         axes.plot(receivers, arrival, ".", color=LINES[0], markersize=2, label="straight + picked difference")
     axes.set_xlim(extent[0], extent[1])
     axes.set_ylim(extent[2], extent[3])
-    axes.set_xlabel("reception")
+    axes.set_xlabel("receiver (index)")
     axes.set_ylabel("time (µs)", labelpad=1)
-    axes.legend(loc="lower right", markerscale=4, facecolor="white", frameon=True, framealpha=0.8)
+    legend_below(axes, markerscale=4.0)
 
 
 def _matrix(axes: Axes, picked: Dataset | None) -> None:
@@ -111,7 +111,7 @@ def _matrix(axes: Axes, picked: Dataset | None) -> None:
     )
     axes.set_facecolor(MISSING)
     _pair_axes(axes)
-    draw_bar([shown], "µs")
+    draw_bar([shown], "object minus water (µs)")
 
 
 def _histogram(axes: Axes, picked: Dataset | None) -> None:
@@ -123,7 +123,7 @@ def _histogram(axes: Axes, picked: Dataset | None) -> None:
         return
     axes.hist(delta, bins=80, color="#7fa6b8")
     axes.set_xlabel("object minus water (µs)")
-    axes.set_ylabel("pairs", labelpad=1)
+    axes.set_ylabel("number of pairs", labelpad=1)
     axes.spines[["top", "right"]].set_visible(False)
     if picked is not None and picked.sigma_s is not None and np.isfinite(picked.sigma_s).any():
         spread = f"{1e9 * float(np.nanmedian(picked.sigma_s)):.0f} ns"
@@ -133,10 +133,10 @@ def _histogram(axes: Axes, picked: Dataset | None) -> None:
 def _reasons(axes: Axes, dataset: Dataset, picked: Dataset | None, findings: list[Finding]) -> None:
     """Excluded pairs, coloured by their first reason."""
     axes.set_title("Pairs left out")
-    found = [f for f in findings if f.action == "left out" and f.pairs is not None]
-    names = list(dict.fromkeys(f.check for f in found))
+    excluding = [f for f in findings if f.action == "left out" and f.pairs is not None]
+    names = list(dict.fromkeys(f.check for f in excluding))
     reason = np.zeros((len(dataset.tx), len(dataset.rx)))
-    for finding in reversed(found):
+    for finding in reversed(excluding):
         reason[finding.pairs] = 1 + names.index(finding.check)
     if picked is not None:
         unread = ~np.isfinite(picked.differential_tof()) & (reason == 0.0)
@@ -161,7 +161,7 @@ def _reasons(axes: Axes, dataset: Dataset, picked: Dataset | None, findings: lis
     for place, name in enumerate(names, start=1):
         count = int((reason == place).sum())
         axes.plot([], [], "s", color=colours[place], label=f"{name}: {count}")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncol=2, handletextpad=0.2)
+    legend_below(axes)
     _pair_axes(axes)
 
 
@@ -187,8 +187,8 @@ def _list(axes: Axes, examined: Examined, findings: list[Finding]) -> None:
 
 
 def _pair_axes(axes: Axes) -> None:
-    axes.set_xlabel("reception")
-    axes.set_ylabel("emission", labelpad=1)
+    axes.set_xlabel("receiver (index)")
+    axes.set_ylabel("emitter (index)", labelpad=1)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
 

@@ -94,9 +94,9 @@ def _with_truth(result: Reconstruction, truth: Truth, why: str, k: int) -> bytes
         return to_png(figure)
 
 
-def _compared(result: Reconstruction, found: Comparison, k: int) -> bytes:
-    speed, true_speed = cut(result.speed, k), cut(found.true_speed_mps, k)
-    region = cut(found.region, k)
+def _compared(result: Reconstruction, comparison: Comparison, k: int) -> bytes:
+    speed, true_speed = cut(result.speed, k), cut(comparison.true_speed_mps, k)
+    region = cut(comparison.region, k)
     grid = (result.spacing_m, result.origin_m)
     difference = speed - true_speed
     # A slice may lie outside the region; it is then shown where the truth covers it.
@@ -111,10 +111,10 @@ def _compared(result: Reconstruction, found: Comparison, k: int) -> bytes:
         draw_bar(maps, LABELS["speed"])
         axes = next(panels)
         spread = symmetric_limits([difference[within]])
-        title = f"Difference: {found}"
+        title = f"Difference: {comparison}"
         shown = draw_map(axes, difference, *grid, spread, colormap=DIFFERENCE, title=title, outline=region)
         draw_bar([shown], "reconstruction minus truth (m/s)")
-        axes.set_xlabel(f"x (mm)\nerrors in: {found.region_choice}")
+        axes.set_xlabel(f"x (mm)\nerrors in: {comparison.region_choice}")
         if has_section(result):
             _section(next(panels), result, limits)
         else:

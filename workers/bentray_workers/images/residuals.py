@@ -58,7 +58,7 @@ def draw_residuals(axes: Axes, counts: Counts, rms_s: float | None) -> None:
     axes.set_title("Residuals" if rms_s is None else f"Residuals, {1e9 * rms_s:.3g} ns rms")
     half, most = (f"{float(f'{1e9 * within(counts, share):.2g}'):g}" for share in (0.5, 0.95))
     axes.set_xlabel(f"measured minus predicted (ns)\nhalf within {half}, 95 % within {most} ns")
-    axes.set_ylabel("pairs", labelpad=1)
+    axes.set_ylabel("number of pairs (area)", labelpad=1)
     axes.xaxis.set_major_locator(FixedLocator(_ticks(1e9 * linear, reach)))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
@@ -69,10 +69,10 @@ def draw_residuals(axes: Axes, counts: Counts, rms_s: float | None) -> None:
 
 def _merged(counts: Counts, linear: float) -> tuple[Floats, Counts]:
     """Edges and counts with the fine bins around zero merged."""
-    kept = np.abs(RESIDUAL_EDGES_S) >= FINEST * linear
-    kept[[0, -1]] = True
+    outer = np.abs(RESIDUAL_EDGES_S) >= FINEST * linear
+    outer[[0, -1]] = True
     before = np.concatenate(([0], np.cumsum(counts)))
-    return RESIDUAL_EDGES_S[kept], np.diff(before[kept])
+    return RESIDUAL_EDGES_S[outer], np.diff(before[outer])
 
 
 def _place(value: Floats, linear: float) -> Floats:

@@ -1,4 +1,4 @@
-"""The picture of one slice of a reconstruction file."""
+"""The picture of one slice of a reconstruction or volume file."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from bentray_kernels.errors import InvalidInput
 
 from ..files.reconstruction import read_reconstruction
+from ..files.volume import read_volume
 from .captions import LABELS, NAMES, facts
 from .maps import RECOVERY_LIMITS, Limits, robust_limits
 from .plane import UPRIGHT, plane_of
@@ -61,11 +62,30 @@ def slice_png(
     elif quantity == "recovery":
         limits = RECOVERY_LIMITS
     title = ", ".join(filter(None, (NAMES[quantity], plane.caption())))
-    limits = given_limits(limits, low, high)
+    limits = requested_limits(limits, low, high)
     return plane_png(plane, limits, chosen, title=title, unit=LABELS[quantity], note=facts(result))
 
 
-def given_limits(limits: Limits, low: float | None, high: float | None) -> Limits:
+def volume_slice_png(
+    path: Path,
+    *,
+    axis: str = UPRIGHT,
+    index: int | None = None,
+    low: float | None = None,
+    high: float | None = None,
+    **style: Any,
+) -> bytes:
+    """As ``slice_png`` for the values of a volume file, with limits from the slice."""
+    chosen = SliceStyle(**style)
+    volume = read_volume(path)
+    plane = plane_of(volume.values, volume.spacing_m, volume.origin_m, axis, index)
+    limits = requested_limits(robust_limits([plane.image]), low, high)
+    caption = plane.caption()
+    title = caption[0].upper() + caption[1:]
+    return plane_png(plane, limits, chosen, title=title, unit="value", note=volume.title[:80])
+
+
+def requested_limits(limits: Limits, low: float | None, high: float | None) -> Limits:
     """The limits, replaced by requested ones.
 
     Raises:

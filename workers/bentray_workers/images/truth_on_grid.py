@@ -55,8 +55,8 @@ def on_grid(values: ArrayLike, truth: Truth, result: Reconstruction) -> Floats:
     read = RegularGridInterpolator(lines, known, bounds_error=False, fill_value=np.nan)
     if not z:
         return np.asarray(read(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)))
-    found = np.empty(result.speed.shape)
+    interpolated = np.empty(result.speed.shape)
     # Slice by slice, so that the coordinates of all nodes are never in memory at once.
     for k, place in enumerate(z[0]):
-        found[..., k] = read(np.stack(np.meshgrid(x, y, place, indexing="ij"), axis=-1))[..., 0]
-    return found
+        interpolated[..., k] = read(np.stack(np.meshgrid(x, y, place, indexing="ij"), axis=-1))[..., 0]
+    return interpolated

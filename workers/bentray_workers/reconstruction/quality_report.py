@@ -69,8 +69,8 @@ def calibrate_file(
         return quality, None
     with open_slice(path, whole, 0) as one:
         right = apply(one, [finding for finding in quality.examined.findings if finding.slice == 0])
-        found = calibrate(right, water_times(right), fit_speed=fit_speed)
-    return replace(quality, picked=found.applied(quality.picked)), found
+        calibration = calibrate(right, water_times(right), fit_speed=fit_speed)
+    return replace(quality, picked=calibration.applied(quality.picked)), calibration
 
 
 def examine_file(
@@ -129,8 +129,8 @@ def _cancellable(path: Path, picker: str) -> Quality:
 
 def _check_size(path: Path, largest_bytes: int) -> None:
     with opened(path, Limits()) as reader:
-        found = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
-        size = sum(math.prod(one.shape) * one.dtype.itemsize for one in found if one is not None)
+        stored = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
+        size = sum(math.prod(one.shape) * one.dtype.itemsize for one in stored if one is not None)
     if size > largest_bytes:
         raise InvalidInput(
             "dataset", f"{size} bytes of traces", f"at most {largest_bytes}; bentray quality has no limit"

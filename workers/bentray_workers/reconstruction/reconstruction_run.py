@@ -41,7 +41,7 @@ def reconstruct(
     on_progress: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
     work_dir: Path | None = None,
-    on_saved: Callable[[], None] = lambda: None,
+    on_saved: Callable[[], None] | None = None,
     share: Share | None = None,
 ) -> Reconstruction:
     """Reconstruct a dataset file.
@@ -68,7 +68,7 @@ def reconstruct(
     with _folder(work_dir) as folder:
         resources = RECONSTRUCTION if client is None else resources_for(client, settings)
         pool = open_pool(client, folder, share, placement=lambda: {"resources": resources}, threads=1)
-        checkpoints = Checkpoints(folder / "checkpoints", on_saved)
+        checkpoints = Checkpoints(folder / "checkpoints", on_saved or (lambda: None))
         job = _Job(pool, stop, dataset_path, folder, checkpoints, count())
         progress = _JobProgress(on_progress)
         path, findings, chosen, trials = _pick_with_guides(job, settings, progress)

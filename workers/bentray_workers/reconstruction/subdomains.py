@@ -62,8 +62,8 @@ class BlockField:
     def block(self, place: Place) -> Floats:
         """The times of one block, s, in its own shape."""
         future = self.swept[place]
-        found: Floats = future.client.submit(_times, future, resources=RECONSTRUCTION, pure=False).result()
-        return found
+        times: Floats = future.client.submit(_times, future, resources=RECONSTRUCTION, pure=False).result()
+        return times
 
     def whole(self) -> Floats:
         """(nx, ny[, nz]), s; fetched block by block."""
@@ -169,10 +169,10 @@ def opened(speed: Speed) -> Floats:
         return speed
     try:
         with PARSING:
-            found: Floats = np.load(speed, mmap_mode="r", allow_pickle=False)
+            mapped: Floats = np.load(speed, mmap_mode="r", allow_pickle=False)
     except (OSError, ValueError) as error:
         raise InvalidInput("speed", f"{speed} ({error})", "a .npy file of numbers") from error
-    return found
+    return mapped
 
 
 def slowness_of(speed: Speed, box: Box) -> Floats:
@@ -203,9 +203,9 @@ def sweep(
     times = np.full(slowness.shape, math.inf)
     for node, time in before.items():
         times[node] = time
-    found = sweep_block(slowness, times, faces, spacing, tolerance)
+    swept = sweep_block(slowness, times, faces, spacing, tolerance)
     # The seeds are changes for the neighbours too.
-    return BlockSweep(found.times, found.faces, tuple(bool(np.isfinite(face).any()) for face in found.faces))
+    return BlockSweep(swept.times, swept.faces, tuple(bool(np.isfinite(face).any()) for face in swept.faces))
 
 
 def _edges(swept: BlockSweep) -> Edges:
@@ -236,11 +236,11 @@ def _seeds(speed: Floats, spacing: float, source: Floats) -> dict[Node, float]:
 
 def _within(seeds: Mapping[Node, float], box: Box) -> dict[Node, float]:
     """The seeds in a block, by their nodes in it."""
-    found = {}
+    inside = {}
     for node, time in seeds.items():
         if all(b.start <= i < b.stop for i, b in zip(node, box, strict=True)):
-            found[tuple(i - b.start for i, b in zip(node, box, strict=True))] = time
-    return found
+            inside[tuple(i - b.start for i, b in zip(node, box, strict=True))] = time
+    return inside
 
 
 def _homes(client: Client, places: Sequence[Place]) -> dict[Place, str]:

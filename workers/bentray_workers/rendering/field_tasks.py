@@ -59,21 +59,21 @@ def lay_out(mesh_path: Path, settings: FieldSettings, folder: Path) -> None:
         return
     stored = load_mesh(mesh_path)
     check_faces(len(stored.mesh.faces))
-    found = parameterise(stored.mesh)
+    layout = parameterise(stored.mesh)
     laid_out = time.perf_counter()
-    image, error = _image(found.chart, settings)
+    image, error = _image(layout.chart, settings)
     maps = GeometryMaps.of(image, stored.colours)
     sampled = time.perf_counter()
     if error is None:
-        error = geometric_error(found.chart.mesh, image.mesh())
-    surface = surface_of(found.chart)
+        error = geometric_error(layout.chart.mesh, image.mesh())
+    surface = surface_of(layout.chart)
     points, starts = spread_points(surface, settings.divisions)
     columns = 6 * settings.inner_samples**2
     if len(points) * columns > MOST_INNER:
         taken = f"{settings.divisions}, {len(points)} points by {columns} directions"
         accepted = f"at most {MOST_INNER} entries: fewer divisions or inner_samples"
         raise InvalidInput("divisions", taken, accepted)
-    write_chart(files.chart, found.chart)
+    write_chart(files.chart, layout.chart)
     write_geometry_image(files.image, maps)
     write_array(files.points, points)
     write_array(files.starts, starts)
@@ -84,9 +84,9 @@ def lay_out(mesh_path: Path, settings: FieldSettings, folder: Path) -> None:
         "faces": len(stored.mesh.faces),
         "vertices": len(stored.mesh.vertices),
         "points": len(points),
-        "conformal": found.conformal,
-        "area_stretch": found.area_stretch,
-        "median_quasi_conformal": float(np.median(found.quasi_conformal)),
+        "conformal": layout.conformal,
+        "area_stretch": layout.area_stretch,
+        "median_quasi_conformal": float(np.median(layout.quasi_conformal)),
         "image_pixels": image.size,
         "image_rms": error.rms,
         "image_greatest": error.greatest,

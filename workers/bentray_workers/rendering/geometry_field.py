@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import errno
-import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from distributed import Client
 
 from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Progress
 
-from ..cluster.fair_shares import Share
 from ..cluster.resources import RENDER
-from ..cluster.task_pool import open_pool, run_job
+from ..cluster.task_pool import JobControl, run_job
+from ..files.atomic import sync
 from ..files.geometry_field_folder import FieldFiles, read_json
 from .field_settings import FieldSettings
 from .field_tasks import TASK_RAYS, finish, inner_rows, lay_out, outer_rows
@@ -91,10 +90,7 @@ def build_field(
     settings: FieldSettings,
     target: Path,
     work_dir: Path,
-    on_progress: Callable[[Progress], None] | None = None,
-    on_saved: Callable[[], None] | None = None,
-    stop: Callable[[], bool] | None = None,
-    share: Share | None = None,
+    **control: Unpack[JobControl],
 ) -> dict[str, Any]:
     """Compute the geometry field of a mesh; an existing one is used as it is.
 
@@ -104,10 +100,7 @@ def build_field(
         settings: of the field.
         target: the folder of the field; it appears whole or not at all.
         work_dir: a folder of the same file system, see ``GeometryFieldGraph``.
-        on_progress: called at the start and after each task; the total is 0 before the layout.
-        on_saved: called after each task.
-        stop: polled several times a second; true raises ``Cancelled``.
-        share: of the workers; None: all of them.
+        control: see ``JobControl``.
 
     Returns:
         The figures of the field: sizes, errors and seconds.
@@ -116,15 +109,13 @@ def build_field(
         Cancelled: when ``stop`` returned true.
         InvalidInput: from the mesh or the settings.
     """
-    if target.exists():
-        if on_progress is not None:
-            on_progress(Progress(1, 1))
-    else:
+    if not target.exists():
         graph = GeometryFieldGraph(mesh_path, settings, work_dir)
         where = {"resources": RENDER}
-        pool = open_pool(client, work_dir, share, lane="render", placement=lambda: where, priority=PRIORITY)
-        run_job(graph, pool, on_progress, on_saved, stop)
+        run_job(client, graph, work_dir, lane="render", placement=lambda: where, priority=PRIORITY, **control)
         _move(graph.folder, target)
+    elif on_progress := control.get("on_progress"):
+        on_progress(Progress(1, 1))
     return read_json(FieldFiles(target).figures)
 
 
@@ -140,8 +131,4 @@ def _move(folder: Path, target: Path) -> None:
     except OSError as error:
         if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
             raise
-    handle = os.open(target.parent, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+    sync(target.parent)

@@ -153,8 +153,8 @@ class RefractionView:
 
     def plain(self) -> dict[str, Any]:
         """The fields as JSON values."""
-        found = {one.name: getattr(self, one.name) for one in fields(self)}
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in found.items()}
+        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
 
 def check_even(shape: tuple[int, ...], spacing_m: tuple[float | None, ...]) -> None:

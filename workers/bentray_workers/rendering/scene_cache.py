@@ -105,9 +105,9 @@ def stored_shape(path: Path) -> tuple[int, ...]:
     """The shape in a volume or reconstruction file, without reading its values."""
     with opened(path, Limits(total_bytes=LARGEST_BYTES)) as reader:
         for place in ("values", "speed_mps"):
-            found = reader.checked(place, "buif", "(nx, ny, nz) numbers")
-            if found is not None:
-                return tuple(int(n) for n in found.shape)
+            stored = reader.checked(place, "buif", "(nx, ny, nz) numbers")
+            if stored is not None:
+                return tuple(int(n) for n in stored.shape)
     raise InvalidInput("values", "nothing", "(nx, ny, nz) numbers")
 
 

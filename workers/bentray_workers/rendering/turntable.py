@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import zipfile
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 from distributed import Client
 from PIL import Image
@@ -16,11 +16,9 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range
 from bentray_kernels.request_fields import setting
 from bentray_kernels.task_graph import Task
-from bentray_kernels.tomography import Progress
 
 from ..cluster.capacities import capacities_by_address
-from ..cluster.fair_shares import Share
-from ..cluster.task_pool import Placement, open_pool, run_job
+from ..cluster.task_pool import JobControl, Placement, run_job
 from ..files.atomic import atomic_replace, write_bytes
 from ..images.png import Colours
 from .picture_cost import placed, refraction_bytes
@@ -131,10 +129,7 @@ def draw_turntable(
     turntable: Turntable,
     target: Path,
     work_dir: Path,
-    on_progress: Callable[[Progress], None] | None = None,
-    on_saved: Callable[[], None] | None = None,
-    stop: Callable[[], bool] | None = None,
-    share: Share | None = None,
+    **control: Unpack[JobControl],
 ) -> None:
     """Draw all frames and write them to one file.
 
@@ -145,10 +140,7 @@ def draw_turntable(
         target: the file to write, by a worker, whole or not at all.
         work_dir: a folder for the frames, which every worker can read and write; frames of an unfinished run
             of the same turntable are not drawn again.
-        on_progress: called at the start and after each task.
-        on_saved: called after each task.
-        stop: polled several times a second; true raises ``Cancelled``.
-        share: of the workers; None: all of them.
+        control: see ``JobControl``.
 
     Raises:
         Cancelled: when ``stop`` returned true.
@@ -159,8 +151,8 @@ def draw_turntable(
     def placement() -> Placement:
         return placed(size, capacities_by_address(client))
 
-    pool = open_pool(client, work_dir, share, lane="render", placement=placement, priority=PRIORITY)
-    run_job(TurntableGraph(path, turntable, target, work_dir), pool, on_progress, on_saved, stop)
+    graph = TurntableGraph(path, turntable, target, work_dir)
+    run_job(client, graph, work_dir, lane="render", placement=placement, priority=PRIORITY, **control)
 
 
 def draw_frame_tile(path: Path, turntable: Turntable, number: int, first: int, last: int) -> Colours:

@@ -47,10 +47,10 @@ def _timed(settings: Timed, folder: Path) -> Dataset:
     delta = np.empty(shape)
     ratio = np.empty(shape) if settings.attenuation else None
     for part in parts_of(settings):
-        found = read_part(part, folder)
-        delta[part.scan, part.first : part.last] = found[0]
+        arrays = read_part(part, folder)
+        delta[part.scan, part.first : part.last] = arrays[0]
         if ratio is not None:
-            ratio[part.scan, part.first : part.last] = found[1]
+            ratio[part.scan, part.first : part.last] = arrays[1]
     if isinstance(settings, volume.VolumeSimulationSettings):
         return volume.scan_of(settings, delta, ratio)
     return plane.scan_of(settings, delta[0], None if ratio is None else ratio[0])

@@ -122,8 +122,8 @@ def read_part(part: Part, folder: Path) -> list[NDArray[Any]]:
     """
     path = part.path(folder)
     try:
-        with PARSING, np.load(path, allow_pickle=False) as found:
-            return [found[str(k)] for k in range(len(found.files))]
+        with PARSING, np.load(path, allow_pickle=False) as archive:
+            return [archive[str(k)] for k in range(len(archive.files))]
     except UNREADABLE as error:
         path.unlink(missing_ok=True)
         raise ResultsLostError(f"{path.name} is damaged: {error}") from None

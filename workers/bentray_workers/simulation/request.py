@@ -23,13 +23,13 @@ CHOICES = {"phantom": ("table6", "table7")}
 
 def range_of(name: str) -> Range:
     """The range of a number over all kinds of scan; each checks its own range."""
-    found = [known[name] for known in map(ranges_of, KINDS) if name in known]
+    ranges = [known[name] for known in map(ranges_of, KINDS) if name in known]
     return Range(
-        min(one.least for one in found),
-        max(one.most for one in found),
-        all(one.above for one in found),
-        all(one.below for one in found),
-        found[0].unit,
+        min(one.least for one in ranges),
+        max(one.most for one in ranges),
+        all(one.above for one in ranges),
+        all(one.below for one in ranges),
+        ranges[0].unit,
     )
 
 
@@ -106,17 +106,17 @@ class PhantomScan:
         elif self.phantom == "table7":
             kind = VolumeSimulationSettings
         known = {one.name for one in fields(kind)}
-        given = {
+        values = {
             one.name: getattr(self, one.name)
             for one in fields(self)
             if one.name not in ("phantom", "waveform") and getattr(self, one.name) is not None
         }
-        for name, value in given.items():
+        for name, value in values.items():
             if name not in known:
                 raise InvalidInput(name, value, f"nothing, unless {CONDITIONS[name]}")
-        return kind(**given)
+        return kind(**values)
 
     def plain(self) -> dict[str, Any]:
         """All settings of this scan as JSON values, which give the same scan again."""
-        given = {name: value for name, value in asdict(self.chosen()).items() if value is not None}
-        return {"phantom": self.phantom, "waveform": self.waveform, **given}
+        values = {name: value for name, value in asdict(self.chosen()).items() if value is not None}
+        return {"phantom": self.phantom, "waveform": self.waveform, **values}

@@ -6,15 +6,14 @@ import tempfile
 from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from distributed import Client
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Progress
 
-from ..cluster.fair_shares import Share
-from ..cluster.task_pool import open_pool, run_job
+from ..cluster.task_pool import JobControl, run_job
 from ..files.dataset import read_dataset
 from .parts import folder_of
 from .request import Simulated
@@ -44,10 +43,7 @@ def simulate_to_file(
     settings: Simulated,
     target: Path,
     work_dir: Path | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
-    on_saved: Callable[[], None] | None = None,
-    stop: Callable[[], bool] | None = None,
-    share: Share | None = None,
+    **control: Unpack[JobControl],
 ) -> dict[str, Any]:
     """Simulate a scan into a dataset file.
 
@@ -57,10 +53,7 @@ def simulate_to_file(
         target: the file to write, whole or not at all.
         work_dir: a folder that every worker can read and write; parts that an unfinished run of the same scan
             left there are used. None: a temporary folder of this machine.
-        on_progress: called after each task.
-        on_saved: the same.
-        stop: polled several times a second; true raises ``Cancelled``, without waiting for running tasks.
-        share: of the workers; None: all of them.
+        control: see ``JobControl``.
 
     Returns:
         As ``assembly.write_scan``.
@@ -73,6 +66,6 @@ def simulate_to_file(
         folder = folder_of(Path(work))
         folder.mkdir(exist_ok=True)
         graph = SimulationGraph(settings, folder, target)
-        run_job(graph, open_pool(client, Path(work), share), on_progress, on_saved, stop)
+        run_job(client, graph, Path(work), **control)
     assert graph.result is not None
     return graph.result

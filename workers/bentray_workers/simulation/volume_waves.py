@@ -33,7 +33,7 @@ class VolumeWaveSettings(WaveSimulationSettings):
     # Each node of the boundary costs far more than in 2-D.
     edge_nodes: ClassVar[int] = EDGE_NODES
     phantom_side_m: ClassVar[float] = TABLE7_SIDE_M
-    phantom_name: ClassVar[str] = "Table 7"
+    phantom_name: ClassVar[str] = "3-D breast phantom (Li 2008, Table 7)"
 
     @property
     def phantom(self) -> PhantomSlice:

@@ -81,7 +81,7 @@ class WaveSimulationSettings:
     dimensions: ClassVar[int] = 2
     edge_nodes: ClassVar[int] = EDGE_NODES
     phantom_side_m: ClassVar[float] = TABLE6_SIDE_M
-    phantom_name: ClassVar[str] = "Table 6"
+    phantom_name: ClassVar[str] = "2-D breast phantom (Li 2008, Table 6)"
 
     def __post_init__(self) -> None:
         check_ranges(self)
@@ -207,7 +207,7 @@ def scan_of(settings: WaveSimulationSettings, waveform: Waveform) -> Dataset:
         sampling_rate_hz=SAMPLES_A_PERIOD * settings.frequency_hz,
         t0_s=-BEFORE / settings.frequency_hz,
         title=(
-            f"{settings.phantom_name} phantom, {1e3 * settings.side_m:g} mm, "
+            f"{settings.phantom_name}, {1e3 * settings.side_m:g} mm, "
             f"waves of {1e-3 * settings.frequency_hz:g} kHz"
         ),
         source=(

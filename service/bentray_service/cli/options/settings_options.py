@@ -75,6 +75,6 @@ def settings_from(asked: Asked) -> Settings:
     Raises:
         InvalidInput: naming the setting, its value and what is accepted.
     """
-    from ...asked_settings import nested, settings_of
+    from ...settings_request import nested, settings_of
 
     return settings_of(nested(asked.options))

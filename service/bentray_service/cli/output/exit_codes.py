@@ -31,7 +31,7 @@ class Commands(TyperGroup):
         try:
             code = super().main(*args, **options)
         except InvalidInput as error:
-            from ...refusals import DatabaseUnavailable, StorageFull, StorageUnavailable
+            from ...errors import DatabaseUnavailable, StorageFull, StorageUnavailable
 
             away = isinstance(error, DatabaseUnavailable | StorageUnavailable | StorageFull)
             _end(str(error), WORK_FAILED if away else BAD_INPUT)

@@ -60,15 +60,15 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
 def errors(result: Reconstruction, truth: Truth, roi: NDArray[np.bool_] | None = None) -> dict[str, Any]:
     """Errors against the ground truth, or the reason why they were not computed, as plain values."""
     try:
-        found = compare(result, truth, roi)
+        comparison = compare(result, truth, roi)
     except NotComparable as reason:
         return {"region": f"not compared: {reason}", "region_nodes": 0, "axes": truth.axes}
     return {
-        "region": found.region_choice,
-        "region_nodes": int(found.region.sum()),
-        "true_range_mps": list(found.true_range_mps),
-        "mean_absolute_error_of_range": found.mean_absolute_error_of_range,
-        "rmse_mps": found.rmse_mps,
+        "region": comparison.region_choice,
+        "region_nodes": int(comparison.region.sum()),
+        "true_range_mps": list(comparison.true_range_mps),
+        "mean_absolute_error_of_range": comparison.mean_absolute_error_of_range,
+        "rmse_mps": comparison.rmse_mps,
         "registration": "none",
         "axes": truth.axes,
     }

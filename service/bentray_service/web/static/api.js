@@ -2,7 +2,7 @@
 
 import { authorization } from "./key.js";
 
-function inWords(problem) {
+export function inWords(problem) {
   if (problem.errors && problem.errors.length > 1) {
     return problem.errors.map((one) => `${one.field}: found ${one.found}; accepted: ${one.accepted}`).join(" · ");
   }
@@ -11,8 +11,6 @@ function inWords(problem) {
   }
   return `${problem.title}: ${problem.detail}`;
 }
-
-export { inWords };
 
 export async function request(path, options = {}) {
   let response;

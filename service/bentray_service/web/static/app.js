@@ -1,23 +1,19 @@
 // The viewer: upload a scan, start a reconstruction, follow the jobs; see glass.js for volumes, mesh.js for meshes.
 import { request } from "./api.js";
+import { at, showError } from "./dom.js";
 import { loadVolumes, volumeTitle, watchGlass } from "./glass.js";
 import { showJobs } from "./jobs.js";
 import { admitted } from "./key.js";
 import { loadMeshes, meshTitle, showFields, watchMeshes } from "./mesh.js";
+import { fillSelect, startJob } from "./panel.js";
 import { uploads } from "./uploads.js";
 
 const BUSY_MS = 700;
 const IDLE_MS = 4000;
-const at = (id) => document.getElementById(id);
 const datasets = new Map();
-// Volumes of jobs that the list of volumes has been read for.
-const asked = new Set();
+// Volumes of jobs that are in the list of volumes already.
+const listed = new Set();
 let timer = 0;
-
-function say(id, error) {
-  at(id).textContent = error ? error.message : "";
-  at(id).hidden = !error;
-}
 
 function titleOf(dataset) {
   return dataset.title || dataset.id;
@@ -43,13 +39,7 @@ async function loadDatasets(chosen) {
   const { datasets: rows } = await request("/v1/datasets");
   datasets.clear();
   for (const row of rows) datasets.set(row.id, row);
-  const select = at("dataset");
-  const before = chosen || select.value;
-  if (rows.length) {
-    select.replaceChildren(...rows.map((row) => new Option(`${titleOf(row)} (${new Date(row.created).toLocaleString()})`, row.id)));
-    select.disabled = false;
-    if (datasets.has(before)) select.value = before;
-  }
+  fillSelect("dataset", rows, titleOf, chosen);
   showFacts();
 }
 
@@ -59,16 +49,16 @@ async function refresh() {
   try {
     const { jobs } = await request("/v1/jobs");
     if (jobs.some((job) => job.dataset && !datasets.has(job.dataset))) await loadDatasets();
-    const made = jobs.filter((job) => job.volume && !asked.has(job.volume)).map((job) => job.volume);
+    const made = jobs.filter((job) => job.volume && !listed.has(job.volume)).map((job) => job.volume);
     if (made.length) await loadVolumes();
-    for (const volume of made) asked.add(volume);
+    for (const volume of made) listed.add(volume);
     at("empty").hidden = jobs.length > 0;
     showJobs(at("jobs"), jobs, titleOfJob, cancel);
     showFields(jobs);
     if (jobs.some((job) => ["queued", "running", "cancelling"].includes(job.state))) wait = BUSY_MS;
-    say("jobs-error", null);
+    showError("jobs-error", null);
   } catch (error) {
-    say("jobs-error", error);
+    showError("jobs-error", error);
   }
   timer = setTimeout(refresh, wait);
 }
@@ -78,7 +68,7 @@ async function cancel(job) {
     await request(job.links.cancel, { method: "POST" });
     await refresh();
   } catch (error) {
-    say("jobs-error", error);
+    showError("jobs-error", error);
   }
 }
 
@@ -86,28 +76,21 @@ function showMethod() {
   at("rays").disabled = new FormData(at("run")).get("method") === "auto";
 }
 
-async function start(event) {
+function start(event) {
   event.preventDefault();
-  say("run-error", null);
   const form = new FormData(event.target);
   const settings = { method: form.get("method"), nodes: Number(form.get("nodes")), iterations: Number(form.get("iterations")) };
-  // With auto the rays are tried, not asked for.
+  // The method auto chooses the rays itself.
   if (form.has("rays")) settings.rays = form.get("rays");
-  const body = JSON.stringify({ kind: "reconstruction", dataset: at("dataset").value, settings });
-  try {
-    await request("/v1/jobs", { method: "POST", headers: { "Content-Type": "application/json" }, body });
-    await refresh();
-  } catch (error) {
-    say("run-error", error);
-  }
+  startJob({ kind: "reconstruction", dataset: at("dataset").value, settings }, "run-error", refresh);
 }
 
-// What jobs take when nothing is said, as the service itself describes it.
+// The default settings of jobs, from the OpenAPI description.
 async function fillDefaults() {
   const { components } = await request("/openapi.json");
   for (const [id, schema] of [["run", "Settings"], ["look", "Turntable"], ["field", "FieldSettings"]]) {
     for (const input of at(id).querySelectorAll("input[required]")) {
-      // The value that a form goes back to when it is reset.
+      // Also used when the form is reset.
       if (input.type === "number") input.defaultValue = components.schemas[schema].properties[input.name].default;
     }
   }
@@ -133,11 +116,11 @@ at("dataset").addEventListener("change", showFacts);
 at("run").addEventListener("submit", start);
 at("run").addEventListener("change", showMethod);
 showMethod();
-fillDefaults().catch((error) => say("run-error", error));
+fillDefaults().catch((error) => showError("run-error", error));
 health();
 if (await admitted(request)) {
-  loadDatasets().catch((error) => say("jobs-error", error));
-  loadVolumes().catch((error) => say("jobs-error", error));
-  loadMeshes().catch((error) => say("jobs-error", error));
+  loadDatasets().catch((error) => showError("jobs-error", error));
+  loadVolumes().catch((error) => showError("jobs-error", error));
+  loadMeshes().catch((error) => showError("jobs-error", error));
   refresh();
 }

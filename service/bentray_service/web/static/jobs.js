@@ -26,7 +26,7 @@ function duration(seconds) {
   return seconds < 90 ? `${seconds.toFixed(1)} s` : `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
 }
 
-// Mean residual of each sweep over the slices, stage after stage; and before which sweeps a stage begins.
+// Mean residual of each iteration over the slices, stage by stage; and the iterations at which a stage begins.
 function residuals(history) {
   const sums = new Map();
   for (const { stage, sweep, residual_rms_s: value } of history) {
@@ -69,7 +69,7 @@ function sparkline({ values, begins }) {
   return picture;
 }
 
-// A picture that leads to a larger one.
+// An image that links to a larger one.
 function drawn(address, words, larger = address) {
   const frame = make("div", "picture");
   const image = make("img");
@@ -82,8 +82,7 @@ function drawn(address, words, larger = address) {
   return frame;
 }
 
-// The bare slice, for scales and words of the whole picture cannot be read so small, and what its colours mean;
-// a volume in space is also shown as glass.
+// The slice without a frame, whose text would be too small, and its range of colours; a 3-D volume is also rendered.
 async function showVolume(column, job, title) {
   const volume = await request(job.links.volume);
   const [low, high] = volume.value_range;
@@ -121,8 +120,8 @@ function pictures(job, title) {
   return column;
 }
 
-// What was asked for, in a heading and a line.
-function asked({ kind, settings }) {
+// The request in a heading and a line.
+function summaryOf({ kind, settings }) {
   if (kind === "geometry-field") {
     return ["Geometry field", `${settings.samples} samples per edge, image of ${settings.image_size} pixels`];
   }
@@ -137,7 +136,7 @@ function asked({ kind, settings }) {
   return [method === "auto" ? "Automatic" : RAYS[rays], `${METHODS[method]}, ${nodes} × ${nodes} nodes, ${iterations} iterations`];
 }
 
-// In a few words, and in full when asked for.
+// The plan in a line, with details on demand.
 function planned({ tasks, largest_bytes: bytes, minutes, why }) {
   const box = make("details");
   const time = minutes ? `, about ${duration(60 * minutes)}` : "";
@@ -147,7 +146,7 @@ function planned({ tasks, largest_bytes: bytes, minutes, why }) {
 
 function facts(job, title, onCancel) {
   const box = make("div");
-  const [what, settings] = asked(job);
+  const [what, settings] = summaryOf(job);
   const heading = make("h3", "", what);
   heading.append(make("span", `state ${job.state}`, job.state));
   box.append(heading, make("p", "", title), make("p", "", settings));
@@ -193,7 +192,7 @@ function facts(job, title, onCancel) {
   return box;
 }
 
-// titleOf(job): of what it works on, where that is known.
+// titleOf(job): title of its input, if known.
 export function showJobs(list, jobs, titleOf, onCancel) {
   const present = new Set(jobs.map((job) => job.id));
   for (const [id, card] of cards) {

@@ -1,7 +1,7 @@
-// The API key of this tab: asked for where the service wants one, kept until the tab is closed, in no address.
+// The API key of this tab: entered where the service requires one, kept until the tab is closed, in no address.
+import { at } from "./dom.js";
 
 const STORED = "bentray-key";
-const at = (id) => document.getElementById(id);
 
 export function authorization() {
   const key = sessionStorage.getItem(STORED);
@@ -78,15 +78,15 @@ export function withKey(anchor, address) {
   return anchor;
 }
 
-function ask(why) {
+function requestKey(why) {
   at("key").hidden = false;
   at("key-error").textContent = hasKey() ? why : "";
   at("key-error").hidden = !hasKey();
 }
 
-// Tell who the reader is for the service; whether it lets him in.
+// Show the identity of the user; returns whether the service accepts the key.
 export async function admitted(request) {
-  document.addEventListener("locked", (event) => ask(event.detail));
+  document.addEventListener("locked", (event) => requestKey(event.detail));
   at("key").addEventListener("submit", (event) => {
     event.preventDefault();
     sessionStorage.setItem(STORED, new FormData(event.target).get("key").trim());
@@ -103,7 +103,7 @@ export async function admitted(request) {
       how === "open" ? "Open to this machine; no key needed" : `Tenant ${tenant} (${scopes.join(", ")})`;
     return true;
   } catch (error) {
-    // Where no key helps, the reason stands here.
+    // Other errors than a missing key are shown with their reason.
     at("access").textContent = at("key").hidden ? error.message : "Authentication required";
     return false;
   }

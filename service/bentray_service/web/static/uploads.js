@@ -1,7 +1,7 @@
-// A place where files are dropped: sends one, says how far it is, and why it was refused.
+// A drop zone for files: uploads one, and shows progress and errors.
 import { upload } from "./api.js";
+import { at } from "./dom.js";
 
-const at = (id) => document.getElementById(id);
 
 // The elements are prefix-drop, prefix-file, prefix-upload, prefix-name, prefix-bar and prefix-error.
 export function uploads(prefix, addressOf, mediaType, onStored) {

@@ -1,9 +1,9 @@
-// How a volume is looked at: the view that suits it, and views as addresses of pictures.
+// Views of a volume: the default one, and views as query parameters.
 
-// Part of the speed of water that a speed must be off it to be shown as glass.
+// Smallest difference from the speed of water, relative to it, of a surface to render.
 const LEAST = 0.005;
 
-// A reconstruction in space as glass in water, which bends light as much as it bends sound.
+// A 3-D reconstruction as glass in water, with the refractive index of sound.
 export function glassOf({ water_speed_mps: water, value_range: [lowest, highest] }) {
   const between = (speed) => Number(((water + speed) / 2).toPrecision(6));
   const index = (speed) => Number((water / speed).toPrecision(4));

@@ -46,26 +46,26 @@ def copy_dataset(
 
         def pieces(name: str, chunk: tuple[int, ...]) -> Iterator[Piece]:
             path = f"waveform/{name}"
-            found = reader.checked(path, NUMERIC, TRACES)
-            assert found is not None
-            for where in blocks(found, chunk):
+            stored = reader.checked(path, NUMERIC, TRACES)
+            assert stored is not None
+            for where in blocks(stored, chunk):
                 with rejecting_damage(path, TRACES):
-                    values = found[where]
+                    values = stored[where]
                 yield where, trace_type(path, values)
 
         write_dataset(target, dataset, pieces)
     return dataset
 
 
-def blocks(found: h5py.Dataset, chunk: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
+def blocks(stored: h5py.Dataset, chunk: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
     """Boxes of an array of about ``PIECE_BYTES``, aligned to its chunks.
 
     Args:
-        found: the array.
+        stored: the array.
         chunk: of the target file; boxes are aligned to it too if they stay small.
     """
-    shape, size = found.shape, found.dtype.itemsize
-    own = found.chunks or (1,) * len(shape)
+    shape, size = stored.shape, stored.dtype.itemsize
+    own = stored.chunks or (1,) * len(shape)
     both = [math.lcm(a, b) for a, b in zip(own, chunk, strict=True)]
     unit = both if math.prod(both) * size <= PIECE_BYTES else own
     box = [min(side, n) for side, n in zip(unit, shape, strict=True)]

@@ -52,9 +52,10 @@ def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) ->
     for place in SIZED:
         check_size(place, _shape(reader, place))
     speed, temperature = _water(reader)
-    position = _floats(reader, "geometry/element_position_m", "(elements, 2 or 3) numbers in m")
-    if position is None:
-        raise InvalidInput("geometry/element_position_m", "nothing", "(elements, 2 or 3) numbers in m")
+    accepted = "(elements, 2 or 3) numbers in m"
+    position = np.ascontiguousarray(
+        reader.required("geometry/element_position_m", NUMERIC, accepted), np.float64
+    )
     dimension = reader.number("", "dimension", "2 or 3")
     if dimension is not None and position.ndim == 2 and dimension != position.shape[1]:
         raise InvalidInput("@dimension", f"{dimension:g}", f"{position.shape[1]}, as element_position_m has")
@@ -79,7 +80,7 @@ def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) ->
             "traveltime/delta_tof_s, traveltime/tof_s or waveform/object",
         )
     dataset = Dataset(
-        element_position_m=position,
+        element_position_m=np.ascontiguousarray(position, np.float64),
         tx=tx,
         rx=rx,
         water_speed_mps=speed,
@@ -102,8 +103,8 @@ def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) ->
 
 def _shape(reader: Reader, place: str) -> tuple[int, ...]:
     """Of an array as the file declares it; () where it is absent, or one number."""
-    found = reader.checked(place, "iufb", "an array of numbers")
-    return () if found is None else tuple(found.shape)
+    stored = reader.checked(place, "iufb", "an array of numbers")
+    return () if stored is None else tuple(stored.shape)
 
 
 def _check_format(reader: Reader) -> None:
@@ -143,11 +144,11 @@ def placeholder_traces(reader: Reader) -> Waveform:
     """Arrays of zeros of the shape and type of the traces, which take no memory."""
 
     def placeholder(path: str) -> NDArray[Any] | None:
-        found = reader.checked(path, NUMERIC, TRACES)
-        if found is None:
+        stored = reader.checked(path, NUMERIC, TRACES)
+        if stored is None:
             return None
-        zero = trace_type(path, np.zeros((), dtype=found.dtype))
-        return np.broadcast_to(zero, found.shape)
+        zero = trace_type(path, np.zeros((), dtype=stored.dtype))
+        return np.broadcast_to(zero, stored.shape)
 
     return _waveform(reader, placeholder)
 
@@ -220,9 +221,7 @@ def _flags(reader: Reader, path: str, accepted: str) -> NDArray[np.bool_] | None
 
 def _indices(reader: Reader, path: str) -> NDArray[np.int64]:
     accepted = "(n,) integers that count elements from 0"
-    array = reader.array(path, "iu", accepted)
-    if array is None:
-        raise InvalidInput(path, "nothing", accepted)
+    array = reader.required(path, "iu", accepted)
     if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
         raise InvalidInput(path, array.max(), accepted)
     return np.ascontiguousarray(array, dtype=np.int64)

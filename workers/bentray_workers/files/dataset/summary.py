@@ -8,7 +8,6 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import check_size
 from bentray_kernels.tomography.settings import Settings
 
@@ -29,13 +28,14 @@ def counts_in(path: Path) -> DatasetCounts:
     """
     with opened(path, Limits()) as reader:
         position, tx, rx = (
-            _required(reader, place)
+            _sized(reader, place)
             for place in ("geometry/element_position_m", "acquisition/tx", "acquisition/rx")
         )
+        heights = _sized(reader, "slice/z_m") if reader.has("slice/z_m") else None
         received = reader.checked("waveform/object", NUMERIC, "traces")
         water = reader.number("water", "sound_speed_mps", "m/s")
         return DatasetCounts(
-            **array_counts(position, tx, rx, _sized(reader, "slice/z_m")),
+            **array_counts(position, tx, rx, heights),
             times=any(_bytes(reader, f"traveltime/{name}") for name in ("delta_tof_s", "tof_s")),
             amplitudes=_bytes(reader, "amplitude/log_ratio_np") > 0,
             traces_bytes=sum(_bytes(reader, f"waveform/{name}") for name in ("object", "water")),
@@ -53,21 +53,13 @@ def summary_of(path: Path, settings: Settings) -> Summary:
     return counts_in(path).summary(settings)
 
 
-def _required(reader: Reader, place: str) -> NDArray[Any]:
-    found = _sized(reader, place)
-    if found is None:
-        raise InvalidInput(place, "nothing", "numbers")
-    return found
-
-
-def _sized(reader: Reader, place: str) -> NDArray[Any] | None:
-    found = reader.checked(place, NUMERIC, "numbers")
-    if found is None:
-        return None
-    check_size(place, found.shape)
-    return reader.array(place, NUMERIC, "numbers")
+def _sized(reader: Reader, place: str) -> NDArray[Any]:
+    """An array, whose size is checked before it is read."""
+    declared = reader.checked(place, NUMERIC, "numbers")
+    check_size(place, () if declared is None else declared.shape)
+    return reader.required(place, NUMERIC, "numbers")
 
 
 def _bytes(reader: Reader, path: str) -> int:
-    found = reader.checked(path, NUMERIC, "numbers")
-    return 0 if found is None else math.prod(found.shape) * found.dtype.itemsize
+    stored = reader.checked(path, NUMERIC, "numbers")
+    return 0 if stored is None else math.prod(stored.shape) * stored.dtype.itemsize

@@ -29,8 +29,8 @@ def trace_samples(path: Path) -> int:
 
 def samples_in(reader: Reader) -> int:
     """As ``trace_samples`` for an open file."""
-    found = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
-    return 0 if None in found or found[0] is None else int(found[0].shape[-1])
+    stored = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
+    return 0 if None in stored or stored[0] is None else int(stored[0].shape[-1])
 
 
 @contextmanager
@@ -50,8 +50,8 @@ def open_slice(
     """
     with opened(path, Limits()) as reader:
         stacked = whole.slice_z_m is not None
-        kept = partial(_emissions, reader, poll=poll, index=index if stacked else None)
-        waveform = _waveform(reader, whole, index, kept)
+        read = partial(_emissions, reader, poll=poll, index=index if stacked else None)
+        waveform = _waveform(reader, whole, index, read)
         yield replace(whole.slice(index), waveform=waveform)
 
 
@@ -92,8 +92,8 @@ def _emissions(reader: Reader, path: str, *, poll: Callable[[], None], index: in
 
     def emission(e: int) -> NDArray[Any]:
         poll()
-        found: NDArray[Any] = rows(e // block)[e % block]
-        return found
+        traces: NDArray[Any] = rows(e // block)[e % block]
+        return traces
 
     dtype = trace_type(path, np.zeros(1, dtype=stored.dtype)).dtype
     return Emissions.of(emission, stored.shape[-3:], dtype)

@@ -64,25 +64,25 @@ def picking_task_bytes(traces: Traces | None, pairs: int, settings: Settings) ->
         pairs: in all slices.
         settings: of the reconstruction.
     """
-    found = {"write_picked": WRITING_BYTES + 48 * pairs}
+    sizes = {"write_picked": WRITING_BYTES + 48 * pairs}
     if traces is None:
-        return found
+        return sizes
     of_slice = traces.emissions * traces.receivers
     samples = traces.receivers * traces.samples
     reading = READING_BYTES + 2 * samples * traces.sample_bytes
     filtered = FILTER_BYTES if PICKERS[settings.picking.picker].filtered else 0
-    found["pick_emissions"] = reading + (READ_BYTES + filtered) * samples + 8 * of_slice
+    sizes["pick_emissions"] = reading + (READ_BYTES + filtered) * samples + 8 * of_slice
     if settings.reads_amplitudes:
         pulse = math.ceil((BEFORE + AFTER) * traces.rate_hz / traces.frequency_hz) + 1
         # The pulse is the median over several emissions.
-        found["pick_emissions"] += traces.receivers * pulse * (GATE_BYTES + PULSE_COPIES * EMISSIONS)
-        found["pick_emissions"] += traces.receivers * FREQUENCIES * POWER_BYTES + 8 * of_slice
-    found["finish_slice"] = finish_slice_bytes(of_slice)
+        sizes["pick_emissions"] += traces.receivers * pulse * (GATE_BYTES + PULSE_COPIES * EMISSIONS)
+        sizes["pick_emissions"] += traces.receivers * FREQUENCIES * POWER_BYTES + 8 * of_slice
+    sizes["finish_slice"] = finish_slice_bytes(of_slice)
     if settings.picking.examine:
         pulse = PULSE_COPIES * (2 * math.ceil(traces.rate_hz / traces.frequency_hz) + 1)
-        found["measure_traces"] = reading + MEASURE_BYTES * samples
-        found["examine_slice"] = reading + READ_BYTES * samples + (pulse + FIGURE_BYTES) * of_slice
-    return found
+        sizes["measure_traces"] = reading + MEASURE_BYTES * samples
+        sizes["examine_slice"] = reading + READ_BYTES * samples + (pulse + FIGURE_BYTES) * of_slice
+    return sizes
 
 
 def finish_slice_bytes(pairs: int) -> int:

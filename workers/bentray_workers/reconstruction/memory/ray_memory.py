@@ -98,14 +98,14 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     image = REAL * math.prod(shape)
     state = state_bytes(shape, settings)
     # A process caches times and losses of the dataset, and those of recent problems.
-    kept = 3 * REAL * scan.pairs + 3 * REAL * emitters_of(scan, settings) * scan.receivers
+    cached = 3 * REAL * scan.pairs + 3 * REAL * emitters_of(scan, settings) * scan.receivers
     tracked = shape
     if settings.numerics.axial_margin_nodes is not None and len(shape) == 3:
         tracked = (*shape[:2], min(shape[2], 2 * settings.numerics.axial_margin_nodes + 2))
     field = 2 * REAL * math.prod(tracked)
     if settings.rays != "straight":
         field = field_bytes(tracked, settings.ray_eikonal)
-    base = FLOOR_BYTES + kept + state
+    base = FLOOR_BYTES + cached + state
 
     def tracing(rows: int) -> int:
         share = min(BATCH, emitters_of(scan, settings)) / max(1, emitters_of(scan, settings))
@@ -117,31 +117,31 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         entries = rows * _entries(settings, scan.in_space)
         return base + math.ceil(entries * ENTRY_BYTES) + 5 * REAL * rows + (8 + 8 * len(shape)) * image
 
-    found: dict[str, int] = {}
+    sizes: dict[str, int] = {}
     if scan.traces_bytes:
-        found |= picking_task_bytes(scan.traces, scan.pairs, settings)
+        sizes |= picking_task_bytes(scan.traces, scan.pairs, settings)
         if settings.numerics.guided_rounds and scan.traces is not None:
             # The rays of its emissions through the guiding image.
             part = emissions_per_task(scan.traces.receivers * scan.traces.samples)
             part = min(part, scan.traces.emissions)
             predicted = part * scan.traces.receivers
-            found["pick_emissions"] += field + 2 * image + 2 * rows_bytes(scan, settings, predicted)
+            sizes["pick_emissions"] += field + 2 * image + 2 * rows_bytes(scan, settings, predicted)
     elif scan.period and settings.picking.examine:
-        found["finish_slice"] = finish_slice_bytes(scan.pairs // scan.slices)
+        sizes["finish_slice"] = finish_slice_bytes(scan.pairs // scan.slices)
     if settings.method == "gauss-newton":
-        found["trace_rays"] = tracing(rays)
-        found["update_gauss_newton"] = solving(rays)
+        sizes["trace_rays"] = tracing(rays)
+        sizes["update_gauss_newton"] = solving(rays)
     elif solver_of(settings, len(shape)).compiled:
-        found["update_sart"] = base + _pass_bytes(shape, scan.receivers)
+        sizes["update_sart"] = base + _pass_bytes(shape, scan.receivers)
     else:
-        found["update_sart"] = base + field + 8 * image
+        sizes["update_sart"] = base + field + 8 * image
     if settings.attenuation.enabled and scan.amplitudes:
-        found["trace_attenuation_rays"] = tracing(rays)
-        found["solve_attenuation"] = solving(rays)
+        sizes["trace_attenuation_rays"] = tracing(rays)
+        sizes["solve_attenuation"] = solving(rays)
     if settings.resolution_check:
-        found["trace_final_rays"] = tracing(rays)
-        found["check_resolution"] = solving(rays)
-    return found
+        sizes["trace_final_rays"] = tracing(rays)
+        sizes["check_resolution"] = solving(rays)
+    return sizes
 
 
 def _pass_bytes(shape: tuple[int, ...], receivers: int) -> int:

@@ -72,11 +72,11 @@ def wave_task_bytes(traces: Traces | None, width_m: float, settings: Settings) -
         return {}
     plan = _scale(traces, width_m).bands(settings)
     (judge,) = validation_settings(WaveSettings(plan)).bands
-    found = {"validate_image": _band_bytes(traces, width_m, settings, judge)["start_band"]}
+    sizes = {"validate_image": _band_bytes(traces, width_m, settings, judge)["start_band"]}
     for band in plan if refines(settings) else ():
         for name, size in _band_bytes(traces, width_m, settings, band).items():
-            found[name] = max(size, found.get(name, 0))
-    return found
+            sizes[name] = max(size, sizes.get(name, 0))
+    return sizes
 
 
 def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) -> dict[str, int]:
@@ -86,8 +86,8 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
     samples = traces.receivers * extent.steps
     looks = band.emitters + WaveSettings((band,)).held_out
     # Cached data of a problem: traces of its emitters, and the resampler to the time steps of the simulation.
-    kept = traces.bytes_of(looks) + 4 * traces.samples * extent.steps
-    base = FLOOR_BYTES + kept
+    cached = traces.bytes_of(looks) + 4 * traces.samples * extent.steps
+    base = FLOOR_BYTES + cached
     medium = MEDIUM_BYTES * padded
     return {
         "start_band": base

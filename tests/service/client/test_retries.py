@@ -17,10 +17,10 @@ import pytest
 import uvicorn
 
 from bentray_service.app import create_app
-from bentray_service.client import AsyncClient, Client, ClientError, flows, patience, uploading
+from bentray_service.client import AsyncClient, Client, ClientError, flows, retries, uploading
 from bentray_service.client.connection import Connection
 from bentray_service.client.errors import NoAnswer
-from bentray_service.client.patience import Retries
+from bentray_service.client.retries import Retries
 from bentray_service.client.steps import DownloadStep, PauseStep, RequestStep
 from bentray_service.settings import ServiceSettings
 
@@ -44,8 +44,8 @@ class Walk:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, seconds: float = 300.0) -> None:
         self.now, self.pauses, self.told = 1000.0, [], list[str]()
-        monkeypatch.setattr(patience, "time", SimpleNamespace(monotonic=lambda: self.now))
-        self._patience = Retries(seconds, self.told.append)
+        monkeypatch.setattr(retries, "time", SimpleNamespace(monotonic=lambda: self.now))
+        self._retries = Retries(seconds, self.told.append)
         self.ask(LOOK, "first")
 
     def ask(self, step: Any, *answers: Any) -> Any:
@@ -54,7 +54,7 @@ class Walk:
         def flow() -> Any:
             return (yield step)
 
-        walk, left, answer = self._patience.through(flow()), iter(answers), None
+        walk, left, answer = self._retries.through(flow()), iter(answers), None
         try:
             while True:
                 asked = walk.throw(answer) if isinstance(answer, Exception) else walk.send(answer)
@@ -92,7 +92,7 @@ def test_it_ends(walk: Walk) -> None:
         walk.ask(LOOK)
     assert 280.0 < sum(walk.pauses) <= 300.0
     with pytest.raises(ClientError, match="500"):
-        walk.ask(LOOK, *[answered(500)] * patience.MOST_ERRORS)
+        walk.ask(LOOK, *[answered(500)] * retries.MOST_ERRORS)
 
 
 def test_a_wait_with_an_end_of_its_own_ends_there(walk: Walk) -> None:
@@ -141,7 +141,7 @@ def test_a_job_has_one_key_however_often_it_is_sent() -> None:
 
 @pytest.fixture
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(patience, "FIRST_PAUSE_S", 0.05)
+    monkeypatch.setattr(retries, "FIRST_PAUSE_S", 0.05)
 
 
 def test_a_job_whose_answer_was_lost_is_started_once(

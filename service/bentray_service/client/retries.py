@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from .errors import ClientError, NoAnswer
-from .steps import DownloadStep, Flow, PauseStep, RequestStep, Step
+from .steps import DownloadStep, Flow, FlowRun, PauseStep, RequestStep, Step
 
 T = TypeVar("T")
 
@@ -34,7 +34,7 @@ class Retries:
 
     Args:
         seconds: time limit from the first attempt of a request.
-        told: called with a message when retries begin and when they end.
+        on_message: called with a message when retries begin and when they end.
     """
 
     def __init__(self, seconds: float, on_message: Callable[[str], None] | None) -> None:
@@ -44,18 +44,14 @@ class Retries:
 
     def through(self, flow: Flow[T]) -> Flow[T]:
         """The same flow with retries of its steps."""
-        answer: Any = None
-        error: ClientError | None = None
-        while True:
+        run = FlowRun(flow)
+        outcome: Any = None
+        while (step := run.next(outcome)) is not None:
             try:
-                step = flow.send(answer) if error is None else flow.throw(error)
-            except StopIteration as end:
-                value: T = end.value
-                return value
-            try:
-                answer, error = (yield from self._done(step)), None
-            except ClientError as failure:
-                answer, error = None, failure
+                outcome = yield from self._done(step)
+            except ClientError as error:
+                outcome = error
+        return run.result
 
     def _done(self, step: Step) -> Flow[Any]:
         begun, pause, errors, waits = time.monotonic(), FIRST_PAUSE_S, 0, False
@@ -64,7 +60,7 @@ class Retries:
             last = min(last, step.until)
         while True:
             try:
-                answer = yield step
+                result = yield step
             except ClientError as error:
                 self._answered |= error.status is not None
                 errors += error.status == ERROR
@@ -82,7 +78,7 @@ class Retries:
                 self._answered |= not isinstance(step, PauseStep)
                 if waits:
                     self._say("The service answers again.")
-                return answer
+                return result
 
     def _say(self, line: str) -> None:
         if self._on_message is not None:

@@ -15,27 +15,27 @@ from bentray_kernels.tomography.stored_settings import REMOVED, RENAMED
 ADAPTER: TypeAdapter[Settings] = TypeAdapter(Settings)
 
 
-def known_only(given: Any, of: type[Any] = Settings, place: str = "") -> Any:
-    """``given`` if all its names are fields of the dataclass ``of``; other types than a mapping pass.
+def check_setting_names(settings: Any, kind: type[Any] = Settings, place: str = "") -> Any:
+    """Return ``settings`` if all its names are fields of a dataclass; other types than a mapping pass.
 
     Args:
-        given: the JSON value.
-        of: the dataclass; its fields may be dataclasses.
+        settings: the JSON value.
+        kind: the dataclass; its fields may be dataclasses.
         place: before the names in the error.
 
     Raises:
         InvalidInput: naming the first unknown field, and what to use instead.
     """
-    known = {field.name: field.default for field in fields(of)}
-    for name, value in given.items() if isinstance(given, Mapping) else ():
+    known = {field.name: field.default for field in fields(kind)}
+    for name, value in settings.items() if isinstance(settings, Mapping) else ():
         inner = is_dataclass(known.get(name))
         if name not in known or (inner and isinstance(value, bool)):
-            instead = _instead(name) if of is Settings else ""
+            instead = _instead(name) if kind is Settings else ""
             accepted = instead or "a known setting: " + ", ".join(known)
             raise InvalidInput(place + str(name), repr(value)[:80], accepted)
         if inner:
-            known_only(value, type(known[name]), f"{place}{name}.")
-    return given
+            check_setting_names(value, type(known[name]), f"{place}{name}.")
+    return settings
 
 
 def _instead(name: str) -> str:
@@ -51,21 +51,21 @@ def _instead(name: str) -> str:
 
 def nested(values: Mapping[str, Any]) -> dict[str, Any]:
     """Values by the names of ``PLACES`` as the nested record has them."""
-    found: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     for name, value in values.items():
         record, _, leaf = PLACES[name].rpartition(".")
-        (found.setdefault(record, {}) if record else found)[leaf] = value
-    return found
+        (settings.setdefault(record, {}) if record else settings)[leaf] = value
+    return settings
 
 
-def settings_of(given: Mapping[str, Any]) -> Settings:
+def settings_of(values: Mapping[str, Any]) -> Settings:
     """The settings of a nested record of numbers and words as JSON has them; the rest takes its default.
 
     Raises:
         InvalidInput: naming the first setting that is unknown or wrong, its value and what is accepted.
     """
     try:
-        return ADAPTER.validate_python(known_only(dict(given)))
+        return ADAPTER.validate_python(check_setting_names(dict(values)))
     except ValidationError as error:
         # Loads FastAPI, which nothing else here needs.
         from .web.errors import fault_of

@@ -11,7 +11,7 @@ from fastapi import Request
 from fastapi.params import Query
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.asked_view import asked_of
+from bentray_service.view_parameters import view_dependency
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.refraction_view import RefractionView
 
@@ -22,7 +22,7 @@ def asked(query: bytes) -> Request:
 
 @pytest.mark.parametrize("kind", [RefractionView, FieldView])
 def test_every_field_is_a_parameter(kind: type[Any]) -> None:
-    parameters = dict(inspect.signature(asked_of(kind)).parameters)
+    parameters = dict(inspect.signature(view_dependency(kind)).parameters)
     del parameters["request"]
     assert list(parameters) == [field.name for field in fields(kind)]
     for field in fields(kind):
@@ -34,12 +34,12 @@ def test_every_field_is_a_parameter(kind: type[Any]) -> None:
 
 
 def test_lists_become_tuples() -> None:
-    view = asked_of(RefractionView)(asked(b"iso=1&iso=2"), iso=[1.0, 2.0], index=[1.1, 1.2])
+    view = view_dependency(RefractionView)(asked(b"iso=1&iso=2"), iso=[1.0, 2.0], index=[1.1, 1.2])
     assert view == RefractionView(iso=(1.0, 2.0), index=(1.1, 1.2))
 
 
 def test_a_parameter_that_does_not_exist_is_named() -> None:
     with pytest.raises(InvalidInput, match=r"isos: found '1'; accepted: one of iso, index"):
-        asked_of(RefractionView)(asked(b"isos=1"))
+        view_dependency(RefractionView)(asked(b"isos=1"))
     with pytest.raises(InvalidInput, match=r"iso: found '1'; accepted: one of scene, mode"):
-        asked_of(FieldView)(asked(b"iso=1"))
+        view_dependency(FieldView)(asked(b"iso=1"))

@@ -12,14 +12,14 @@ from bentray_kernels.errors import InvalidInput
 LISTED = {"mesh": "meshes", "field": "geometry-fields"}
 
 
-class Refusal(InvalidInput):
+class Rejection(InvalidInput):
     """A refusal whose constructor has other arguments; it is pickled as plain InvalidInput."""
 
     def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
         return InvalidInput, (self.field, self.value, self.accepted)
 
 
-class UnknownId(Refusal):
+class UnknownId(Rejection):
     """No item has this id."""
 
     def __init__(self, field: str, value: str) -> None:
@@ -27,14 +27,14 @@ class UnknownId(Refusal):
         super().__init__(field, repr(value[:80]), f"the id of a {field} that exists; see GET /v1/{listed}")
 
 
-class Deleted(Refusal, FileNotFoundError):  # noqa: N818 - a refusal, like the others
+class Deleted(Rejection, FileNotFoundError):  # noqa: N818 - a refusal, like the others
     """The item was deleted during the request."""
 
     def __init__(self, name: str) -> None:
         InvalidInput.__init__(self, "id", f"{name}, which has been deleted", "the id of an existing item")
 
 
-class Damaged(Refusal):
+class Damaged(Rejection):
     """The content of a stored file has changed."""
 
     def __init__(self, name: str, found: str) -> None:
@@ -44,7 +44,7 @@ class Damaged(Refusal):
         super().__init__("stored data", f"{name}, {found}", accepted)
 
 
-class WrongMediaType(Refusal):
+class WrongMediaType(Rejection):
     """The Content-Type is not accepted."""
 
     def __init__(self, found: str | None, accepted: Sequence[str]) -> None:
@@ -127,7 +127,7 @@ class Forbidden(InvalidInput):
     """The caller does not have the required permission."""
 
 
-class RateLimited(Refusal):
+class RateLimited(Rejection):
     """The tenant exceeds a rate limit.
 
     Attributes:
@@ -147,7 +147,7 @@ class QuotaExceeded(InvalidInput):
     """The storage quota of the tenant is exceeded."""
 
 
-class RangeNotSatisfiable(Refusal):
+class RangeNotSatisfiable(Rejection):
     """The requested range starts beyond the end of the file.
 
     Attributes:
@@ -159,7 +159,7 @@ class RangeNotSatisfiable(Refusal):
         self.size = size
 
 
-class NoAnimation(Refusal):
+class NoAnimation(Rejection):
     """The job has no animation: it has another kind, or has not succeeded."""
 
     def __init__(self, job_id: str, kind: str, state: str) -> None:
@@ -170,21 +170,21 @@ class StorageFull(InvalidInput):
     """The disk of the service is full."""
 
 
-class StorageUnavailable(Refusal):
+class StorageUnavailable(Rejection):
     """The bucket with the files is unavailable."""
 
     def __init__(self, found: str) -> None:
         super().__init__("storage", found, "a later request, when the storage is available")
 
 
-class DatabaseUnavailable(Refusal, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
+class DatabaseUnavailable(Rejection, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
     """The database is unavailable, locked by another program, or overloaded."""
 
     def __init__(self, found: str) -> None:
         InvalidInput.__init__(self, "database", found, "a later request, when the database is available")
 
 
-class DatabaseFull(Refusal, StorageFull, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
+class DatabaseFull(Rejection, StorageFull, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
     """The disk of the database is full."""
 
     def __init__(self) -> None:

@@ -16,7 +16,7 @@ from bentray_workers.rendering.refraction_view import RefractionView
 View = TypeVar("View")
 
 
-def asked_of(kind: type[View]) -> Callable[..., View]:
+def view_dependency(kind: type[View]) -> Callable[..., View]:
     """A dependency that builds a view from the query; it raises InvalidInput for unknown parameters.
 
     Args:
@@ -24,12 +24,11 @@ def asked_of(kind: type[View]) -> Callable[..., View]:
     """
     names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
 
-    def view_of(request: Request, **given: Any) -> View:
+    def view_of(request: Request, **values: Any) -> View:
         for name in request.query_params:
             if name not in names:
                 raise InvalidInput(name, repr(request.query_params[name])[:80], "one of " + ", ".join(names))
-        asked: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in given.items()}
-        return kind(**asked)
+        return kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
 
     view_of.__signature__ = _signature(kind)  # type: ignore[attr-defined]
     return view_of
@@ -38,7 +37,7 @@ def asked_of(kind: type[View]) -> Callable[..., View]:
 def _signature(kind: type[Any]) -> inspect.Signature:
     """The signature for FastAPI: the fields of the view with their descriptions."""
     types = get_type_hints(kind)
-    found = [inspect.Parameter("request", inspect.Parameter.KEYWORD_ONLY, annotation=Request)]
+    parameters = [inspect.Parameter("request", inspect.Parameter.KEYWORD_ONLY, annotation=Request)]
     for field in fields(kind):
         default: Any = field.default
         several = isinstance(default, tuple)
@@ -47,7 +46,7 @@ def _signature(kind: type[Any]) -> inspect.Signature:
             description=field.metadata["description"] + (" May be repeated." if several else ""),
             json_schema_extra=field.metadata.get("json_schema_extra"),
         )
-        found.append(
+        parameters.append(
             inspect.Parameter(
                 field.name,
                 inspect.Parameter.KEYWORD_ONLY,
@@ -55,8 +54,8 @@ def _signature(kind: type[Any]) -> inspect.Signature:
                 annotation=Annotated[annotation, query],
             )
         )
-    return inspect.Signature(found)
+    return inspect.Signature(parameters)
 
 
-ViewParameters = Annotated[RefractionView, Depends(asked_of(RefractionView))]
-FieldViewParameters = Annotated[FieldView, Depends(asked_of(FieldView))]
+ViewParameters = Annotated[RefractionView, Depends(view_dependency(RefractionView))]
+FieldViewParameters = Annotated[FieldView, Depends(view_dependency(FieldView))]

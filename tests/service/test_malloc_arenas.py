@@ -7,12 +7,12 @@ import sys
 
 import pytest
 
-from bentray_service.arenas import MOST
+from bentray_service.malloc_arenas import MOST
 
 # Prints how many arenas there are once many threads have allocated.
 PROGRAM = """
 import ctypes, sys, tempfile, threading
-from bentray_service.arenas import limit_arenas
+from bentray_service.malloc_arenas import limit_arenas
 
 if sys.argv[1] == "limited":
     limit_arenas()
