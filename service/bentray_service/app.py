@@ -31,7 +31,7 @@ from .housekeeping import Housekeeper
 from .ingest.append import UploadLocks
 from .ingest.canonical import IngestLimits
 from .ingest.fair_queue import FairQueue, readers_at_once
-from .ingest.reader import UploadIngest
+from .ingest.upload_ingest import UploadIngest
 from .ingest.upload_limits import UploadLimits
 from .jobs.feed import EventFeed
 from .jobs.kinds import KINDS
@@ -66,7 +66,7 @@ from .web import errors
 from .web.description import OpenApiApp
 from .web.headers import SecurityHeaders
 from .web.request_id import RequestIds
-from .web.request_rate import RequestRate
+from .web.slow_bodies import SlowBodies
 from .web.tus_headers import TusHeaders
 from .wiring import Parts
 
@@ -115,7 +115,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     # Set when the server stops, so that event streams end before it waits for them.
     app.state.leaving = threading.Event()
     errors.install_handlers(app, tuple(KINDS))
-    app.add_middleware(RequestRate, seconds=settings.upload_patience_s)
+    app.add_middleware(SlowBodies, seconds=settings.upload_patience_s)
     app.add_middleware(TusHeaders)
     app.add_middleware(Guard)
     app.add_middleware(SecurityHeaders)
@@ -188,9 +188,9 @@ def _open(
     ingest_queue = FairQueue(readers_at_once(settings.ingest_memory_bytes))
     ingest_queue.start()
     stack.callback(ingest_queue.stop)
-    reader = UploadIngest(pieces, files, stores, limits, settings.upload_keep_s, ingest_queue, quota)
-    reader.start()
-    stack.callback(reader.stop)
+    upload_ingest = UploadIngest(pieces, files, stores, limits, settings.upload_keep_s, ingest_queue, quota)
+    upload_ingest.start()
+    stack.callback(upload_ingest.stop)
     housekeeper = Housekeeper(
         pieces,
         files,
@@ -207,7 +207,7 @@ def _open(
     stack.callback(housekeeper.stop)
     pictures = Pictures(cluster, store.fetch)
     stack.callback(pictures.stop)
-    threads: dict[str, Runner | UploadIngest] = {"runner": runner, "reader": reader}
+    threads: dict[str, Runner | UploadIngest] = {"runner": runner, "ingest": upload_ingest}
     readiness = Readiness(database, files, compute, threads, settings.min_free_bytes)
     stack.callback(readiness.stop)
     return Parts(
@@ -225,7 +225,7 @@ def _open(
         ingest_queue=ingest_queue,
         deletion=deletion,
         hold=hold,
-        reader=reader,
+        upload_ingest=upload_ingest,
         housekeeper=housekeeper,
         geometry_fields=GeometryFields(database),
         compute=compute,

@@ -15,7 +15,7 @@ from bentray_kernels.errors import InvalidInput
 from .compute import Compute
 from .errors import NotReady
 from .files.data_folder import Files
-from .ingest.reader import UploadIngest
+from .ingest.upload_ingest import UploadIngest
 from .jobs.runner import Runner
 from .rows.database import Database
 

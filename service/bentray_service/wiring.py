@@ -18,7 +18,7 @@ from .files.deletion import Deletion
 from .housekeeping import Housekeeper
 from .ingest.append import UploadLocks
 from .ingest.fair_queue import FairQueue
-from .ingest.reader import UploadIngest
+from .ingest.upload_ingest import UploadIngest
 from .ingest.upload_limits import UploadLimits
 from .jobs.feed import EventFeed
 from .jobs.runner import Runner
@@ -52,7 +52,7 @@ class Parts:
     ingest_queue: FairQueue
     deletion: Deletion
     hold: UploadLocks
-    reader: UploadIngest
+    upload_ingest: UploadIngest
     housekeeper: Housekeeper
     compute: Compute
     pictures: Pictures

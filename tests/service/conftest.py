@@ -20,7 +20,7 @@ from bentray_kernels.tomography.result import Iteration, Progress, Reconstructio
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.app import create_app
 from bentray_service.ingest import canonical
-from bentray_service.ingest.child import convert_upload
+from bentray_service.ingest.ingest_process import convert_upload
 from bentray_service.ingest.sandbox import summary_in
 from bentray_service.settings import ServiceSettings
 from bentray_service.web.listening import Listening

@@ -115,12 +115,12 @@ def plain_update(
 
 
 @kernel(inline="always")
-def factored_axis(node: int, stride: int, curl: float, front: Front) -> FactoredAxis:
+def factored_axis(node: int, stride: int, inverse_4t0: float, front: Front) -> FactoredAxis:
     """One axis of the factored difference, taken positive away from its neighbour, over T0/h.
 
     Where no neighbour is settled the time is infinite and the offset 0. The slope is then that of T0 if
     the source lies beside the node, between two node lines (the minimum along the axis is at no node,
-    so ∂T/∂x is not 0 there), and else 0. ``curl`` is 1/(4·T0²).
+    so ∂T/∂x is not 0 there), and else 0. ``inverse_4t0`` is 1/(4·T0²).
     """
     squares, tau, settled = front.squares, front.tau, front.settled
     left = settled[node - stride]
@@ -129,7 +129,7 @@ def factored_axis(node: int, stride: int, curl: float, front: Front) -> Factored
     # h·s0²·x from the squares of T0 either side, exactly: no coordinates need to be kept.
     difference = squares[node + stride] - squares[node - stride]
     if first == math.inf:
-        return _across(abs(difference), curl, front.limit), 0.0, math.inf, 0
+        return _across(abs(difference), inverse_4t0, front.limit), 0.0, math.inf, 0
     offset = -stride if left <= right else stride
     along = difference if left <= right else -difference
     second = settled[node + 2 * offset]
@@ -137,13 +137,13 @@ def factored_axis(node: int, stride: int, curl: float, front: Front) -> Factored
     # Second order: 3/2·(4τ1 − τ2)/3; first order: τ1.
     near = tau[node + offset]
     shift = 2.0 * near - 0.5 * tau[node + 2 * offset] if second <= first else near
-    return weight + along * curl, -shift, first, offset
+    return weight + along * inverse_4t0, -shift, first, offset
 
 
 @kernel(inline="always")
-def _across(difference: float, curl: float, limit: float) -> float:
+def _across(difference: float, inverse_4t0: float, limit: float) -> float:
     """Slope of an axis that has no neighbour upwind; ``difference`` is that of T0² either side."""
-    return difference * curl if difference < limit * (1.0 - ON_LINE) else 0.0
+    return difference * inverse_4t0 if difference < limit * (1.0 - ON_LINE) else 0.0
 
 
 @kernel(inline="always")
@@ -158,15 +158,15 @@ def factored_update(node: int, front: Front) -> float:
     strides, spacing, slowness = front.strides, front.spacing, front.slowness
     square = front.squares[node]
     inverse = 1.0 / square
-    curl = 0.25 * inverse
+    inverse_4t0 = 0.25 * inverse
     base = math.sqrt(square)
     local = spacing * slowness[node]
     rhs = local * local * inverse
-    a = factored_axis(node, strides[0], curl, front)
-    b = factored_axis(node, strides[1], curl, front)
+    a = factored_axis(node, strides[0], inverse_4t0, front)
+    b = factored_axis(node, strides[1], inverse_4t0, front)
     c = (0.0, 0.0, math.inf, 0)
     if strides[2] != 0:
-        c = factored_axis(node, strides[2], curl, front)
+        c = factored_axis(node, strides[2], inverse_4t0, front)
     # Nearly every node: all axes have a neighbour, and the root is downwind of them.
     slopes = a[0] * a[0] + b[0] * b[0] + c[0] * c[0]
     mixed = a[0] * a[1] + b[0] * b[1] + c[0] * c[1]
@@ -213,13 +213,13 @@ def _factored_fewer(
     mixed = a[0] * a[1]
     shifts = a[1] * a[1] - rhs
     # Axes beside the source turn the front even without a neighbour.
-    curl = 0.25 / squares[node]
+    inverse_4t0 = 0.25 / squares[node]
     across_b = b[0]
     if b[2] < math.inf:
-        across_b = _across(abs(squares[node + b[3]] - squares[node - b[3]]), curl, limit)
+        across_b = _across(abs(squares[node + b[3]] - squares[node - b[3]]), inverse_4t0, limit)
     across_c = c[0]
     if c[2] < math.inf:
-        across_c = _across(abs(squares[node + c[3]] - squares[node - c[3]]), curl, limit)
+        across_c = _across(abs(squares[node + c[3]] - squares[node - c[3]]), inverse_4t0, limit)
     factor = -1.0
     if c[2] < math.inf:
         factor = factored_root(

@@ -17,7 +17,7 @@ from ..rows.tenants import LOCAL, tenant_of_user
 from ..settings import ServiceSettings
 from ..web.addresses import is_loopback, names_loopback, networks, within
 from .caller import ANYONE, SCOPES, USUAL, Caller, scope_of
-from .request_rates import RequestRates
+from .rate_limits import RateLimits
 
 log = logging.getLogger("bentray.access")
 
@@ -44,8 +44,8 @@ class SignIn:
         self._keys = keys
         self._trusted = networks(settings.trusted_proxies or "")
         self._user_header = settings.proxy_user_header
-        self._requests = RequestRates(settings.requests_per_minute)
-        self._renders = RequestRates(settings.renders_per_minute)
+        self._requests = RateLimits(settings.requests_per_minute)
+        self._renders = RateLimits(settings.renders_per_minute)
         self._no_keys_until = -math.inf
         if settings.first_key_file is not None and not keys.any():
             self._create_first_key(settings)
@@ -106,7 +106,7 @@ class SignIn:
         """
         self._take(self._renders, "renders", caller)
 
-    def _take(self, rates: RequestRates, what: str, caller: Caller) -> None:
+    def _take(self, rates: RateLimits, what: str, caller: Caller) -> None:
         wait_s = rates.take(caller.tenant) if caller.how != "open" else 0.0
         if wait_s > 0.0:
             raise RateLimited(

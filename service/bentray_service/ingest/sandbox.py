@@ -19,9 +19,11 @@ from typing import Any
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import StorageFull
-from .child import ACCEPTED
+from .ingest_process import ACCEPTED
 
 log = logging.getLogger("bentray.ingest")
+
+PROGRAM = "bentray_service.ingest.ingest_process"
 
 # Minimum ingestion rate of a slow machine, bytes/s.
 BYTES_PER_S = 8 * 2**20
@@ -75,7 +77,7 @@ def ingest(
         StorageFull: when there is no space for the canonical file.
     """
     seconds += source.stat().st_size // BYTES_PER_S
-    command = [sys.executable, "-I", "-m", "bentray_service.ingest.child", what, str(source), str(target)]
+    command = [sys.executable, "-I", "-m", PROGRAM, what, str(source), str(target)]
     command += ["--memory", str(memory_bytes), "--seconds", str(seconds), "--given", json.dumps(dict(given))]
     with tempfile.TemporaryFile(dir=scratch) as complaint:
         process = subprocess.Popen(  # noqa: S603 - our own program and paths
@@ -103,7 +105,7 @@ def ingest(
 
 
 def summary_in(outcome: Mapping[str, Any]) -> dict[str, Any]:
-    """The summary in an outcome of ``child.convert_upload``.
+    """The summary in an outcome of ``ingest_process.convert_upload``.
 
     Raises:
         InvalidInput, StorageFull: that the outcome names.

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ..access.request_rates import RequestRates
+from ..access.rate_limits import RateLimits
 from ..errors import Busy, RateLimited
 from ..rows.tenants import Tenant
 
@@ -33,7 +33,7 @@ class UploadLimits:
         self._in_all = in_all
         self._lock = threading.Lock()
         self._there: Counter[Tenant] = Counter()
-        self._begun = RequestRates(begun_per_minute)
+        self._begun = RateLimits(begun_per_minute)
 
     def check_begin(self, tenant: Tenant) -> None:
         """Check the rate limit of new resumable uploads.

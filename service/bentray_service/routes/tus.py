@@ -175,7 +175,7 @@ async def append_upload(
                 expires = await run_in_threadpool(service.uploads.keep, upload_id, keep_s)
             if offset == length:
                 await run_in_threadpool(service.uploads.mark_complete, upload_id)
-                service.reader.notify()
+                service.upload_ingest.notify()
     headers = {"Upload-Offset": str(offset), "Upload-Expires": http_date(expires)}
     return Response(status_code=status.HTTP_204_NO_CONTENT, headers=headers)
 

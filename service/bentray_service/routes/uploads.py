@@ -13,8 +13,8 @@ from starlette.requests import ClientDisconnect
 
 from ..errors import Busy
 from ..ingest.canonical import IngestLimits, make_canonical
-from ..ingest.child import ACCEPTED
 from ..ingest.fair_queue import FairQueue
+from ..ingest.ingest_process import ACCEPTED
 from ..ingest.receive import Received, receive
 from ..rows.ids import new_id
 from ..rows.stored_tables import UploadedTable

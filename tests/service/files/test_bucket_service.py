@@ -138,7 +138,7 @@ def test_a_service_that_leaves_meanwhile_goes_on_at_the_next_start(
 
 
 def test_an_upload_in_pieces_waits_too(service, scan, s3_server, monkeypatch):
-    monkeypatch.setattr("bentray_service.ingest.reader.PATIENCE_SECONDS", 0.05)
+    monkeypatch.setattr("bentray_service.ingest.upload_ingest.PATIENCE_SECONDS", 0.05)
     http, content = service("one"), scan().read_bytes()
     tus = {"Tus-Resumable": "1.0.0"}
     place = http.post("/v1/uploads", headers={**tus, "Upload-Length": str(len(content))}).headers["location"]

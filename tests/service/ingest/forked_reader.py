@@ -17,7 +17,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from bentray_service.ingest import child, sandbox
+from bentray_service.ingest import ingest_process, sandbox
 
 MEMORY_BYTES = 2 * 2**30
 # Of processor time: a file that takes more sends HDF5 round in circles.
@@ -53,7 +53,7 @@ def main() -> None:
     files = json.loads(Path(sys.argv[3]).read_text())
     # What every fork needs is imported once.
     for what in {what for what, _, _ in files}:
-        child.convert_upload(what, Path("/dev/null"), Path("/dev/null/none"), {"title": ""})
+        ingest_process.convert_upload(what, Path("/dev/null"), Path("/dev/null/none"), {"title": ""})
     import_module("bentray_workers.files.reconstruction")
     for what, path, given in files:
         sys.stdout.write(json.dumps(read_one(memory, seconds, what, Path(path), given)) + "\n")
@@ -66,10 +66,10 @@ def read_one(memory: int, seconds: float, what: str, path: Path, given: dict[str
     begun = time.monotonic()
     process_id = os.fork()
     if process_id == 0:
-        child.limit_resources(memory, seconds)
+        ingest_process.limit_resources(memory, seconds)
         # Ends it also inside of a library, which the limit of processor time does only while it computes.
         signal.alarm(30 * int(seconds))
-        answer = child.convert_upload(what, path, path.with_suffix(".canonical"), given)
+        answer = ingest_process.convert_upload(what, path, path.with_suffix(".canonical"), given)
         os.write(sink, json.dumps(answer).encode())
         os._exit(0)
     os.close(sink)

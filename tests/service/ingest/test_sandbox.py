@@ -127,10 +127,10 @@ def test_a_canonical_file_may_be_larger_than_the_memory(program, scan, tmp_path)
     program(
         "import sys, json, resource\n"
         "from pathlib import Path\n"
-        "from bentray_service.ingest import child\n"
+        "from bentray_service.ingest import ingest_process\n"
         "most = lambda: resource.getrlimit(resource.RLIMIT_FSIZE)[0]\n"
-        "child.convert_upload = lambda *given: {'ok': {'most': most()}}\n"
-        "child.main()\n"
+        "ingest_process.convert_upload = lambda *given: {'ok': {'most': most()}}\n"
+        "ingest_process.main()\n"
     )
     with (tmp_path / "large").open("wb") as file:
         file.truncate(3 * 2**30)
@@ -159,7 +159,7 @@ def test_a_full_disk_is_told_as_such(program, scan, tmp_path):
 def test_memory_is_limited(program, scan, tmp_path):
     program(
         "import sys, json\n"
-        "from bentray_service.ingest.child import limit_resources\n"
+        "from bentray_service.ingest.ingest_process import limit_resources\n"
         "limit_resources(int(sys.argv[sys.argv.index('--memory') + 1]), 60)\n"
         "try:\n    bytearray(2 * 1024**3)\n    found = 'room'\n"
         "except MemoryError:\n    found = 'no room'\n"

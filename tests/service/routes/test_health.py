@@ -40,8 +40,8 @@ def test_database_that_cannot_be_written(start):
 
 def test_uploads_that_nobody_reads(start):
     http = start()
-    http.app.state.parts.reader.stop()
-    assert faults(http.get("/health/ready")) == ["reader"]
+    http.app.state.parts.upload_ingest.stop()
+    assert faults(http.get("/health/ready")) == ["ingest"]
 
 
 def test_several_faults_are_all_named(start, cluster):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.limits import ELEMENTS, EMISSIONS, SAMPLES, SLICES
-from bentray_service.ingest.child import convert_upload
+from bentray_service.ingest.ingest_process import convert_upload
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
 

@@ -323,7 +323,7 @@ def test_what_was_whole_at_a_death_is_read_at_the_next_start(start, scan, state)
     place = begin(http, len(content))
     row = http.app.state.parts.uploads.receiving()[0]
     files = http.app.state.parts.files.of("local")
-    http.app.state.parts.reader.stop()
+    http.app.state.parts.upload_ingest.stop()
     files.upload(row["id"]).write_bytes(content)
     files.candidate(row["result_id"]).write_bytes(content[:500])
     if state == "reading":
@@ -345,7 +345,7 @@ def test_what_was_stored_at_a_death_is_not_stored_twice(start, scan):
     http.__exit__()
     http = start()
     http.app.state.parts.uploads.mark_complete(upload)
-    http.app.state.parts.reader.notify()
+    http.app.state.parts.upload_ingest.notify()
     assert settled(http, place)["result"] == done["result"]
     assert len(http.get("/v1/datasets").json()["datasets"]) == 1
 

@@ -213,8 +213,8 @@ def _search_direction(problem: WaveProblem, limits: Steps, state: InversionState
 
 
 def _ended(problem: WaveProblem, state: InversionState) -> InversionState:
-    judged = state.skipped or problem.band.of == "attenuation"
-    return replace(state, image=state.best if judged else state.base, done=True)
+    by_held_out = state.skipped or problem.band.of == "attenuation"
+    return replace(state, image=state.best if by_held_out else state.base, done=True)
 
 
 def _shortened(problem: WaveProblem, limits: Steps, state: InversionState, misfit: float) -> InversionState:
@@ -229,14 +229,14 @@ def _shortened(problem: WaveProblem, limits: Steps, state: InversionState, misfi
     return replace(state, way=way, image=moved, shortenings=state.shortenings + 1)
 
 
-def given_by(history: Sequence[Evaluation], *, judged: bool) -> int:
+def given_by(history: Sequence[Evaluation], *, by_held_out: bool) -> int:
     """Index of the image that a finished band returned.
 
     Args:
         history: of the band.
-        judged: whether it returned the image with the lowest held-out misfit instead of the last.
+        by_held_out: whether it returned the image with the lowest held-out misfit instead of the last.
     """
     accepted = [k for k, record in enumerate(history) if record.accepted]
-    if judged and not math.isnan(history[0].held):
+    if by_held_out and not math.isnan(history[0].held):
         return min(accepted, key=lambda k: history[k].held)
     return accepted[-1]

@@ -46,8 +46,8 @@ class BandEnd:
         """Misfit of held-out emitters in that image; NaN where none was evaluated."""
         if not self.history:
             return math.nan
-        judged = self.skipped or self.image.attenuation is not None
-        return self.history[band_inversion.given_by(self.history, judged=judged)].held
+        by_held_out = self.skipped or self.image.attenuation is not None
+        return self.history[band_inversion.given_by(self.history, by_held_out=by_held_out)].held
 
 
 @dataclass(frozen=True)

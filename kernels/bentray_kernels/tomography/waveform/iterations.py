@@ -35,7 +35,7 @@ def iteration_records(
     """
     band = settings.bands[number]
     loss = band.of == "attenuation"
-    given = given_by(history, judged=skipped or loss) if over and history else -1
+    given = given_by(history, by_held_out=skipped or loss) if over and history else -1
     return [
         Iteration(
             index,

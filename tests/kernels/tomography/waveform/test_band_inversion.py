@@ -86,8 +86,8 @@ def test_of_the_attenuation_held_out_emitters_choose_the_image():
     assert not state.skipped
     assert np.array_equal(state.image, liked)
     assert liked.min() >= 0.0
-    assert given_by(state.history, judged=True) == 1
-    assert given_by(state.history, judged=False) == 2
+    assert given_by(state.history, by_held_out=True) == 1
+    assert given_by(state.history, by_held_out=False) == 2
 
 
 def test_without_held_out_emitters_the_last_image_counts():
@@ -101,7 +101,7 @@ def test_without_held_out_emitters_the_last_image_counts():
         look = EmitterMisfit((1.0 - 0.1 * k) * problem.used.size, 0.0, change(k, shape), np.ones(shape))
         state = step(problem, plan, state, [look])
     assert np.array_equal(state.image, last)
-    assert given_by(state.history, judged=True) == 1
+    assert given_by(state.history, by_held_out=True) == 1
 
 
 def change(seed, shape):

@@ -1,6 +1,6 @@
 """The ingest process: limits its resources, reads an untrusted file, writes the canonical file, prints JSON.
 
-``python -m bentray_service.ingest.child WHAT IN OUT --memory BYTES --seconds SECONDS --given JSON``
+``python -m bentray_service.ingest.ingest_process WHAT IN OUT --memory BYTES --seconds SECONDS --given JSON``
 
 Before writing, it prints ``{"reserve": bytes}`` and waits for the line ``go`` on its input.
 """

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bentray_service.ingest import child
+from bentray_service.ingest import ingest_process
 from bentray_workers.files.dataset.record import LONGEST_TEXT
 
 
 def test_summary_of_a_good_file(scan, tmp_path):
-    answer = child.convert_upload("dataset", scan(), tmp_path / "out.h5", {})
+    answer = ingest_process.convert_upload("dataset", scan(), tmp_path / "out.h5", {})
     counts = answer["ok"].pop("counts")
     assert (counts["emissions"], counts["elements"], counts["width_m"]) == (16, 16, 0.1)
     assert answer["ok"] == {
@@ -36,15 +36,15 @@ def test_summary_of_a_good_file(scan, tmp_path):
 
 
 def test_the_canonical_file_says_the_same(scan, tmp_path):
-    first = child.convert_upload("dataset", scan(), tmp_path / "once.h5", {})
-    assert child.convert_upload("dataset", tmp_path / "once.h5", tmp_path / "twice.h5", {}) == first
+    first = ingest_process.convert_upload("dataset", scan(), tmp_path / "once.h5", {})
+    assert ingest_process.convert_upload("dataset", tmp_path / "once.h5", tmp_path / "twice.h5", {}) == first
 
 
 def test_a_bad_file_is_named(scan, tmp_path):
     def spoil(file):
         file["geometry/element_position_m"][3] = np.nan
 
-    answer = child.convert_upload("dataset", scan(spoil), tmp_path / "out.h5", {})
+    answer = ingest_process.convert_upload("dataset", scan(spoil), tmp_path / "out.h5", {})
     assert answer["error"]["field"] == "geometry/element_position_m"
     assert "element 3" in answer["error"]["found"]
 
@@ -55,7 +55,7 @@ def test_a_reader_that_breaks_is_the_fault_of_the_file(scan, tmp_path, monkeypat
         raise error
 
     monkeypatch.setattr("bentray_workers.foreign_scans.convert_dataset", broken)
-    answer = child.convert_upload("dataset", scan(), tmp_path / "out.h5", {})
+    answer = ingest_process.convert_upload("dataset", scan(), tmp_path / "out.h5", {})
     assert answer["error"]["field"] == "file"
 
 
@@ -64,13 +64,13 @@ def test_a_full_disk_is_no_fault_of_the_file(scan, tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device", str(target))
 
     monkeypatch.setattr("bentray_workers.foreign_scans.convert_dataset", full)
-    assert child.convert_upload("dataset", scan(), tmp_path / "out.h5", {}) == {"full": True}
+    assert ingest_process.convert_upload("dataset", scan(), tmp_path / "out.h5", {}) == {"full": True}
 
 
 def test_a_volume(tmp_path):
     np.save(tmp_path / "v.npy", np.arange(60.0).reshape(3, 4, 5))
     given = {"title": "A head", "spacing_m": [2e-3], "shape": None, "dtype": None}
-    answer = child.convert_upload("volume", tmp_path / "v.npy", tmp_path / "out.h5", given)
+    answer = ingest_process.convert_upload("volume", tmp_path / "v.npy", tmp_path / "out.h5", given)
     assert answer["ok"] == {
         "title": "A head",
         "shape": [3, 4, 5],
@@ -78,20 +78,20 @@ def test_a_volume(tmp_path):
         "origin_m": [0.0] * 3,
         "value_range": [0.0, 59.0],
     }
-    again = child.convert_upload("volume", tmp_path / "out.h5", tmp_path / "again.h5", {})
+    again = ingest_process.convert_upload("volume", tmp_path / "out.h5", tmp_path / "again.h5", {})
     assert again == answer
 
 
 def test_a_bad_volume_is_named(tmp_path):
     np.save(tmp_path / "v.npy", np.full((2, 2, 2), np.nan))
-    answer = child.convert_upload("volume", tmp_path / "v.npy", tmp_path / "out.h5", {})
+    answer = ingest_process.convert_upload("volume", tmp_path / "v.npy", tmp_path / "out.h5", {})
     assert (answer["error"]["field"], answer["error"]["found"]) == ("values", "nan at node (0, 0, 0)")
     assert not (tmp_path / "out.h5").exists()
 
 
 @given(st.text())
 def test_text_from_a_file_is_printable_and_short(value):
-    clean = child.text(value)
+    clean = ingest_process.text(value)
     assert len(clean) <= LONGEST_TEXT
     assert clean.isprintable()
     clean.encode()
@@ -99,7 +99,7 @@ def test_text_from_a_file_is_printable_and_short(value):
 
 def test_the_readers_of_scans_and_volumes_load_nothing_compiled():
     """Each upload starts a process: Numba and SciPy would take most of its time."""
-    readers = [child.READERS[what] for what in ("dataset", "volume")]
+    readers = [ingest_process.READERS[what] for what in ("dataset", "volume")]
     code = (
         "import importlib, sys\n"
         f"for name in {readers!r}: importlib.import_module(name)\n"
@@ -112,7 +112,8 @@ def test_the_readers_of_scans_and_volumes_load_nothing_compiled():
 def test_reading_a_scan_loads_no_compiled_kernels(scan, tmp_path):
     # They take seconds for every upload, and the reader's environment names no place to keep them.
     program = (
-        "import sys; from pathlib import Path; from bentray_service.ingest.child import convert_upload\n"
+        "import sys; from pathlib import Path\n"
+        "from bentray_service.ingest.ingest_process import convert_upload\n"
         "found = convert_upload('dataset', Path(sys.argv[1]), Path(sys.argv[2]), {})\n"
         "print(sorted(found), 'numba' in sys.modules)"
     )

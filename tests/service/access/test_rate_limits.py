@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bentray_service.access import request_rates
-from bentray_service.access.request_rates import RequestRates
+from bentray_service.access import rate_limits
+from bentray_service.access.rate_limits import RateLimits
 
 
 class Clock:
@@ -17,7 +17,7 @@ class Clock:
 @given(st.integers(1, 50), st.lists(st.floats(0.0, 40.0), max_size=120))
 def test_never_more_than_a_full_bucket_and_what_came_since(per_minute, waits):
     clock = Clock()
-    found, taken = RequestRates(per_minute, clock), 0
+    found, taken = RateLimits(per_minute, clock), 0
     for wait in waits:
         clock.now += wait
         delay = found.take("a")
@@ -31,14 +31,14 @@ def test_never_more_than_a_full_bucket_and_what_came_since(per_minute, waits):
 
 
 def test_nought_is_any_number():
-    found = RequestRates(0)
+    found = RateLimits(0)
     assert {found.take("a") for _ in range(1000)} == {0.0}
 
 
 def test_buckets_that_are_full_again_are_forgotten(monkeypatch):
-    monkeypatch.setattr(request_rates, "MANY", 10)
+    monkeypatch.setattr(rate_limits, "MANY", 10)
     clock = Clock()
-    found = RequestRates(60, clock)
+    found = RateLimits(60, clock)
     for number in range(9):
         found.take(str(number))
     for _ in range(60):

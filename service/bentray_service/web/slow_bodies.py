@@ -12,7 +12,7 @@ from ..errors import BodyTimeout
 LEAST_BYTES = 64 * 1024
 
 
-class RequestRate:
+class SlowBodies:
     """ASGI middleware: ``LEAST_BYTES`` or the end of each body must arrive in every period of ``seconds``.
 
     Otherwise reading the body raises :class:`BodyTimeout`.

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from bentray_service.errors import BodyTimeout
-from bentray_service.web.request_rate import LEAST_BYTES, RequestRate
+from bentray_service.web.slow_bodies import LEAST_BYTES, SlowBodies
 
 HTTP = {"type": "http"}
 SECONDS = 0.5
@@ -27,7 +27,7 @@ def run(chunks, *, every, seconds=SECONDS, scope=HTTP):
         body = chunks.pop(0)
         return {"type": "http.request", "body": body, "more_body": bool(chunks)}
 
-    asyncio.run(RequestRate(app, seconds)(scope, receive, None))
+    asyncio.run(SlowBodies(app, seconds)(scope, receive, None))
     return got
 
 
@@ -61,7 +61,7 @@ def test_who_waits_after_the_body_is_not_hurried():
         await asyncio.sleep(0.0 if len(messages) == 2 else 0.3)
         return messages.pop(0)
 
-    asyncio.run(RequestRate(app, 0.1)(HTTP, receive, None))
+    asyncio.run(SlowBodies(app, 0.1)(HTTP, receive, None))
     assert not messages
 
 
@@ -69,4 +69,4 @@ def test_other_connections_pass():
     async def app(scope, receive, send):
         assert receive == "receive"
 
-    asyncio.run(RequestRate(app, 0.1)({"type": "lifespan"}, "receive", "send"))
+    asyncio.run(SlowBodies(app, 0.1)({"type": "lifespan"}, "receive", "send"))

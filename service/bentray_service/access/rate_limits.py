@@ -17,7 +17,7 @@ class _TokenBucket:
     seen: float
 
 
-class RequestRates:
+class RateLimits:
     """Token buckets of tenants.
 
     Args:

@@ -9,10 +9,10 @@ from bentray_kernels.errors import InvalidInput
 from bentray_service.access.quota import Quota
 from bentray_service.errors import StorageFull, UnknownId
 from bentray_service.files.data_folder import Files
-from bentray_service.ingest import reader as reading
+from bentray_service.ingest import upload_ingest as reading
 from bentray_service.ingest.canonical import IngestLimits
 from bentray_service.ingest.fair_queue import FairQueue
-from bentray_service.ingest.reader import UploadIngest
+from bentray_service.ingest.upload_ingest import UploadIngest
 from bentray_service.rows.database import open_database
 from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.rows.uploads import Uploads
