@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from typing import Any, ClassVar, Literal
 
+from ..acquisition.picking.picker_names import DEFAULT_PICKER, PickerName
 from ..errors import InvalidInput
 from ..limits import SPEED_MPS
 from ..ranges import SEED, Range
@@ -85,8 +86,8 @@ class PickingSettings:
 
     __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
-    picker: Literal["aic", "threshold", "energy-ratio", "sta-lta", "correlation", "matched"] = setting(
-        "aic", "How the first arrival of a trace is picked."
+    picker: PickerName = setting(  # noqa: RUF009 - a string, by its alias
+        DEFAULT_PICKER, "How the first arrival of a trace is picked."
     )
     examine: bool = setting(
         True,

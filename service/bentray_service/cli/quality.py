@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
+from bentray_kernels.acquisition.picking.picker_names import DEFAULT_PICKER
+
 from .options.paths import input_file, output_folder
 from .output.exit_codes import WorkFailed
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
@@ -24,7 +26,7 @@ class Water(StrEnum):
 def quality(
     file: Annotated[Path, typer.Argument(help="Dataset file (HDF5, format uct-transmission).")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
-    picker: Annotated[str, typer.Option(help="Picker of first arrivals in raw traces.")] = "aic",
+    picker: Annotated[str, typer.Option(help="Picker of first arrivals in raw traces.")] = DEFAULT_PICKER,
     calibrate: Annotated[
         Water | None,
         typer.Option(

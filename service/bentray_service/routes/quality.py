@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
+
+from bentray_kernels.acquisition.picking.picker_names import DEFAULT_PICKER, PickerName
 
 from ..web.errors import problems
 from ..wiring import CallerTenant, Service, caller_of, parts_of
@@ -15,7 +17,7 @@ from .pictures import PICTURE, picture, while_connected
 router = APIRouter()
 
 Picker = Annotated[
-    Literal["aic", "threshold", "energy-ratio", "sta-lta", "correlation", "matched"],
+    PickerName,
     Query(description="Picker of first arrivals in traces; ignored for scans with travel times."),
 ]
 
@@ -31,7 +33,7 @@ async def check_render_rate(request: Request) -> None:
     dependencies=[Depends(check_render_rate)],
 )
 async def show_quality(
-    dataset_id: str, request: Request, service: Service, tenant: CallerTenant, picker: Picker = "aic"
+    dataset_id: str, request: Request, service: Service, tenant: CallerTenant, picker: Picker = DEFAULT_PICKER
 ) -> QualityRecord:
     """Check the quality of a scan on a worker: faulty elements and times, and the action taken for each."""
     dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
@@ -43,7 +45,7 @@ async def show_quality(
 @router.head("/{dataset_id}/quality.png", include_in_schema=False)
 @router.get("/{dataset_id}/quality.png", response_class=Response, responses={**PICTURE, **problems(404, 422)})
 async def quality_png(
-    dataset_id: str, request: Request, service: Service, tenant: CallerTenant, picker: Picker = "aic"
+    dataset_id: str, request: Request, service: Service, tenant: CallerTenant, picker: Picker = DEFAULT_PICKER
 ) -> Response:
     """The quality report as an image: gathers with picks, matrix of times, findings."""
     dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)

@@ -10,6 +10,7 @@ from typing import Any
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.calibration import Calibration, calibrate, water_times
+from bentray_kernels.acquisition.picking.picker_names import DEFAULT_PICKER
 from bentray_kernels.acquisition.quality import Report, examine_slices
 from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.errors import InvalidInput
@@ -74,7 +75,10 @@ def calibrate_file(
 
 
 def examine_file(
-    path: Path, picker: str = "aic", progress: OnEmission | None = None, largest_bytes: int | None = None
+    path: Path,
+    picker: str = DEFAULT_PICKER,
+    progress: OnEmission | None = None,
+    largest_bytes: int | None = None,
 ) -> Quality:
     """Examine a dataset file.
 

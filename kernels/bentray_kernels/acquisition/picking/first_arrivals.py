@@ -13,6 +13,7 @@ from .. import rules
 from ..dataset import Dataset, Floats
 from .consistency import consistent
 from .differential import emission
+from .picker_names import DEFAULT_PICKER
 from .pickers import PICKERS, Picker, picker_named
 from .pulse import Inverse
 
@@ -24,7 +25,7 @@ ROUNDING = 1.0 / math.sqrt(12.0)
 
 def pick(
     dataset: Dataset,
-    picker: str = "aic",
+    picker: str = DEFAULT_PICKER,
     progress: Callable[[int, int], None] | None = None,
     *,
     predicted_s: Floats | None = None,

@@ -41,7 +41,7 @@ PICKERS: Mapping[str, Picker] = MappingProxyType(
     {
         p.name: p
         for p in (
-            Picker("aic", AIC, "Akaike's criterion splits noise from signal (default)"),
+            Picker("aic", AIC, "Akaike's criterion splits noise from signal"),
             Picker("threshold", THRESHOLD, "first crossing of a fifth of the peak, or four times the noise"),
             Picker("energy-ratio", ENERGY_RATIO, "steepest rise of Coppens' ratio of recent to all energy"),
             Picker("sta-lta", STA_LTA, "short over long average of the energy"),

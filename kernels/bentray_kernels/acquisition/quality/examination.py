@@ -11,6 +11,7 @@ import numpy as np
 from ...arrays import Flags, Floats
 from ..dataset import Dataset
 from ..picking.first_arrivals import pick
+from ..picking.picker_names import DEFAULT_PICKER
 from .contradictions import find_contradictions
 from .correction import apply, stacked
 from .dead import find_dead
@@ -35,7 +36,7 @@ class Examined:
 
 
 def examine(
-    dataset: Dataset, picker: str = "aic", progress: Callable[[int, int], None] | None = None
+    dataset: Dataset, picker: str = DEFAULT_PICKER, progress: Callable[[int, int], None] | None = None
 ) -> Examined:
     """Check a scan, correct what can be corrected, pick its times where it has none, and check those.
 
@@ -55,7 +56,7 @@ def examine(
 def examine_slices(
     dataset: Dataset,
     slices: Iterable[Dataset],
-    picker: str = "aic",
+    picker: str = DEFAULT_PICKER,
     progress: Callable[[int, int], None] | None = None,
 ) -> Examined:
     """As ``examine``, with slices from an iterator.
