@@ -37,6 +37,7 @@ def test_every_scan_has_a_page(drawn, kind):
     if kind == "times":
         dataset = replace(examine(dataset).picked, waveform=None)
     elif kind == "refused":
+        # With twelve elements hardly a chord misses the object.
         dataset = replace(dataset, waveform=Waveform(dataset.waveform.object))
     else:
         both = (np.stack([t, t]) for t in (dataset.waveform.object, dataset.waveform.water))

@@ -190,9 +190,16 @@ def test_times_that_came_with_a_scan_are_examined_where_half_a_period_is_known(t
     assert found.words(stacked=False) == "nothing found"
 
 
-def test_without_a_water_shot_nothing_is_begun(tmp_path):
-    with pytest.raises(InvalidInput, match="waveform/water"):
-        arrived(replace(clean(), waveform=Waveform(clean().waveform.object)), tmp_path)
+def test_without_a_water_shot_the_times_are_nearly_the_same(tmp_path):
+    bare = replace(clean(), waveform=Waveform(clean().waveform.object))
+    (tmp_path / "with").mkdir()
+    (tmp_path / "without").mkdir()
+    expected, _ = arrived(clean(), tmp_path / "with")
+    picked, findings = arrived(bare, tmp_path / "without")
+    assert "water shot" in {finding.check for finding in findings.findings}
+    both = np.isfinite(expected.delta_tof_s) & np.isfinite(picked.delta_tof_s)
+    assert both.sum() > 0.9 * np.isfinite(expected.delta_tof_s).sum()
+    assert np.std((picked.delta_tof_s - expected.delta_tof_s)[both]) < 0.03 / clean().center_frequency_hz
 
 
 def test_what_was_picked_before_a_death_is_not_picked_again(tmp_path, monkeypatch):

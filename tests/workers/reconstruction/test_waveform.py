@@ -112,10 +112,21 @@ def test_slices_are_refined_by_themselves(cluster, tmp_path, expected):
     assert {sweep.slice for sweep in result.history if sweep.band_hz} == {0, 1}
 
 
-def test_a_scan_without_traces_of_the_water_is_refused_before_any_work(tmp_path):
-    mute = replace(pick(scan()), waveform=Waveform(scan().waveform.object))
-    write_dataset(tmp_path / "mute.h5", mute)
+@pytest.mark.parametrize("picked", [False, True], ids=["traces alone", "times and traces"])
+def test_without_a_water_shot_the_image_is_nearly_as_good(picked, tmp_path, expected):
+    bare = replace(pick(scan()) if picked else scan(), waveform=Waveform(scan().waveform.object))
+    write_dataset(tmp_path / "bare.h5", bare)
+    result = reconstruction_run.reconstruct(None, tmp_path / "bare.h5", PLAN)
+    assert "water shot: none" in result.provenance["quality"]
+    with_water, without = (
+        error(Image(one.speed, one.spacing_m[0], one.origin_m)) for one in (expected, result)
+    )
+    assert without < 1.15 * with_water
+
+
+def test_a_scan_without_traces_is_rejected_before_any_work(tmp_path):
+    write_dataset(tmp_path / "times.h5", replace(pick(scan()), waveform=None))
     seen = []
-    with pytest.raises(InvalidInput, match="traces of object and water"):
-        reconstruction_run.reconstruct(None, tmp_path / "mute.h5", PLAN, seen.append)
+    with pytest.raises(InvalidInput, match="'waveform' for a scan without traces"):
+        reconstruction_run.reconstruct(None, tmp_path / "times.h5", PLAN, seen.append)
     assert not seen

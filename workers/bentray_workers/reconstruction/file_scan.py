@@ -20,6 +20,7 @@ from ..cluster.job_cancellation import check_job_active
 from ..files.dataset import read_dataset
 from ..files.dataset.traces import open_slice
 from ..files.findings import read_findings
+from ..files.reference import with_reference
 
 
 class FileScan(NamedTuple):
@@ -81,4 +82,5 @@ def _wave_problem(scan: FileWaveScan, number: int) -> WaveProblem:
     faults = read_findings(scan.findings).of_traces(scan.slice)
     poll = partial(check_job_active, scan.findings.parent)
     with open_slice(scan.path, read_once(scan.path, scan.stamp), scan.slice, poll) as one:
-        return prepare(apply(one, faults), scan.plan, number, poll=poll)
+        whole = with_reference(apply(one, faults), scan.findings.parent, scan.slice)
+        return prepare(whole, scan.plan, number, poll=poll)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -22,8 +22,16 @@ from bentray_kernels.acquisition.picking.first_arrivals import (
 )
 from bentray_kernels.acquisition.quality import Finding
 from bentray_kernels.acquisition.quality.correction import apply, stacked
+from bentray_kernels.acquisition.quality.estimated_water import find_estimated_water
 from bentray_kernels.acquisition.quality.examination import check_times
 from bentray_kernels.acquisition.quality.recording import Measured, check_traces
+from bentray_kernels.acquisition.reference import (
+    ChordPulses,
+    WaterChords,
+    estimate_reference,
+    find_water_chords,
+    read_pulses,
+)
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.task_graph import Task
@@ -31,10 +39,11 @@ from bentray_kernels.tomography import Progress
 from bentray_kernels.tomography.guided_picking import predicted_delta
 
 from ..cluster.job_cancellation import check_job_active
-from ..files.dataset.traces import open_slice, trace_samples
+from ..files.dataset.traces import lacks_water, open_slice, trace_samples
 from ..files.dataset.write import write_dataset
 from ..files.findings import ScanFindings, read_findings, write_findings
 from ..files.reconstruction import read_reconstruction
+from ..files.reference import reference_path, with_reference, write_reference
 from .file_scan import read_once
 from .memory.picking_memory import parts_of
 
@@ -99,6 +108,7 @@ class PickingSource(NamedTuple):
         picker: for scans without travel times.
         examine: whether the scan is examined first.
         amplitudes: their source, see ``Settings``.
+        waves: whether traces are compared with simulated ones after picking.
     """
 
     path: Path
@@ -107,6 +117,7 @@ class PickingSource(NamedTuple):
     picker: str
     examine: bool
     amplitudes: str = "recorded"
+    waves: bool = False
 
     @property
     def dataset(self) -> Dataset:
@@ -123,11 +134,23 @@ class PickingSource(NamedTuple):
         """Whether amplitudes are read from the traces."""
         return self.amplitudes != "recorded"
 
+    @property
+    def estimates_water(self) -> bool:
+        """Whether a water shot is needed and must be estimated, because the file has none."""
+        needed = self.waves or self.reads_amplitudes or not self.dataset.picked
+        return needed and lacks_water(self.path) and self.dataset.center_frequency_hz is not None
+
     @contextmanager
     def slice(self, index: int, findings: Sequence[Finding] = ()) -> Iterator[Dataset]:
         """One slice with traces that are read on access, with the findings corrected."""
         with open_slice(self.path, self.dataset, index, partial(check_job_active, self.folder)) as one:
             yield apply(one, findings)
+
+    @contextmanager
+    def with_water(self, index: int, findings: Sequence[Finding]) -> Iterator[Dataset]:
+        """As ``slice``, with the estimated water shot where the file has none."""
+        with self.slice(index, findings) as one:
+            yield with_reference(one, self.folder, index)
 
 
 class PickingGraph:
@@ -150,10 +173,16 @@ class PickingGraph:
         dataset = source.dataset
         self._slices = range(dataset.slices)
         self._parts: list[range] = []
+        self._picks = False
         if source.reads_amplitudes or not dataset.picked:
             with source.slice(0) as one:
-                require_traces(one)
+                require_traces(one, water=False)
+            self._picks = True
+        self._estimates = guide is None and source.estimates_water
+        if self._picks or self._estimates:
             self._parts = parts_of(len(dataset.tx), trace_samples(source.path) * len(dataset.rx))
+        examines = guide is None and source.examine and not dataset.picked
+        self._measures = examines or self._estimates
         self._findings: dict[int, Any] = {k: guide.faults(k) if guide else () for k in self._slices}
         self._results: dict[tuple[Any, int], dict[int, Any]] = defaultdict(dict)
         self._emissions_done: dict[Any, int] = defaultdict(int)
@@ -162,11 +191,11 @@ class PickingGraph:
     def progress(self) -> Progress:
         """Emissions examined, then emissions picked, of all; 0 of 0 if no traces are read."""
         total = len(self._slices) * sum(map(len, self._parts))
-        examined, picked = self._emissions_done[measure_traces], self._emissions_done[pick_emissions]
-        examines = self._source.examine and not self._source.dataset.picked and not self._guide
-        if examines and examined < total:
-            return Progress(examined, total, phase=EXAMINING)
-        return Progress(picked, total, phase=PICKING)
+        examined = self._emissions_done[measure_traces] + self._emissions_done[read_chords]
+        to_examine = total * (self._measures + self._estimates)
+        if examined < to_examine:
+            return Progress(examined, to_examine, phase=EXAMINING)
+        return Progress(self._emissions_done[pick_emissions], total if self._picks else 0, phase=PICKING)
 
     @property
     def done(self) -> int:
@@ -177,21 +206,20 @@ class PickingGraph:
         return self.progress.total
 
     def first(self) -> list[Task]:
-        if not self._parts:
-            return [Task(finish_slice, (self._source, k, (), []), keep_on_worker=True) for k in self._slices]
-        if self._guide or not self._source.examine or self._source.dataset.picked:
-            return [task for k in self._slices for task in self._picking(k)]
-        return [
-            Task(measure_traces, (self._source, k, part), keep_on_worker=True)
-            for k in self._slices
-            for part in self._parts
-        ]
+        if self._measures:
+            return [task for k in self._slices for task in self._each_part(measure_traces, k)]
+        return [task for k in self._slices for task in self._picking(k)]
 
     def after(self, task: Task, result: Any) -> list[Task]:
         if task.function is write_picked:
             return []
         index = task.arguments[1]
         if task.function is examine_slice:
+            self._findings[index], chords = result
+            if chords is None:
+                return self._picking(index)
+            return self._each_part(read_chords, index, self._findings[index], chords)
+        if task.function is estimate_slice_water:
             self._findings[index] = result
             return self._picking(index)
         if task.function is finish_slice:
@@ -208,11 +236,25 @@ class PickingGraph:
         parts = self._pop(task.function, index)
         if task.function is measure_traces:
             return [Task(examine_slice, (self._source, index, parts), keep_on_worker=True)]
-        return [Task(finish_slice, (self._source, index, self._findings[index], parts), keep_on_worker=True)]
+        arguments = self._source, index, self._findings[index]
+        if task.function is read_chords:
+            chords = task.arguments[3]
+            return [Task(estimate_slice_water, (*arguments, chords, parts))]
+        return [Task(finish_slice, (*arguments, parts), keep_on_worker=True)]
 
     def _picking(self, index: int) -> list[Task]:
-        arguments = self._source, index, self._findings[index], self._guide
-        return [Task(pick_emissions, (*arguments, part), keep_on_worker=True) for part in self._parts]
+        """The tasks that pick a slice, or the one that finishes it."""
+        findings = self._findings[index]
+        if self._picks:
+            return self._each_part(pick_emissions, index, findings, self._guide)
+        return [Task(finish_slice, (self._source, index, findings, []), keep_on_worker=True)]
+
+    def _each_part(self, function: Callable[..., Any], index: int, *arguments: Any) -> list[Task]:
+        """A task for each batch of emissions of a slice."""
+        return [
+            Task(function, (self._source, index, *arguments, part), keep_on_worker=True)
+            for part in self._parts
+        ]
 
     def _pop(self, function: Any, index: int) -> list[Any]:
         """Results of the tasks of a kind in order, and forget them."""
@@ -225,18 +267,57 @@ def measure_traces(source: PickingSource, index: int, part: range) -> Measured:
         return Measured.of(one, part)
 
 
-def examine_slice(source: PickingSource, index: int, parts: list[Measured]) -> tuple[Finding, ...]:
-    """Task: findings in the traces of a slice; an unusable scan is rejected."""
+def examine_slice(
+    source: PickingSource, index: int, parts: list[Measured]
+) -> tuple[tuple[Finding, ...], WaterChords | None]:
+    """Task: findings in the traces of a slice; an unusable scan is rejected.
+
+    Also the chords through water, where the water shot is estimated from them.
+    """
+    measured = Measured.joined(parts)
     with source.slice(index) as one:
-        findings, _ = check_traces(one, Measured.joined(parts))
-    return _usable(source, index, findings)
+        findings: Sequence[Finding] = ()
+        if source.examine and not one.picked:
+            findings, _ = check_traces(one, measured)
+        findings = _usable(source, index, findings)
+        if not source.estimates_water:
+            return findings, None
+        assert one.center_frequency_hz is not None
+        corrected = apply(one, findings)
+        return findings, find_water_chords(
+            corrected, measured.object.strongest_s, 1.0 / one.center_frequency_hz
+        )
+
+
+def read_chords(
+    source: PickingSource, index: int, findings: tuple[Finding, ...], chords: WaterChords, part: range
+) -> ChordPulses:
+    """Task: pulses of the chords through water in a batch of emissions."""
+    with source.slice(index, findings) as one:
+        assert one.center_frequency_hz is not None
+        return read_pulses(one, part, chords, 1.0 / one.center_frequency_hz)
+
+
+def estimate_slice_water(
+    source: PickingSource,
+    index: int,
+    findings: tuple[Finding, ...],
+    chords: WaterChords,
+    parts: list[ChordPulses],
+) -> tuple[Finding, ...]:
+    """Task: estimate the water shot of a slice and write it; the findings with what was estimated."""
+    one = apply(source.dataset.slice(index), findings)
+    assert one.center_frequency_hz is not None
+    reference = estimate_reference(one, chords, ChordPulses.joined(parts), 1.0 / one.center_frequency_hz)
+    write_reference(reference_path(source.folder, index), reference)
+    return (*findings, find_estimated_water(one, reference))
 
 
 def pick_emissions(
     source: PickingSource, index: int, findings: tuple[Finding, ...], guide: PickingGuide | None, part: range
 ) -> EmissionPicks:
     """Task: times of a batch of emissions with standard deviations, and amplitudes if needed."""
-    with source.slice(index, findings) as one:
+    with source.with_water(index, findings) as one:
         if one.picked:
             delta = one.differential_tof()[part.start : part.stop]
             sigma = np.full_like(delta, np.nan)

@@ -107,6 +107,7 @@ def _pick_with_guides(
         settings.picking.picker,
         settings.picking.examine,
         amplitudes,
+        settings.method in ("auto", "waveform"),
     )
     path, findings = _pick(job, source, PickingFiles.of(job.folder), None, progress)
     rounds = 0 if source.dataset.picked else settings.numerics.guided_rounds

@@ -148,15 +148,19 @@ def screen_times(dataset: Dataset, delta: Floats, sigma: Floats, *, screened: bo
     return delta, np.where(np.isfinite(delta), sigma, np.nan)
 
 
-def require_traces(dataset: Dataset) -> None:
+def require_traces(dataset: Dataset, *, water: bool = True) -> None:
     """Check that a dataset has what picking requires.
+
+    Args:
+        dataset: the scan.
+        water: whether a water shot is required; without one it can be estimated, see ``reference``.
 
     Raises:
         InvalidInput: naming the first missing field.
     """
     if dataset.waveform is None:
         raise InvalidInput("waveform/object", "no traces", "traces to pick from")
-    if dataset.waveform.water is None:
+    if water and dataset.waveform.water is None:
         raise InvalidInput("waveform/water", "no traces", "the same scan without the object, to compare with")
     if dataset.center_frequency_hz is None:
         raise InvalidInput(

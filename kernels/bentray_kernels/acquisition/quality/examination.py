@@ -9,12 +9,15 @@ from itertools import count
 import numpy as np
 
 from ...arrays import Flags, Floats
+from ...errors import InvalidInput
 from ..dataset import Dataset
 from ..picking.first_arrivals import pick
 from ..picking.picker_names import DEFAULT_PICKER
+from ..reference import reference_of
 from .contradictions import find_contradictions
 from .correction import apply, stacked
 from .dead import find_dead
+from .estimated_water import WATER_SHOT, find_estimated_water
 from .finding import Finding, Report
 from .recording import Measured, check_traces
 from .time_zero import find_time_shift
@@ -108,11 +111,20 @@ def _slice(
     """Findings of one slice, its corrected dataset, and the checks made; ``step`` is called per emission."""
     findings: list[Finding] = []
     checked: tuple[str, ...] = ()
+    measured = None
     if dataset.waveform is not None:
-        findings, checked = check_traces(dataset, Measured.of(dataset, range(len(dataset.tx)), step))
+        measured = Measured.of(dataset, range(len(dataset.tx)), step)
+        findings, checked = check_traces(dataset, measured)
     if any(finding.action == "refused" for finding in findings):
         return findings, None, checked
     dataset = apply(dataset, findings)
+    if measured is not None and measured.water is None and not dataset.picked:
+        try:
+            reference = reference_of(dataset, measured.object.strongest_s)
+        except InvalidInput as error:
+            return [*findings, Finding(WATER_SHOT, error.value, error.accepted, "refused")], None, checked
+        findings.append(find_estimated_water(dataset, reference))
+        dataset = reference.applied(dataset)
     if not dataset.picked:
         dataset = pick(dataset, picker, lambda done, total: step(), screened=False)
     of_times = check_times(dataset)

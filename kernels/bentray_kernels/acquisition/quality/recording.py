@@ -84,9 +84,6 @@ def check_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], t
 
 def _unpickable(dataset: Dataset) -> Finding | None:
     """A finding if the traces cannot be picked."""
-    assert dataset.waveform is not None
-    if dataset.waveform.water is None:
-        return Finding("water shot", "none", "the same scan without the object, or travel times", "refused")
     if dataset.center_frequency_hz is None:
         return Finding("centre frequency", "none", "the centre frequency of the pulse", "refused")
     return None

@@ -125,17 +125,17 @@ def wave_settings(scale: WaveScale, settings: Settings) -> WaveSettings:
 
 
 def check_traces(samples: int) -> None:
-    """Check that a scan has traces of object and water.
+    """Check that a scan has traces of the object.
 
     Args:
-        samples: of each trace; 0 if object or water is missing.
+        samples: of each trace; 0 without traces.
 
     Raises:
-        InvalidInput: without traces of both.
+        InvalidInput: without traces.
     """
     if not samples:
         raise InvalidInput(
             "method",
-            "'waveform' for a scan without traces of object and water",
-            "sart, gauss-newton or auto, or waveform/object and waveform/water in the file",
+            "'waveform' for a scan without traces",
+            "sart, gauss-newton or auto, or waveform/object in the file",
         )

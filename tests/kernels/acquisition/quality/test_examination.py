@@ -109,14 +109,22 @@ def test_a_whole_region_that_contradicts_its_reverse_is_left_out():
     assert left.T[6:12, 20:27].all()
 
 
-def test_without_a_water_shot_traces_are_refused_and_travel_times_are_not():
+def test_without_a_water_shot_it_is_estimated_where_times_are_picked():
     alone = replace(clean(), waveform=Waveform(clean().waveform.object))
+    (finding,) = examine(alone).report.findings
+    assert (finding.check, finding.action) == ("water shot", "reported")
+    assert finding.value == pytest.approx(clean().water_speed_mps, rel=2e-3)
+    assert examine(replace(alone, delta_tof_s=sought())).report.findings == ()
+
+
+def test_a_water_shot_that_cannot_be_estimated_is_asked_for():
+    random = np.random.default_rng(0)
+    noise = random.standard_normal(clean().waveform.object.shape).astype(np.float32)
+    alone = replace(clean(), waveform=Waveform(noise))
     examined = examine(alone)
     assert examined.picked is None
-    assert examined.report.refusal.check == "water shot"
-    with pytest.raises(InvalidInput, match="water shot: found none; accepted: the same scan without"):
+    with pytest.raises(InvalidInput, match="accepted: "):
         corrected(alone, examined.report)
-    assert examine(replace(alone, delta_tof_s=sought())).report.refusal is None
 
 
 @pytest.mark.parametrize("factor", [0.4, 2.5])

@@ -1,7 +1,7 @@
 """Peak memory of the calls that examine and pick a scan, in processes of their own; see ``ray_task_memory``.
 
-Called as ``picking_task_memory.py FOLDER PICKER ELEMENTS SAMPLES``; prints bytes by task as JSON, and those
-of the traces. FOLDER is for the scan's file.
+Called as ``picking_task_memory.py FOLDER PICKER ELEMENTS SAMPLES WATER``; prints bytes by task as JSON, and
+those of the traces. FOLDER is for the file of the scan, WATER is ``water`` or ``object``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from bentray_workers.reconstruction.picking_graph import PickingFiles, PickingGr
 RATE_HZ, CENTRE_HZ, WATER_MPS, RADIUS_M = 8e6, 1e6, 1480.0, 0.05
 
 
-def scan(elements: int, samples: int) -> Dataset:
+def scan(elements: int, samples: int, water: bool) -> Dataset:
     """Water through water with a little noise, one emission made at a time."""
     ring = Ring(elements, RADIUS_M).positions()
     every, time = np.arange(elements), np.arange(samples) / RATE_HZ - 4e-6
@@ -37,7 +37,7 @@ def scan(elements: int, samples: int) -> Dataset:
         every,
         every,
         WATER_MPS,
-        waveform=Waveform(traces, traces),
+        waveform=Waveform(traces, traces if water else None),
         center_frequency_hz=CENTRE_HZ,
         sampling_rate_hz=RATE_HZ,
         t0_s=-4e-6,
@@ -60,14 +60,14 @@ def bytes_of(path: Path, picker: str) -> dict[str, int]:
     return found
 
 
-def main(folder: Path, picker: str, elements: int, samples: int) -> None:
+def main(folder: Path, picker: str, elements: int, samples: int, water: bool) -> None:
     # Loading compiled code takes memory too, here and not in the forks.
-    write_dataset(folder / "small.h5", scan(12, 700))
+    write_dataset(folder / "small.h5", scan(12 if water else 48, 700, water))
     bytes_of(folder / "small.h5", picker)
-    write_dataset(folder / "scan.h5", scan(elements, samples))
+    write_dataset(folder / "scan.h5", scan(elements, samples, water))
     found = bytes_of(folder / "scan.h5", picker)
-    sys.stdout.write(json.dumps({**found, "traces": 4 * elements**2 * samples}) + "\n")
+    sys.stdout.write(json.dumps({**found, "traces": (4 if water else 2) * elements**2 * samples}) + "\n")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), int(sys.argv[4]))
+    main(Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), sys.argv[5] == "water")

@@ -19,10 +19,14 @@ MIB = 2**20
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("picker", "elements", "samples"),
-    [pytest.param("aic", 100, 2400, marks=pytest.mark.nightly), ("matched", 64, 1500)],
+    ("picker", "elements", "samples", "shots"),
+    [
+        pytest.param("aic", 100, 2400, "water", marks=pytest.mark.nightly),
+        pytest.param("aic", 100, 2400, "object", marks=pytest.mark.nightly),
+        ("matched", 64, 1500, "water"),
+    ],
 )
-def test_calls_take_what_the_plan_says_and_never_the_traces(tmp_path, picker, elements, samples):
+def test_calls_take_what_the_plan_says_and_never_the_traces(tmp_path, picker, elements, samples, shots):
     # Freed arrays go back at once, so that a fork's peak is that of its own.
     environment = {
         **os.environ,
@@ -30,7 +34,7 @@ def test_calls_take_what_the_plan_says_and_never_the_traces(tmp_path, picker, el
         "MALLOC_MMAP_THRESHOLD_": "65536",
         "MALLOC_TRIM_THRESHOLD_": "65536",
     }
-    command = [sys.executable, str(PROGRAM), str(tmp_path), picker, str(elements), str(samples)]
+    command = [sys.executable, str(PROGRAM), str(tmp_path), picker, str(elements), str(samples), shots]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     measured = json.loads(done.stdout)
     traces = measured.pop("traces")

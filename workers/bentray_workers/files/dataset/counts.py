@@ -29,6 +29,7 @@ class Traces:
         rate_hz: of the samples.
         frequency_hz: centre frequency of the pulse.
         water_mps: speed of sound in water.
+        water_shot: whether there are traces of the water alone.
     """
 
     emissions: int
@@ -38,6 +39,7 @@ class Traces:
     rate_hz: float
     frequency_hz: float
     water_mps: float
+    water_shot: bool = True
 
     def bytes_of(self, emissions: int) -> int:
         """Size of object traces of some emissions of one slice."""
@@ -62,7 +64,7 @@ class Summary:
         width_m: of the array, m.
         traces_bytes: of the waveforms, 0 with travel times.
         amplitudes: whether there are amplitudes.
-        traces: of object and water, for a full-waveform refinement; None if one of them is absent.
+        traces: for a full-waveform refinement; None without traces of the object.
         period: whether the centre frequency is known, so that times are examined.
     """
 
@@ -92,9 +94,10 @@ class DatasetCounts:
         times: whether there are travel times.
         amplitudes: whether there are recorded amplitudes.
         traces_bytes: of the traces of object and water.
-        samples, sample_bytes: of each trace; 0 samples unless there are traces of object and water.
+        samples, sample_bytes: of each trace; 0 without traces of the object.
         rate_hz, frequency_hz: sampling rate and centre frequency; None if unknown.
         water_mps: speed of sound in water.
+        water_shot: whether there are traces of the water alone; older records do not state it.
     """
 
     emissions: int
@@ -112,6 +115,7 @@ class DatasetCounts:
     rate_hz: float | None
     frequency_hz: float | None
     water_mps: float
+    water_shot: bool = True
 
     @classmethod
     def of(cls, dataset: Dataset) -> DatasetCounts:
@@ -123,11 +127,12 @@ class DatasetCounts:
             times=dataset.picked,
             amplitudes=dataset.log_ratio_np is not None,
             traces_bytes=sum(one.size * one.dtype.itemsize for one in both),
-            samples=int(both[0].shape[-1]) if len(both) == 2 else 0,
+            samples=0 if traces is None else int(traces.object.shape[-1]),
             sample_bytes=both[0].dtype.itemsize if both else 0,
             rate_hz=dataset.sampling_rate_hz,
             frequency_hz=dataset.center_frequency_hz,
             water_mps=float(dataset.water_speed_mps),
+            water_shot=len(both) == 2,
         )
 
     def summary(self, settings: Settings) -> Summary:
@@ -168,6 +173,7 @@ class DatasetCounts:
             self.rate_hz,
             self.frequency_hz,
             self.water_mps,
+            self.water_shot,
         )
 
 

@@ -45,6 +45,7 @@ def counts_in(path: Path) -> DatasetCounts:
             frequency_hz=reader.number("acquisition", "center_frequency_hz", "Hz"),
             # The speed hardly affects sizes.
             water_mps=1500.0 if water is None else water,
+            water_shot=_bytes(reader, "waveform/water") > 0,
         )
 
 

@@ -22,15 +22,22 @@ from .read import NUMERIC, TRACES, trace_type
 
 
 def trace_samples(path: Path) -> int:
-    """Samples of each trace of a dataset file; 0 without traces of object and water."""
+    """Samples of each trace of a dataset file; 0 without traces of the object."""
     with opened(path, Limits()) as reader:
         return samples_in(reader)
 
 
+def lacks_water(path: Path) -> bool:
+    """Whether a dataset file has traces of the object, but no water shot."""
+    with opened(path, Limits()) as reader:
+        found = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
+    return found[0] is not None and found[1] is None
+
+
 def samples_in(reader: Reader) -> int:
     """As ``trace_samples`` for an open file."""
-    stored = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
-    return 0 if None in stored or stored[0] is None else int(stored[0].shape[-1])
+    received = reader.checked("waveform/object", NUMERIC, TRACES)
+    return 0 if received is None else int(received.shape[-1])
 
 
 @contextmanager

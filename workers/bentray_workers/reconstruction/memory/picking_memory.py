@@ -11,6 +11,7 @@ import math
 from bentray_kernels.acquisition.picking.gate import FREQUENCIES
 from bentray_kernels.acquisition.picking.pickers import PICKERS
 from bentray_kernels.acquisition.picking.pulse import AFTER, BEFORE, EMISSIONS
+from bentray_kernels.acquisition.reference import chords_of_emission
 from bentray_kernels.tomography.settings import Settings
 
 from ...files.dataset.counts import Traces
@@ -26,6 +27,9 @@ MEASURE_BYTES, READ_BYTES, FILTER_BYTES = 58, 12, 64
 
 # Bytes for amplitudes of one emission: per sample of the gate, as long as the pulse; per frequency.
 GATE_BYTES, POWER_BYTES = 24, 100
+
+# Bytes per sample of an estimated water shot; per chord that it is estimated from: some spectra of its pulse.
+SHOT_BYTES, CHORD_BYTES = 8, 16 * 1024
 
 # Bytes per pair: copies of a period of its pulse and statistics; neighbours and their medians.
 PULSE_COPIES, FIGURE_BYTES, SETTLE_BYTES = 3 * 8, 100, 720
@@ -52,7 +56,8 @@ def picking_tasks(traces: Traces | None, slices: int, settings: Settings) -> int
     if traces is None:
         return 0
     parts = -(-traces.emissions // emissions_per_task(traces.receivers * traces.samples))
-    examined = slices * (parts + 1) if settings.picking.examine else 0
+    examined = slices * (parts + 1) if settings.picking.examine or not traces.water_shot else 0
+    examined += 0 if traces.water_shot else slices * (parts + 1)
     return examined + (slices * (parts + 1) + 1) * (1 + settings.numerics.guided_rounds)
 
 
@@ -77,8 +82,13 @@ def picking_task_bytes(traces: Traces | None, pairs: int, settings: Settings) ->
         # The pulse is the median over several emissions.
         sizes["pick_emissions"] += traces.receivers * pulse * (GATE_BYTES + PULSE_COPIES * EMISSIONS)
         sizes["pick_emissions"] += traces.receivers * FREQUENCIES * POWER_BYTES + 8 * of_slice
+    if not traces.water_shot:
+        chords = traces.emissions * chords_of_emission(traces.emissions)
+        sizes["pick_emissions"] += SHOT_BYTES * samples
+        sizes["read_chords"] = reading + READ_BYTES * samples + CHORD_BYTES // 16 * chords
+        sizes["estimate_slice_water"] = TIMES_BYTES + CHORD_BYTES * chords
     sizes["finish_slice"] = finish_slice_bytes(of_slice)
-    if settings.picking.examine:
+    if settings.picking.examine or not traces.water_shot:
         pulse = PULSE_COPIES * (2 * math.ceil(traces.rate_hz / traces.frequency_hz) + 1)
         sizes["measure_traces"] = reading + MEASURE_BYTES * samples
         sizes["examine_slice"] = reading + READ_BYTES * samples + (pulse + FIGURE_BYTES) * of_slice

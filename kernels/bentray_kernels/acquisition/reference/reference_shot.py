@@ -1,0 +1,387 @@
+"""The water shot that a scan lacks, estimated from the chords of the object scan that miss the object."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Flags, Floats, Ints
+from ...errors import InvalidInput
+from ..dataset import Dataset
+from ..emissions import Emissions
+from ..picking.onset import LEAD
+from .water_chords import FEWEST, WaterChords, find_water_chords
+
+Spectrum = NDArray[np.complex128]
+
+# Extent of a pulse about the maximum of its envelope, periods, and of the fall at its ends.
+BEFORE, AFTER, TAPER = 3.0, 4.0, 1.0
+
+# Most chords that are kept, over all emissions, and of each emission; least of each emission.
+MOST_CHORDS, MOST_OF_EMISSION, LEAST_OF_EMISSION = 16384, 64, 8
+
+# Receivers whose traces are computed together.
+RECEIVERS_AT_ONCE = 32
+
+# Highest frequency of the model over the centre frequency.
+HIGHEST = 3.0
+
+# Least correlation of a chord's pulse with the common pulse.
+LEAST_CORRELATION = 0.8
+
+# Frequencies with less of the largest amplitude do not determine phases.
+FAINT = 0.1
+
+# Pairs that determine the delay and the gain of an element.
+FEWEST_OF_ELEMENT = 4
+
+ROUNDS = 3
+
+
+class ChordPulses(NamedTuple):
+    """Recorded pulses of chords through water.
+
+    Attributes:
+        emission, reception: (chords,), indices of the pair.
+        begin: (chords,), index of the first sample in the trace.
+        samples: (chords, length), in counts, or in the unit of ``Waveform.object_scale``.
+        noise: (chords,), standard deviation of the trace before its arrival, NaN if that is too short.
+    """
+
+    emission: Ints
+    reception: Ints
+    begin: Ints
+    samples: NDArray[np.float32]
+    noise: Floats
+
+    @classmethod
+    def joined(cls, parts: Sequence[ChordPulses]) -> ChordPulses:
+        """Concatenate the pulses of parts of the emissions."""
+        return cls(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+@dataclass(frozen=True)
+class ReferenceShot:
+    """A model of the water shot: pulse, wave number, delays and gains.
+
+    The pulse of a pair has the spectrum
+    ``gain_e gain_r / sqrt(d) · spectrum · exp(−i (ω (t_e + t_r + delay) + wave_number d))``.
+
+    Attributes:
+        frequency_hz: (n,), equally spaced from 0.
+        spectrum: (n,), of the common pulse, relative to its arrival.
+        wave_number: (n,), rad/m: measured over distance, so that dispersion is taken along.
+        delay_s: of all pairs.
+        emission_delay_s, reception_delay_s: (ntx,), (nrx,), s, of mean 0; 0 where no chord determines it.
+        emission_gain, reception_gain: (ntx,), (nrx,), logarithms.
+        chords: number of chords used.
+        speed_mps: phase speed at the centre frequency.
+        speed_sigma_mps: its standard deviation.
+        scatter_s: robust standard deviation of the arrivals.
+        noise: standard deviation of the noise in the traces. Pickers find the onset of a noiseless pulse
+            earlier than that of a recorded one.
+    """
+
+    frequency_hz: Floats
+    spectrum: Spectrum
+    wave_number: Floats
+    delay_s: float
+    emission_delay_s: Floats
+    reception_delay_s: Floats
+    emission_gain: Floats
+    reception_gain: Floats
+    chords: int
+    speed_mps: float
+    speed_sigma_mps: float
+    scatter_s: float
+    noise: float
+
+    def applied(self, dataset: Dataset) -> Dataset:
+        """The dataset of one slice with this as its water shot; its traces are computed on access."""
+        traces = dataset.waveform
+        assert traces is not None
+        samples = int(traces.object.shape[-1])
+        shape = (len(dataset.tx), len(dataset.rx), samples)
+        water = Emissions.of(partial(self.traces, dataset, samples=samples), shape, np.dtype(np.float32))
+        scale = None if traces.object_scale is None else np.ones(shape[:2])
+        changed: dict[str, Any] = {"water": water, "water_scale": scale}
+        return replace(dataset, waveform=replace(traces, **changed))
+
+    def traces(self, dataset: Dataset, emission: int, samples: int) -> NDArray[np.float32]:
+        """The traces of one emission in water, (nrx, samples)."""
+        assert dataset.sampling_rate_hz is not None
+        offset = dataset.element_position_m[dataset.rx] - dataset.element_position_m[dataset.tx[emission]]
+        distance = np.linalg.norm(offset, axis=1)
+        # A period with room for the pulse at either end.
+        pulse = math.ceil(dataset.sampling_rate_hz / self.frequency_hz[1])
+        length = 2 ** math.ceil(math.log2(samples + pulse))
+        frequency = np.fft.rfftfreq(length, 1.0 / dataset.sampling_rate_hz)
+        real, imaginary = (
+            np.interp(frequency, self.frequency_hz, part, right=0.0)
+            for part in (self.spectrum.real, self.spectrum.imag)
+        )
+        wave_number = np.interp(frequency, self.frequency_hz, self.wave_number)
+        late = self.delay_s + self.emission_delay_s[emission] + self.reception_delay_s - dataset.t0_s
+        apart = np.maximum(distance, distance.max() * 1e-3)
+        gain = np.exp(self.emission_gain[emission] + self.reception_gain) / np.sqrt(apart)
+        random = np.random.default_rng(emission)
+        shots = np.empty((len(distance), samples), dtype=np.float32)
+        # Some receivers at once, so that the spectra take little memory.
+        for begin in range(0, len(distance), RECEIVERS_AT_ONCE):
+            some = slice(begin, begin + RECEIVERS_AT_ONCE)
+            phase = 2.0 * np.pi * late[some, None] * frequency + distance[some, None] * wave_number
+            spectra = gain[some, None] * (real + 1j * imaginary) * np.exp(-1j * phase)
+            shots[some] = np.fft.irfft(spectra, length, axis=1)[:, :samples]
+            shots[some] += self.noise * random.standard_normal((len(phase), samples))
+        return shots
+
+
+def reference_of(dataset: Dataset, strongest_s: Floats) -> ReferenceShot:
+    """The reference shot of a slice, from the maxima of its envelopes and its traces.
+
+    Args:
+        dataset: of one slice with traces of the object, sampling rate and centre frequency.
+        strongest_s: (ntx, nrx), s, see ``quality.measures``.
+
+    Raises:
+        InvalidInput: where too few chords pass through water.
+    """
+    assert dataset.center_frequency_hz is not None
+    period_s = 1.0 / dataset.center_frequency_hz
+    chords = find_water_chords(dataset, strongest_s, period_s)
+    pulses = read_pulses(dataset, range(len(dataset.tx)), chords, period_s)
+    return estimate_reference(dataset, chords, pulses, period_s)
+
+
+def chords_of_emission(emissions: int) -> int:
+    """Most chords of each emission that are kept."""
+    return min(MOST_OF_EMISSION, max(LEAST_OF_EMISSION, MOST_CHORDS // emissions))
+
+
+def read_pulses(
+    dataset: Dataset, emissions: Iterable[int], chords: WaterChords, period_s: float
+) -> ChordPulses:
+    """Cut the pulses of chords through water out of the traces of some emissions.
+
+    Args:
+        dataset: of one slice with traces of the object, which may be ``Emissions``.
+        emissions: indices, from 0.
+        chords: see ``find_water_chords``.
+        period_s: of the pulse, s.
+    """
+    traces = dataset.waveform
+    assert traces is not None
+    assert dataset.sampling_rate_hz is not None
+    before, length = _window(dataset.sampling_rate_hz * period_s)
+    arrival = (chords.arrival_s(dataset.distance_m()) - dataset.t0_s) * dataset.sampling_rate_hz
+    begin = np.floor(arrival).astype(np.int64) - before
+    most = chords_of_emission(len(dataset.tx))
+    whole = chords.pairs & (begin >= 0) & (begin + length <= traces.object.shape[-1])
+    found: list[tuple[int, int, int]] = []
+    samples: list[NDArray[np.float32]] = []
+    noise: list[float] = []
+    for e in emissions:
+        receivers = np.flatnonzero(whole[e])
+        if not receivers.size:
+            continue
+        receivers = receivers[np.unique(np.linspace(0, receivers.size - 1, most).astype(np.int64))]
+        emission = np.asarray(traces.object[e])
+        for r in receivers.tolist():
+            trace = emission[r].astype(np.float32)
+            trace -= np.median(trace)
+            if traces.object_scale is not None:
+                trace *= np.float32(traces.object_scale[e, r])
+            found.append((e, r, int(begin[e, r])))
+            samples.append(trace[begin[e, r] : begin[e, r] + length])
+            before_it = trace[: begin[e, r]]
+            noise.append(1.4826 * float(np.median(np.abs(before_it))) if len(before_it) >= LEAD else np.nan)
+    index = np.array(found, dtype=np.int64).reshape(-1, 3)
+    pulses = np.array(samples, dtype=np.float32).reshape(-1, length)
+    return ChordPulses(index[:, 0], index[:, 1], index[:, 2], pulses, np.array(noise))
+
+
+def estimate_reference(
+    dataset: Dataset, chords: WaterChords, pulses: ChordPulses, period_s: float
+) -> ReferenceShot:
+    """Estimate pulse, wave number, delays and gains from chords through water.
+
+    The common pulse and, at each frequency, the phase over distance are fitted in turn with the delays of
+    elements; then chords are selected again by their delays to a fraction of a sample.
+
+    Args:
+        dataset: of one slice; its traces are not read.
+        chords: by the maxima of envelopes.
+        pulses: of these chords.
+        period_s: of the pulse, s.
+
+    Raises:
+        InvalidInput: where too few chords pass through water.
+    """
+    fit = _Fit(dataset, chords, pulses, period_s)
+    for _ in range(ROUNDS):
+        fit.improve()
+    # Envelopes scatter by a tenth of a period; the delays of pulses show which chords touch the object.
+    arrival = np.full(chords.pairs.shape, np.nan)
+    at = pulses.emission[fit.used], pulses.reception[fit.used]
+    arrival[at] = (fit.model_s() + fit.lag_s)[fit.used]
+    again = find_water_chords(dataset, arrival, period_s, tolerance=0.01)
+    fit.keep(again.pairs)
+    for _ in range(ROUNDS):
+        fit.improve()
+    return fit.reference()
+
+
+class _Fit:
+    """State of the estimation; phases are relative to the arrival by the model."""
+
+    def __init__(self, dataset: Dataset, chords: WaterChords, pulses: ChordPulses, period_s: float) -> None:
+        assert dataset.sampling_rate_hz is not None
+        rate, self._period_s, self._pulses = dataset.sampling_rate_hz, period_s, pulses
+        self._distance = dataset.distance_m()[pulses.emission, pulses.reception]
+        _, length = _window(rate * period_s)
+        padded = 2 ** math.ceil(math.log2(4 * length))
+        frequency = np.fft.rfftfreq(padded, 1.0 / rate)
+        self._omega = 2.0 * np.pi * frequency[frequency * period_s <= HIGHEST]
+        tapered = pulses.samples * _taper(length, rate * period_s)
+        self._spectra = np.fft.rfft(tapered, padded, axis=1)[:, : self._omega.size]
+        # From the first sample of a window to the time of the emission.
+        begin_s = dataset.t0_s + pulses.begin / rate
+        self._spectra *= np.exp(-1j * begin_s[:, None] * self._omega)
+        self._delay_s, self._slowness = chords.delay_s, 1.0 / chords.speed_mps
+        self._wave_number = self._omega * self._slowness
+        self._emission_s, self._reception_s = np.zeros(len(dataset.tx)), np.zeros(len(dataset.rx))
+        self.used = np.ones(self._distance.size, dtype=bool)
+        self.lag_s = np.zeros(self._distance.size)
+
+    def keep(self, pairs: Flags) -> None:
+        """Use only these pairs, (ntx, nrx)."""
+        self.used = pairs[self._pulses.emission, self._pulses.reception]
+
+    def model_s(self) -> Floats:
+        """Arrival of each chord by the model, without dispersion, s."""
+        return np.asarray(
+            self._delay_s
+            + self._slowness * self._distance
+            + self._emission_s[self._pulses.emission]
+            + self._reception_s[self._pulses.reception]
+        )
+
+    def improve(self) -> None:
+        """One round: the common pulse, the delays of chords and elements, and the phase over distance."""
+        aligned = self._aligned()
+        self._pulse = _median_spectrum(aligned[self.used])
+        strong = np.abs(self._pulse) > FAINT * np.abs(self._pulse).max()
+        power = np.where(strong, np.abs(self._pulse) ** 2, 0.0)
+        across = aligned * np.conj(self._pulse)
+        self.amplitude = across.real.sum(axis=1) / (np.abs(self._pulse) ** 2).sum()
+        size = np.linalg.norm(aligned, axis=1) * np.linalg.norm(self._pulse)
+        alike = across.real.sum(axis=1) / np.where(size > 0.0, size, 1.0)
+        self.used &= alike > LEAST_CORRELATION
+        if self.used.sum() < FEWEST:
+            raise InvalidInput(
+                "waveform/water",
+                f"no traces, and {int(self.used.sum())} chords through water with the same pulse",
+                f"a scan without the object, or at least {FEWEST} chords that miss the object",
+            )
+        phase = np.angle(across)
+        self.lag_s = -(phase * power * self._omega).sum(axis=1) / (power * self._omega**2).sum()
+        emission_s, reception_s = self._of_elements(self.lag_s)
+        self._emission_s += emission_s
+        self._reception_s += reception_s
+        # What elements do not explain: the phase over distance, at each frequency.
+        moved = emission_s[self._pulses.emission] + reception_s[self._pulses.reception]
+        phase = np.angle(across * np.exp(1j * moved[:, None] * self._omega))[self.used]
+        apart = self._distance[self.used] - self._distance[self.used].mean()
+        slope = apart @ (phase - phase.mean(axis=0)) / (apart @ apart)
+        at = np.flatnonzero(strong)
+        self._wave_number -= np.interp(self._omega, self._omega[at], slope[at])
+
+    def reference(self) -> ReferenceShot:
+        """The result."""
+        frequency = 1.0 / self._period_s
+        wave_number = float(np.interp(2.0 * np.pi * frequency, self._omega, self._wave_number))
+        size = np.log(np.maximum(self.amplitude, np.finfo(np.float64).tiny) * np.sqrt(self._distance))
+        emission_gain, reception_gain = self._of_elements(size, centred=False)
+        known = self._pulses.noise[np.isfinite(self._pulses.noise)]
+        left = self.lag_s[self.used] - np.median(self.lag_s[self.used])
+        scatter = 1.4826 * float(np.median(np.abs(left)))
+        speed = 2.0 * np.pi * frequency / wave_number
+        spread = float(np.std(self._distance[self.used])) * math.sqrt(self.used.sum())
+        return ReferenceShot(
+            frequency_hz=np.asarray(self._omega / (2.0 * np.pi), dtype=np.float64),
+            spectrum=self._pulse,
+            wave_number=np.asarray(self._wave_number, dtype=np.float64),
+            delay_s=self._delay_s,
+            emission_delay_s=self._emission_s,
+            reception_delay_s=self._reception_s,
+            emission_gain=emission_gain,
+            reception_gain=reception_gain,
+            chords=int(self.used.sum()),
+            speed_mps=speed,
+            speed_sigma_mps=scatter / spread * speed**2,
+            scatter_s=scatter,
+            noise=float(np.median(known)) if known.size else 0.0,
+        )
+
+    def _aligned(self) -> Spectrum:
+        """Spectra of the pulses relative to their arrival by the model."""
+        late = self._delay_s + self._emission_s[self._pulses.emission]
+        late = late + self._reception_s[self._pulses.reception]
+        phase = late[:, None] * self._omega + self._distance[:, None] * self._wave_number
+        return np.asarray(self._spectra * np.exp(1j * phase))
+
+    def _of_elements(self, values: Floats, *, centred: bool = True) -> tuple[Floats, Floats]:
+        """Parts of a value of each chord for its emitter and receiver, by median polish.
+
+        Each has the mean 0 if ``centred``, else the mean is that of the receivers. Elements with few chords
+        get 0, or the mean.
+        """
+        pulses, used = self._pulses, self.used
+        table = np.full((self._emission_s.size, self._reception_s.size), np.nan)
+        table[pulses.emission[used], pulses.reception[used]] = values[used]
+        emission, reception = np.zeros(len(table)), np.zeros(table.shape[1])
+        common = float(np.nanmedian(table))
+        for _ in range(4):
+            emission += _medians(table - common - emission[:, None] - reception)
+            reception += _medians((table - common - emission[:, None] - reception).T)
+        common += float(emission.mean() + reception.mean())
+        emission, reception = emission - emission.mean(), reception - reception.mean()
+        return (emission, reception) if centred else (emission, reception + common)
+
+
+def _window(period: float) -> tuple[int, int]:
+    """Samples before the arrival, and all samples, of a pulse with a period in samples."""
+    before = math.ceil(BEFORE * period)
+    return before, before + math.ceil(AFTER * period)
+
+
+def _taper(length: int, period: float) -> Floats:
+    """Half a cosine at both ends of a window, (length,)."""
+    ends = max(1, round(TAPER * period))
+    ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(ends) + 0.5) / ends)
+    window = np.ones(length)
+    window[:ends], window[-ends:] = ramp, ramp[::-1]
+    return window
+
+
+def _median_spectrum(spectra: Spectrum) -> Spectrum:
+    """The common pulse: the median over chords, each scaled to its largest amplitude."""
+    size = np.abs(spectra).max(axis=1, keepdims=True)
+    scaled = spectra[size[:, 0] > 0.0] / size[size[:, 0] > 0.0]
+    return np.asarray(np.median(scaled.real, axis=0) + 1j * np.median(scaled.imag, axis=0))
+
+
+def _medians(rows: Floats) -> Floats:
+    """Median of each row without its NaN; 0 with fewer than ``FEWEST_OF_ELEMENT`` values."""
+    result = np.zeros(len(rows))
+    for index, row in enumerate(rows):
+        values = row[np.isfinite(row)]
+        if values.size >= FEWEST_OF_ELEMENT:
+            result[index] = np.median(values)
+    return result

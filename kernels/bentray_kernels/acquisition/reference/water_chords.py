@@ -1,0 +1,180 @@
+"""Chords that miss the object, and the line of arrival time over distance through them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Flags, Floats, Ints
+from ...errors import InvalidInput
+from ..dataset import Dataset
+
+# Apparent speeds of coupling media that are searched, m/s: oil to salt water at 50 °C, and grid dispersion.
+SLOWEST_MPS, FASTEST_MPS, SPEEDS = 1350.0, 1650.0, 301
+
+# Width of a bin of the first search, periods: the maximum of an envelope scatters by less.
+BIN = 0.05
+
+# Shorter chords hold ringing, cross-talk and the near field: wavelengths, and at most a part of the longest.
+NEAREST, NEAREST_PART = 8.0, 0.2
+
+# Chords are examined from the edge of the array inwards, in groups of this part of all.
+GROUP = 0.02
+
+# The outermost chords are taken to miss the object, and further ones must agree with them: at least this part
+# of all, over this part of the longest distance, so that they determine a line.
+OUTERMOST, OUTERMOST_SPAN = 0.06, 0.1
+
+# Distance from the first line within which the outermost chords are used, periods.
+SEARCHED = 0.3
+
+# Largest distance from the line at which a chord agrees: robust deviations of the outermost chords, periods.
+AGREEING, LEAST_TOLERANCE = 4.0, 0.02
+
+# Least part of a group that agrees; the search ends at the second group in a row with less.
+LEAST_PART = 0.75
+
+FEWEST = 24
+
+ROUNDS = 8
+
+
+@dataclass(frozen=True)
+class WaterChords:
+    """Chords through water alone, with arrival = delay + distance / speed.
+
+    Attributes:
+        pairs: (ntx, nrx), chords that miss the object.
+        speed_mps: apparent speed of the coupling medium.
+        delay_s: of the arrivals, with that of the pulse and of the recording's time zero.
+        scatter_s: robust standard deviation of the arrivals from the line.
+        speed_sigma_mps: standard deviation of the speed, from the scatter.
+    """
+
+    pairs: Flags
+    speed_mps: float
+    delay_s: float
+    scatter_s: float
+    speed_sigma_mps: float
+
+    def arrival_s(self, distance_m: Floats) -> Floats:
+        """Arrival in water at a distance, s."""
+        return self.delay_s + distance_m / self.speed_mps
+
+
+def find_water_chords(
+    dataset: Dataset, arrival_s: Floats, period_s: float, tolerance: float = LEAST_TOLERANCE
+) -> WaterChords:
+    """Find the chords that miss the object, without an assumption on its size.
+
+    The line through most arrivals is searched among all plausible speeds. From the outermost chords inwards,
+    groups of chords are added while they agree with the line through the previous ones.
+
+    Args:
+        dataset: of one slice.
+        arrival_s: (ntx, nrx), s, NaN where unknown: of a scan with the object.
+        period_s: of the pulse, s.
+        tolerance: least distance from the line that agrees, periods.
+
+    Raises:
+        InvalidInput: where no such line exists: too few chords miss the object.
+    """
+    distance = dataset.distance_m()
+    nearest = min(NEAREST * dataset.water_speed_mps * period_s, NEAREST_PART * float(distance.max()))
+    known = np.isfinite(arrival_s) & (distance > nearest)
+    known &= dataset.tx[:, None] != dataset.rx[None, :]
+    if dataset.valid is not None:
+        known &= dataset.valid
+    pairs = np.flatnonzero(known)
+    if pairs.size < FEWEST:
+        raise _refusal(pairs.size)
+    x, y = distance.ravel()[pairs], arrival_s.ravel()[pairs]
+    order = np.argsort(-chord_offset(dataset).ravel()[pairs], kind="stable")
+    groups = _groups(order, x, OUTERMOST_SPAN * float(distance.max()))
+    agreeing = next(groups)
+    slowness, delay = _densest_line(x, y, BIN * period_s)
+    agreeing = agreeing[np.abs(y[agreeing] - delay - slowness * x[agreeing]) <= SEARCHED * period_s]
+    slowness, delay, spread = _line(x[agreeing], y[agreeing]) if agreeing.size >= FEWEST else (0.0, 0.0, 0.0)
+    reach = max(AGREEING * spread, tolerance * period_s)
+    misses = 0
+    for group in groups:
+        alike = group[np.abs(y[group] - delay - slowness * x[group]) <= reach]
+        misses = misses + 1 if alike.size < LEAST_PART * group.size else 0
+        if misses > 1:
+            break
+        if not misses:
+            agreeing = np.concatenate((agreeing, alike))
+            slowness, delay, _ = _line(x[agreeing], y[agreeing])
+    if agreeing.size >= FEWEST:
+        slowness, delay, spread = _line(x[agreeing], y[agreeing])
+    speed = 1.0 / slowness if slowness > 0.0 else float("inf")
+    if agreeing.size < FEWEST or not SLOWEST_MPS <= speed <= FASTEST_MPS:
+        raise _refusal(agreeing.size)
+    found = np.zeros(distance.size, dtype=bool)
+    found[pairs[agreeing]] = True
+    sigma = spread / (np.std(x[agreeing]) * np.sqrt(agreeing.size)) * speed**2
+    return WaterChords(found.reshape(distance.shape), speed, delay, spread, float(sigma))
+
+
+def chord_offset(dataset: Dataset) -> Floats:
+    """Distance of chords from the centre of the array over that of the farthest element, (ntx, nrx)."""
+    position = dataset.element_position_m
+    place = position - 0.5 * (position.min(axis=0) + position.max(axis=0))
+    start = place[dataset.tx][:, None]
+    along = place[dataset.rx][None] - start
+    length = np.maximum((along**2).sum(axis=-1), np.finfo(np.float64).tiny)
+    part = np.clip(-(start * along).sum(axis=-1) / length, 0.0, 1.0)
+    nearest = np.linalg.norm(start + part[..., None] * along, axis=-1)
+    return np.asarray(nearest / np.linalg.norm(place, axis=1).max())
+
+
+def _densest_line(x: Floats, y: Floats, width: float) -> tuple[float, float]:
+    """Slowness and delay of the line, of all plausible slownesses, near which most points lie."""
+    most, best = -1.0, (0.0, 0.0)
+    for slowness in 1.0 / np.linspace(SLOWEST_MPS, FASTEST_MPS, SPEEDS):
+        delay = y - slowness * x
+        least = float(np.percentile(delay, 0.5))
+        place = np.floor((delay - least) / width)
+        inside = (place >= 0.0) & (place < 1e5)
+        near = np.convolve(np.bincount(place[inside].astype(np.int64)), (0.5, 1.0, 0.5), "same")
+        peak = int(near.argmax())
+        if near[peak] > most:
+            most, best = float(near[peak]), (float(slowness), least + (peak + 0.5) * width)
+    return best
+
+
+def _groups(order: Ints, x: Floats, span: float) -> Iterator[Ints]:
+    """Chords from the edge of the array inwards: the outermost ones, over a span, then small groups."""
+    reached = np.maximum.accumulate(x[order]) - np.minimum.accumulate(x[order])
+    first = max(FEWEST, int(OUTERMOST * order.size), int(np.searchsorted(reached, span)) + 1)
+    size = max(FEWEST, int(GROUP * order.size))
+    yield order[:first]
+    for begin in range(first, order.size, size):
+        yield order[begin : begin + size]
+
+
+def _line(x: Floats, y: Floats) -> tuple[float, float, float]:
+    """Slowness, delay and robust deviation of the line through points, without outliers."""
+    used = np.ones(x.size, dtype=bool)
+    slowness, delay, spread = 0.0, 0.0, 0.0
+    for _ in range(ROUNDS):
+        apart = x[used] - x[used].mean()
+        if not (size := float(apart @ apart)) > 0.0:
+            break
+        slowness = float(apart @ y[used]) / size
+        delay = float(y[used].mean() - slowness * x[used].mean())
+        off = np.abs(y - slowness * x - delay)
+        spread = 1.4826 * float(np.median(off))
+        used = off <= AGREEING * spread + 1e-15
+    return slowness, delay, spread
+
+
+def _refusal(chords: int) -> InvalidInput:
+    return InvalidInput(
+        "waveform/water",
+        f"no traces, and {chords} chords of the object scan that pass through water alone",
+        f"a scan without the object, or at least {FEWEST} chords that miss the object "
+        f"(an apparent speed of {SLOWEST_MPS:g} to {FASTEST_MPS:g} m/s)",
+    )
