@@ -148,7 +148,7 @@ def test_traces_are_planned_for():
 
 def test_waves_are_planned_for():
     asked = Settings(method="waveform")
-    with pytest.raises(InvalidInput, match="traces of object and water"):
+    with pytest.raises(InvalidInput, match="for a scan without traces"):
         plan(RING, asked, [])
     heard = replace(RING, traces=Traces(256, 256, 1000, 2, 1e7, 4e5, 1500.0))
     found = plan(heard, asked, [LARGE])

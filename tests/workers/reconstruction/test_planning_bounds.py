@@ -139,7 +139,7 @@ numbers = {
 def test_every_dataset_within_the_limits_has_a_plan(way, **counts):
     settings, known = Settings.of(**way), DatasetCounts(**counts)
     if settings.method == "waveform" and known.summary(settings).traces is None:
-        with pytest.raises(InvalidInput, match="traces of object and water"):
+        with pytest.raises(InvalidInput, match="for a scan without traces"):
             planned(known, settings)
         return
     found = planned(known, settings)

@@ -124,6 +124,17 @@ def test_without_a_water_shot_the_image_is_nearly_as_good(picked, tmp_path, expe
     assert without < 1.15 * with_water
 
 
+def test_an_estimated_water_shot_is_the_same_on_a_cluster(cluster, tmp_path):
+    write_dataset(tmp_path / "bare.h5", replace(scan(), waveform=Waveform(scan().waveform.object)))
+    rays = Settings.of(nodes=32, iterations=2)
+    here, there = (
+        reconstruction_run.reconstruct(client, tmp_path / "bare.h5", rays)
+        for client in (None, cluster.client)
+    )
+    assert np.array_equal(here.speed, there.speed)
+    assert here.provenance == there.provenance
+
+
 def test_a_scan_without_traces_is_rejected_before_any_work(tmp_path):
     write_dataset(tmp_path / "times.h5", replace(pick(scan()), waveform=None))
     seen = []

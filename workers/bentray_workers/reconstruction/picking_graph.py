@@ -181,8 +181,10 @@ class PickingGraph:
         self._estimates = guide is None and source.estimates_water
         if self._picks or self._estimates:
             self._parts = parts_of(len(dataset.tx), trace_samples(source.path) * len(dataset.rx))
-        examines = guide is None and source.examine and not dataset.picked
-        self._measures = examines or self._estimates
+        self._examines = guide is None and source.examine and not dataset.picked
+        self._measures = self._examines or self._estimates
+        # Of the object, until the chords through water are found in them.
+        self._measured: dict[int, list[Any]] = {}
         self._findings: dict[int, Any] = {k: guide.faults(k) if guide else () for k in self._slices}
         self._results: dict[tuple[Any, int], dict[int, Any]] = defaultdict(dict)
         self._emissions_done: dict[Any, int] = defaultdict(int)
@@ -215,10 +217,10 @@ class PickingGraph:
             return []
         index = task.arguments[1]
         if task.function is examine_slice:
-            self._findings[index], chords = result
-            if chords is None:
-                return self._picking(index)
-            return self._each_part(read_chords, index, self._findings[index], chords)
+            self._findings[index] = result
+            return self._chords(index) if self._estimates else self._picking(index)
+        if task.function is find_chords:
+            return self._each_part(read_chords, index, self._findings[index], result)
         if task.function is estimate_slice_water:
             self._findings[index] = result
             return self._picking(index)
@@ -235,12 +237,20 @@ class PickingGraph:
             return []
         parts = self._pop(task.function, index)
         if task.function is measure_traces:
+            self._measured[index] = parts if self._estimates else []
+            if not self._examines:
+                return self._chords(index)
             return [Task(examine_slice, (self._source, index, parts), keep_on_worker=True)]
         arguments = self._source, index, self._findings[index]
         if task.function is read_chords:
             chords = task.arguments[3]
-            return [Task(estimate_slice_water, (*arguments, chords, parts))]
+            return [Task(estimate_slice_water, (*arguments, chords, parts), keep_on_worker=True)]
         return [Task(finish_slice, (*arguments, parts), keep_on_worker=True)]
+
+    def _chords(self, index: int) -> list[Task]:
+        """The task that finds the chords through water of a slice."""
+        arguments = self._source, index, self._findings[index], self._measured.pop(index)
+        return [Task(find_chords, arguments, keep_on_worker=True)]
 
     def _picking(self, index: int) -> list[Task]:
         """The tasks that pick a slice, or the one that finishes it."""
@@ -267,26 +277,20 @@ def measure_traces(source: PickingSource, index: int, part: range) -> Measured:
         return Measured.of(one, part)
 
 
-def examine_slice(
-    source: PickingSource, index: int, parts: list[Measured]
-) -> tuple[tuple[Finding, ...], WaterChords | None]:
-    """Task: findings in the traces of a slice; an unusable scan is rejected.
-
-    Also the chords through water, where the water shot is estimated from them.
-    """
-    measured = Measured.joined(parts)
+def examine_slice(source: PickingSource, index: int, parts: list[Measured]) -> tuple[Finding, ...]:
+    """Task: findings in the traces of a slice; an unusable scan is rejected."""
     with source.slice(index) as one:
-        findings: Sequence[Finding] = ()
-        if source.examine and not one.picked:
-            findings, _ = check_traces(one, measured)
-        findings = _usable(source, index, findings)
-        if not source.estimates_water:
-            return findings, None
-        assert one.center_frequency_hz is not None
-        corrected = apply(one, findings)
-        return findings, find_water_chords(
-            corrected, measured.object.strongest_s, 1.0 / one.center_frequency_hz
-        )
+        findings, _ = check_traces(one, Measured.joined(parts))
+    return _usable(source, index, findings)
+
+
+def find_chords(
+    source: PickingSource, index: int, findings: tuple[Finding, ...], parts: list[Measured]
+) -> WaterChords:
+    """Task: the chords of a slice through water, from which its water shot is estimated."""
+    one = apply(source.dataset.slice(index), findings)
+    assert one.center_frequency_hz is not None
+    return find_water_chords(one, Measured.joined(parts).object.strongest_s, 1.0 / one.center_frequency_hz)
 
 
 def read_chords(

@@ -94,7 +94,7 @@ def test_held_out_emitters_decide_against_it():
 def test_a_scan_without_traces_is_not_advised():
     deaf = replace(heard(), waveform=None)
     assert "waveform" not in reconstruct(deaf, PLAN).provenance
-    with pytest.raises(InvalidInput, match="traces of object and water"):
+    with pytest.raises(InvalidInput, match="for a scan without traces"):
         reconstruct(deaf, replace(PLAN, method="waveform"))
 
 

@@ -93,10 +93,11 @@ def test_what_auto_may_do_is_planned():
     assert wave_task_bytes(None, 0.1, auto) == wave_task_bytes(SCAN, 0.1, Settings()) == {}
 
 
-def test_traces_are_summed_up_where_there_are_both(tmp_path):
+def test_traces_are_summed_up_with_and_without_a_water_shot(tmp_path):
     write_dataset(tmp_path / "scan.h5", scan())
     found = summary_of(tmp_path / "scan.h5", Settings()).traces
     assert found == Traces(12, ELEMENTS, 120, 4, RATE_HZ, CENTRE_HZ, WATER)
     alone = replace(scan().waveform, water=None)
     write_dataset(tmp_path / "alone.h5", replace(scan(), waveform=alone))
-    assert summary_of(tmp_path / "alone.h5", Settings()).traces is None
+    expected = replace(found, water_shot=False)
+    assert summary_of(tmp_path / "alone.h5", Settings()).traces == expected

@@ -28,8 +28,8 @@ MEASURE_BYTES, READ_BYTES, FILTER_BYTES = 58, 12, 64
 # Bytes for amplitudes of one emission: per sample of the gate, as long as the pulse; per frequency.
 GATE_BYTES, POWER_BYTES = 24, 100
 
-# Bytes per sample of an estimated water shot; per chord that it is estimated from: some spectra of its pulse.
-SHOT_BYTES, CHORD_BYTES = 8, 16 * 1024
+# Bytes per sample of an estimated water shot; per chord that it is estimated from, for its pulse, its spectra.
+SHOT_BYTES, PULSE_BYTES, SPECTRA_BYTES = 8, 2048, 10 * 1024
 
 # Bytes per pair: copies of a period of its pulse and statistics; neighbours and their medians.
 PULSE_COPIES, FIGURE_BYTES, SETTLE_BYTES = 3 * 8, 100, 720
@@ -85,13 +85,18 @@ def picking_task_bytes(traces: Traces | None, pairs: int, settings: Settings) ->
     if not traces.water_shot:
         chords = traces.emissions * chords_of_emission(traces.emissions)
         sizes["pick_emissions"] += SHOT_BYTES * samples
-        sizes["read_chords"] = reading + READ_BYTES * samples + CHORD_BYTES // 16 * chords
-        sizes["estimate_slice_water"] = TIMES_BYTES + CHORD_BYTES * chords
-    sizes["finish_slice"] = finish_slice_bytes(of_slice)
+        sizes["find_chords"] = TIMES_BYTES + FIGURE_BYTES * of_slice
+        sizes["read_chords"] = reading + READ_BYTES * samples + PULSE_BYTES * chords
+        sizes["estimate_slice_water"] = TIMES_BYTES + SPECTRA_BYTES * chords
     if settings.picking.examine or not traces.water_shot:
-        pulse = PULSE_COPIES * (2 * math.ceil(traces.rate_hz / traces.frequency_hz) + 1)
         sizes["measure_traces"] = reading + MEASURE_BYTES * samples
+    sizes["finish_slice"] = finish_slice_bytes(of_slice)
+    if settings.picking.examine:
+        pulse = PULSE_COPIES * (2 * math.ceil(traces.rate_hz / traces.frequency_hz) + 1)
         sizes["examine_slice"] = reading + READ_BYTES * samples + (pulse + FIGURE_BYTES) * of_slice
+        if not traces.water_shot:
+            # It reads no traces: polarity is checked in the water shot.
+            sizes["examine_slice"] = 2 * TIMES_BYTES + FIGURE_BYTES * of_slice
     return sizes
 
 
