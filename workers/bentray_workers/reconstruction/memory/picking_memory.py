@@ -28,7 +28,7 @@ MEASURE_BYTES, READ_BYTES, FILTER_BYTES = 58, 12, 64
 # Bytes for amplitudes of one emission: per sample of the gate, as long as the pulse; per frequency.
 GATE_BYTES, POWER_BYTES = 24, 100
 
-# Bytes per sample of an estimated water shot; per chord that it is estimated from, for its pulse, its spectra.
+# Bytes per sample of an estimated water shot; per chord that it is estimated from: pulse, spectra.
 SHOT_BYTES, PULSE_BYTES, SPECTRA_BYTES = 8, 2048, 10 * 1024
 
 # Bytes per pair: copies of a period of its pulse and statistics; neighbours and their medians.
@@ -84,7 +84,8 @@ def picking_task_bytes(traces: Traces | None, pairs: int, settings: Settings) ->
         sizes["pick_emissions"] += traces.receivers * FREQUENCIES * POWER_BYTES + 8 * of_slice
     if not traces.water_shot:
         chords = traces.emissions * chords_of_emission(traces.emissions)
-        sizes["pick_emissions"] += SHOT_BYTES * samples
+        # One of two shots is read, the other computed.
+        sizes["pick_emissions"] += SHOT_BYTES * samples - READING_BYTES // 2
         sizes["find_chords"] = TIMES_BYTES + FIGURE_BYTES * of_slice
         sizes["read_chords"] = reading + READ_BYTES * samples + PULSE_BYTES * chords
         sizes["estimate_slice_water"] = TIMES_BYTES + SPECTRA_BYTES * chords
