@@ -85,7 +85,7 @@ def picking_task_bytes(traces: Traces | None, pairs: int, settings: Settings) ->
     if not traces.water_shot:
         chords = traces.emissions * chords_of_emission(traces.emissions)
         # One of two shots is read, the other computed.
-        sizes["pick_emissions"] += SHOT_BYTES * samples - READING_BYTES // 2
+        sizes["pick_emissions"] += SHOT_BYTES * samples - 2 * READING_BYTES // 5
         sizes["find_chords"] = TIMES_BYTES + FIGURE_BYTES * of_slice
         sizes["read_chords"] = reading + READ_BYTES * samples + PULSE_BYTES * chords
         sizes["estimate_slice_water"] = TIMES_BYTES + SPECTRA_BYTES * chords
