@@ -48,7 +48,7 @@ def test_calls_take_what_the_plan_says_and_never_the_traces(tmp_path, picker, el
         if not taken <= told[name] <= 1.5 * taken + 8 * MIB
     }
     assert not wrong
-    if picker == "aic":
+    if (picker, shots) == ("aic", "water"):
         assert max(measured.values()) < 0.5 * traces
 
 
