@@ -161,7 +161,7 @@ def viewer(
         usual = SimulationSettings(nodes=96, elements=64, coupling_mps=1375.0)
         write_dataset(file, scan or simulate(usual, lambda _: None))
         with running_service(Path(folder) / "data", Path(folder) / "log") as url, Client(url) as client:
-            client.wait(client.submit(client.upload(file)["id"], dict(settings)).id)
+            client.wait(client.submit(client.upload(file).id, dict(settings)).id)
             browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
             page = browser.new_page(viewport={"width": size[0], "height": size[1]})
             page.goto(url)

@@ -91,8 +91,8 @@ class Quota:
             self._ended.add((tenant, name))
         try:
             self._release_ended()
-        except SQLAlchemyError:
-            log.warning("the reservation of %s will be released later", name, exc_info=True)
+        except SQLAlchemyError as error:
+            log.warning("the reservation of %s will be released later: %s", name, error)
 
     def begin(self, files: Files, *, alone: bool) -> None:
         """Drop reservations of dead processes, and correct the sizes of stored items.

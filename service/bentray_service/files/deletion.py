@@ -79,8 +79,8 @@ class Deletion:
             usage.forget(connection, stored.tenant, [name, *results, *fields, *gone])
         try:
             self._files.of(stored.tenant).remove([name, *results, *fields, *gone])
-        except (StorageUnavailable, DatabaseUnavailable, OSError):
-            log.warning("files of %s remain until they are removed as orphans", stored.id, exc_info=True)
+        except (StorageUnavailable, DatabaseUnavailable, OSError) as error:
+            log.warning("files of %s remain until they are removed as orphans: %s", stored.id, error)
 
     def older_than(self, time: float) -> Iterator[StoredItem]:
         """The items of all tenants created before a time, s since 1970."""

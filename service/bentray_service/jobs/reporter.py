@@ -69,8 +69,8 @@ class Reporter:
         except DatabaseUnavailable:
             # The job continues while the database is unavailable; the next report is complete.
             pass
-        except SQLAlchemyError:
-            log.warning("the progress of %s could not be stored", self._job_id, exc_info=True)
+        except SQLAlchemyError as error:
+            log.warning("the progress of %s could not be stored: %s", self._job_id, error)
 
     def flush(self) -> None:
         """Store the last progress; called at the end, too."""
@@ -96,8 +96,8 @@ class Reporter:
                 self._queue.record_size(self._job_id, self._taken())
         except DatabaseUnavailable:
             pass
-        except SQLAlchemyError:
-            log.warning("a checkpoint of %s could not be recorded", self._job_id, exc_info=True)
+        except SQLAlchemyError as error:
+            log.warning("a checkpoint of %s could not be recorded: %s", self._job_id, error)
 
     def stop(self) -> bool:
         """Whether to stop: after a cancellation or takeover, or when this service stops."""
@@ -111,8 +111,8 @@ class Reporter:
                 self._stopped = state != "running"
             except DatabaseUnavailable:
                 pass
-            except SQLAlchemyError:
-                log.warning("the state of %s could not be read", self._job_id, exc_info=True)
+            except SQLAlchemyError as error:
+                log.warning("the state of %s could not be read: %s", self._job_id, error)
         return self._stopped
 
 

@@ -107,5 +107,5 @@ class Keys:
         try:
             with self._database.write() as connection:
                 connection.execute(update(keys).where(keys.c.id == key_id).values(used=now))
-        except SQLAlchemyError:
-            log.warning("the last use of key %s could not be stored", key_id, exc_info=True)
+        except SQLAlchemyError as error:
+            log.warning("the last use of key %s could not be stored: %s", key_id, error)

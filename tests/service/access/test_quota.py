@@ -10,6 +10,7 @@ import nibabel
 import numpy as np
 import pytest
 
+from bentray_service.errors import DatabaseUnavailable
 from bentray_service.files.disk import bytes_in
 from bentray_service.rows.ids import new_id
 from bentray_service.rows.tenants import LOCAL
@@ -173,3 +174,21 @@ def test_what_a_service_that_died_had_reserved_is_free_at_the_next_start(start):
     assert used(http) == (0, MOST)
     http.__exit__()
     assert used(start(max_tenant_bytes=MOST)) == (0, 0)
+
+
+def test_a_reservation_is_released_later_if_the_database_is_away(start, monkeypatch, caplog):
+    """An expected state: one line in the log, without a traceback."""
+    http = start()
+    quota = http.app.state.parts.quota
+    with monkeypatch.context() as away:
+
+        def refuse():
+            raise DatabaseUnavailable("away")
+
+        away.setattr(quota._database, "write", refuse)
+        quota.release(LOCAL, "vol-1.npy")
+    (record,) = [one for one in caplog.records if "released later" in one.getMessage()]
+    assert record.exc_info is None
+    assert quota._ended
+    quota.renew()
+    assert not quota._ended
