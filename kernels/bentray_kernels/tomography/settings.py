@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from typing import Any, ClassVar, Literal
 
-from ..acquisition.picking.picker_names import DEFAULT_PICKER, PickerName
 from ..errors import InvalidInput
 from ..limits import SPEED_MPS
+from ..picker_names import DEFAULT_PICKER, PickerName
 from ..ranges import SEED, Range
 from ..request_fields import check, setting
 from .numerics import Numerics

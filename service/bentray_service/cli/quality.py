@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from bentray_kernels.acquisition.picking.picker_names import DEFAULT_PICKER
+from bentray_kernels.picker_names import DEFAULT_PICKER
 
 from .options.paths import input_file, output_folder
 from .output.exit_codes import WorkFailed

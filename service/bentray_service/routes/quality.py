@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from bentray_kernels.acquisition.picking.picker_names import DEFAULT_PICKER, PickerName
+from bentray_kernels.picker_names import DEFAULT_PICKER, PickerName
 
 from ..web.errors import problems
 from ..wiring import CallerTenant, Service, caller_of, parts_of

@@ -10,10 +10,10 @@ from typing import Any
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.calibration import Calibration, calibrate, water_times
-from bentray_kernels.acquisition.picking.picker_names import DEFAULT_PICKER
 from bentray_kernels.acquisition.quality import Report, examine_slices
 from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.picker_names import DEFAULT_PICKER
 
 from ..cluster.task_cancellation import cancellation_check
 from ..files.dataset import Limits, read_dataset

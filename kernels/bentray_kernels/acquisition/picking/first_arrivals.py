@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import InvalidInput
+from ...picker_names import DEFAULT_PICKER
 from .. import rules
 from ..dataset import Dataset, Floats
 from .consistency import consistent
 from .differential import emission
-from .picker_names import DEFAULT_PICKER
 from .pickers import PICKERS, Picker, picker_named
 from .pulse import Inverse
 

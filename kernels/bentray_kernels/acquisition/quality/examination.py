@@ -10,9 +10,9 @@ import numpy as np
 
 from ...arrays import Flags, Floats
 from ...errors import InvalidInput
+from ...picker_names import DEFAULT_PICKER
 from ..dataset import Dataset
 from ..picking.first_arrivals import pick
-from ..picking.picker_names import DEFAULT_PICKER
 from ..reference import reference_of
 from .contradictions import find_contradictions
 from .correction import apply, stacked
