@@ -1,6 +1,7 @@
 """Refinement by waveforms on a cluster: the same bits as in one process, progress, stopping, going on."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_kernels.tomography.waveform.inversion_state import Image
 from bentray_workers.files.dataset import write_dataset
+from bentray_workers.files.reference import reference_path
 from bentray_workers.reconstruction import reconstruction_run
 
 from ...kernels.tomography.waveform.scans import error, scan, water
@@ -133,6 +135,32 @@ def test_an_estimated_water_shot_is_the_same_on_a_cluster(cluster, tmp_path):
     )
     assert np.array_equal(here.speed, there.speed)
     assert here.provenance == there.provenance
+
+
+def test_times_do_not_need_a_water_shot_that_cannot_be_estimated(tmp_path):
+    """Chords through water are searched only where they are needed."""
+    silent = np.random.default_rng(0).standard_normal(scan().waveform.object.shape).astype(np.float32)
+    write_dataset(tmp_path / "times.h5", replace(pick(scan()), waveform=Waveform(silent)))
+    rays = Settings.of(nodes=32, iterations=2, method="auto")
+    result = reconstruction_run.reconstruct(None, tmp_path / "times.h5", rays)
+    assert "waveform" not in result.provenance
+    with pytest.raises(InvalidInput, match=r"waveform/water: found no traces, and \d+ chords"):
+        reconstruction_run.reconstruct(None, tmp_path / "times.h5", PLAN)
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:-900])])
+def test_a_lost_reference_is_made_again_and_reported_without_an_examination(tmp_path, damage):
+    write_dataset(tmp_path / "bare.h5", replace(scan(), waveform=Waveform(scan().waveform.object)))
+    rays = Settings.of(nodes=32, iterations=2, examine=False)
+    work = tmp_path / "work"
+    work.mkdir()
+    first = reconstruction_run.reconstruct(None, tmp_path / "bare.h5", rays, work_dir=work)
+    assert "water shot: none" in first.provenance["quality"]
+    whole = reference_path(work, 0).read_bytes()
+    damage(reference_path(work, 0))
+    again = reconstruction_run.reconstruct(None, tmp_path / "bare.h5", rays, work_dir=work)
+    assert reference_path(work, 0).read_bytes() == whole
+    assert np.array_equal(again.speed, first.speed)
 
 
 def test_a_scan_without_traces_is_rejected_before_any_work(tmp_path):

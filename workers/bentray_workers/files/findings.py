@@ -39,7 +39,7 @@ class ScanFindings(NamedTuple):
 
     def words(self, *, stacked: bool) -> str:
         """Summary in one line; see ``finding.words``."""
-        if not self.examined:
+        if not self.examined and not self.findings:
             return "not examined, since the scan has travel times and no centre frequency"
         return words(self.findings, stacked=stacked)
 

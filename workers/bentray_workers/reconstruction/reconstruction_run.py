@@ -24,9 +24,10 @@ from ..cluster.fair_shares import Share
 from ..cluster.resources import RECONSTRUCTION
 from ..cluster.task_pool import open_pool
 from ..files.dataset import read_dataset
-from ..files.dataset.traces import trace_samples
+from ..files.dataset.traces import lacks_water, trace_samples
 from ..files.findings import ScanFindings, read_findings
 from ..files.reconstruction import write_reconstruction
+from ..files.reference import read_reference, reference_path
 from .file_scan import FileScan, FileWaveScan
 from .picking_graph import PickingFiles, PickingGraph, PickingGuide, PickingSource
 
@@ -74,7 +75,7 @@ def reconstruct(
         path, findings, chosen, trials = _pick_with_guides(job, settings, progress)
         result = _reconstruct_picked(job, path, chosen, progress)
         result = replace(result, trials=trials or result.trials)
-    if not settings.picking.examine:
+    if not settings.picking.examine and not findings.findings:
         return result
     quality = findings.words(stacked=result.speed.ndim == 3)
     return replace(result, provenance={**result.provenance, "quality": quality})
@@ -107,7 +108,7 @@ def _pick_with_guides(
         settings.picking.picker,
         settings.picking.examine,
         amplitudes,
-        settings.method in ("auto", "waveform"),
+        settings.method == "waveform",
     )
     path, findings = _pick(job, source, PickingFiles.of(job.folder), None, progress)
     rounds = 0 if source.dataset.picked else settings.numerics.guided_rounds
@@ -145,6 +146,9 @@ def _pick(
     """The file to reconstruct after a round of picking, and its findings."""
     try:
         findings = read_findings(files.findings, files.picked)
+        if source.estimates_water:
+            for index in range(source.dataset.slices):
+                read_reference(reference_path(job.folder, index))
     except (OSError, ValueError, KeyError, TypeError):
         # Absent, or damaged since.
         graph = PickingGraph(source, files, guide)
@@ -155,6 +159,8 @@ def _pick(
 
 
 def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _JobProgress) -> Reconstruction:
+    # A scan with travel times and without a water shot has no estimated one, unless waves are requested.
+    bare = lacks_water(job.scan) and not reference_path(job.folder, 0).exists()
     stamp, recorded = path.stat().st_mtime_ns, job.scan.stat().st_mtime_ns
     faults = PickingFiles.of(job.folder).findings
 
@@ -176,7 +182,7 @@ def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _Jo
         lambda plan, part: FileScan(path, stamp, plan, part),
         run_graphs,
         lambda plan, index: FileWaveScan(job.scan, recorded, plan, index, faults),
-        trace_samples(job.scan),
+        0 if bare else trace_samples(job.scan),
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from ...arrays import Floats
 from ..dataset import Dataset
 from ..noise import robust_deviation
+from ..reference import chord_offset
 from .finding import Finding
 from .water_line import WaterLine
 
@@ -49,7 +50,7 @@ def find_time_shift(dataset: Dataset, delta: Floats) -> list[Finding]:
         dataset: of one slice.
         delta: (ntx, nrx), s.
     """
-    missing = delta[_outside(dataset) & np.isfinite(delta)]
+    missing = delta[(chord_offset(dataset) >= OUTSIDE) & np.isfinite(delta)]
     if missing.size < FEWEST:
         return []
     offset = float(np.median(missing))
@@ -68,16 +69,3 @@ def find_time_shift(dataset: Dataset, delta: Floats) -> list[Finding]:
             unit="s",
         )
     ]
-
-
-def _outside(dataset: Dataset) -> np.ndarray:
-    """(ntx, nrx): pairs whose chord stays near the ring; none where the array is not a ring."""
-    place = dataset.element_position_m[:, :2]
-    centre = 0.5 * (place.min(axis=0) + place.max(axis=0))
-    a = (place - centre)[dataset.tx][:, None, :]
-    b = (place - centre)[dataset.rx][None, :, :]
-    along = b - a
-    length = np.maximum((along**2).sum(axis=-1), 1e-30)
-    part = np.clip(-(a * along).sum(axis=-1) / length, 0.0, 1.0)
-    nearest = np.linalg.norm(a + part[..., None] * along, axis=-1)
-    return np.asarray(nearest >= OUTSIDE * np.linalg.norm(place - centre, axis=1).max())

@@ -8,12 +8,13 @@ from .reference_shot import (
     read_pulses,
     reference_of,
 )
-from .water_chords import WaterChords, find_water_chords
+from .water_chords import WaterChords, chord_offset, find_water_chords
 
 __all__ = [
     "ChordPulses",
     "ReferenceShot",
     "WaterChords",
+    "chord_offset",
     "chords_of_emission",
     "estimate_reference",
     "find_water_chords",

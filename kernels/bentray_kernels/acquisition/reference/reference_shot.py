@@ -15,6 +15,7 @@ from ...arrays import Flags, Floats, Ints
 from ...errors import InvalidInput
 from ..dataset import Dataset
 from ..emissions import Emissions
+from ..noise import robust_deviation
 from ..picking.onset import LEAD
 from .water_chords import FEWEST, WaterChords, find_water_chords
 
@@ -200,7 +201,7 @@ def read_pulses(
             found.append((e, r, int(begin[e, r])))
             samples.append(trace[begin[e, r] : begin[e, r] + length])
             before_it = trace[: begin[e, r]]
-            noise.append(1.4826 * float(np.median(np.abs(before_it))) if len(before_it) >= LEAD else np.nan)
+            noise.append(robust_deviation(before_it) if len(before_it) >= LEAD else np.nan)
     index = np.array(found, dtype=np.int64).reshape(-1, 3)
     pulses = np.array(samples, dtype=np.float32).reshape(-1, length)
     return ChordPulses(index[:, 0], index[:, 1], index[:, 2], pulses, np.array(noise))
@@ -309,8 +310,7 @@ class _Fit:
         size = np.log(np.maximum(self.amplitude, np.finfo(np.float64).tiny) * np.sqrt(self._distance))
         emission_gain, reception_gain = self._of_elements(size, centred=False)
         known = self._pulses.noise[np.isfinite(self._pulses.noise)]
-        left = self.lag_s[self.used] - np.median(self.lag_s[self.used])
-        scatter = 1.4826 * float(np.median(np.abs(left)))
+        scatter = robust_deviation(self.lag_s[self.used])
         speed = 2.0 * np.pi * frequency / wave_number
         spread = float(np.std(self._distance[self.used])) * math.sqrt(self.used.sum())
         return ReferenceShot(

@@ -10,6 +10,8 @@ import numpy as np
 from ...arrays import Flags, Floats, Ints
 from ...errors import InvalidInput
 from ..dataset import Dataset
+from ..noise import robust_deviation
+from ..robust_line import robust_line
 
 # Apparent speeds of coupling media that are searched, m/s: oil to salt water at 50 °C, and grid dispersion.
 SLOWEST_MPS, FASTEST_MPS, SPEEDS = 1350.0, 1650.0, 301
@@ -37,8 +39,6 @@ AGREEING, LEAST_TOLERANCE = 4.0, 0.02
 LEAST_PART = 0.75
 
 FEWEST = 24
-
-ROUNDS = 8
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,10 @@ def find_water_chords(
     agreeing = next(groups)
     slowness, delay = _densest_line(x, y, BIN * period_s)
     agreeing = agreeing[np.abs(y[agreeing] - delay - slowness * x[agreeing]) <= SEARCHED * period_s]
-    slowness, delay, spread = _line(x[agreeing], y[agreeing]) if agreeing.size >= FEWEST else (0.0, 0.0, 0.0)
+    if agreeing.size < FEWEST:
+        raise _refusal(agreeing.size)
+    slowness, delay = robust_line(x[agreeing], y[agreeing])
+    spread = robust_deviation(y[agreeing] - slowness * x[agreeing])
     reach = max(AGREEING * spread, tolerance * period_s)
     misses = 0
     for group in groups:
@@ -106,21 +109,20 @@ def find_water_chords(
             break
         if not misses:
             agreeing = np.concatenate((agreeing, alike))
-            slowness, delay, _ = _line(x[agreeing], y[agreeing])
-    if agreeing.size >= FEWEST:
-        slowness, delay, spread = _line(x[agreeing], y[agreeing])
+            slowness, delay = robust_line(x[agreeing], y[agreeing])
     speed = 1.0 / slowness if slowness > 0.0 else float("inf")
-    if agreeing.size < FEWEST or not SLOWEST_MPS <= speed <= FASTEST_MPS:
+    if not SLOWEST_MPS <= speed <= FASTEST_MPS:
         raise _refusal(agreeing.size)
     found = np.zeros(distance.size, dtype=bool)
     found[pairs[agreeing]] = True
+    spread = robust_deviation(y[agreeing] - slowness * x[agreeing])
     sigma = spread / (np.std(x[agreeing]) * np.sqrt(agreeing.size)) * speed**2
     return WaterChords(found.reshape(distance.shape), speed, delay, spread, float(sigma))
 
 
 def chord_offset(dataset: Dataset) -> Floats:
-    """Distance of chords from the centre of the array over that of the farthest element, (ntx, nrx)."""
-    position = dataset.element_position_m
+    """Distance of chords from the axis of the array over that of the farthest element, (ntx, nrx)."""
+    position = dataset.element_position_m[:, :2]
     place = position - 0.5 * (position.min(axis=0) + position.max(axis=0))
     start = place[dataset.tx][:, None]
     along = place[dataset.rx][None] - start
@@ -153,22 +155,6 @@ def _groups(order: Ints, x: Floats, span: float) -> Iterator[Ints]:
     yield order[:first]
     for begin in range(first, order.size, size):
         yield order[begin : begin + size]
-
-
-def _line(x: Floats, y: Floats) -> tuple[float, float, float]:
-    """Slowness, delay and robust deviation of the line through points, without outliers."""
-    used = np.ones(x.size, dtype=bool)
-    slowness, delay, spread = 0.0, 0.0, 0.0
-    for _ in range(ROUNDS):
-        apart = x[used] - x[used].mean()
-        if not (size := float(apart @ apart)) > 0.0:
-            break
-        slowness = float(apart @ y[used]) / size
-        delay = float(y[used].mean() - slowness * x[used].mean())
-        off = np.abs(y - slowness * x - delay)
-        spread = 1.4826 * float(np.median(off))
-        used = off <= AGREEING * spread + 1e-15
-    return slowness, delay, spread
 
 
 def _refusal(chords: int) -> InvalidInput:

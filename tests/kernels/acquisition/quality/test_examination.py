@@ -11,7 +11,6 @@ import pytest
 
 from bentray_kernels.acquisition import Dataset, Waveform, pick
 from bentray_kernels.acquisition.quality import Examined, corrected, examine
-from bentray_kernels.errors import InvalidInput
 
 from ..traces import FREQUENCY_HZ, blob_delay, scan
 
@@ -115,16 +114,6 @@ def test_without_a_water_shot_it_is_estimated_where_times_are_picked():
     assert (finding.check, finding.action) == ("water shot", "reported")
     assert finding.value == pytest.approx(clean().water_speed_mps, rel=2e-3)
     assert examine(replace(alone, delta_tof_s=sought())).report.findings == ()
-
-
-def test_a_water_shot_that_cannot_be_estimated_is_asked_for():
-    random = np.random.default_rng(0)
-    noise = random.standard_normal(clean().waveform.object.shape).astype(np.float32)
-    alone = replace(clean(), waveform=Waveform(noise))
-    examined = examine(alone)
-    assert examined.picked is None
-    with pytest.raises(InvalidInput, match="accepted: "):
-        corrected(alone, examined.report)
 
 
 @pytest.mark.parametrize("factor", [0.4, 2.5])

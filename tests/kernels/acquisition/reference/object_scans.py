@@ -8,7 +8,7 @@ import numpy as np
 
 from bentray_kernels.acquisition import Dataset, Waveform
 
-from ..traces import RADIUS_M, WATER_MPS, scan
+from ..traces import WATER_MPS, scan
 
 ELEMENTS = 64
 
@@ -55,6 +55,3 @@ def without_water(dataset: Dataset) -> Dataset:
     """The same scan without its water shot."""
     assert dataset.waveform is not None
     return replace(dataset, waveform=replace(dataset.waveform, water=None, water_scale=None))
-
-
-__all__ = ["ELEMENTS", "RADIUS_M", "WATER_MPS", "disc_delay_s", "scan", "with_elements", "without_water"]

@@ -144,6 +144,7 @@ class DatasetCounts:
         """
         both = (self.elements, self.elements)
         emitters, receivers = both if settings.numerics.reciprocity else (self.emissions, self.receivers)
+        estimated = not self.times or settings.reads_amplitudes or settings.method == "waveform"
         return Summary(
             emitters=emitters,
             receivers=receivers,
@@ -154,7 +155,7 @@ class DatasetCounts:
             width_m=self.width_m,
             traces_bytes=0 if self.times and not settings.reads_amplitudes else self.traces_bytes,
             amplitudes=self.amplitudes or settings.reads_amplitudes,
-            traces=self._traces(),
+            traces=self._traces() if self.water_shot or estimated else None,
             period=self.frequency_hz is not None,
         )
 
