@@ -81,10 +81,9 @@ def test_no_page_of_dask_is_shown(installation: Installation, part: str) -> None
 
 @pytest.mark.parametrize(
     "part",
-    # Workers and services are killed in tests/faults too.
+    # The others are killed in tests/faults too.
     [
-        *(pytest.param(part, marks=pytest.mark.nightly) for part in ("worker", "service")),
-        "scheduler",
+        *(pytest.param(part, marks=pytest.mark.nightly) for part in ("worker", "service", "scheduler")),
         "database",
     ],
 )

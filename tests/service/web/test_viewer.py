@@ -224,9 +224,13 @@ def test_what_cannot_be_shown_is_told_in_words(page, serve, tmp_path):
 
 def test_a_mesh_is_uploaded_and_its_field_looked_at(page, serve, tmp_path, monkeypatch):
     build = kinds.geometry_field.build_field
-    monkeypatch.setattr(
-        kinds.geometry_field, "build_field", lambda _, *args, **control: build(None, *args, **control)
-    )
+
+    def small(_, mesh, settings, *folders, **control):
+        # The settings of the page take seconds.
+        coarse = replace(settings, inner_samples=4, divisions=4, image_size=33)
+        return build(None, mesh, coarse, *folders, **control)
+
+    monkeypatch.setattr(kinds.geometry_field, "build_field", small)
     ring = torus(16, 10)
     content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
     (tmp_path / "ring.ply").write_bytes(content)

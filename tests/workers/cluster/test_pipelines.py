@@ -17,6 +17,7 @@ from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.mesh import StoredMesh, write_mesh
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
+from bentray_workers.rendering import geometry_field as geometry_field_module
 from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.geometry_field import build_field
 from bentray_workers.rendering.turntable import Turntable, draw_turntable
@@ -26,7 +27,7 @@ from bentray_workers.simulation.simulation_run import simulate_to_file
 PLAN = Settings(nodes=32, iterations=6, method="gauss-newton", resolution_check=True)
 SCAN = PhantomScan(waveform=True, nodes=32, elements=16, frequency_hz=2e5, side_m=0.03, emissions=8, snr=20.0)
 TURNTABLE = Turntable(iso=(0.5,), width=32, height=24, frames=8)
-FIELD = FieldSettings(samples=16, inner_samples=8, divisions=8, image_size=33)
+FIELD = FieldSettings(samples=6, inner_samples=4, divisions=4, image_size=33)
 
 
 def reconstruction(client, folder, work, on_progress):
@@ -77,8 +78,10 @@ def mortal(tmp_path_factory):
 
 
 @pytest.mark.parametrize("pipeline", PIPELINES, ids=lambda pipeline: pipeline.__name__)
-def test_a_killed_worker_changes_nothing(mortal, inputs, pipeline):
+def test_a_killed_worker_changes_nothing(mortal, inputs, pipeline, monkeypatch):
     """Nor does the cluster: the expected bits are those of one thread or more of this process."""
+    # Seven tasks for the larger table of the field.
+    monkeypatch.setattr(geometry_field_module, "TASK_RAYS", 32 * 6 * 6**2)
     killed, seen = [], []
 
     def kill(progress):

@@ -14,8 +14,8 @@ from bentray_workers.images.quality_page import quality_png
 from ...kernels.acquisition.traces import blob_delay, scan
 
 
-def panels(drawn) -> list[str]:
-    return [axes.get_title(loc="left") for axes in drawn[-1].axes if axes.get_title(loc="left")]
+def panels(figures) -> list[str]:
+    return [axes.get_title(loc="left") for axes in figures[-1].axes if axes.get_title(loc="left")]
 
 
 def test_the_page_names_what_was_found(drawn):
@@ -32,7 +32,7 @@ def test_the_page_names_what_was_found(drawn):
 
 
 @pytest.mark.parametrize("kind", ["times", "refused", "slices"])
-def test_every_scan_has_a_page(drawn, kind):
+def test_every_scan_has_a_page(undrawn, kind):
     dataset = scan(blob_delay(12), elements=12)
     if kind == "times":
         dataset = replace(examine(dataset).picked, waveform=None)
@@ -43,7 +43,7 @@ def test_every_scan_has_a_page(drawn, kind):
         dataset = replace(dataset, slice_z_m=np.array([0.0, 0.01]), waveform=Waveform(*both))
     index = 0 if kind == "slices" else None
     assert quality_png(dataset.slice(0), examine(dataset), index).startswith(b"\x89PNG")
-    words = " ".join(drawn.words())
+    words = " ".join(undrawn.words())
     expected = {"times": "no object traces", "refused": "centre frequency: none", "slices": "slice 0"}[kind]
     assert expected in words
 

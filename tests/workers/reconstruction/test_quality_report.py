@@ -26,7 +26,7 @@ def test_report_and_page_are_of_one_examination(tmp_path):
     assert found.report["picker"] == found.picked.picker == "correlation"
 
 
-def test_the_page_is_about_the_slice_with_most_findings(tmp_path, drawn):
+def test_the_page_is_about_the_slice_with_most_findings(tmp_path, undrawn):
     one = scan(blob_delay(16), elements=16)
     both = [np.stack([t, t]) for t in (one.waveform.object, one.waveform.water)]
     for traces in both:
@@ -35,7 +35,7 @@ def test_the_page_is_about_the_slice_with_most_findings(tmp_path, drawn):
         tmp_path / "scan.h5", replace(one, slice_z_m=np.array([0.0, 0.01]), waveform=Waveform(*both))
     )
     assert quality.quality_page(tmp_path / "scan.h5", "aic").startswith(b"\x89PNG")
-    assert "Quality of Scan, slice 1: usable" in drawn.words()
+    assert "Quality of Scan, slice 1: usable" in undrawn.words()
 
 
 def test_one_emission_is_in_memory_and_all_are_counted(tmp_path, monkeypatch):

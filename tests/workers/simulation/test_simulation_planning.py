@@ -94,6 +94,8 @@ def test_without_workers_it_is_planned_for_one():
     assert "none is connected yet" in none.why
 
 
+@pytest.mark.slow
+@pytest.mark.nightly
 def test_tasks_take_what_the_plan_says():
     scans = [
         {"nodes": 100, "elements": 300, "snr": 10.0},

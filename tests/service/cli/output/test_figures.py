@@ -68,7 +68,7 @@ def test_what_cannot_be_compared_is_said() -> None:
 
 
 @pytest.mark.parametrize("wide", [False, True])
-def test_table_and_pictures_tell_the_same_errors(drawn: Any, wide: bool) -> None:
+def test_table_and_pictures_tell_the_same_errors(undrawn: Any, wide: bool) -> None:
     """Fat as fast as the water lies in the region of the file and outside the outline."""
     roi = np.zeros((17, 17), dtype=bool)
     roi[2:15, 2:15] = True
@@ -79,10 +79,10 @@ def test_table_and_pictures_tell_the_same_errors(drawn: Any, wide: bool) -> None
     shown = f"{rows['mean absolute error'].removesuffix(' the range')} range, {rows['rms error']} rms"
     assert scan.truth is not None
     comparison_png(scan.truth, {"bent": image(speed)}, scan.roi)
-    assert f"Bent: {shown}" in drawn.words()
-    assert f"Errors in: {rows['error region']}" in drawn.words()
+    assert f"Bent: {shown}" in undrawn.words()
+    assert f"Errors in: {rows['error region']}" in undrawn.words()
     report_png(image(speed), scan.truth, scan.roi)
-    assert f"Difference: {shown}" in drawn.words()
+    assert f"Difference: {shown}" in undrawn.words()
     assert rows["error region"].startswith("mask/roi" if wide else "the outline")
 
 

@@ -18,13 +18,10 @@ MIB = 2**20
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("picker", "elements", "samples", "shots"),
-    [
-        pytest.param("aic", 100, 2400, "water", marks=pytest.mark.nightly),
-        pytest.param("aic", 100, 2400, "object", marks=pytest.mark.nightly),
-        ("matched", 64, 1500, "water"),
-    ],
+    [("aic", 100, 2400, "water"), ("aic", 100, 2400, "object"), ("matched", 64, 1500, "water")],
 )
 def test_calls_take_what_the_plan_says_and_never_the_traces(tmp_path, picker, elements, samples, shots):
     # Freed arrays go back at once, so that a fork's peak is that of its own.

@@ -26,12 +26,13 @@ SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("asked", "elements", "samples"),
     # Each has its largest band last.
     [
-        pytest.param({"bands": 2, "emitters": 16, "attenuation": False}, 64, 260, marks=pytest.mark.nightly),
-        pytest.param({"attenuation": False}, 128, 300, marks=pytest.mark.nightly),
+        ({"bands": 2, "emitters": 16, "attenuation": False}, 64, 260),
+        ({"attenuation": False}, 128, 300),
         ({"bands": 1}, 96, 300),
     ],
 )
