@@ -11,6 +11,7 @@ from .dispersion import dispersion
 from .reconstruction_settings import reconstruction_settings
 from .rest import records, routes
 from .scan_limits import scan_limits
+from .scan_readers import scan_readers
 from .service_settings import settings_table
 
 # A page includes one of these by a comment on its own line: <!-- from the code: commands -->
@@ -20,6 +21,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "records": records,
     "dispersion": dispersion,
     "scan limits": scan_limits,
+    "scan readers": scan_readers,
     "service settings": settings_table,
     "reconstruction settings": reconstruction_settings,
 }

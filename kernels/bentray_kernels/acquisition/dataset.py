@@ -48,6 +48,7 @@ class Dataset:
         sigma_s: standard deviation of the travel times, s.
         log_ratio_np: ln(A_water / A_object), Np.
         valid: pairs that may be used; NaN pairs are never used.
+        water_temperature_assumed: whether nobody stated the speed or the temperature of the water.
 
     Raises:
         InvalidInput: naming the field as in the file format.
@@ -74,6 +75,7 @@ class Dataset:
     sampling_rate_hz: float | None = ranged(None, SAMPLING_HZ, place="acquisition@sampling_rate_hz")
     t0_s: float = ranged(0.0, TIME_S, place="acquisition@t0_s")
     water_temperature_c: float | None = ranged(None, TEMPERATURE_C, place="water@temperature_c")
+    water_temperature_assumed: bool = False
     water_attenuation_np_m: float | None = ranged(None, ATTENUATION_NP_M, place="water@attenuation_np_m")
     amplitude_frequency_hz: float | None = ranged(None, FREQUENCY_HZ, place="amplitude@frequency_hz")
     picker: str = ""

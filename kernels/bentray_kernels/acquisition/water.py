@@ -51,3 +51,13 @@ def temperature_from_speed(speed_mps: float) -> float:
             low = middle
         else:
             high = middle
+
+
+def describe_assumption(temperature_c: float) -> str:
+    """A sentence for results of scans without a stated water, with the effect of one degree."""
+    speed = speed_from_temperature(temperature_c)
+    slope = speed_from_temperature(temperature_c + 1.0) - speed
+    return (
+        f"The water temperature is not stated in the scan: {temperature_c:g} °C ({speed:.1f} m/s) is "
+        f"assumed; one degree more raises every speed by {slope:.0f} m/s. State it by --temperature."
+    )

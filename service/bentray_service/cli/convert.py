@@ -7,32 +7,40 @@ from typing import Annotated, Any
 
 import typer
 
-from .options.paths import check_apart, input_file, output_file
+from .options.paths import check_apart, output_file
+from .options.scan_options import Frequency, Map, SoundSpeed, Temperature, Unit, given_of, input_scan
 from .output.terminal import AsJson, print_json, print_lines
-
-ACCEPTED = "the path of a scan in MATLAB 5 or 7.3, .npz, a zip of k-Wave outputs, or HDF5"
 
 
 def convert(
-    file: Annotated[Path, typer.Argument(help="Scan file; the format is detected from its content.")],
+    file: Annotated[Path, typer.Argument(help="Scan; the format is detected from its content.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset file to write (.h5).")],
+    map: Map = None,  # noqa: A002 - the name of the option
+    unit: Unit = None,
+    temperature: Temperature = None,
+    sound_speed: SoundSpeed = None,
+    frequency: Frequency = None,
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Convert a scan from another format (MATLAB, k-Wave, NumPy) into a dataset file.
+    """Convert a scan of another program into a dataset file.
 
-    Supported are MATLAB files with delta_tof and element_positions, or with time, transducerPositionsXY and
-    full_dataset; .npz files with the array names of the dataset format; and zip files of k-Wave outputs with
-    geometry.npz, object/*.h5 and water/*.h5. The service accepts these formats directly.
+    The documentation of scan files lists the formats with their variables and units: MATLAB, NumPy, k-Wave,
+    zea (OpenH-RF), openUSCT. They are detected by content, and the other commands accept them directly.
 
-    Example:  bentray convert scan.mat -o scan.h5
+    Own variables are named by --map, with a field of element_position, delta_tof, tof, sigma, object (the
+    traces), water, time, sampling_rate, t0, tx, rx, center_frequency, temperature, sound_speed, log_ratio
+    and valid.
+
+    Example:  bentray convert scan.mat -o scan.h5 --map element_position=pos --map delta_tof=dtof --unit mm
     """
-    source, target = input_file(file, ACCEPTED), output_file(output, force=force, suffix=".h5")
+    source, target = input_scan(file), output_file(output, force=force, suffix=".h5")
     check_apart({"output": target}, {"file": source})
+    given = given_of(map, unit, temperature, sound_speed, frequency)
 
     from bentray_workers.foreign_scans import convert_dataset
 
-    dataset = convert_dataset(source, target)
+    dataset = convert_dataset(source, target, given=given)
     summary: dict[str, Any] = {
         "file": str(source),
         "output": str(target),

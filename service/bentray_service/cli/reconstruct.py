@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options.paths import input_file, output_folder
+from .options.paths import output_folder
+from .options.scan_options import (
+    Frequency,
+    Map,
+    SoundSpeed,
+    Temperature,
+    Unit,
+    dataset_file,
+    given_of,
+    input_scan,
+)
 from .options.settings_options import Asked, settings_from, with_settings_options
 from .output.results import show_results, write_results
 from .output.terminal import AsJson, progress_bar, residual_note
@@ -22,7 +32,7 @@ if TYPE_CHECKING:
 
 @with_settings_options
 def reconstruct(
-    file: Annotated[Path, typer.Argument(help="Dataset file (HDF5, format uct-transmission).")],
+    file: Annotated[Path, typer.Argument(help="Dataset file, or a scan of another program.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
     asked: Asked,
     workers: Annotated[
@@ -33,26 +43,31 @@ def reconstruct(
             help="Worker processes; 1 runs in this process.",
         ),
     ] = None,
+    map: Map = None,  # noqa: A002 - the name of the option
+    unit: Unit = None,
+    temperature: Temperature = None,
+    sound_speed: SoundSpeed = None,
+    frequency: Frequency = None,
     as_json: AsJson = False,
 ) -> None:
     """Reconstruct a scan into OUTPUT/reconstruction.h5, .png and .json.
 
     Example:  bentray reconstruct scan.h5 -o result --rays curved --iterations 6
     """
-    source, folder = input_file(file), output_folder(output)
-    settings = settings_from(asked)
+    source, folder = input_scan(file), output_folder(output)
+    settings, given = settings_from(asked), given_of(map, unit, temperature, sound_speed, frequency)
 
     from bentray_workers.files.dataset import read_dataset
 
-    dataset = read_dataset(source, traces=False)
     started = time.perf_counter()
-    with progress_bar("Reconstructing") as step:
+    with dataset_file(source, given, folder) as scan, progress_bar("Reconstructing") as step:
+        dataset = read_dataset(scan, traces=False)
 
         def show(progress: Progress) -> None:
             rms = progress.history[-1].residual_rms_s if progress.history else None
             step(progress.done, progress.total, residual_note(rms) or progress.phase)
 
-        result = run(source, dataset, settings, workers, show)
+        result = run(scan, dataset, settings, workers, show)
     found = write_results(folder, result, dataset, time.perf_counter() - started, file=str(source))
     show_results(f"Reconstruction of {source.name}", found, as_json=as_json)
 

@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import gettempdir
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .options.paths import input_file, output_folder
+from .options.paths import output_folder
+from .options.scan_options import (
+    Frequency,
+    Map,
+    SoundSpeed,
+    Temperature,
+    Unit,
+    dataset_file,
+    given_of,
+    input_scan,
+)
 from .options.settings_options import Asked, settings_from, with_settings_options
 from .output.exit_codes import client_errors
 from .output.results import show_results, write_results
@@ -27,9 +38,7 @@ def submit(
     *,
     file: Annotated[
         Path | None,
-        typer.Argument(
-            help="Dataset file (HDF5, format uct-transmission).", show_default="with --batch, none"
-        ),
+        typer.Argument(help="Dataset file, or a scan of another program.", show_default="with --batch, none"),
     ] = None,
     asked: Asked,
     url: Annotated[str, typer.Option(help="Address of the service.")] = "http://127.0.0.1:8000",
@@ -68,6 +77,11 @@ def submit(
         ),
     ] = None,
     tls: Tls = None,
+    map: Map = None,  # noqa: A002 - the name of the option
+    unit: Unit = None,
+    temperature: Temperature = None,
+    sound_speed: SoundSpeed = None,
+    frequency: Frequency = None,
     as_json: AsJson = False,
 ) -> None:
     """Upload a scan, reconstruct it on a service and download the result.
@@ -101,7 +115,11 @@ def submit(
         )
     settings = settings_from(asked)
     if file is not None:
-        _submit(file, settings, url, output, wait=wait, as_json=as_json)
+        given = given_of(map, unit, temperature, sound_speed, frequency)
+        source = input_scan(file)
+        folder = None if output is None else output_folder(output)
+        with dataset_file(source, given, folder or Path(gettempdir())) as scan:
+            _submit(source, scan, settings, url, folder, wait=wait, as_json=as_json)
     if batch is not None and scheduler is not None:
         from .batch import submit_batch
 
@@ -109,16 +127,14 @@ def submit(
 
 
 def _submit(
-    file: Path, settings: Settings, url: str, output: Path | None, *, wait: bool, as_json: bool
+    source: Path, scan: Path, settings: Settings, url: str, folder: Path | None, *, wait: bool, as_json: bool
 ) -> None:
-    source = input_file(file)
-    folder = None if output is None else output_folder(output)
-
+    """Submit ``scan``, the dataset file made of ``source``."""
     from ..client import Client
 
     with client_errors(), Client(url, on_wait=remark) as client:
         with progress_bar("Uploading") as step:
-            dataset = client.upload(source, step)
+            dataset = client.upload(scan, step)
         job = client.submit(dataset.id, settings.to_dict())
         if job.plan is not None:
             remark(job.plan.why)
@@ -128,7 +144,7 @@ def _submit(
         if folder is not None:
             volume = client.download(job.volume or "", "hdf5", folder / "reconstruction.h5")
     if folder is not None:
-        _report(source, folder, volume, job, as_json)
+        _report(source, scan, folder, volume, job, as_json)
     elif as_json:
         print_json(job.model_dump(mode="json"))
     else:
@@ -142,12 +158,12 @@ def show_job(record: JobRecord, step: Step) -> None:
     step(progress.done, progress.total, note or progress.phase or record.state)
 
 
-def _report(source: Path, folder: Path, volume: Path, job: JobRecord, as_json: bool) -> None:
+def _report(source: Path, scan: Path, folder: Path, volume: Path, job: JobRecord, as_json: bool) -> None:
     from bentray_workers.files.dataset import read_dataset
     from bentray_workers.files.reconstruction import read_reconstruction
 
     # The ground truth is in the local file only.
-    dataset = read_dataset(source, traces=False)
+    dataset = read_dataset(scan, traces=False)
     result = read_reconstruction(volume)
     found = write_results(folder, result, dataset, job.seconds or 0.0, file=str(source), job=job.id)
     show_results(f"Reconstruction of {source.name}", found, as_json=as_json)

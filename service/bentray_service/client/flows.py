@@ -45,7 +45,8 @@ def upload(
         on_progress: called with ``(sent, total)``, bytes.
         kind: type of the file.
         resume: id of an interrupted upload, from ``ClientError.upload``.
-        metadata: ``title`` of a volume or mesh; ``spacing_m``, ``shape`` and ``dtype`` of a volume.
+        metadata: ``title`` of a volume or mesh; ``spacing_m``, ``shape`` and ``dtype`` of a volume;
+            ``map``, ``unit``, ``temperature_c``, ``sound_speed_mps`` and ``frequency_hz`` of a foreign scan.
 
     Returns:
         the record of the dataset, volume or mesh.

@@ -31,7 +31,8 @@ PACKING = 2
 
 # Accepted types, with a description of the formats.
 ACCEPTED = {
-    "dataset": "a scan as uct-transmission (HDF5), MATLAB 5 or 7.3, .npz of arrays, or zip of k-Wave outputs",
+    "dataset": "a scan as uct-transmission, zea or openUSCT (HDF5), MATLAB 5 or 7.3, .npz of arrays, or a "
+    "zip of k-Wave outputs",
     "volume": "a volume as NumPy (.npy), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype",
     "mesh": "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB",
 }
@@ -112,9 +113,9 @@ def convert_upload(
 
 
 def _dataset(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) -> dict[str, Any]:
-    from bentray_workers.foreign_scans import convert_dataset
+    from bentray_workers.foreign_scans import Given, convert_dataset
 
-    return record_of(convert_dataset(source, target, on_size=on_size))
+    return record_of(convert_dataset(source, target, on_size=on_size, given=Given.of(**given)))
 
 
 def _volume(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) -> dict[str, Any]:

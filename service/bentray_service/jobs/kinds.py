@@ -233,6 +233,8 @@ def field_links(field_id: str) -> dict[str, str]:
 
 
 def _describe(result: Reconstruction) -> Plain:
+    notes = [result.provenance.get("water"), advice_of(result) if result.trials else None]
+    advice = " ".join(filter(None, notes))
     return {
         "axes": ",".join("xyz"[: result.speed.ndim]),
         "shape": list(result.speed.shape),
@@ -240,7 +242,7 @@ def _describe(result: Reconstruction) -> Plain:
         "origin_m": [finite(value) for value in result.origin_m],
         "speed_range_mps": [float(result.speed.min()), float(result.speed.max())],
         "water_speed_mps": float(result.water_speed_mps),
-        "provenance": {**result.provenance, **({"advice": advice_of(result)} if result.trials else {})},
+        "provenance": {**result.provenance, **({"advice": advice} if advice else {})},
     }
 
 

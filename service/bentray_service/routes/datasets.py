@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Depends, Request, Response, status
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Request, Response, status
+from pydantic import Field
 
 from ..files.deletion import StoredItem
 from ..web.errors import problems
@@ -12,10 +15,12 @@ from .bodies import Limit, accept_media_types
 from .downloads import download, download_of
 from .models.records import DatasetList, DatasetRecord
 from .records import dataset_record
+from .upload_metadata import scan_given
 from .uploads import body_of, receive_upload
 
 HDF5 = "application/x-hdf5"
 MEDIA_TYPES = (HDF5, "application/octet-stream")
+NONE: list[str] = []
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
 router.include_router(quality.router)
@@ -29,10 +34,32 @@ router.include_router(quality.router)
     responses=problems(413, 415, 422, 503, 507),
 )
 async def upload_dataset(
-    request: Request, response: Response, service: Service, tenant: CallerTenant
+    request: Request,
+    response: Response,
+    service: Service,
+    tenant: CallerTenant,
+    map: Annotated[  # noqa: A002 - the name of the query parameter
+        list[Annotated[str, Field(max_length=300)]],
+        Query(
+            max_length=40,
+            description="Own variables of a MATLAB, HDF5 or NumPy file: FIELD=VARIABLE, as "
+            "element_position=pos; once for each.",
+        ),
+    ] = NONE,
+    unit: Annotated[
+        list[Annotated[str, Field(max_length=20)]],
+        Query(max_length=2, description="Unit of lengths and of times in the file, as mm and us."),
+    ] = NONE,
+    temperature_c: Annotated[float | None, Query(description="Temperature of the water, °C.")] = None,
+    sound_speed_mps: Annotated[float | None, Query(description="Speed of sound in the water, m/s.")] = None,
+    frequency_hz: Annotated[float | None, Query(description="Centre frequency, Hz.")] = None,
 ) -> DatasetRecord:
-    """Upload a scan. A separate process validates it and stores it in the canonical format."""
-    row = await receive_upload(request, service, tenant, service.datasets, {})
+    """Upload a scan. A separate process validates it and stores it in the canonical format.
+
+    The parameters state properties that a file of another program lacks.
+    """
+    given = scan_given(map, unit, temperature_c, sound_speed_mps, frequency_hz)
+    row = await receive_upload(request, service, tenant, service.datasets, given)
     record = dataset_record(row)
     response.headers["Location"] = record.links["self"]
     return record

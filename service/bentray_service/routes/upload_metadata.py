@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from bentray_kernels.errors import InvalidInput
@@ -17,13 +17,25 @@ LONGEST_TITLE = 200
 # Nodes along an axis of a volume of raw bytes.
 SIDE = Range(2, 2**31)
 FORM = "names, each with its value in base 64, separated by commas"
-KNOWN = ("kind", "title", "spacing_m", "shape", "dtype")
+KNOWN = (
+    "kind",
+    "title",
+    "spacing_m",
+    "shape",
+    "dtype",
+    "map",
+    "unit",
+    "temperature_c",
+    "sound_speed_mps",
+    "frequency_hz",
+)
 
 # Formats of text in requests, for the OpenAPI description. A space may follow a comma.
 _PAIR = r"[!-+\--~]+( ([A-Za-z0-9+/]{4})*([A-Za-z0-9+/]{2}==|[A-Za-z0-9+/]{3}=)?)?"
 METADATA = f"^({_PAIR}(, ?{_PAIR})*)?$"
 _DISTANCE = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?"
 SPACING = f"^{_DISTANCE}(, ?{_DISTANCE}, ?{_DISTANCE})?$"
+NUMBER = r"[+-]?([0-9]{1,15}\.?[0-9]{0,15}|\.[0-9]{1,15})([eE][+-]?[0-9]{1,2})?"
 _COUNT = r"[1-9][0-9]{0,9}"
 SHAPE = f"^{_COUNT}, ?{_COUNT}, ?{_COUNT}$"
 
@@ -63,7 +75,45 @@ def read_metadata(header: str) -> tuple[str, dict[str, Any]]:
         return what, volume_given(
             title, metadata.get("spacing_m"), metadata.get("shape"), metadata.get("dtype")
         )
-    return what, {}
+    variables, units = (metadata[name].split(",") if metadata.get(name) else [] for name in ("map", "unit"))
+    temperature_c, sound_speed_mps, frequency_hz = (
+        _number(name, metadata[name]) if metadata.get(name) else None
+        for name in ("temperature_c", "sound_speed_mps", "frequency_hz")
+    )
+    return what, scan_given(variables, units, temperature_c, sound_speed_mps, frequency_hz)
+
+
+def scan_given(
+    map: Sequence[str] = (),  # noqa: A002 - the name of the parameter of a request
+    unit: Sequence[str] = (),
+    temperature_c: float | None = None,
+    sound_speed_mps: float | None = None,
+    frequency_hz: float | None = None,
+) -> dict[str, Any]:
+    """What the user states about a scan, as arguments of ``Given.of``; absent values are left out.
+
+    Raises:
+        InvalidInput: as ``Given.of``.
+    """
+    given: dict[str, Any] = {
+        "map": list(map),
+        "unit": list(unit),
+        "temperature_c": temperature_c,
+        "sound_speed_mps": sound_speed_mps,
+        "frequency_hz": frequency_hz,
+    }
+    stated = {name: value for name, value in given.items() if value not in ([], None)}
+    if stated:
+        from bentray_workers.foreign_scans import Given
+
+        Given.of(**stated)
+    return stated
+
+
+def _number(field: str, text: str) -> float:
+    if not re.fullmatch(NUMBER, text):
+        raise InvalidInput(field, repr(text[:40]), "a number")
+    return float(text)
 
 
 def volume_given(title: str, spacing_m: str | None, shape: str | None, dtype: str | None) -> dict[str, Any]:

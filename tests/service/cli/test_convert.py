@@ -12,7 +12,7 @@ from typer.testing import Result
 
 from bentray_workers.files.dataset import read_dataset
 
-from ...workers.foreign_scans.scans import delta_tof, travel_times
+from ...workers.foreign_scans.scans import delta_tof, positions, travel_times
 
 
 def test_a_matlab_file_is_converted(bentray: Callable[..., Result], tmp_path: Path) -> None:
@@ -44,3 +44,38 @@ def test_a_file_is_not_converted_into_itself(bentray: Callable[..., Result], tmp
     result = bentray("convert", tmp_path / "scan.h5", "-o", tmp_path / "scan.h5", "--force")
     assert result.exit_code == 2
     assert (tmp_path / "scan.h5").read_bytes() == before
+
+
+def own_variables(path: Path) -> tuple[object, ...]:
+    """A file in mm and µs under own names; returns the options that describe it."""
+    own = {"pos": 1e3 * positions(), "dtof": 1e6 * delta_tof()}
+    savemat(path, own)
+    return ("--map", "element_position=pos", "--map", "delta_tof=dtof", "--unit", "mm", "--unit", "us")
+
+
+def test_own_variables_are_named_on_the_command_line(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    options = own_variables(tmp_path / "scan.mat")
+    words = ("convert", tmp_path / "scan.mat", "-o", tmp_path / "scan.h5")
+    assert "own names, e.g. --map element_position=NAME" in bentray(*words).stderr
+    assert "write m, or state the unit: --unit mm" in bentray(*words, *options[:4]).stderr
+    result = bentray(*words, *options, "--temperature", 24, "--frequency", 1e6)
+    assert result.exit_code == 0, result.stderr
+    dataset = read_dataset(tmp_path / "scan.h5")
+    np.testing.assert_allclose(dataset.delta_tof_s, delta_tof())
+    assert (dataset.water_temperature_c, dataset.center_frequency_hz) == (24.0, 1e6)
+
+
+def test_a_foreign_scan_is_reconstructed_and_its_assumption_comes_first(
+    bentray: Callable[..., Result], tmp_path: Path
+) -> None:
+    options = own_variables(tmp_path / "scan.mat")
+    quick = ("--nodes", 32, "--iterations", 1, "--rays", "straight", "--method", "sart", "--workers", 1)
+    words = ("reconstruct", tmp_path / "scan.mat", "-o", tmp_path / "out", *options, *quick)
+    result = bentray(*words)
+    assert result.exit_code == 0, result.stderr
+    first = " ".join(result.stdout.split()).partition(". ")[0]
+    assert first.startswith("The water temperature is not stated in the scan: 20 °C (1482.4 m/s) is assumed")
+    assert first.endswith("one degree more raises every speed by 3 m/s")
+    assert sorted(path.suffix for path in (tmp_path / "out").iterdir()) == [".h5", ".json", ".png"]
+    stated = bentray(*words, "--temperature", 20, "--json")
+    assert "water" not in json.loads(stated.stdout)["provenance"]

@@ -51,7 +51,7 @@ def test_a_bad_file_is_named(scan, tmp_path):
 
 @pytest.mark.parametrize("error", [RuntimeError("odd"), MemoryError()])
 def test_a_reader_that_breaks_is_the_fault_of_the_file(scan, tmp_path, monkeypatch, error):
-    def broken(source, target, on_size):
+    def broken(source, target, on_size, given):
         raise error
 
     monkeypatch.setattr("bentray_workers.foreign_scans.convert_dataset", broken)
@@ -60,7 +60,7 @@ def test_a_reader_that_breaks_is_the_fault_of_the_file(scan, tmp_path, monkeypat
 
 
 def test_a_full_disk_is_no_fault_of_the_file(scan, tmp_path, monkeypatch):
-    def full(source, target, on_size):
+    def full(source, target, on_size, given):
         raise OSError(errno.ENOSPC, "No space left on device", str(target))
 
     monkeypatch.setattr("bentray_workers.foreign_scans.convert_dataset", full)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import base64
 import io
 
 import numpy as np
 import pytest
 from scipy.io import savemat
 
-from ...workers.foreign_scans.scans import delta_tof, travel_times, waveforms, write_matlab73
+from bentray_kernels.errors import InvalidInput
+from bentray_service.routes.upload_metadata import read_metadata
+
+from ...workers.foreign_scans.scans import delta_tof, positions, travel_times, waveforms, write_matlab73
 
 BINARY = {"Content-Type": "application/octet-stream"}
 
@@ -51,3 +55,42 @@ def test_the_field_at_fault_is_named(start):
     assert answer.headers["content-type"] == "application/problem+json"
     assert answer.json()["field"] == "element_positions"
     assert answer.json()["found"] == "nothing"
+
+
+OWN = "map=element_position%3Dpos&map=delta_tof%3Ddtof&unit=mm&unit=us&temperature_c=24&frequency_hz=1e6"
+
+
+def own_variables() -> bytes:
+    return matlab({"pos": 1e3 * positions(), "dtof": 1e6 * delta_tof()})
+
+
+def test_own_variables_and_units_are_stated_in_the_request(start):
+    service = start()
+    refused = service.post("/v1/datasets", content=own_variables(), headers=BINARY)
+    assert refused.status_code == 422
+    assert "pos" in refused.json()["found"]
+    taken = service.post(f"/v1/datasets?{OWN}", content=own_variables(), headers=BINARY)
+    assert taken.status_code == 201, taken.text
+    assert taken.json()["water_speed_mps"] == pytest.approx(1494.1, abs=0.5)
+    assert "assumed" not in taken.json()["source"]
+    for query in ("unit=inch", "map=x%3Dy", "temperature_c=1e9", "temperature_c=x", "map=%00"):
+        wrong = service.post(f"/v1/datasets?{query}", content=own_variables(), headers=BINARY)
+        assert wrong.status_code == 422, query
+
+
+def test_they_are_metadata_of_a_resumable_upload():
+    def packed(**said: str) -> str:
+        return ",".join(f"{name} {base64.b64encode(text.encode()).decode()}" for name, text in said.items())
+
+    said = {"map": "element_position=pos,delta_tof=dtof", "unit": "mm,us", "temperature_c": "24"}
+    what, given = read_metadata(packed(kind="dataset", filename="scan.mat", **said))
+    assert (what, given["map"], given["unit"]) == (
+        "dataset",
+        ["element_position=pos", "delta_tof=dtof"],
+        ["mm", "us"],
+    )
+    assert given["temperature_c"] == 24.0
+    assert read_metadata(packed(kind="dataset")) == ("dataset", {})
+    for wrong in ({"temperature_c": "warm"}, {"unit": "inch"}, {"map": "pos"}):
+        with pytest.raises(InvalidInput):
+            read_metadata(packed(**wrong))

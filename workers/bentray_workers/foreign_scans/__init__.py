@@ -1,5 +1,6 @@
-"""Scans in foreign formats: MATLAB 5 and 7.3, NumPy archives, k-Wave; detected by content."""
+"""Scans in foreign formats, detected by content: MATLAB, NumPy, k-Wave, zea, openUSCT."""
 
-from .conversion import convert_dataset
+from .conversion import convert_dataset, is_upload_format
+from .given import Given
 
-__all__ = ["convert_dataset"]
+__all__ = ["Given", "convert_dataset", "is_upload_format"]

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-import zipfile
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from bentray_kernels.acquisition import Dataset
+from bentray_kernels.errors import InvalidInput
 
-from ..files.bounded_reading import rejecting_damage
 from ..files.dataset.copy import copy_dataset
 from ..files.dataset.read import trace_type
 from ..files.dataset.write import Piece, bytes_of, write_dataset
-from ..files.hdf5_reading import SIGNATURE, Limits, opened
-from . import matlab5, npz
+from ..files.hdf5_reading import Limits
 from .arrays import Arrays
-from .kwave import KWave, is_kwave
-from .layouts import layout_of
+from .given import POSITION, Given, GivenArrays
+from .layouts import named_layout
 from .matlab73 import Matlab73
+from .open_scan import OpenScan, open_scan
+from .readers import reader_of
+from .scan_reader import Layout
 
-# HDF5 may begin after a user block; that of MATLAB 7.3 has 512 bytes.
-USER_BLOCK = 512
-MATLAB73 = b"MATLAB 7.3 MAT-file"
+# The unit that ``check_plausible`` proposes.
+PROPOSED = re.compile(r"looks? like (\S+): write (?:m|s)$")
 
 
 def convert_dataset(
@@ -29,17 +30,19 @@ def convert_dataset(
     target: Path,
     limits: Limits | None = None,
     on_size: Callable[[int], None] = lambda size: None,
+    given: Given | None = None,
 ) -> Dataset:
     """Check a scan and write it as a canonical file, with one emission in memory at a time.
 
-    Accepted are the upload format, MATLAB 5 and 7.3, NumPy archives, and zips of k-Wave outputs, detected by
-    content. Other files are rejected as the upload format.
+    Accepted are the upload format and the formats of ``READERS``, detected by content. Other files are
+    rejected as the upload format.
 
     Args:
         source: of the scan.
         target: replaced atomically.
         limits: of HDF5 files; None: the defaults of ``Limits``.
         on_size: called before writing with the largest size of ``target`` without headers, bytes.
+        given: stated by the user: own names of variables, units, water and frequency.
 
     Returns:
         The dataset, with placeholders for traces.
@@ -48,33 +51,54 @@ def convert_dataset(
         InvalidInput: naming the first missing or wrong field, the value found and the accepted values.
         OSError: where the folder cannot be written to or the disk is full.
     """
-    with source.open("rb") as file:
-        start = file.read(USER_BLOCK + len(SIGNATURE))
-    if start.startswith(matlab5.START):
-        return _converted(matlab5.Matlab5(source), target, on_size)
-    if start.startswith(npz.START):
-        with rejecting_damage("file", npz.WHOLE):
-            archive = zipfile.ZipFile(source)
-        with archive:
-            many = is_kwave(archive.namelist())
-            return _converted(KWave(archive, target.parent) if many else npz.Npz(archive), target, on_size)
-    if start.startswith(MATLAB73) and start[USER_BLOCK:] == SIGNATURE:
-        with opened(source, limits or Limits()) as reader:
-            return _converted(Matlab73(reader), target, on_size)
-    if start.startswith(SIGNATURE):
-        with opened(source, limits or Limits()) as reader:
-            # Written by h5py or another tool for MATLAB users: without a user block or our format.
-            if reader.attribute("", "format") is None and _foreign(reader.names()):
-                return _converted(Matlab73(reader), target, on_size)
+    given = given or Given()
+    with open_scan(source, target.parent, limits) as scan:
+        if not scan.claims_upload_format() and not (scan.is_upload_format() and not given.variables):
+            arrays, layout = _read(scan, given)
+            return _write(arrays, layout, target, on_size)
+    if given:
+        accepted = "none: files in the upload format state their units, water and frequency"
+        raise InvalidInput("map, unit, temperature, speed or frequency", "given for this file", accepted)
     return copy_dataset(source, target, limits, on_size)
 
 
-def _foreign(names: tuple[str, ...]) -> bool:
-    return bool({"delta_tof", "element_positions", "full_dataset", "transducerPositionsXY"} & set(names))
+def is_upload_format(path: Path) -> bool:
+    """Whether a file is in the upload format, or in no known format, and needs no conversion."""
+    with open_scan(path, path.parent) as scan:
+        return scan.is_upload_format()
 
 
-def _converted(arrays: Arrays, target: Path, on_size: Callable[[int], None]) -> Dataset:
-    layout = layout_of(arrays)
+def _read(scan: OpenScan, given: Given) -> tuple[Arrays, Layout]:
+    """The arrays of a file and the dataset in them."""
+    if POSITION in given.variables:
+        # Own variables: no known layout has them.
+        if scan.arrays is None:
+            raise InvalidInput("map", "variables for this kind of file", "a MATLAB, HDF5 or NumPy file")
+        reads: Callable[[Arrays], Layout] = named_layout
+        own = scan.arrays
+        if isinstance(own, Matlab73) and not scan.is_matlab and not _of_matlab(scan, given):
+            own.in_python_order()
+    else:
+        reader = reader_of(scan)
+        reads, own = reader.layout, reader.read(scan)
+    arrays: Arrays = GivenArrays(own, given) if given else own
+    try:
+        return arrays, reads(arrays)
+    except InvalidInput as error:
+        proposed = PROPOSED.search(error.accepted)
+        if proposed is None:
+            raise
+        accepted = f"{error.accepted}, or state the unit: --unit {proposed[1].replace('µ', 'u')}"
+        raise InvalidInput(error.field, error.value, accepted) from None
+
+
+def _of_matlab(scan: OpenScan, given: Given) -> bool:
+    """Whether MATLAB wrote the variables of an HDF5 file without its header."""
+    assert scan.hdf5 is not None
+    return any(scan.hdf5.attribute(name, "MATLAB_class") is not None for name in given.variables.values())
+
+
+def _write(arrays: Arrays, layout: Layout, target: Path, on_size: Callable[[int], None]) -> Dataset:
     on_size(bytes_of(layout.dataset))
 
     def pieces(name: str, chunk: tuple[int, ...]) -> Iterator[Piece]:

@@ -18,15 +18,14 @@ from .arrays import Arrays, read_small
 USUAL_C = 20.0
 
 
-def water(arrays: Arrays) -> tuple[float, float | None, str]:
-    """Speed and temperature of water, and a note if they are assumed."""
+def water(arrays: Arrays) -> tuple[float, float | None, bool]:
+    """Speed and temperature of water, and whether they are assumed."""
     speed, temperature = (number(arrays, f"water/{name}") for name in ("sound_speed_mps", "temperature_c"))
     if speed is not None:
-        return speed, temperature, ""
+        return speed, temperature, False
     if temperature is not None:
-        return speed_from_temperature(temperature), temperature, ""
-    assumed = f"; water temperature not given, {USUAL_C:g} °C assumed"
-    return speed_from_temperature(USUAL_C), USUAL_C, assumed
+        return speed_from_temperature(temperature), temperature, False
+    return speed_from_temperature(USUAL_C), USUAL_C, True
 
 
 def truth(arrays: Arrays) -> Truth | None:

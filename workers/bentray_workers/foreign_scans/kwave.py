@@ -25,7 +25,10 @@ from bentray_kernels.errors import InvalidInput
 from ..files.bounded_reading import rejecting_damage as refusing_zip
 from ..files.hdf5_reading import Limits, Reader, opened, rejecting_damage
 from .arrays import LARGEST_ROW, LARGEST_TOTAL, LARGEST_WHOLE
+from .layouts import named_layout
 from .npz import Npz
+from .open_scan import OpenScan
+from .scan_reader import ScanReader, Variable
 from .zip_checks import WHOLE, check_zip
 
 GEOMETRY = "geometry.npz"
@@ -36,11 +39,6 @@ RATE = "acquisition/sampling_rate_hz"
 
 # Time steps of all outputs agree within this part.
 SAME_STEP = 1e-6
-
-
-def is_kwave(names: list[str]) -> bool:
-    """Whether a zip with these members holds outputs of k-Wave."""
-    return any(OUTPUT.fullmatch(name) for name in names)
 
 
 class KWave:
@@ -155,3 +153,28 @@ def _of(output: str) -> Iterator[None]:
         if error.field.startswith(output):
             raise
         raise InvalidInput(f"{output}: {error.field}", error.value, error.accepted) from None
+
+
+def _detect(scan: OpenScan) -> bool:
+    return scan.archive is not None and any(map(OUTPUT.fullmatch, scan.members))
+
+
+def _read(scan: OpenScan) -> KWave:
+    assert scan.archive is not None
+    return KWave(scan.archive, scan.scratch)
+
+
+READER = ScanReader(
+    title="Outputs of k-Wave (zip)",
+    about="One HDF5 output for each emission, in the order of `tx` by name, of a sensor mask; beside them "
+    "`geometry.npz`. k-Wave records in the order of its grid: `rx` lists the element of each receiver.",
+    variables=(
+        Variable("geometry.npz: element_position_m, tx, rx", "as above", "m", "geometry and order"),
+        Variable("object/*.h5: p", "(1, Nt, receivers) in HDF5", "Pa", "pressure"),
+        Variable("object/*.h5: dt", "number", "s", "time step"),
+        Variable("water/*.h5", "as object", "", "the same without the object", "no"),
+    ),
+    detect=_detect,
+    read=_read,
+    layout=named_layout,
+)

@@ -1,9 +1,8 @@
-"""Layouts of foreign files: from arrays by name to a dataset."""
+"""Layouts of plain arrays by name: from MATLAB, HDF5 or NumPy files to a dataset."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,37 +16,11 @@ from bentray_kernels.limits import check_size
 from ..files.dataset.format import NUMBERS, PAIR_ARRAYS
 from .arrays import Arrays, read_small
 from .fields import declared, indices, name_in_file, number, placeholder, required, truth, water
-from .zip_checks import plain_name
+from .open_scan import OpenScan
+from .scan_reader import Layout, ScanReader, Variable
 
 # Tolerance of the time axis, relative to its step.
 UNEVEN = 0.01
-
-
-@dataclass(frozen=True)
-class Layout:
-    """A dataset with placeholders for traces, and the names of the arrays with the traces."""
-
-    dataset: Dataset
-    traces: Mapping[str, str]
-
-
-def layout_of(arrays: Arrays) -> Layout:
-    """The dataset in the arrays.
-
-    Raises:
-        InvalidInput: naming the first missing or wrong array, and for an unknown layout.
-    """
-    names = set(arrays.names())
-    for marks, layout in LAYOUTS:
-        if marks & names:
-            return layout(arrays)
-    shown = ", ".join(sorted(filter(plain_name, names))[:8]) or "none"
-    raise InvalidInput(
-        "file",
-        f"{arrays.kind} with the arrays {shown}"[:160],
-        "delta_tof and element_positions; time, transducerPositionsXY and full_dataset; or the names of the "
-        "upload format",
-    )
 
 
 def _delta_tof(arrays: Arrays) -> Layout:
@@ -73,6 +46,25 @@ def _full_dataset(arrays: Arrays) -> Layout:
     if position.ndim != 2 or position.shape[0] != 2:
         raise InvalidInput("transducerPositionsXY", f"shape {position.shape}", "(2, N) numbers in m")
     position, count = position.T, position.shape[1]
+    samples, rate = _clock(arrays)
+    found = arrays.declared("full_dataset")
+    accepted = f"({samples}, {count}, {count}): Nt by Nrx by Ntx, of time and transducerPositionsXY"
+    if found is None:
+        raise InvalidInput("full_dataset", "nothing", accepted)
+    traces = {"object": "full_dataset"}
+    if arrays.declared("full_dataset_water") is not None:
+        traces["water"] = "full_dataset_water"
+    for name in traces.values():
+        shape = declared(arrays, name)[0]
+        if shape != (count, count, samples):
+            raise InvalidInput(name, f"shape {shape[::-1]}", accepted)
+    every = np.arange(count)
+    return Layout(_dataset(arrays, position, every, every, rate, traces), traces)
+
+
+def _clock(arrays: Arrays) -> tuple[int, dict[str, float]]:
+    """The number of samples in ``time``, and the sampling rate and time of the first sample."""
+    check_size("acquisition/wavelet", declared(arrays, "time")[0], "time")
     time = required(arrays, "time", "(Nt,) times of the samples in s").ravel()
     steps = np.diff(time)
     if (
@@ -82,23 +74,10 @@ def _full_dataset(arrays: Arrays) -> Layout:
         or np.abs(steps - steps.mean()).max() > UNEVEN * steps.mean()
     ):
         raise InvalidInput("time", f"{time.size} samples, not in even steps", "evenly rising times in s")
-    found = arrays.declared("full_dataset")
-    accepted = f"({time.size}, {count}, {count}): Nt by Nrx by Ntx, of time and transducerPositionsXY"
-    if found is None:
-        raise InvalidInput("full_dataset", "nothing", accepted)
-    traces = {"object": "full_dataset"}
-    if arrays.declared("full_dataset_water") is not None:
-        traces["water"] = "full_dataset_water"
-    for name in traces.values():
-        shape = declared(arrays, name)[0]
-        if shape != (count, count, time.size):
-            raise InvalidInput(name, f"shape {shape[::-1]}", accepted)
-    every = np.arange(count)
-    rate = {"sampling_rate_hz": 1.0 / float(steps.mean()), "t0_s": float(time[0])}
-    return Layout(_dataset(arrays, position, every, every, rate, traces), traces)
+    return time.size, {"sampling_rate_hz": 1.0 / float(steps.mean()), "t0_s": float(time[0])}
 
 
-def _named(arrays: Arrays) -> Layout:
+def named_layout(arrays: Arrays) -> Layout:
     """The names of the upload format, with their groups (``acquisition/tx``) or without (``tx``)."""
     position = required(
         arrays, name_in_file(arrays, "geometry/element_position_m"), "(elements, 2 or 3) numbers in m"
@@ -118,6 +97,12 @@ def _named(arrays: Arrays) -> Layout:
     if "object" not in traces and fields["tof_s"] is None and fields["delta_tof_s"] is None:
         raise InvalidInput("traveltime", "neither travel times nor traces", "delta_tof_s, tof_s or object")
     fields["t0_s"] = number(arrays, "acquisition/t0_s") or 0.0
+    if (
+        "object" in traces
+        and number(arrays, "acquisition/sampling_rate_hz") is None
+        and "time" in arrays.names()
+    ):
+        fields |= _clock(arrays)[1]
     return Layout(_dataset(arrays, position, tx, rx, fields, traces), traces)
 
 
@@ -133,13 +118,6 @@ FURTHER = {
 }
 FLAGS = {"mask/valid": "valid", "mask/roi": "roi"}
 
-# Arrays that identify a layout, in this order.
-LAYOUTS: tuple[tuple[set[str], Callable[[Arrays], Layout]], ...] = (
-    ({"delta_tof", "element_positions"}, _delta_tof),
-    ({"transducerPositionsXY", "full_dataset"}, _full_dataset),
-    ({"element_position_m", "geometry/element_position_m"}, _named),
-)
-
 
 def _dataset(
     arrays: Arrays,
@@ -152,6 +130,7 @@ def _dataset(
     """The dataset with water, frequency and truth of the file."""
     position = np.ascontiguousarray(position, dtype=np.float64)
     speed, temperature, assumed = water(arrays)
+    note = f"; water temperature not given, {temperature:g} °C assumed" if assumed else ""
     numbers = {name: number(arrays, f"{place}/{leaf}") for place, leaf, _, name in NUMBERS}
     waveform = None
     if traces:
@@ -170,10 +149,74 @@ def _dataset(
         rx=rx,
         water_speed_mps=speed,
         water_temperature_c=temperature,
+        water_temperature_assumed=assumed,
         waveform=waveform,
         truth=truth(arrays),
-        source=f"from {arrays.kind}{assumed}",
+        source=f"from {arrays.kind}{note}",
         **{name: value for name, value in known.items() if value is not None},
     )
     check_plausible(dataset)
     return dataset
+
+
+def _has(*names: str) -> Any:
+    return lambda scan: bool(scan.names & set(names))
+
+
+def _arrays(scan: OpenScan) -> Arrays:
+    assert scan.arrays is not None
+    return scan.arrays
+
+
+_WATER = (
+    Variable(
+        "sound_speed_mps or temperature_c", "number", "m/s, °C", "of the water; absent: 20 °C assumed", "no"
+    ),
+    Variable("center_frequency_hz", "number", "Hz", "centre frequency", "no"),
+)
+
+DELTA_TOF = ScanReader(
+    title="Travel times of open-UST (MATLAB, NumPy)",
+    about="MATLAB 5 or 7.3, or `.npz`; all elements emit and receive.",
+    variables=(
+        Variable("element_positions", "(N, 2)", "m", "positions of the elements"),
+        Variable("delta_tof", "(N, N)", "s", "arrival with the object minus arrival in water"),
+        *_WATER,
+    ),
+    detect=_has("delta_tof", "element_positions"),
+    read=_arrays,
+    layout=_delta_tof,
+)
+FULL_DATASET = ScanReader(
+    title="Traces of a ring (MATLAB)",
+    about="MATLAB 5 or 7.3, as of WaveformInversionUST and of r-Wave; all elements emit and receive. The "
+    "first sample is at `time(1)`.",
+    variables=(
+        Variable("time", "(Nt,)", "s", "times of the samples, equally spaced"),
+        Variable("transducerPositionsXY", "(2, N)", "m", "positions of the elements"),
+        Variable("full_dataset", "(Nt, Nrx, Ntx)", "any", "traces; Nrx and Ntx are N"),
+        Variable("full_dataset_water", "(Nt, Nrx, Ntx)", "any", "the same without the object", "no"),
+        *_WATER,
+    ),
+    detect=_has("transducerPositionsXY", "full_dataset"),
+    read=_arrays,
+    layout=_full_dataset,
+)
+NAMED = ScanReader(
+    title="The names of the upload format (NumPy, MATLAB)",
+    about="`.npz` of plain arrays, or MATLAB 5 or 7.3, under the names of the table above without their "
+    "groups (`tx`), in `.npz` also with them (`acquisition/tx`); attributes are arrays of one number. MATLAB "
+    "stores axes reversed, so that traces are (nt, nrx, ntx) there.",
+    variables=(
+        Variable("element_position_m", "(elements, 2 or 3)", "m", "positions of the elements"),
+        Variable("tx, rx", "(ntx,), (nrx,) integers", "", "emitting and receiving elements, counted from 0"),
+        Variable(
+            "delta_tof_s, tof_s or object", "(ntx, nrx) or (ntx, nrx, nt)", "s, any", "travel times or traces"
+        ),
+        Variable("sampling_rate_hz or time", "number or (nt,)", "Hz, s", "of the traces", "with traces"),
+        *_WATER,
+    ),
+    detect=_has("element_position_m", "geometry/element_position_m"),
+    read=_arrays,
+    layout=named_layout,
+)

@@ -1,15 +1,17 @@
-"""MATLAB files of version 7.3, which are HDF5: plain arrays of numbers by name."""
+"""Plain arrays of HDF5 files by name, as of MATLAB 7.3."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
+from ..files.dataset.counts import BLOCK_BYTES
 from ..files.hdf5_reading import Reader, rejecting_damage
 from .arrays import check_row
 
@@ -17,13 +19,18 @@ NUMBERS = "a plain array of real numbers"
 
 
 class Matlab73:
-    """The arrays of one file; see ``Arrays``. HDF5 stores them with reversed axes."""
+    """The arrays of one file; see ``Arrays``. MATLAB stores them with reversed axes.
 
-    kind = "a MATLAB 7.3 file"
+    Args:
+        reader: of the file.
+        is_matlab: whether the file has the header of MATLAB.
+    """
+
     reversed_axes = True
 
-    def __init__(self, reader: Reader) -> None:
+    def __init__(self, reader: Reader, *, is_matlab: bool = True) -> None:
         self._reader = reader
+        self.kind = "a MATLAB 7.3 file" if is_matlab else "an HDF5 file"
 
     def names(self) -> tuple[str, ...]:
         return self._reader.names()
@@ -45,7 +52,27 @@ class Matlab73:
         if stored is None:
             raise InvalidInput(name, "nothing", NUMBERS)
         check_row(name, stored.shape, stored.dtype)
-        for k in range(stored.shape[0]):
-            with rejecting_damage(name, NUMBERS):
-                row = np.asarray(stored[k])
-            yield row
+        yield from rows_of(stored, name)
+
+    def in_python_order(self) -> None:
+        """Treat the axes as stored: of a file that no MATLAB wrote, whose variables the user names."""
+        self.reversed_axes = False
+
+
+def rows_of(stored: h5py.Dataset, name: str, before: tuple[int, ...] = ()) -> Iterator[NDArray[Any]]:
+    """The rows of an array along one axis, in blocks, so that a chunk is decompressed once or few times.
+
+    Args:
+        stored: checked array, whose rows fit into the memory.
+        name: for errors.
+        before: indices of the axes before that of the rows.
+    """
+    axis = len(before)
+    count = stored.shape[axis]
+    row_bytes = max(1, stored.dtype.itemsize * int(np.prod(stored.shape[axis + 1 :], dtype=np.int64)))
+    chunk = 1 if stored.chunks is None else stored.chunks[axis]
+    block = max(1, min(chunk, BLOCK_BYTES // row_bytes))
+    for begin in range(0, count, block):
+        with rejecting_damage(name, NUMBERS):
+            rows = np.asarray(stored[(*before, slice(begin, begin + block))])
+        yield from rows

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from distributed import Client
 
+from bentray_kernels.acquisition.water import describe_assumption
 from bentray_kernels.task_graph import Pool, run, run_resumable
 from bentray_kernels.tomography import Progress, Reconstruction, Settings, Trial
 from bentray_kernels.tomography.guided_picking import same_picks
@@ -75,6 +76,10 @@ def reconstruct(
         path, findings, chosen, trials = _pick_with_guides(job, settings, progress)
         result = _reconstruct_picked(job, path, chosen, progress)
         result = replace(result, trials=trials or result.trials)
+    scan = read_dataset(dataset_path, traces=False)
+    if scan.water_temperature_assumed and scan.water_temperature_c is not None:
+        note = describe_assumption(scan.water_temperature_c)
+        result = replace(result, provenance={**result.provenance, "water": note})
     if not settings.picking.examine and not findings.findings:
         return result
     quality = findings.words(stacked=result.speed.ndim == 3)

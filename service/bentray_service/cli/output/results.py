@@ -47,11 +47,16 @@ def write_results(
 
 
 def show_results(title: str, found: dict[str, Any], *, as_json: bool) -> None:
-    """Print the summary table, the choice of ``auto`` and the paths; or all metrics as JSON."""
+    """Print the summary table, the choice of ``auto`` and the paths; or all metrics as JSON.
+
+    An assumption about the water comes first, since it offsets all speeds.
+    """
     from .figures import summary
 
     if as_json:
         print_json(found)
         return
+    if "water" in found["provenance"]:
+        print_lines([found["provenance"]["water"]])
     print_table(title, ("figure", "value"), summary(found))
     print_lines([*([found["reason"]] if found["reason"] else []), *found["outputs"].values()])

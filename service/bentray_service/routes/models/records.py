@@ -109,7 +109,9 @@ class JobRecord(BaseModel):
     plan: PlanRecord | None = Field(
         description="Of a reconstruction or a simulation; null for jobs of earlier versions."
     )
-    advice: str | None = Field(description="Method chosen by auto, and the reason.")
+    advice: str | None = Field(
+        description="Method chosen by auto, and the reason; and whether the water was assumed."
+    )
     progress: ProgressRecord
     history: list[SweepRecord] = Field(description="Iterations so far; a long history is thinned evenly.")
     volume: str | None = Field(

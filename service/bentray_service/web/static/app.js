@@ -96,6 +96,17 @@ async function fillDefaults() {
   }
 }
 
+// What the form states about a file of another program.
+function scanAddress() {
+  const query = new URLSearchParams();
+  for (const [name, value] of new FormData(at("own"))) {
+    for (const one of value.split(",")) {
+      if (one.trim()) query.append(name, one.trim());
+    }
+  }
+  return `/v1/datasets?${query}`;
+}
+
 async function health() {
   const sign = at("health");
   try {
@@ -109,7 +120,11 @@ async function health() {
   setTimeout(health, 15000);
 }
 
-uploads("scan", () => "/v1/datasets", "application/x-hdf5", (dataset) => loadDatasets(dataset.id));
+const sendAgain = uploads("scan", scanAddress, "application/x-hdf5", (dataset) => loadDatasets(dataset.id));
+at("own").addEventListener("submit", (event) => {
+  event.preventDefault();
+  sendAgain();
+});
 watchGlass(refresh);
 watchMeshes(refresh);
 at("dataset").addEventListener("change", showFacts);

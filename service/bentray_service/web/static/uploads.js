@@ -3,11 +3,16 @@ import { upload } from "./api.js";
 import { at } from "./dom.js";
 
 
-// The elements are prefix-drop, prefix-file, prefix-upload, prefix-name, prefix-bar and prefix-error.
+// The elements are prefix-drop, prefix-file, prefix-upload, prefix-name, prefix-bar and prefix-error; a part prefix-own,
+// if any, is opened when a file is refused. Returns a function that sends the last file again.
 export function uploads(prefix, addressOf, mediaType, onStored) {
   const part = (name) => at(`${prefix}-${name}`);
 
+  let last = null;
+
   async function send(file) {
+    last = file;
+    if (part("again")) part("again").disabled = false;
     part("error").hidden = true;
     part("upload").hidden = part("bar").hidden = false;
     part("name").textContent = `Sending ${file.name}`;
@@ -24,6 +29,7 @@ export function uploads(prefix, addressOf, mediaType, onStored) {
       part("upload").hidden = true;
       part("error").textContent = error.message;
       part("error").hidden = false;
+      if (part("own")) part("own").open = true;
     } finally {
       part("file").value = "";
     }
@@ -42,4 +48,5 @@ export function uploads(prefix, addressOf, mediaType, onStored) {
     if (event.dataTransfer.files.length) send(event.dataTransfer.files[0]);
   });
   part("file").addEventListener("change", (event) => event.target.files.length && send(event.target.files[0]));
+  return () => last && send(last);
 }

@@ -85,6 +85,7 @@ def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) ->
         rx=rx,
         water_speed_mps=speed,
         water_temperature_c=temperature,
+        water_temperature_assumed=bool(reader.number("water", "temperature_assumed", "0 or 1") or 0.0),
         element_normal=_floats(reader, "geometry/element_normal", "numbers, one row an element"),
         array_type=reader.text("geometry", "array_type") or "ring",
         t0_s=reader.number("acquisition", "t0_s", "s") or 0.0,

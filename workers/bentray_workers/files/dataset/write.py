@@ -87,6 +87,8 @@ def _write(file: h5py.File, dataset: Dataset, pieces: Pieces | None) -> None:
     water.attrs["sound_speed_mps"] = dataset.water_speed_mps
     if dataset.water_temperature_c is not None:
         water.attrs["temperature_c"] = dataset.water_temperature_c
+    if dataset.water_temperature_assumed:
+        water.attrs["temperature_assumed"] = 1
     for place, name in PAIR_ARRAYS.items():
         if getattr(dataset, name) is not None:
             group, leaf = place.split("/")

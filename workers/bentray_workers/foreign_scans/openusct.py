@@ -1,0 +1,112 @@
+"""Scans of openUSCT: HDF5 with ``geometry/element_pos`` and ``acquisition/data``.
+
+Source:
+    ``software/schema/README.md`` of github.com/Jerome-Graves/openUSCT, format version 1.0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.errors import InvalidInput
+
+from ..files.hdf5_reading import Reader
+from .layouts import named_layout
+from .matlab73 import rows_of
+from .open_scan import OpenScan
+from .scan_reader import ScanReader, Variable
+from .streamed_scan import StreamedScan, Traces
+
+POSITION, DATA, EMITTERS = "geometry/element_pos", "acquisition/data", "acquisition/tx_elements"
+DATA_SHAPE = "(n_tx, n_samples, n_rx) numbers"
+MAJOR = "1."
+
+
+def _detect(scan: OpenScan) -> bool:
+    return scan.hdf5 is not None and scan.hdf5.has(POSITION) and scan.hdf5.has(DATA)
+
+
+def _read(scan: OpenScan) -> StreamedScan:
+    assert scan.hdf5 is not None
+    reader = scan.hdf5
+    version = reader.text("", "format_version")
+    if version is not None and not version.startswith(MAJOR):
+        raise InvalidInput("@format_version", repr(version), "version 1 of openUSCT")
+    data = reader.checked(DATA, "f", DATA_SHAPE)
+    assert data is not None
+    if data.ndim != 3 or 0 in data.shape:
+        raise InvalidInput(DATA, f"shape {data.shape}", DATA_SHAPE)
+    emissions, samples, receivers = data.shape
+    position = _small(reader, POSITION, "f", "(N, 2 or 3) numbers in m", 3 * receivers)
+    if position is None or position.ndim != 2 or len(position) != receivers:
+        found = "nothing" if position is None else f"shape {position.shape}"
+        raise InvalidInput(POSITION, found, f"({receivers}, 2 or 3), as many as receivers in {DATA}")
+    emitters = _small(reader, EMITTERS, "iu", "(n_tx,) integers", emissions)
+    if emitters is not None and emitters.shape != (emissions,):
+        raise InvalidInput(EMITTERS, f"shape {emitters.shape}", f"({emissions},), as of {DATA}")
+    rate = reader.number("acquisition", "sample_rate_hz", "Hz")
+    if rate is None:
+        raise InvalidInput("acquisition@sample_rate_hz", "nothing", "a rate in Hz")
+    # The speed of the medium between the array and the object, with which openUSCT images are made.
+    numbers = {
+        "acquisition/sampling_rate_hz": rate,
+        "acquisition/center_frequency_hz": reader.number("acquisition", "tx_centre_freq_hz", "Hz")
+        or reader.number("geometry", "centre_freq_hz", "Hz"),
+        "water/sound_speed_mps": reader.number("acquisition", "nominal_speed_m_s", "m/s"),
+        "geometry/radius_m": reader.number("geometry", "radius_m", "m"),
+    }
+
+    def traces() -> Iterator[NDArray[Any]]:
+        for emission in rows_of(data, DATA):
+            yield np.ascontiguousarray(emission.T)
+
+    return StreamedScan(
+        "openUSCT",
+        {
+            "geometry/element_position_m": position,
+            "acquisition/tx": np.arange(emissions) if emitters is None else emitters,
+            "acquisition/rx": np.arange(receivers),
+            **{place: np.array(number) for place, number in numbers.items() if number is not None},
+        },
+        {"waveform/object": Traces((emissions, receivers, samples), data.dtype, traces)},
+    )
+
+
+def _small(reader: Reader, path: str, kinds: str, accepted: str, most: int) -> NDArray[Any] | None:
+    """An array whose size is checked before it is read."""
+    stored = reader.checked(path, kinds, accepted)
+    if stored is None:
+        return None
+    if math.prod(stored.shape) > most:
+        raise InvalidInput(path, f"shape {stored.shape}", accepted)
+    return reader.required(path, kinds, accepted)
+
+
+READER = ScanReader(
+    title="openUSCT (HDF5)",
+    about="Schema 1.0 of `software/schema` in github.com/Jerome-Graves/openUSCT. One element emits at a "
+    "time. Attributes are marked with @. The ground truth of a simulation is not read.",
+    variables=(
+        Variable("/geometry/element_pos", "(N, 2 or 3)", "m", "positions of the elements"),
+        Variable("/acquisition/data", "(n_tx, n_samples, n_rx) float32", "any", "traces; N is n_rx"),
+        Variable("/acquisition @sample_rate_hz", "number", "Hz", "sampling rate"),
+        Variable(
+            "/acquisition/tx_elements",
+            "(n_tx,) integers",
+            "",
+            "emitting elements, from 0; absent: the first n_tx",
+            "no",
+        ),
+        Variable("/acquisition @tx_centre_freq_hz", "number", "Hz", "centre frequency", "no"),
+        Variable("/acquisition @nominal_speed_m_s", "number", "m/s", "speed in the coupling medium", "no"),
+        Variable("/geometry @radius_m", "number", "m", "radius of the ring", "no"),
+    ),
+    detect=_detect,
+    read=_read,
+    layout=named_layout,
+)
