@@ -66,7 +66,8 @@ class Compute:
         """Plan the reconstruction of a dataset on the connected workers.
 
         Args:
-            counts: from ``files.dataset.record.record_of``; None: they are read from the file.
+            counts: from ``files.dataset.record.record_of``; None, or without a centre frequency: they
+                are read from the file.
             path: of the file.
             settings: of the reconstruction.
 
@@ -74,7 +75,9 @@ class Compute:
             InvalidInput: when no worker has enough memory or the required resource.
         """
         capacities = self._known(lambda client: probed_capacities(client, settings))
-        known = counts_in(self._fetch(path)) if counts is None else DatasetCounts(**counts)
+        known = None if counts is None else DatasetCounts(**counts)
+        if known is None or (known.samples and known.frequency_hz is None):
+            known = counts_in(self._fetch(path))
         return planning.plan(known.summary(settings), settings, capacities).to_dict()
 
     def plan_simulation(self, request: PhantomScan) -> dict[str, Any]:

@@ -224,6 +224,12 @@ class Dataset:
             slice_z_m=None,
         )
 
+    def in_water(self, speed_mps: float) -> Dataset:
+        """The same scan in water of a measured speed, m/s."""
+        return replace(
+            self, water_speed_mps=speed_mps, water_temperature_c=None, water_temperature_assumed=False
+        )
+
     def differential_tof(self) -> Floats:
         """Object minus water travel time, (…, ntx, nrx), s; NaN where missing, invalid or tx equals rx.
 

@@ -57,11 +57,14 @@ def reconstruct(
     source, folder = input_scan(file), output_folder(output)
     settings, given = settings_from(asked), given_of(map, unit, temperature, sound_speed, frequency)
 
+    from bentray_kernels.tomography.requirements import check_scan
     from bentray_workers.files.dataset import read_dataset
+    from bentray_workers.files.dataset.traces import trace_samples
 
     started = time.perf_counter()
     with dataset_file(source, given, folder) as scan, progress_bar("Reconstructing") as step:
         dataset = read_dataset(scan, traces=False)
+        check_scan(dataset, settings, trace_samples(scan))
 
         def show(progress: Progress) -> None:
             rms = progress.history[-1].residual_rms_s if progress.history else None

@@ -130,7 +130,13 @@ def _submit(
     source: Path, scan: Path, settings: Settings, url: str, folder: Path | None, *, wait: bool, as_json: bool
 ) -> None:
     """Submit ``scan``, the dataset file made of ``source``."""
+    from bentray_kernels.tomography.requirements import check_scan
+    from bentray_workers.files.dataset import read_dataset
+    from bentray_workers.files.dataset.traces import trace_samples
+
     from ..client import Client
+
+    check_scan(read_dataset(scan, traces=False), settings, trace_samples(scan))
 
     with client_errors(), Client(url, on_wait=remark) as client:
         with progress_bar("Uploading") as step:

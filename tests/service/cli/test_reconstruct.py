@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ from typer.testing import Result
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography.requirements import check_scan
 from bentray_service.cli.reconstruct import useful_workers
 from bentray_workers.files.reconstruction import read_reconstruction
 
@@ -121,6 +124,35 @@ def test_there_are_as_many_workers_as_have_work_and_cores(
 def test_a_volume_of_one_height_is_refused_before_any_worker_starts() -> None:
     with pytest.raises(InvalidInput, match="decomposition"):
         useful_workers(heights(1), Settings(decomposition="volume", method="gauss-newton"))
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        (Settings(method="waveform"), "waveform' for a scan without traces"),
+        (Settings.of(amplitudes="ratio"), "waveform/object"),
+        (Settings(roi=True), "mask/roi"),
+        (Settings(speed_bounds_mps=(1600.0, 1800.0)), "speed_bounds_mps"),
+        (Settings(decomposition="volume"), "decomposition"),
+    ],
+)
+def test_what_the_header_shows_is_refused_before_anything_starts(settings: Settings, field: str) -> None:
+    with pytest.raises(InvalidInput, match=field):
+        check_scan(heights(1), settings, 0)
+
+
+def test_that_check_needs_no_compiled_code() -> None:
+    found = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import sys, bentray_kernels.tomography.requirements as _; print(*sys.modules)",
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert not {"numba", "scipy", "distributed"} & set(found.stdout.split())
 
 
 def spoil(path: Path, change: Callable[[h5py.File], None]) -> Path:

@@ -17,7 +17,7 @@ from bentray_kernels.tomography.waveform.waveform_problem import WaveProblem
 from bentray_kernels.tomography.waveform.waveform_settings import WaveSettings
 
 from ..cluster.job_cancellation import check_job_active
-from ..files.dataset import read_dataset
+from ..files.dataset.scan import read_scan
 from ..files.dataset.traces import open_slice
 from ..files.findings import read_findings
 from ..files.reference import with_reference
@@ -73,7 +73,7 @@ def _problem(scan: FileScan, index: int, stage: int) -> Problem:
 @lru_cache(maxsize=2)
 def read_once(path: Path, stamp: int) -> Dataset:
     """A dataset without its traces; ``stamp`` distinguishes a rewritten file from the old one."""
-    return read_dataset(path, traces=False)
+    return read_scan(path)
 
 
 # Two jobs may alternate; more would cost memory, since a problem holds the traces of the object.

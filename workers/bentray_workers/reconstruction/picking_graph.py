@@ -21,14 +21,14 @@ from bentray_kernels.acquisition.picking.first_arrivals import (
     screen_times,
 )
 from bentray_kernels.acquisition.quality import Finding
+from bentray_kernels.acquisition.quality.chords import examine_chords
 from bentray_kernels.acquisition.quality.correction import apply, stacked
-from bentray_kernels.acquisition.quality.estimated_water import find_estimated_water
+from bentray_kernels.acquisition.quality.estimated_water import estimate_from_pulses
 from bentray_kernels.acquisition.quality.examination import check_times
 from bentray_kernels.acquisition.quality.recording import Measured, check_traces
 from bentray_kernels.acquisition.reference import (
     ChordPulses,
     WaterChords,
-    estimate_reference,
     find_water_chords,
     read_pulses,
 )
@@ -98,6 +98,13 @@ class EmissionPicks(NamedTuple):
     delta: Floats
     sigma: Floats
     ratio: Floats | None
+
+
+class ExaminedChords(NamedTuple):
+    """Chords of a slice through water, and the findings in its traces."""
+
+    findings: tuple[Finding, ...]
+    chords: WaterChords
 
 
 class PickingSource(NamedTuple):
@@ -220,7 +227,7 @@ class PickingGraph:
             self._findings[index] = result
             return self._chords(index) if self._estimates else self._picking(index)
         if task.function is find_chords:
-            return self._each_part(read_chords, index, self._findings[index], result)
+            return self._each_part(read_chords, index, result)
         if task.function is estimate_slice_water:
             self._findings[index] = result
             return self._picking(index)
@@ -241,11 +248,11 @@ class PickingGraph:
             if not self._examines:
                 return self._chords(index)
             return [Task(examine_slice, (self._source, index, parts), keep_on_worker=True)]
-        arguments = self._source, index, self._findings[index]
         if task.function is read_chords:
-            chords = task.arguments[3]
-            return [Task(estimate_slice_water, (*arguments, chords, parts), keep_on_worker=True)]
-        return [Task(finish_slice, (*arguments, parts), keep_on_worker=True)]
+            found = task.arguments[2]
+            return [Task(estimate_slice_water, (self._source, index, found, parts), keep_on_worker=True)]
+        arguments = self._source, index, self._findings[index], parts
+        return [Task(finish_slice, arguments, keep_on_worker=True)]
 
     def _chords(self, index: int) -> list[Task]:
         """The task that finds the chords through water of a slice."""
@@ -286,35 +293,35 @@ def examine_slice(source: PickingSource, index: int, parts: list[Measured]) -> t
 
 def find_chords(
     source: PickingSource, index: int, findings: tuple[Finding, ...], parts: list[Measured]
-) -> WaterChords:
-    """Task: the chords of a slice through water, from which its water shot is estimated."""
+) -> ExaminedChords:
+    """Task: the chords of a slice through water, from which its water shot is estimated, and all findings."""
     one = apply(source.dataset.slice(index), findings)
+    measures = Measured.joined(parts).object
+    if source.examine:
+        found, chords = examine_chords(one, measures)
+        return ExaminedChords((*findings, *_usable(source, index, found)), chords)
     assert one.center_frequency_hz is not None
-    return find_water_chords(one, Measured.joined(parts).object.strongest_s, 1.0 / one.center_frequency_hz)
+    return ExaminedChords(
+        findings, find_water_chords(one, measures.strongest_s, 1.0 / one.center_frequency_hz)
+    )
 
 
-def read_chords(
-    source: PickingSource, index: int, findings: tuple[Finding, ...], chords: WaterChords, part: range
-) -> ChordPulses:
+def read_chords(source: PickingSource, index: int, found: ExaminedChords, part: range) -> ChordPulses:
     """Task: pulses of the chords through water in a batch of emissions."""
-    with source.slice(index, findings) as one:
+    with source.slice(index, found.findings) as one:
         assert one.center_frequency_hz is not None
-        return read_pulses(one, part, chords, 1.0 / one.center_frequency_hz)
+        return read_pulses(one, part, found.chords, 1.0 / one.center_frequency_hz)
 
 
 def estimate_slice_water(
-    source: PickingSource,
-    index: int,
-    findings: tuple[Finding, ...],
-    chords: WaterChords,
-    parts: list[ChordPulses],
+    source: PickingSource, index: int, found: ExaminedChords, parts: list[ChordPulses]
 ) -> tuple[Finding, ...]:
     """Task: estimate the water shot of a slice and write it; the findings with what was estimated."""
-    one = apply(source.dataset.slice(index), findings)
-    assert one.center_frequency_hz is not None
-    reference = estimate_reference(one, chords, ChordPulses.joined(parts), 1.0 / one.center_frequency_hz)
+    one = apply(source.dataset.slice(index), found.findings)
+    pulses = ChordPulses.joined(parts)
+    later, reference = estimate_from_pulses(one, found.chords, pulses, examine=source.examine)
     write_reference(reference_path(source.folder, index), reference)
-    return (*findings, find_estimated_water(one, reference))
+    return (*found.findings, *_usable(source, index, later))
 
 
 def pick_emissions(

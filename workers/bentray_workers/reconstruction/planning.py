@@ -10,6 +10,7 @@ from typing import Any, Literal
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import WIDTH_M
 from bentray_kernels.tomography.model_selection.selection import CANDIDATES
+from bentray_kernels.tomography.requirements import check_waveform
 from bentray_kernels.tomography.settings import LEAST_NODES, Settings
 from bentray_kernels.tomography.stage_graphs import BATCH
 
@@ -103,6 +104,9 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     for method in methods:
         for name, size in call_bytes(scan, method).items():
             calls[name] = max(size, calls.get(name, 0))
+    if settings.method == "waveform":
+        samples = 0 if scan.traces is None else scan.traces.samples
+        check_waveform(settings, samples, scan.slices, in_space=scan.in_space)
     # Candidates of 3-D arrays are validated by times alone.
     traces = None if scan.in_space and settings.method == "auto" else scan.traces
     refining = budgeted(traces, scan.width_m, scan.slices, settings)

@@ -10,7 +10,7 @@ from typing import Any
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.calibration import Calibration, calibrate, water_times
-from bentray_kernels.acquisition.quality import Report, examine_slices
+from bentray_kernels.acquisition.quality import Finding, Report, examine_slices
 from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.picker_names import DEFAULT_PICKER
@@ -18,6 +18,7 @@ from bentray_kernels.picker_names import DEFAULT_PICKER
 from ..cluster.task_cancellation import cancellation_check
 from ..files.dataset import Limits, read_dataset
 from ..files.dataset.read import NUMERIC, TRACES
+from ..files.dataset.scan import read_scan, spectrum_of
 from ..files.dataset.traces import open_slice
 from ..files.hdf5_reading import opened
 
@@ -64,7 +65,7 @@ def calibrate_file(
     Raises:
         InvalidInput: as ``examine_file``, and for a scan without a water shot.
     """
-    whole = read_dataset(path, traces=False)
+    whole = read_scan(path)
     quality = _examined(path, whole, picker, progress)
     if quality.picked is None:
         return quality, None
@@ -93,7 +94,7 @@ def examine_file(
     """
     if largest_bytes is not None:
         _check_size(path, largest_bytes)
-    return _examined(path, read_dataset(path, traces=False), picker, progress)
+    return _examined(path, read_scan(path), picker, progress)
 
 
 def _examined(path: Path, whole: Dataset, picker: str, progress: OnEmission | None) -> Quality:
@@ -101,11 +102,23 @@ def _examined(path: Path, whole: Dataset, picker: str, progress: OnEmission | No
     from ..images.quality_page import quality_png
 
     examined = examine_slices(whole, _slices(path, whole), picker, progress)
+    if frequency := _estimated_frequency(path):
+        findings = (frequency, *examined.report.findings)
+        examined = replace(examined, report=replace(examined.report, findings=findings))
     of_slices = [f.slice for f in examined.report.findings]
     worst = max(set(of_slices), key=of_slices.count, default=0)
     with open_slice(path, whole, worst) as one:
         page = quality_png(one, examined, worst if whole.slice_z_m is not None else None)
     return Quality(examined.report.to_dict(), page, examined.picked, examined.report)
+
+
+def _estimated_frequency(path: Path) -> Finding | None:
+    """A finding if the file has no centre frequency, and it was estimated."""
+    spectrum = spectrum_of(path, read_dataset(path, traces=False))
+    if spectrum is None:
+        return None
+    accepted, value = "acquisition@center_frequency_hz", spectrum.center_frequency_hz
+    return Finding("centre frequency", spectrum.summary, accepted, "reported", value=value, unit="Hz")
 
 
 def _slices(path: Path, whole: Dataset) -> Iterator[Dataset]:

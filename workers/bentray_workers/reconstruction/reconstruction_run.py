@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from distributed import Client
 
+from bentray_kernels.acquisition.quality.water_speed import WATER_SPEED, water_summary
 from bentray_kernels.acquisition.water import describe_assumption
 from bentray_kernels.task_graph import Pool, run, run_resumable
 from bentray_kernels.tomography import Progress, Reconstruction, Settings, Trial
@@ -25,6 +26,7 @@ from ..cluster.fair_shares import Share
 from ..cluster.resources import RECONSTRUCTION
 from ..cluster.task_pool import open_pool
 from ..files.dataset import read_dataset
+from ..files.dataset.scan import read_scan, spectrum_of
 from ..files.dataset.traces import lacks_water, trace_samples
 from ..files.findings import ScanFindings, read_findings
 from ..files.reconstruction import write_reconstruction
@@ -76,14 +78,30 @@ def reconstruct(
         path, findings, chosen, trials = _pick_with_guides(job, settings, progress)
         result = _reconstruct_picked(job, path, chosen, progress)
         result = replace(result, trials=trials or result.trials)
-    scan = read_dataset(dataset_path, traces=False)
-    if scan.water_temperature_assumed and scan.water_temperature_c is not None:
-        note = describe_assumption(scan.water_temperature_c)
-        result = replace(result, provenance={**result.provenance, "water": note})
-    if not settings.picking.examine and not findings.findings:
-        return result
-    quality = findings.words(stacked=result.speed.ndim == 3)
-    return replace(result, provenance={**result.provenance, "quality": quality})
+        estimated = _estimated(job, findings)
+    if settings.picking.examine or findings.findings:
+        estimated["quality"] = findings.words(stacked=result.speed.ndim == 3)
+    return replace(result, provenance={**result.provenance, **estimated})
+
+
+def _estimated(job: _Job, findings: ScanFindings) -> dict[str, str]:
+    """Sentences of the provenance about what was estimated from the scan: water speed and pulse."""
+    scan = read_dataset(job.scan, traces=False)
+    estimated = {}
+    spectrum = spectrum_of(job.scan, scan)
+    if spectrum is not None:
+        estimated["pulse"] = spectrum.summary
+    shot = reference_path(job.folder, 0)
+    if shot.exists():
+        reference = read_reference(shot)
+        estimated["water"] = water_summary(scan, reference.speed_mps, reference.speed_sigma_mps)
+    else:
+        of_water = next((one for one in findings.findings if one.check == WATER_SPEED), None)
+        if of_water is not None:
+            estimated["water"] = f"{of_water.found}, {of_water.action}"
+        elif scan.water_temperature_assumed and scan.water_temperature_c is not None:
+            estimated["water"] = describe_assumption(scan.water_temperature_c)
+    return estimated
 
 
 class _Job(NamedTuple):
@@ -182,7 +200,7 @@ def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _Jo
             report()
 
     return run_reconstruction(
-        read_dataset(path, traces=False),
+        read_scan(path),
         settings,
         lambda plan, part: FileScan(path, stamp, plan, part),
         run_graphs,

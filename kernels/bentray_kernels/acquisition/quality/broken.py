@@ -46,12 +46,17 @@ def find_clipped(dataset: Dataset, measures: Measures, which: str) -> list[Findi
     part = float(pairs.sum()) / max(int(measures.detected.sum()), 1)
     message = f"{which}: {int(pairs.sum())} traces clipped at their highest or lowest value"
     message += ", the gain is too high" if part > MOST_CLIPPED else ""
+    # Saturated channels, unless all of them are.
+    often = pairs.sum(axis=0) > 0.5 * np.maximum(measures.detected.sum(axis=0), 1)
+    saturated = dataset.rx[often] if often.sum() < 0.5 * often.size else dataset.rx[:0]
     return [
         Finding(
             "clipping",
             message,
             "pulses within the range of the recorder",
             "reported",
+            tuple(int(k) for k in saturated),
+            "reception" if saturated.size else "",
             pairs=np.asarray(pairs),
             value=part,
             unit="of all traces",

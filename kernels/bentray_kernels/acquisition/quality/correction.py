@@ -14,6 +14,7 @@ from ..emissions import invert_polarity, reorder_channels
 from ..waveform import Waveform
 from .finding import Finding, Report
 from .time_zero import OBJECT, RECORDING
+from .water_speed import WATER_SPEED
 
 
 def corrected(dataset: Dataset, report: Report) -> Dataset:
@@ -76,6 +77,9 @@ def stacked(dataset: Dataset, parts: list[Dataset]) -> Dataset:
         dataset,
         waveform=waveform,
         t0_s=first.t0_s,
+        water_speed_mps=first.water_speed_mps,
+        water_temperature_c=first.water_temperature_c,
+        water_temperature_assumed=first.water_temperature_assumed,
         picker=first.picker,
         **{name: several(name) for name in names},  # type: ignore[arg-type]
     )
@@ -91,6 +95,8 @@ def _corrected(dataset: Dataset, finding: Finding) -> Dataset:
             if getattr(dataset, name) is not None
         }
         return replace(dataset, **taken_off)
+    if finding.check == WATER_SPEED:
+        return dataset.in_water(finding.value)
     if finding.check == "polarity":
         return replace(dataset, waveform=_with_polarity(dataset, finding))
     return _exchanged(dataset, finding)
@@ -100,7 +106,7 @@ def _with_polarity(dataset: Dataset, finding: Finding) -> Waveform | None:
     traces = dataset.waveform
     if traces is None:
         return None
-    where = _places(dataset, finding)
+    where = pairs_of(dataset, finding)
     water = None if traces.water is None else invert_polarity(traces.water, where)
     return replace(traces, object=invert_polarity(traces.object, where), water=water)
 
@@ -133,7 +139,8 @@ def exchange_order(dataset: Dataset, finding: Finding) -> tuple[Ints, int]:
     return order, axis
 
 
-def _places(dataset: Dataset, finding: Finding) -> Flags:
+def pairs_of(dataset: Dataset, finding: Finding) -> Flags:
+    """(ntx, nrx): pairs with the elements of a finding in its role."""
     element = dataset.tx if finding.role == "emission" else dataset.rx
     wrong = np.isin(element, finding.elements)
     pairs = np.zeros((len(dataset.tx), len(dataset.rx)), dtype=bool)

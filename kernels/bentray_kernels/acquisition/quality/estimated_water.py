@@ -3,17 +3,78 @@
 from __future__ import annotations
 
 from ..dataset import Dataset
-from ..reference import ReferenceShot
+from ..reference import (
+    ChordPulses,
+    ReferenceShot,
+    WaterChords,
+    chord_signs,
+    estimate_reference,
+    read_pulses,
+)
+from .chords import examine_chords
+from .correction import apply, pairs_of
 from .finding import Finding
+from .measures import Measures
+from .polarity import find_inverted
+from .sampling import sampling
+from .water_speed import find_water_speed
 
 WATER_SHOT = "water shot"
+
+
+def estimate_water(dataset: Dataset, measures: Measures) -> tuple[list[Finding], ReferenceShot]:
+    """The water shot of a slice, and the findings in the chords that it is estimated from.
+
+    Args:
+        dataset: of one slice with traces of the object, sampling rate and centre frequency.
+        measures: of these traces.
+
+    Raises:
+        InvalidInput: where too few chords pass through water.
+    """
+    assert dataset.center_frequency_hz is not None
+    findings, chords = examine_chords(dataset, measures)
+    period_s = 1.0 / dataset.center_frequency_hz
+    pulses = read_pulses(apply(dataset, findings), range(len(dataset.tx)), chords, period_s)
+    found, reference = estimate_from_pulses(apply(dataset, findings), chords, pulses)
+    return [*findings, *found], reference
+
+
+def estimate_from_pulses(
+    dataset: Dataset, chords: WaterChords, pulses: ChordPulses, *, examine: bool = True
+) -> tuple[list[Finding], ReferenceShot]:
+    """The water shot of a slice from the pulses of its chords, and findings in polarity and water speed.
+
+    Args:
+        dataset: of one slice, with the findings in its chords applied; its traces are not read.
+        chords: through water.
+        pulses: of these.
+        examine: whether polarity and water speed are examined.
+
+    Raises:
+        InvalidInput: where too few chords pass through water.
+    """
+    assert dataset.center_frequency_hz is not None
+    period_s = 1.0 / dataset.center_frequency_hz
+    findings: list[Finding] = []
+    if examine:
+        findings = find_inverted(dataset, chord_signs(dataset, chords, pulses, period_s))
+    for finding in findings:
+        pulses = pulses.inverted(pairs_of(dataset, finding))
+    reference = estimate_reference(dataset, chords, pulses, period_s)
+    findings.append(find_estimated_water(dataset, reference))
+    if examine:
+        speed = find_water_speed(dataset, reference.speed_mps, reference.speed_sigma_mps)
+        findings += [*speed, *sampling(apply(dataset, speed), reference.speed_mps)]
+    return findings, reference
 
 
 def find_estimated_water(dataset: Dataset, reference: ReferenceShot) -> Finding:
     """What was estimated from the chords that miss the object, beside what the file states."""
     found = (
         f"none; from {reference.chords} chords that miss the object: water of {reference.speed_mps:.1f} m/s "
-        f"(stated: {dataset.water_speed_mps:.1f}), arrivals {1e6 * reference.delay_s:.3g} µs late"
+        f"({'assumed' if dataset.water_temperature_assumed else 'stated'}: {dataset.water_speed_mps:.1f}), "
+        f"arrivals {1e6 * reference.delay_s:.3g} µs late"
     )
     return Finding(
         WATER_SHOT, found, "a scan without the object", "reported", value=reference.speed_mps, unit="m/s"

@@ -13,11 +13,10 @@ from ...errors import InvalidInput
 from ...picker_names import DEFAULT_PICKER
 from ..dataset import Dataset
 from ..picking.first_arrivals import pick
-from ..reference import reference_of
 from .contradictions import find_contradictions
 from .correction import apply, stacked
 from .dead import find_dead
-from .estimated_water import WATER_SHOT, find_estimated_water
+from .estimated_water import WATER_SHOT, estimate_water
 from .finding import Finding, Report
 from .recording import Measured, check_traces
 from .time_zero import find_time_shift
@@ -120,11 +119,13 @@ def _slice(
     dataset = apply(dataset, findings)
     if measured is not None and measured.water is None and not dataset.picked:
         try:
-            reference = reference_of(dataset, measured.object.strongest_s)
+            estimated, reference = estimate_water(dataset, measured.object)
         except InvalidInput as error:
             return [*findings, Finding(WATER_SHOT, error.value, error.accepted, "refused")], None, checked
-        findings.append(find_estimated_water(dataset, reference))
-        dataset = reference.applied(dataset)
+        findings += estimated
+        if any(finding.action == "refused" for finding in estimated):
+            return findings, None, checked
+        dataset = reference.applied(apply(dataset, estimated))
     if not dataset.picked:
         dataset = pick(dataset, picker, lambda done, total: step(), screened=False)
     of_times = check_times(dataset)

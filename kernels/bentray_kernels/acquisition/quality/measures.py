@@ -32,6 +32,7 @@ class Measures:
         detected: there is a pulse.
         clipped: it is clipped at its maximum, minimum or both.
         strongest_s: time of the maximum of the envelope; NaN without a pulse.
+        peak: largest distance from the median, in counts.
     """
 
     broken: Flags
@@ -39,15 +40,29 @@ class Measures:
     detected: Flags
     clipped: Flags
     strongest_s: Floats
+    peak: Floats
 
     @classmethod
     def of(cls, traces: Iterable[NDArray[Any]], dataset: Dataset) -> Measures:
         """Measures of the traces of emissions, (nrx, nt) each; converted to floating point one by one."""
         assert dataset.sampling_rate_hz is not None
         rows = [_emission(np.asarray(emission)) for emission in traces]
-        broken, constant, detected, clipped, strongest = (np.stack(part) for part in zip(*rows, strict=True))
+        broken, constant, detected, clipped, strongest, peak = (
+            np.stack(part) for part in zip(*rows, strict=True)
+        )
         time = np.where(detected, dataset.t0_s + strongest / dataset.sampling_rate_hz, np.nan)
-        return cls(broken, constant, detected, clipped, time)
+        return cls(broken, constant, detected, clipped, time, peak)
+
+    @property
+    def unclipped_s(self) -> Floats:
+        """Times of the maxima, (ntx, nrx), s; where most pulses are complete, without clipped ones.
+
+        Clipped maxima are off by a fraction of a period, and strong near pairs are clipped: the fit of a line
+        would be biased.
+        """
+        unclipped = np.where(self.clipped, np.nan, self.strongest_s)
+        most = 2 * np.isfinite(unclipped).sum() >= np.isfinite(self.strongest_s).sum()
+        return unclipped if most else self.strongest_s
 
     @classmethod
     def joined(cls, parts: Sequence[Measures]) -> Measures:
@@ -56,7 +71,7 @@ class Measures:
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-def _emission(traces: NDArray[Any]) -> tuple[Flags, Flags, Flags, Flags, Floats]:
+def _emission(traces: NDArray[Any]) -> tuple[Flags, Flags, Flags, Flags, Floats, Floats]:
     x = traces.astype(np.float64)
     broken = np.asarray(~np.isfinite(x).all(axis=1))
     x[broken] = 0.0
@@ -72,7 +87,7 @@ def _emission(traces: NDArray[Any]) -> tuple[Flags, Flags, Flags, Flags, Floats]
     clipped = detected & (peak > steps) & (_run(x, x.max(axis=1)) | _run(x, x.min(axis=1)))
     # The strongest extremum differs between pulses; their envelope has one maximum.
     envelope = _envelope(x - offset)
-    return broken, constant, detected, clipped, _vertex(envelope, np.argmax(envelope, axis=1))
+    return broken, constant, detected, clipped, _vertex(envelope, np.argmax(envelope, axis=1)), peak
 
 
 def _envelope(x: Floats) -> Floats:

@@ -20,16 +20,14 @@ MOST = 0.6
 FEWEST = 4
 
 
-def find_inverted(dataset: Dataset, strongest_s: Floats) -> list[Finding]:
+def find_inverted(dataset: Dataset, sign: Floats) -> list[Finding]:
     """Find elements with inverted polarity, in emission and in reception.
 
-    Pulses are aligned at the maxima of their envelopes, which do not depend on polarity or position errors.
-
     Args:
-        dataset: of one slice, with water traces, channels in their places, and a centre frequency.
-        strongest_s: (ntx, nrx), times of the maxima; NaN where there is none.
+        dataset: of one slice, channels in their places.
+        sign: (ntx, nrx), correlation with the usual pulse, from -1 to 1; NaN where unknown. See
+            ``water_signs``, and ``reference.chord_signs`` without a water shot.
     """
-    sign = _signs(dataset, strongest_s)
     findings = []
     # Alternate, so that an inverted receiver does not make the emitters appear inverted.
     emission, reception = np.ones(len(dataset.tx)), np.ones(len(dataset.rx))
@@ -58,8 +56,15 @@ def find_inverted(dataset: Dataset, strongest_s: Floats) -> list[Finding]:
     return findings
 
 
-def _signs(dataset: Dataset, strongest_s: Floats) -> Floats:
-    """(ntx, nrx): correlation with the median pulse, from -1 to 1; NaN without a pulse."""
+def water_signs(dataset: Dataset, strongest_s: Floats) -> Floats:
+    """(ntx, nrx): correlation with the median pulse in water, from -1 to 1; NaN without a pulse.
+
+    Pulses are aligned at the maxima of their envelopes, which do not depend on polarity or position errors.
+
+    Args:
+        dataset: of one slice, with water traces, channels in their places, and a centre frequency.
+        strongest_s: (ntx, nrx), times of the maxima; NaN where there is none.
+    """
     assert dataset.waveform is not None
     assert dataset.waveform.water is not None
     assert dataset.sampling_rate_hz is not None

@@ -13,24 +13,36 @@ from ..dataset import Dataset
 from .broken import find_broken, find_clipped
 from .correction import apply, exchange_order
 from .dead import find_dead
+from .drift import DRIFT, find_drift
+from .elements import CLOCK, DISPLACED, find_element_errors
 from .finding import Finding
 from .measures import Measures
-from .polarity import find_inverted
+from .polarity import find_inverted, water_signs
 from .positions import find_displaced
 from .sampling import frequency, sampling
+from .shadow import SCATTERER, find_scatterer
 from .swapped import find_swapped
 from .time_zero import find_recording_shift
 from .water_line import WaterLine
+from .water_speed import WATER_SPEED, find_water_speed
 
 OF_TRACES = ("values", "constant traces", "clipping", "dead elements")
 OF_WATER = (
     "sampling rate",
+    WATER_SPEED,
     "centre frequency",
     "time zero of the recording",
     "swapped channels",
     "polarity",
     "element positions",
+    CLOCK,
+    DISPLACED,
+    DRIFT,
+    SCATTERER,
 )
+
+# Standard deviation of the water speed from maxima of envelopes, as a part of it: dispersion moves them.
+ENVELOPE = 0.002
 
 
 class Measured(NamedTuple):
@@ -75,7 +87,10 @@ def check_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], t
     findings, strongest = _of_traces(dataset, measured)
     checked: tuple[str, ...] = OF_TRACES
     if strongest is not None:
+        assert measured.water is not None
         findings += _of_water(apply(dataset, findings), strongest)
+        if dataset.center_frequency_hz is not None:
+            findings += find_scatterer(dataset, _log_ratio(measured.object, measured.water))
         checked += OF_WATER
     if not dataset.picked and (missing := _unpickable(dataset)):
         findings.append(missing)
@@ -102,19 +117,8 @@ def _of_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], Flo
         findings += find_clipped(dataset, measures, which)
     if measured.water is None:
         return findings, None
-    valid, strongest = apply(dataset, findings).valid, _unclipped_maxima(measured.water)
+    valid, strongest = apply(dataset, findings).valid, measured.water.unclipped_s
     return findings, strongest if valid is None else np.where(valid, strongest, np.nan)
-
-
-def _unclipped_maxima(water: Measures) -> Floats:
-    """Times of the maxima, (ntx, nrx), s; where most pulses are complete, without clipped ones.
-
-    Clipped maxima are off by a fraction of a period, and strong near pairs are clipped: the fit of the line
-    would be biased.
-    """
-    unclipped = np.where(water.clipped, np.nan, water.strongest_s)
-    most = 2 * np.isfinite(unclipped).sum() >= np.isfinite(water.strongest_s).sum()
-    return unclipped if most else water.strongest_s
 
 
 def _of_water(dataset: Dataset, strongest: Floats) -> list[Finding]:
@@ -122,18 +126,38 @@ def _of_water(dataset: Dataset, strongest: Floats) -> list[Finding]:
     line = WaterLine.of(dataset, strongest)
     if line is None:
         return [Finding("water shot", "almost no pulses", "pulses that crossed the water", "refused")]
-    findings = sampling(dataset, line) + frequency(dataset)
-    if findings or dataset.center_frequency_hz is None:
-        return findings
-    exchanged = find_swapped(dataset, strongest, line)
+    speed = find_water_speed(dataset, line.speed_mps, ENVELOPE * line.speed_mps)
+    dataset = apply(dataset, speed)
+    refused = sampling(dataset, line.speed_mps) + frequency(dataset)
+    if refused or dataset.center_frequency_hz is None:
+        return refused
+    line = WaterLine.of(dataset, strongest)
+    assert line is not None
+    straight = dataset.distance_m() / dataset.water_speed_mps + line.intercept_s
+    exchanged = find_swapped(dataset, strongest, straight)
     for finding in exchanged:
         # The maxima after the exchange of channels.
         order, axis = exchange_order(dataset, finding)
         strongest = np.take(strongest, order, axis=axis)
-    inverted = find_inverted(apply(dataset, exchanged), strongest)
-    return (
-        exchanged + inverted + find_recording_shift(dataset, line) + find_displaced(dataset, strongest, line)
-    )
+    right = apply(dataset, exchanged)
+    inverted = find_inverted(right, water_signs(right, strongest))
+    return [
+        *speed,
+        *exchanged,
+        *inverted,
+        *find_recording_shift(dataset, line),
+        *find_displaced(dataset, strongest, line),
+        *find_element_errors(dataset, line.departures(dataset, strongest)),
+        *find_drift(dataset, line.departures(dataset, strongest)),
+    ]
+
+
+def _log_ratio(received: Measures, water: Measures) -> Floats:
+    """Logarithm of the object's amplitude over that of the water, (ntx, nrx); NaN where one has no pulse."""
+    # A pulse that the object has removed is as weak as what was found.
+    known = water.detected & np.isfinite(received.peak) & (received.peak > 0.0)
+    ratio = np.where(known, received.peak, 1.0) / np.where(known, water.peak, 1.0)
+    return np.where(known, np.log(ratio), np.nan)
 
 
 def _left_out(findings: list[Finding], like: Flags) -> Flags:

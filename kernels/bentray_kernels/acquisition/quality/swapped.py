@@ -9,7 +9,6 @@ import numpy as np
 from ...arrays import Floats
 from ..dataset import Dataset
 from .finding import Finding, Role
-from .water_line import WaterLine
 
 # An element is suspected if the deviations of its times exceed this fraction of a period and this multiple of
 # the usual deviation.
@@ -20,20 +19,19 @@ SUSPECT_TIMES = 4.0
 BETTER = 0.4
 
 
-def find_swapped(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list[Finding]:
+def find_swapped(dataset: Dataset, strongest_s: Floats, expected_s: Floats) -> list[Finding]:
     """Find pairs of swapped channels, first receivers, then emitters.
 
     Args:
         dataset: of one slice, with a centre frequency.
-        strongest_s: (ntx, nrx), of the water.
-        line: through them.
+        strongest_s: (ntx, nrx), times of the maxima of envelopes.
+        expected_s: (ntx, nrx), these times in water, for the stated positions; NaN for pairs not in water.
     """
     assert dataset.center_frequency_hz is not None
     period = 1.0 / dataset.center_frequency_hz
-    straight = dataset.distance_m() / dataset.water_speed_mps + line.intercept_s
     roles: tuple[tuple[Role, Floats, Floats], ...] = (
-        ("reception", strongest_s, straight),
-        ("emission", strongest_s.T, straight.T),
+        ("reception", strongest_s, expected_s),
+        ("emission", strongest_s.T, expected_s.T),
     )
     findings = []
     for role, times, expected in roles:

@@ -10,6 +10,9 @@ from ...arrays import Floats
 from ..dataset import Dataset
 from ..robust_line import FEWEST, robust_line
 
+# Nearer pairs than this part of the longest contain cross-talk and the near field.
+NEAR = 0.25
+
 
 @dataclass(frozen=True)
 class WaterLine:
@@ -25,6 +28,12 @@ class WaterLine:
     intercept_s: float
     residual_s: Floats
 
+    def departures(self, dataset: Dataset, strongest_s: Floats) -> Floats:
+        """Times minus the line with its own speed, (ntx, nrx), s; NaN for near pairs and without a time."""
+        distance = dataset.distance_m()
+        late = strongest_s - distance / self.speed_mps
+        return np.where(distance > NEAR * distance.max(), late, np.nan)
+
     @classmethod
     def of(cls, dataset: Dataset, strongest_s: Floats) -> WaterLine | None:
         """The line through the water maxima; None with too few of them.
@@ -34,7 +43,7 @@ class WaterLine:
             strongest_s: (ntx, nrx), NaN where there is none.
         """
         distance = dataset.distance_m()
-        known = np.isfinite(strongest_s) & (distance > 0.25 * distance.max())
+        known = np.isfinite(strongest_s) & (distance > NEAR * distance.max())
         if known.sum() < FEWEST or np.ptp(distance[known]) == 0.0:
             return None
         x, y = distance[known], strongest_s[known]

@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Flags, Floats, Ints
+from ...arrays import Flags, Floats
 from ...errors import InvalidInput
 from ..dataset import Dataset
 from ..emissions import Emissions
 from ..noise import robust_deviation
-from ..picking.onset import LEAD
+from .chord_pulses import ChordPulses, window
 from .water_chords import FEWEST, WaterChords, find_water_chords
 
 Spectrum = NDArray[np.complex128]
 
-# Extent of a pulse about the maximum of its envelope, periods, and of the fall at its ends.
-BEFORE, AFTER, TAPER = 3.0, 4.0, 1.0
-
-# Most chords that are kept, over all emissions, and of each emission; least of each emission.
-MOST_CHORDS, MOST_OF_EMISSION, LEAST_OF_EMISSION = 16384, 64, 8
+# Fall at the ends of a pulse, periods.
+TAPER = 1.0
 
 # Receivers whose traces are computed together.
 RECEIVERS_AT_ONCE = 32
@@ -44,27 +40,8 @@ FEWEST_OF_ELEMENT = 4
 
 ROUNDS = 3
 
-
-class ChordPulses(NamedTuple):
-    """Recorded pulses of chords through water.
-
-    Attributes:
-        emission, reception: (chords,), indices of the pair.
-        begin: (chords,), index of the first sample in the trace.
-        samples: (chords, length), in counts, or in the unit of ``Waveform.object_scale``.
-        noise: (chords,), standard deviation of the trace before its arrival, NaN if that is too short.
-    """
-
-    emission: Ints
-    reception: Ints
-    begin: Ints
-    samples: NDArray[np.float32]
-    noise: Floats
-
-    @classmethod
-    def joined(cls, parts: Sequence[ChordPulses]) -> ChordPulses:
-        """Concatenate the pulses of parts of the emissions."""
-        return cls(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+# Frequencies that give the group speed, on both sides of the centre, as a part of it.
+GROUP = 0.2
 
 
 @dataclass(frozen=True)
@@ -83,7 +60,8 @@ class ReferenceShot:
         emission_gain, reception_gain: (ntx,), (nrx,), logarithms.
         chords: number of chords used.
         speed_mps: phase speed at the centre frequency.
-        speed_sigma_mps: its standard deviation.
+        speed_sigma_mps: its standard deviation: from the scatter of the arrivals, for the distances that the
+            delays of elements leave, and half the difference from the group speed, which water does not have.
         scatter_s: robust standard deviation of the arrivals.
         noise: standard deviation of the noise in the traces. Pickers find the onset of a noiseless pulse
             earlier than that of a recorded one.
@@ -143,70 +121,6 @@ class ReferenceShot:
         return shots
 
 
-def reference_of(dataset: Dataset, strongest_s: Floats) -> ReferenceShot:
-    """The reference shot of a slice, from the maxima of its envelopes and its traces.
-
-    Args:
-        dataset: of one slice with traces of the object, sampling rate and centre frequency.
-        strongest_s: (ntx, nrx), s, see ``quality.measures``.
-
-    Raises:
-        InvalidInput: where too few chords pass through water.
-    """
-    assert dataset.center_frequency_hz is not None
-    period_s = 1.0 / dataset.center_frequency_hz
-    chords = find_water_chords(dataset, strongest_s, period_s)
-    pulses = read_pulses(dataset, range(len(dataset.tx)), chords, period_s)
-    return estimate_reference(dataset, chords, pulses, period_s)
-
-
-def chords_of_emission(emissions: int) -> int:
-    """Most chords of each emission that are kept."""
-    return min(MOST_OF_EMISSION, max(LEAST_OF_EMISSION, MOST_CHORDS // emissions))
-
-
-def read_pulses(
-    dataset: Dataset, emissions: Iterable[int], chords: WaterChords, period_s: float
-) -> ChordPulses:
-    """Cut the pulses of chords through water out of the traces of some emissions.
-
-    Args:
-        dataset: of one slice with traces of the object, which may be ``Emissions``.
-        emissions: indices, from 0.
-        chords: see ``find_water_chords``.
-        period_s: of the pulse, s.
-    """
-    traces = dataset.waveform
-    assert traces is not None
-    assert dataset.sampling_rate_hz is not None
-    before, length = _window(dataset.sampling_rate_hz * period_s)
-    arrival = (chords.arrival_s(dataset.distance_m()) - dataset.t0_s) * dataset.sampling_rate_hz
-    begin = np.floor(arrival).astype(np.int64) - before
-    most = chords_of_emission(len(dataset.tx))
-    whole = chords.pairs & (begin >= 0) & (begin + length <= traces.object.shape[-1])
-    found: list[tuple[int, int, int]] = []
-    samples: list[NDArray[np.float32]] = []
-    noise: list[float] = []
-    for e in emissions:
-        receivers = np.flatnonzero(whole[e])
-        if not receivers.size:
-            continue
-        receivers = receivers[np.unique(np.linspace(0, receivers.size - 1, most).astype(np.int64))]
-        emission = np.asarray(traces.object[e])
-        for r in receivers.tolist():
-            trace = emission[r].astype(np.float32)
-            trace -= np.median(trace)
-            if traces.object_scale is not None:
-                trace *= np.float32(traces.object_scale[e, r])
-            found.append((e, r, int(begin[e, r])))
-            samples.append(trace[begin[e, r] : begin[e, r] + length])
-            before_it = trace[: begin[e, r]]
-            noise.append(robust_deviation(before_it) if len(before_it) >= LEAD else np.nan)
-    index = np.array(found, dtype=np.int64).reshape(-1, 3)
-    pulses = np.array(samples, dtype=np.float32).reshape(-1, length)
-    return ChordPulses(index[:, 0], index[:, 1], index[:, 2], pulses, np.array(noise))
-
-
 def estimate_reference(
     dataset: Dataset, chords: WaterChords, pulses: ChordPulses, period_s: float
 ) -> ReferenceShot:
@@ -225,17 +139,31 @@ def estimate_reference(
         InvalidInput: where too few chords pass through water.
     """
     fit = _Fit(dataset, chords, pulses, period_s)
+    known_s = fit.known_s
     for _ in range(ROUNDS):
         fit.improve()
     # Envelopes scatter by a tenth of a period; the delays of pulses show which chords touch the object.
     arrival = np.full(chords.pairs.shape, np.nan)
     at = pulses.emission[fit.used], pulses.reception[fit.used]
-    arrival[at] = (fit.model_s() + fit.lag_s)[fit.used]
+    arrival[at] = (fit.model_s() + fit.lag_s - known_s)[fit.used]
     again = find_water_chords(dataset, arrival, period_s, tolerance=0.01)
     fit.keep(again.pairs)
     for _ in range(ROUNDS):
         fit.improve()
     return fit.reference()
+
+
+def chord_signs(dataset: Dataset, chords: WaterChords, pulses: ChordPulses, period_s: float) -> Floats:
+    """(ntx, nrx): correlation of each chord's pulse with the usual one, from -1 to 1; NaN for other pairs.
+
+    Args:
+        dataset, chords, pulses, period_s: as ``estimate_reference`` takes them.
+    """
+    sign = np.full(chords.pairs.shape, np.nan)
+    if pulses.emission.size:
+        alike = _Fit(dataset, chords, pulses, period_s).likeness()
+        sign[pulses.emission, pulses.reception] = alike
+    return sign
 
 
 class _Fit:
@@ -245,7 +173,7 @@ class _Fit:
         assert dataset.sampling_rate_hz is not None
         rate, self._period_s, self._pulses = dataset.sampling_rate_hz, period_s, pulses
         self._distance = dataset.distance_m()[pulses.emission, pulses.reception]
-        _, length = _window(rate * period_s)
+        _, length = window(rate * period_s)
         padded = 2 ** math.ceil(math.log2(4 * length))
         frequency = np.fft.rfftfreq(padded, 1.0 / rate)
         self._omega = 2.0 * np.pi * frequency[frequency * period_s <= HIGHEST]
@@ -257,6 +185,12 @@ class _Fit:
         self._delay_s, self._slowness = chords.delay_s, 1.0 / chords.speed_mps
         self._wave_number = self._omega * self._slowness
         self._emission_s, self._reception_s = np.zeros(len(dataset.tx)), np.zeros(len(dataset.rx))
+        # Known delays of the elements of each chord, s.
+        self.known_s = np.zeros(self._distance.size)
+        if chords.emission_delay_s is not None and chords.reception_delay_s is not None:
+            self._emission_s += chords.emission_delay_s
+            self._reception_s += chords.reception_delay_s
+            self.known_s += self._emission_s[pulses.emission] + self._reception_s[pulses.reception]
         self.used = np.ones(self._distance.size, dtype=bool)
         self.lag_s = np.zeros(self._distance.size)
 
@@ -272,6 +206,13 @@ class _Fit:
             + self._emission_s[self._pulses.emission]
             + self._reception_s[self._pulses.reception]
         )
+
+    def likeness(self) -> Floats:
+        """Correlation of each chord's pulse with the common pulse."""
+        aligned = self._aligned()
+        common = _median_spectrum(aligned[self.used])
+        size = np.linalg.norm(aligned, axis=1) * np.linalg.norm(common)
+        return np.asarray((aligned * np.conj(common)).real.sum(axis=1) / np.where(size > 0.0, size, 1.0))
 
     def improve(self) -> None:
         """One round: the common pulse, the delays of chords and elements, and the phase over distance."""
@@ -312,7 +253,11 @@ class _Fit:
         known = self._pulses.noise[np.isfinite(self._pulses.noise)]
         scatter = robust_deviation(self.lag_s[self.used])
         speed = 2.0 * np.pi * frequency / wave_number
-        spread = float(np.std(self._distance[self.used])) * math.sqrt(self.used.sum())
+        ends = 2.0 * np.pi * frequency * np.array((1.0 - GROUP, 1.0 + GROUP))
+        group = float(np.ptp(ends) / np.diff(np.interp(ends, self._omega, self._wave_number))[0])
+        emission, reception = self._of_elements(self._distance, centred=False)
+        left = self._distance - emission[self._pulses.emission] - reception[self._pulses.reception]
+        spread = float(np.std(left[self.used])) * math.sqrt(self.used.sum())
         return ReferenceShot(
             frequency_hz=np.asarray(self._omega / (2.0 * np.pi), dtype=np.float64),
             spectrum=self._pulse,
@@ -324,7 +269,7 @@ class _Fit:
             reception_gain=reception_gain,
             chords=int(self.used.sum()),
             speed_mps=speed,
-            speed_sigma_mps=scatter / spread * speed**2,
+            speed_sigma_mps=math.hypot(scatter / max(spread, 1e-9) * speed**2, 0.5 * (group - speed)),
             scatter_s=scatter,
             noise=float(np.median(known)) if known.size else 0.0,
         )
@@ -353,12 +298,6 @@ class _Fit:
         common += float(emission.mean() + reception.mean())
         emission, reception = emission - emission.mean(), reception - reception.mean()
         return (emission, reception) if centred else (emission, reception + common)
-
-
-def _window(period: float) -> tuple[int, int]:
-    """Samples before the arrival, and all samples, of a pulse with a period in samples."""
-    before = math.ceil(BEFORE * period)
-    return before, before + math.ceil(AFTER * period)
 
 
 def _taper(length: int, period: float) -> Floats:

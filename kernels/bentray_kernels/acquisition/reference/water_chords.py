@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,6 +51,7 @@ class WaterChords:
         delay_s: of the arrivals, with that of the pulse and of the recording's time zero.
         scatter_s: robust standard deviation of the arrivals from the line.
         speed_sigma_mps: standard deviation of the speed, from the scatter.
+        emission_delay_s, reception_delay_s: (ntx,), (nrx,), known delays of elements, s; None: 0.
     """
 
     pairs: Flags
@@ -58,10 +59,16 @@ class WaterChords:
     delay_s: float
     scatter_s: float
     speed_sigma_mps: float
+    emission_delay_s: Floats | None = None
+    reception_delay_s: Floats | None = None
 
     def arrival_s(self, distance_m: Floats) -> Floats:
-        """Arrival in water at a distance, s."""
+        """Arrival in water at a distance, s, without delays of elements."""
         return self.delay_s + distance_m / self.speed_mps
+
+    def with_delays(self, emission_s: Floats, reception_s: Floats) -> WaterChords:
+        """The same chords, whose elements are late, (ntx,) and (nrx,), s."""
+        return replace(self, emission_delay_s=emission_s, reception_delay_s=reception_s)
 
 
 def find_water_chords(

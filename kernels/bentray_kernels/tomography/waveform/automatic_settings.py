@@ -10,6 +10,7 @@ import numpy as np
 from ...acquisition import Dataset
 from ...errors import InvalidInput
 from ..numerics import BANDS
+from ..requirements import check_waveform
 from ..settings import Settings
 from .waveform_cost import core_seconds
 from .waveform_settings import Band, WaveSettings, bands, loss_band
@@ -94,13 +95,7 @@ def scale_of(dataset: Dataset, settings: Settings, samples: int, slices: int) ->
         InvalidInput: for a scan without traces of object and water, without a centre frequency, or with
             elements in space.
     """
-    check_traces(samples)
-    if dataset.element_position_m.shape[1] != 2:
-        raise InvalidInput(
-            "method", "'waveform' for elements in space", "sart, gauss-newton or auto, or slices of a ring"
-        )
-    if settings.roi and dataset.slices > 1:
-        raise InvalidInput("roi", "true", "false, with method waveform and several slices")
+    check_waveform(settings, samples, dataset.slices, in_space=dataset.element_position_m.shape[1] != 2)
     if dataset.center_frequency_hz is None:
         raise InvalidInput(
             "acquisition@center_frequency_hz", "nothing", "the centre frequency of the pulse, Hz"
@@ -122,20 +117,3 @@ def wave_settings(scale: WaveScale, settings: Settings) -> WaveSettings:
         seed=settings.seed,
         roi=settings.roi,
     )
-
-
-def check_traces(samples: int) -> None:
-    """Check that a scan has traces of the object.
-
-    Args:
-        samples: of each trace; 0 without traces.
-
-    Raises:
-        InvalidInput: without traces.
-    """
-    if not samples:
-        raise InvalidInput(
-            "method",
-            "'waveform' for a scan without traces",
-            "sart, gauss-newton or auto, or waveform/object in the file",
-        )

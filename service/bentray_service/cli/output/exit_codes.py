@@ -31,10 +31,7 @@ class Commands(TyperGroup):
         try:
             code = super().main(*args, **options)
         except InvalidInput as error:
-            from ...errors import DatabaseUnavailable, StorageFull, StorageUnavailable
-
-            away = isinstance(error, DatabaseUnavailable | StorageUnavailable | StorageFull)
-            _end(str(error), WORK_FAILED if away else BAD_INPUT)
+            _end(str(error), WORK_FAILED if _unavailable(error) else BAD_INPUT)
         except WorkFailed as error:
             _end(str(error), WORK_FAILED)
         except typer.TyperException as error:
@@ -46,6 +43,16 @@ class Commands(TyperGroup):
         except OSError as error:
             _end(f"{error.filename or 'the system'}: {error.strerror or error}", WORK_FAILED)
         sys.exit(code if isinstance(code, int) else 0)
+
+
+def _unavailable(error: Exception) -> bool:
+    """Whether database or storage are unavailable."""
+    # Their errors need SQLAlchemy, which a command that raised another error has not loaded.
+    if f"{__package__.partition('.')[0]}.errors" not in sys.modules:
+        return False
+    from ...errors import DatabaseUnavailable, StorageFull, StorageUnavailable
+
+    return isinstance(error, DatabaseUnavailable | StorageUnavailable | StorageFull)
 
 
 @contextmanager

@@ -96,6 +96,8 @@ def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
         rows.insert(4, ("residual", f"{found['residual_rms_s'] * 1e9:.0f} ns rms"))
     if found["recovery_mean"] is not None:
         rows.append(("resolution check", f"{100 * found['recovery_mean']:.0f} % of a checkerboard recovered"))
+    if "pulse" in found["provenance"]:
+        rows.append(("pulse", found["provenance"]["pulse"]))
     if found["provenance"].get("quality", NOTHING_FOUND) != NOTHING_FOUND:
         rows.append(("scan", found["provenance"]["quality"]))
     truth = found["truth"]

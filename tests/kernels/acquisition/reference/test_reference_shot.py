@@ -7,8 +7,8 @@ import pytest
 
 from bentray_kernels.acquisition.picking.first_arrivals import pick
 from bentray_kernels.acquisition.quality import examine
+from bentray_kernels.acquisition.quality.estimated_water import estimate_water
 from bentray_kernels.acquisition.quality.measures import Measures
-from bentray_kernels.acquisition.reference import reference_of
 
 from ..traces import FREQUENCY_HZ, RADIUS_M, WATER_MPS, scan
 from .object_scans import ELEMENTS, disc_delay_s, with_elements, without_water
@@ -18,7 +18,7 @@ DELAY_S = disc_delay_s(0.6 * RADIUS_M)
 
 def estimated(dataset):
     bare = without_water(dataset)
-    return reference_of(bare, Measures.of(bare.waveform.object, bare).strongest_s)
+    return estimate_water(bare, Measures.of(bare.waveform.object, bare))[1]
 
 
 @pytest.mark.parametrize("start_s", [0.0, 1e-6, -1e-6])

@@ -1,4 +1,7 @@
-"""Counts of a dataset file, without reading the arrays over its pairs."""
+"""Counts of a dataset file, without reading the arrays over its pairs.
+
+Of a scan without a centre frequency, some emissions are read to estimate it.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ from bentray_kernels.tomography.settings import Settings
 from ..hdf5_reading import Limits, Reader, opened
 from .counts import DatasetCounts, Summary, array_counts
 from .read import NUMERIC
+from .scan import spectrum_in
 from .traces import samples_in
 
 
@@ -34,6 +38,10 @@ def counts_in(path: Path) -> DatasetCounts:
         heights = _sized(reader, "slice/z_m") if reader.has("slice/z_m") else None
         received = reader.checked("waveform/object", NUMERIC, "traces")
         water = reader.number("water", "sound_speed_mps", "m/s")
+        frequency = reader.number("acquisition", "center_frequency_hz", "Hz")
+        if frequency is None:
+            spectrum = spectrum_in(reader, stacked=heights is not None)
+            frequency = None if spectrum is None else spectrum.center_frequency_hz
         return DatasetCounts(
             **array_counts(position, tx, rx, heights),
             times=any(_bytes(reader, f"traveltime/{name}") for name in ("delta_tof_s", "tof_s")),
@@ -42,7 +50,7 @@ def counts_in(path: Path) -> DatasetCounts:
             samples=samples_in(reader),
             sample_bytes=0 if received is None else 2 if received.dtype.kind != "f" else 4,
             rate_hz=reader.number("acquisition", "sampling_rate_hz", "Hz"),
-            frequency_hz=reader.number("acquisition", "center_frequency_hz", "Hz"),
+            frequency_hz=frequency,
             # The speed hardly affects sizes.
             water_mps=1500.0 if water is None else water,
             water_shot=_bytes(reader, "waveform/water") > 0,

@@ -57,7 +57,7 @@ def open_slice(
     """
     with opened(path, Limits()) as reader:
         stacked = whole.slice_z_m is not None
-        read = partial(_emissions, reader, poll=poll, index=index if stacked else None)
+        read = partial(emissions_in, reader, poll=poll, index=index if stacked else None)
         waveform = _waveform(reader, whole, index, read)
         yield replace(whole.slice(index), waveform=waveform)
 
@@ -81,8 +81,10 @@ def _waveform(reader: Reader, whole: Dataset, index: int, read: Callable[[str], 
     return Waveform(received, water, 1.0 if scale is None else scale, *of_slice)
 
 
-def _emissions(reader: Reader, path: str, *, poll: Callable[[], None], index: int | None) -> Emissions | None:
-    """The traces of a path, of one slice unless ``index`` is None."""
+def emissions_in(
+    reader: Reader, path: str, *, poll: Callable[[], None] = lambda: None, index: int | None
+) -> Emissions | None:
+    """The traces of a path, of one slice unless ``index`` is None, to be read while the file is open."""
     stored = reader.checked(path, NUMERIC, TRACES)
     if stored is None:
         return None

@@ -6,10 +6,7 @@ Compared with measured peaks in ``tests/workers/reconstruction/memory/test_wavef
 from __future__ import annotations
 
 from bentray_kernels.tomography.settings import Settings
-from bentray_kernels.tomography.waveform.automatic_settings import (
-    WaveScale,
-    check_traces,
-)
+from bentray_kernels.tomography.waveform.automatic_settings import WaveScale
 from bentray_kernels.tomography.waveform.band_grid import Extent
 from bentray_kernels.tomography.waveform.source_calibration import SHOTS
 from bentray_kernels.tomography.waveform.validation import validation_settings
@@ -62,12 +59,7 @@ def wave_task_bytes(traces: Traces | None, width_m: float, settings: Settings) -
 
     Returns:
         By the name of the task in ``refinement_graph`` and ``validation``; empty if no waves are simulated.
-
-    Raises:
-        InvalidInput: for a refinement without traces.
     """
-    if settings.method == "waveform":
-        check_traces(0 if traces is None else traces.samples)
     if traces is None or not settings.selects_model:
         return {}
     plan = _scale(traces, width_m).bands(settings)

@@ -1,0 +1,85 @@
+"""Checks of a scan without a water shot, by the chords that miss the object."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Flags, Floats
+from ..dataset import Dataset
+from ..reference import WaterChords, chord_offset, find_water_chords
+from .correction import apply, exchange_order
+from .drift import find_drift
+from .elements import CLOCK, find_element_errors
+from .finding import Finding
+from .measures import Measures
+from .shadow import find_scatterer
+from .swapped import find_swapped
+
+# Chords as far from the axis as all but this part of those found in water are taken to miss the object.
+INNERMOST = 2.0
+
+# Iterations of the median over emissions and over receptions.
+POLISHED = 4
+
+
+def examine_chords(dataset: Dataset, measures: Measures) -> tuple[list[Finding], WaterChords]:
+    """Findings in the chords through water, and these chords, with faults corrected.
+
+    Args:
+        dataset: of one slice, with a centre frequency; its traces are not read.
+        measures: of the traces of the object.
+
+    Raises:
+        InvalidInput: where too few chords pass through water.
+    """
+    assert dataset.center_frequency_hz is not None
+    period, strongest = 1.0 / dataset.center_frequency_hz, measures.unclipped_s
+    chords = find_water_chords(dataset, strongest, period)
+    findings = find_swapped(dataset, strongest, _expected(dataset, chords))
+    if findings:
+        for finding in findings:
+            order, axis = exchange_order(dataset, finding)
+            strongest = np.take(strongest, order, axis=axis)
+        dataset = apply(dataset, findings)
+        chords = find_water_chords(dataset, strongest, period)
+    late = strongest - _expected(dataset, chords)
+    found = find_element_errors(dataset, late)
+    findings += found
+    emission, reception = np.zeros(len(dataset.tx)), np.zeros(len(dataset.rx))
+    for finding in found:
+        if finding.check == CLOCK:
+            sent = finding.role == "emission"
+            of_role = np.isin(dataset.tx if sent else dataset.rx, finding.elements)
+            (emission if sent else reception)[of_role] += finding.value
+    if emission.any() or reception.any():
+        right = strongest - emission[:, None] - reception
+        chords = find_water_chords(dataset, right, period).with_delays(emission, reception)
+        late = right - _expected(dataset, chords)
+    findings += find_drift(dataset, late)
+    findings += find_scatterer(dataset, _log_ratio(dataset, measures))
+    return findings, chords
+
+
+def _expected(dataset: Dataset, chords: WaterChords) -> Floats:
+    """Times of the maxima of chords that miss the object, (ntx, nrx), s; NaN for the others."""
+    offset = chord_offset(dataset)
+    outside: Flags = offset >= np.percentile(offset[chords.pairs], INNERMOST)
+    distance = dataset.distance_m()
+    outside &= distance >= distance[chords.pairs].min()
+    return np.where(outside, chords.arrival_s(distance), np.nan)
+
+
+def _log_ratio(dataset: Dataset, measures: Measures) -> Floats:
+    """Logarithm of the amplitude over what emitter, receiver and distance explain; NaN without a trace."""
+    distance = dataset.distance_m()
+    known = np.isfinite(measures.peak) & (measures.peak > 0.0) & (distance > 0.0)
+    if dataset.valid is not None:
+        known &= dataset.valid
+    ratio = np.where(known, np.log(np.where(known, measures.peak * np.sqrt(distance), 1.0)), np.nan)
+    for _ in range(POLISHED):
+        for axis in (0, 1):
+            some = known.any(axis=axis)
+            middle = np.zeros(some.size)
+            middle[some] = np.nanmedian(ratio[:, some] if axis == 0 else ratio[some], axis=axis)
+            ratio = ratio - (middle if axis == 0 else middle[:, None])
+    return ratio

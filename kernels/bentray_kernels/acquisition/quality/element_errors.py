@@ -1,0 +1,93 @@
+"""Delays and displacements of single elements, fitted to residuals of travel times in water."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ..dataset import Dataset
+from ..noise import robust_deviation
+
+# Iterations over all elements, and of the selection of residuals of one element.
+ROUNDS, SELECTIONS = 3, 4
+
+# Residuals beyond this many robust deviations are excluded.
+OUTLYING = 4.0
+
+# Fewest residuals of an element: two coordinates, two delays, and redundant ones.
+FEWEST = 12
+
+# Combinations of coordinates and delays that residuals determine worse than this part of the best remain 0.
+UNDETERMINED = 0.02
+
+
+class ElementErrors(NamedTuple):
+    """Errors of elements; NaN where too few residuals determine them.
+
+    Attributes:
+        emission_delay_s, reception_delay_s: (elements,), s.
+        displacement_m: (elements, 2), true minus stated position, m.
+    """
+
+    emission_delay_s: Floats
+    reception_delay_s: Floats
+    displacement_m: Floats
+
+
+def fit_element_errors(dataset: Dataset, residual_s: Floats) -> ElementErrors:
+    """Fit each element in turn, with the errors of the others removed, by least squares without outliers.
+
+    Args:
+        dataset: of one slice.
+        residual_s: (ntx, nrx), s: times in water minus those of the stated positions; NaN where unknown.
+    """
+    place, elements = dataset.element_position_m[:, :2], len(dataset.element_position_m)
+    away = place[dataset.tx][:, None] - place[dataset.rx][None]
+    # Direction of growing times for the emitter; that of the receiver is the opposite.
+    away /= np.maximum(np.linalg.norm(away, axis=-1), 1e-12)[..., None]
+    middle = float(np.nanmedian(residual_s)) if np.isfinite(residual_s).any() else 0.0
+    left = residual_s - middle
+    # Displacement over the speed of the water, and delays in emission and reception, s.
+    errors = np.zeros((elements, 4))
+    few = np.zeros(elements, dtype=bool)
+    for _ in range(ROUNDS):
+        for k in range(elements):
+            emission, reception = np.flatnonzero(dataset.tx == k), np.flatnonzero(dataset.rx == k)
+            rows = _design(away, emission, reception)
+            values = np.concatenate((left[emission].ravel(), left[:, reception].ravel()))
+            values = np.asarray(values + rows @ errors[k], dtype=np.float64)
+            few[k] = np.isfinite(values).sum() < FEWEST
+            if few[k]:
+                continue
+            errors[k] = _robust_fit(rows[np.isfinite(values)], values[np.isfinite(values)])
+            values = values - rows @ errors[k]
+            split = left[emission].size
+            left[emission] = values[:split].reshape(len(emission), -1)
+            left[:, reception] = values[split:].reshape(-1, len(reception))
+    errors[few] = np.nan
+    return ElementErrors(errors[:, 2], errors[:, 3], errors[:, :2] * dataset.water_speed_mps)
+
+
+def _design(away: Floats, emission: Ints, reception: Ints) -> Floats:
+    """Derivatives of the times of an element by its displacement and its delays, (pairs, 4)."""
+    sent, received = away[emission].reshape(-1, 2), -away[:, reception].reshape(-1, 2)
+    rows = np.zeros((len(sent) + len(received), 4))
+    rows[:, :2] = np.concatenate((sent, received))
+    rows[: len(sent), 2] = rows[len(sent) :, 3] = 1.0
+    return rows
+
+
+def _robust_fit(rows: Floats, values: Floats) -> Floats:
+    """Least squares, repeated without the values far from the previous fit."""
+    # The first selection is about the median, because many values of a late element are far from zero.
+    off = np.asarray(values - np.median(values), dtype=np.float64)
+    solution: Floats = np.zeros(rows.shape[1])
+    for _ in range(SELECTIONS):
+        near = np.abs(off - np.median(off)) <= OUTLYING * robust_deviation(off) + 1e-12
+        if near.sum() < FEWEST:
+            break
+        solution = np.asarray(np.linalg.lstsq(rows[near], values[near], rcond=UNDETERMINED)[0])
+        off = np.asarray(values - rows @ solution, dtype=np.float64)
+    return solution

@@ -1,0 +1,98 @@
+"""Elements with a clock offset, and displaced elements, by the times of chords through water."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ..dataset import Dataset
+from ..noise import robust_deviation
+from .element_errors import fit_element_errors
+from .finding import Finding, Role
+
+CLOCK, DISPLACED = "clock offset", "displaced elements"
+
+# Smallest delay and displacement that are reported, periods and wavelengths, and multiples of the usual ones.
+LEAST_DELAY, LEAST_DISPLACEMENT, UNUSUAL = 0.1, 0.08, 6.0
+
+# Largest part of the elements: if more deviate, the drawing of the array is wrong, which is another finding.
+MOST = 0.4
+
+
+def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
+    """Find modules whose clock is late or early, and elements away from their stated positions.
+
+    Args:
+        dataset: of one slice, channels in their places, with a centre frequency.
+        residual_s: (ntx, nrx), s: times in water minus those of the stated positions; NaN where unknown.
+    """
+    assert dataset.center_frequency_hz is not None
+    if dataset.element_position_m.shape[1] != 2:
+        return []
+    errors = fit_element_errors(dataset, residual_s)
+    least_s = LEAST_DELAY / dataset.center_frequency_hz
+    roles: tuple[tuple[Role, Floats], ...] = (
+        ("emission", errors.emission_delay_s),
+        ("reception", errors.reception_delay_s),
+    )
+    findings = []
+    for role, delay in roles:
+        off = delay - np.nanmedian(delay) if np.isfinite(delay).any() else delay
+        for run in _runs(_unusual(off, least_s), off):
+            value = float(np.median(off[run]))
+            late = f"{'late' if value > 0.0 else 'early'} by {1e9 * abs(value):.0f} ns"
+            findings.append(
+                Finding(
+                    CLOCK,
+                    f"{_named(run)} {late} in {role}",
+                    f"within {1e9 * least_s:.0f} ns, a tenth of a period",
+                    "reported",
+                    tuple(run.tolist()),
+                    role,
+                    value=value,
+                    unit="s",
+                )
+            )
+    distance = np.linalg.norm(errors.displacement_m, axis=1)
+    least_m = LEAST_DISPLACEMENT * dataset.water_speed_mps / dataset.center_frequency_hz
+    displaced = _unusual(distance, least_m)
+    if displaced.size:
+        farthest = float(distance[displaced].max())
+        findings.append(
+            Finding(
+                DISPLACED,
+                f"{_named(displaced)} {1e3 * farthest:.2g} mm from the stated position",
+                f"within {1e3 * least_m:.2g} mm; see bentray quality --calibrate",
+                "reported",
+                tuple(displaced.tolist()),
+                value=farthest,
+                unit="m",
+            )
+        )
+    return findings
+
+
+def _unusual(values: Floats, least: float) -> Ints:
+    """Indices of values far from the usual ones; none where most are."""
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return np.array([], dtype=np.int64)
+    beyond = np.abs(values) > max(least, float(np.median(known)) + UNUSUAL * robust_deviation(known))
+    return np.flatnonzero(beyond) if beyond.sum() <= MOST * known.size else np.array([], dtype=np.int64)
+
+
+def _runs(places: Ints, values: Floats) -> list[Ints]:
+    """Neighbouring elements with deviations of the same sign, together."""
+    if not places.size:
+        return []
+    breaks = (np.diff(places) > 1) | (np.diff(np.sign(values[places])) != 0.0)
+    return list(np.split(places, np.flatnonzero(breaks) + 1))
+
+
+def _named(elements: Ints) -> str:
+    """Elements in words."""
+    if elements.size == 1:
+        return f"element {elements[0]} is"
+    if elements[-1] - elements[0] == elements.size - 1:
+        return f"elements {elements[0]} to {elements[-1]} are"
+    return f"{elements.size} elements are"

@@ -1,0 +1,96 @@
+"""A strong scatterer, such as a bubble: chords through one small place have lost much amplitude."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Flags, Floats
+from ..dataset import Dataset
+from .finding import Finding
+
+SCATTERER = "strong scatterer"
+
+# Logarithm of the amplitude, relative to the usual one, of a chord in the shadow.
+SHADOWED = -0.7
+
+# Grid of places, over the width of the array, and the half-width of the chords through one, wavelengths.
+PLACES, HALF_WIDTH = 41, 0.5
+
+# Part of the chords through a place that are in its shadow; of those that pass it at a distance; of all.
+INSIDE, OUTSIDE, MOST = 0.6, 0.35, 0.2
+
+# The chords that pass it at a distance, in half-widths.
+BESIDE = (4.0, 6.0)
+
+# Fewest chords through a place.
+FEWEST = 12
+
+# Places outside this part of the array's radius are crossed by few chords.
+REACH = 0.85
+
+# Pairs that are compared, drawn evenly.
+MOST_PAIRS = 20_000
+
+
+def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
+    """Find the place whose chords are in shadow while those that pass beside it are not.
+
+    Args:
+        dataset: of one slice, with elements in a plane and a centre frequency.
+        log_ratio: (ntx, nrx), logarithm of the amplitude over that in water; NaN where unknown.
+    """
+    assert dataset.center_frequency_hz is not None
+    known = np.isfinite(log_ratio) & (dataset.tx[:, None] != dataset.rx[None, :])
+    if dataset.element_position_m.shape[1] != 2 or known.sum() < FEWEST:
+        return []
+    shadow = known & (log_ratio - np.median(log_ratio[known]) < SHADOWED)
+    if not 0 < shadow.sum() <= MOST * known.sum():
+        return []
+    pairs = np.argwhere(known)
+    pairs = pairs[:: max(1, len(pairs) // MOST_PAIRS)]
+    dark = shadow[pairs[:, 0], pairs[:, 1]]
+    width = HALF_WIDTH * dataset.water_speed_mps / dataset.center_frequency_hz
+    best, found = 0.0, None
+    for place in _places(dataset):
+        off = _offset(dataset, place)[pairs[:, 0], pairs[:, 1]]
+        through, beside = off <= width, (off >= BESIDE[0] * width) & (off <= BESIDE[1] * width)
+        if through.sum() < FEWEST or not beside.any():
+            continue
+        inside = float(dark[through].mean())
+        if inside > max(best, INSIDE) and dark[beside].mean() <= OUTSIDE:
+            best, found = inside, place
+    if found is None:
+        return []
+    crossing: Flags = shadow & (_offset(dataset, found) <= width)
+    return [
+        Finding(
+            SCATTERER,
+            f"at ({1e3 * found[0]:.0f}, {1e3 * found[1]:.0f}) mm, such as a bubble: {int(crossing.sum())} "
+            "pairs through it have lost half of their amplitude",
+            "an object without gas",
+            "reported",
+            pairs=crossing,
+            value=best,
+            unit="of the chords through it",
+        )
+    ]
+
+
+def _places(dataset: Dataset) -> Floats:
+    """Places inside the array, (n, 2), m."""
+    position = dataset.element_position_m
+    low, high = position.min(axis=0), position.max(axis=0)
+    axes = [np.linspace(a, b, PLACES) for a, b in zip(low, high, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    centre = 0.5 * (low + high)
+    radius = np.linalg.norm(position - centre, axis=1).min()
+    return np.asarray(grid[np.linalg.norm(grid - centre, axis=1) <= REACH * radius])
+
+
+def _offset(dataset: Dataset, place: Floats) -> Floats:
+    """Distance of a place from each chord, (ntx, nrx), m."""
+    start = dataset.element_position_m[dataset.tx][:, None]
+    along = dataset.element_position_m[dataset.rx][None] - start
+    length = np.maximum((along**2).sum(axis=-1), 1e-30)
+    part = np.clip(((place - start) * along).sum(axis=-1) / length, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(start + part[..., None] * along - place, axis=-1))

@@ -1,0 +1,162 @@
+"""Faults that real scans have, one planted in each scan, with its water shot and without."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.acquisition.quality import Finding, examine
+from bentray_kernels.acquisition.quality.correction import apply
+from bentray_kernels.acquisition.quality.estimated_water import estimate_water
+from bentray_kernels.acquisition.quality.recording import Measured, check_traces
+
+from ..reference.object_scans import disc_delay_s, without_water
+from ..traces import RADIUS_M, WATER_MPS, scan
+
+ELEMENTS = 64
+
+# What is found in every scan without a water shot.
+ALWAYS = "water shot"
+
+Traces = Callable[[np.ndarray], np.ndarray]
+
+
+@cache
+def recorded() -> Dataset:
+    """A slow disc of half the radius."""
+    return scan(disc_delay_s(0.5 * RADIUS_M), elements=ELEMENTS, noise=0.02)
+
+
+def with_traces(change: Traces, *, water: bool) -> Dataset:
+    """The scan with changed traces, with its water shot or without."""
+    traces = recorded().waveform
+    assert traces is not None
+    whole = replace(recorded(), waveform=Waveform(change(traces.object), change(traces.water)))
+    return whole if water else without_water(whole)
+
+
+def later(traces: np.ndarray, seconds: np.ndarray) -> np.ndarray:
+    """Traces of each pair moved by (ntx, nrx) s."""
+    turn = -2j * np.pi * np.fft.rfftfreq(traces.shape[-1], 1.0 / recorded().sampling_rate_hz)
+    spectra = np.fft.rfft(traces, axis=-1) * np.exp(turn * np.asarray(seconds)[..., None])
+    return np.fft.irfft(spectra, traces.shape[-1], axis=-1).astype(np.float32)
+
+
+def found(dataset: Dataset) -> list[Finding]:
+    """Findings in the traces, without picking them."""
+    measured = Measured.of(dataset, range(ELEMENTS))
+    findings, _ = check_traces(dataset, measured)
+    if measured.water is None:
+        findings += estimate_water(apply(dataset, findings), measured.object)[0]
+    return [finding for finding in findings if finding.check != ALWAYS]
+
+
+both = pytest.mark.parametrize("water", [True, False])
+
+
+@both
+def test_no_fault_is_found_where_none_is_planted(water):
+    assert not found(with_traces(lambda traces: traces, water=water))
+
+
+@both
+@pytest.mark.parametrize(("a", "b"), [(5, 40), (5, 6)])
+def test_swapped_channels(water, a, b):
+    order = np.arange(ELEMENTS)
+    order[[a, b]] = b, a
+    (finding,) = found(with_traces(lambda traces: traces[:, order], water=water))
+    assert (finding.check, finding.elements, finding.role) == ("swapped channels", (a, b), "reception")
+    assert finding.action == "corrected"
+
+
+@both
+def test_inverted_polarity(water):
+    sign = np.ones((ELEMENTS, ELEMENTS, 1), dtype=np.float32)
+    sign[20] *= -1.0
+    sign[:, 9] *= -1.0
+    findings = found(with_traces(lambda traces: sign * traces, water=water))
+    assert {(f.check, f.elements, f.role) for f in findings} == {
+        ("polarity", (20,), "emission"),
+        ("polarity", (9,), "reception"),
+    }
+
+
+@both
+def test_saturated_traces(water):
+    def change(traces: np.ndarray) -> np.ndarray:
+        clipped = traces.copy()
+        clipped[:, 30:33] = np.clip(clipped[:, 30:33], -0.15, 0.15)
+        return clipped
+
+    findings = found(with_traces(change, water=water))
+    assert {f.check for f in findings} == {"clipping"}
+    assert all(f.elements == (30, 31, 32) for f in findings)
+
+
+@both
+def test_a_clock_offset_of_a_module(water):
+    late = np.zeros((ELEMENTS, ELEMENTS))
+    late[:, 16:24] = 3e-7
+    (finding,) = found(with_traces(lambda traces: later(traces, late), water=water))
+    assert (finding.check, finding.elements, finding.role) == (
+        "clock offset",
+        tuple(range(16, 24)),
+        "reception",
+    )
+    assert finding.value == pytest.approx(3e-7, rel=0.05)
+
+
+def test_times_are_right_in_spite_of_it():
+    """The offset is part of the estimated water shot, as it is of a recorded one."""
+    late = np.zeros((ELEMENTS, ELEMENTS))
+    late[:, 16:24] = 3e-7
+    times = [
+        examine(with_traces(lambda traces: later(traces, late), water=water)).picked.differential_tof()
+        for water in (True, False)
+    ]
+    off = (times[1] - times[0])[:, 16:24]
+    assert np.isfinite(off).mean() > 0.9
+    assert np.nanmedian(np.abs(off)) < 1e-8
+
+
+@both
+@pytest.mark.parametrize("off_m", [(5e-4, 0.0), (0.0, 5e-4)])
+def test_an_element_half_a_millimetre_off(water, off_m):
+    place = recorded().element_position_m.copy()
+    place[17] += off_m
+    (finding,) = found(replace(with_traces(lambda traces: traces, water=water), element_position_m=place))
+    assert (finding.check, finding.elements) == ("displaced elements", (17,))
+    assert finding.value == pytest.approx(5e-4, rel=0.25)
+
+
+@both
+def test_a_bubble(water):
+    place, radius = np.array([0.012, -0.004]), 0.002
+    start = recorded().element_position_m[:, None]
+    along = recorded().element_position_m[None] - start
+    part = ((place - start) * along).sum(axis=-1) / np.maximum((along**2).sum(axis=-1), 1e-30)
+    nearest = start + np.clip(part, 0.0, 1.0)[..., None] * along - place
+    left = 1.0 - 0.8 * np.exp(-((np.linalg.norm(nearest, axis=-1) / radius) ** 2))
+    shadowed = (recorded().waveform.object * left[..., None]).astype(np.float32)
+    dataset = replace(recorded(), waveform=Waveform(shadowed, recorded().waveform.water))
+    (finding,) = found(dataset if water else without_water(dataset))
+    assert finding.check == "strong scatterer"
+    assert "(12, -5) mm" in finding.found
+    assert (left[finding.pairs] < 0.6).all()
+
+
+@both
+@pytest.mark.parametrize("change_c", [0.5, -0.5])
+def test_water_that_warms_or_cools_during_the_scan(water, change_c):
+    speed = WATER_MPS + 2.9 * change_c * (np.arange(ELEMENTS) / (ELEMENTS - 1.0) - 0.5)
+    distance = recorded().distance_m()
+    late = distance / speed[:, None] - distance / WATER_MPS
+    (finding,) = found(with_traces(lambda traces: later(traces, late), water=water))
+    assert finding.check == "water temperature drift"
+    assert finding.value == pytest.approx(2.9 * change_c, rel=0.15)
+    assert f"{'warms' if change_c > 0.0 else 'cools'} by 0.5 °C" in finding.found

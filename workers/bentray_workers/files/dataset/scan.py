@@ -1,0 +1,63 @@
+"""Reading a scan without its traces, with a centre frequency estimated from them where it has none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.pulse_spectrum import PulseSpectrum, estimate_spectrum
+
+from ..hdf5_reading import Limits, Reader, opened
+from .read import read_dataset
+from .traces import emissions_in
+
+
+def read_scan(path: Path) -> Dataset:
+    """A dataset without its traces; a missing centre frequency is estimated from them.
+
+    Args:
+        path: of the HDF5 file.
+
+    Raises:
+        InvalidInput: as ``read_dataset``, and for traces without a pulse where the frequency is missing.
+    """
+    dataset = read_dataset(path, traces=False)
+    spectrum = spectrum_of(path, dataset)
+    if spectrum is None:
+        return dataset
+    return replace(dataset, center_frequency_hz=spectrum.center_frequency_hz)
+
+
+def spectrum_of(path: Path, dataset: Dataset) -> PulseSpectrum | None:
+    """The spectrum of the pulse of a scan without a centre frequency, from the first slice of its traces.
+
+    Args:
+        path: of the HDF5 file.
+        dataset: read from it.
+
+    Returns:
+        None for a scan with a centre frequency or without traces.
+
+    Raises:
+        InvalidInput: for traces without a pulse.
+    """
+    if dataset.center_frequency_hz is not None:
+        return None
+    with opened(path, Limits()) as reader:
+        return spectrum_in(reader, stacked=dataset.slice_z_m is not None)
+
+
+def spectrum_in(reader: Reader, *, stacked: bool) -> PulseSpectrum | None:
+    """The spectrum of the pulse of an open file, from the first slice of its traces; None without traces.
+
+    Args:
+        reader: of the file.
+        stacked: whether its arrays have an axis of slices.
+
+    Raises:
+        InvalidInput: for traces without a pulse.
+    """
+    rate = reader.number("acquisition", "sampling_rate_hz", "Hz")
+    traces = emissions_in(reader, "waveform/object", index=0 if stacked else None)
+    return None if traces is None or rate is None else estimate_spectrum(traces, rate)
