@@ -52,9 +52,9 @@ bench: install ## run the benchmark NAME; NAME=reconstruction ARGS=--quick
 
 lock: ## update the lock files (needs uv on the PATH)
 	@command -v uv >/dev/null || { echo "make lock needs uv: pip install uv" >&2; exit 1; }
-	$(call compile,requirements.lock,--extra build --extra postgres --extra s3 pyproject.toml)
-	$(call compile,requirements-dev.lock,--extra build --extra postgres --extra s3 --extra test --extra lint -c requirements.lock pyproject.toml)
-	$(call compile,requirements-docs.lock,--extra build --extra postgres --extra s3 --extra docs -c requirements-dev.lock pyproject.toml)
+	$(call compile,requirements.lock,--extra build --extra export --extra postgres --extra s3 pyproject.toml)
+	$(call compile,requirements-dev.lock,--extra build --extra export --extra postgres --extra s3 --extra test --extra lint -c requirements.lock pyproject.toml)
+	$(call compile,requirements-docs.lock,--extra build --extra export --extra postgres --extra s3 --extra docs -c requirements-dev.lock pyproject.toml)
 	$(call compile,requirements-generator.lock,--group generator)
 
 clean: ## remove build outputs, caches and .venv

@@ -116,10 +116,18 @@ class Pictures:
         how = {"iso": iso, "step": step, "target": target}
         return dict(await self._one(tenant, what, path, mesh_volume, how))
 
-    async def export(self, tenant: Tenant, volume: VolumeRow, path: Path, target: Path, name: str) -> None:
+    async def export(
+        self,
+        tenant: Tenant,
+        volume: VolumeRow,
+        path: Path,
+        target: Path,
+        name: str,
+        selection: volume_export.Selection,
+    ) -> None:
         """Export a volume to another format, a key of ``volume_export.FORMATS``."""
         what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.export_cost(VolumeFile.of(volume))
-        how = {"target": target, "name": name}
+        how = {"target": target, "name": name, "selection": selection}
         await self._one(tenant, what, path, volume_export.export_volume, how)
 
     def waiting(self) -> dict[Tenant, int]:

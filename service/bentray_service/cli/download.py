@@ -9,6 +9,7 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
+from .export import AttenuationUnit, Quantity
 from .options.paths import output_file
 from .output.exit_codes import client_errors
 from .output.terminal import AsJson, print_json, print_lines, progress_bar, remark
@@ -23,22 +24,36 @@ def download(
     form: Annotated[
         str | None,
         typer.Option(
-            "--format", show_default="by the name", help="hdf5 (or h5), nifti, metaimage, mat or npy."
+            "--format",
+            show_default="by the name",
+            help="hdf5 (or h5), nifti, metaimage, nrrd, mat, vti, ome-zarr, dicom or npy.",
         ),
     ] = None,
+    quantity: Quantity = "speed",
+    attenuation: AttenuationUnit = "Np/m",
     url: Annotated[str, typer.Option(help="Address of the service.")] = "http://127.0.0.1:8000",
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Download a scan or a volume; the extension of OUTPUT selects the format.
 
-    Scans are HDF5 files (.h5), as bentray reconstruct takes them; volumes .h5, .nii, .mha, .mat or .npy.
+    Scans are HDF5 files (.h5), as bentray reconstruct takes them; volumes .h5, .nii, .mha, .nrrd, .mat,
+    .vti, .zip (OME-Zarr), .dcm or .npy.
 
     Example:  bentray download ds-0123456789abcdef0123 -o scan.h5
     """
     formats: dict[str, Format] = {".h5": "hdf5"}
     if stored.startswith("vol-"):
-        formats |= {".nii": "nifti", ".mha": "metaimage", ".mat": "mat", ".npy": "npy"}
+        formats |= {
+            ".nii": "nifti",
+            ".mha": "metaimage",
+            ".nrrd": "nrrd",
+            ".mat": "mat",
+            ".vti": "vti",
+            ".zip": "ome-zarr",
+            ".dcm": "dicom",
+            ".npy": "npy",
+        }
     elif not stored.startswith("ds-"):
         raise InvalidInput("id", repr(stored), "the id of a scan (ds-…) or a volume (vol-…)")
     names: dict[str, Format] = {**{one: one for one in formats.values()}, "h5": "hdf5"}
@@ -48,12 +63,15 @@ def download(
     if chosen is None:
         raise InvalidInput("output", output, "a name ending in " + ", ".join(formats) + ", or --format")
     target = output_file(output, force=force)
+    defaults = {"quantity": "speed", "attenuation": "Np/m"}
+    asked = {"quantity": quantity, "attenuation": attenuation}
+    how = {name: value for name, value in asked.items() if value != defaults[name]}
 
     from ..client import Client
 
     with client_errors(), Client(url, on_wait=remark) as client, progress_bar("Downloading") as step:
         if stored.startswith("vol-"):
-            client.download(stored, chosen, target)
+            client.download(stored, chosen, target, **how)
         else:
             client.download_dataset(stored, target, step)
     if as_json:

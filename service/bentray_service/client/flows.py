@@ -19,7 +19,7 @@ from .steps import DownloadStep, Flow, RequestStep
 from .uploading import PLACES, OnBytes, UploadKind, send_file
 from .waiting import wait_for
 
-Format = Literal["hdf5", "h5", "nifti", "metaimage", "mat", "npy"]
+Format = Literal["hdf5", "h5", "nifti", "metaimage", "nrrd", "mat", "vti", "ome-zarr", "dicom", "npy"]
 Record = TypeVar("Record", bound=BaseModel)
 
 Uploaded: TypeAlias = DatasetRecord | VolumeRecord | MeshRecord
@@ -104,9 +104,16 @@ def slice_png(connection: Connection, /, volume_id: str, **how: str | float) -> 
     return bytes((yield RequestStep("GET", path, {"params": how}, repeatable=True)).content)
 
 
-def download(connection: Connection, volume_id: str, format: Format, path: Path | str) -> Flow[Path]:  # noqa: A002
-    """Download a volume to ``path``, atomically."""
-    yield DownloadStep(f"/v1/volumes/{volume_id}/data", {"params": {"format": format}}, Path(path))
+def download(
+    connection: Connection,
+    /,
+    volume_id: str,
+    format: Format,  # noqa: A002 - the name of the query parameter
+    path: Path | str,
+    **how: str,
+) -> Flow[Path]:
+    """Download a volume to ``path``, atomically; ``how``: quantity, attenuation."""
+    yield DownloadStep(f"/v1/volumes/{volume_id}/data", {"params": {"format": format, **how}}, Path(path))
     return Path(path)
 
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.volume_export import FORMATS, largest_bytes
+from bentray_workers.files.volume_export import FORMATS, Selection, largest_bytes
 
 from .. import __version__
 from ..errors import UnknownId
@@ -37,13 +37,22 @@ async def volume_data(
     service: Service,
     tenant: CallerTenant,
     format: Annotated[  # noqa: A002 - the name of the query parameter
-        Literal["hdf5", "h5", "nifti", "metaimage", "mat", "npy"],
+        Literal["hdf5", "h5", "nifti", "metaimage", "nrrd", "mat", "vti", "ome-zarr", "dicom", "npy"],
         Query(
             description="hdf5 or h5: all data; mat: all images and the grid for MATLAB (version 5); npy: "
-            "values only, speed in m/s; nifti and metaimage (.mha): values with spacing and origin in "
-            "mm, for uniform spacing."
+            "values only; nifti, metaimage (.mha) and nrrd: values with spacing and origin in mm; vti: all "
+            "images for ParaView, lengths in m; ome-zarr: all images as channels of OME-Zarr 0.5 in a zip; "
+            "dicom: speed and attenuation as a Parametric Map. Uneven heights: hdf5, mat and npy only."
         ),
     ] = "hdf5",
+    quantity: Annotated[
+        Literal["speed", "attenuation"],
+        Query(description="Quantity of npy, nifti, metaimage and nrrd of a reconstruction."),
+    ] = "speed",
+    attenuation: Annotated[
+        Literal["Np/m", "dB/cm/MHz"],
+        Query(description="Unit of the attenuation. dB/cm/MHz needs the frequency of the scan."),
+    ] = "Np/m",
 ) -> Response:
     """Download a volume.
 
@@ -55,15 +64,21 @@ async def volume_data(
     # Exports are deleted together with the volume.
     path = await run_in_threadpool(service.files.store.fetch, files.volume(volume["id"]))
     seed = repr((volume["id"], volume["created"], "hdf5" if format == "h5" else format))
+    selection = Selection(quantity, attenuation)
     if format in ("hdf5", "h5"):
+        if selection != Selection():
+            accepted = "speed and Np/m for hdf5, which holds all quantities in SI units"
+            raise InvalidInput("quantity, attenuation", f"{quantity}, {attenuation}", accepted)
         return download(request, path, seed, HDF5)
     chosen = FORMATS[format]
     # Exports are deterministic, so the ETag is computed from the volume.
+    which = "" if selection == Selection() else f"{quantity}-{'np' if attenuation == 'Np/m' else 'db'}."
+    seed = repr((seed, which)) if which else seed
     tag = tag_of(path, repr((__version__, seed)))
     if (response := unchanged(request, tag)) is not None:
         return response
-    name = f"{volume['id']}-{'speed' if 'job_id' in volume else 'values'}.{chosen.extension}"
-    made = files.export(volume["id"], chosen.extension)
+    name = f"{volume['id']}-{quantity if 'job_id' in volume else 'values'}.{chosen.extension}"
+    made = files.export(volume["id"], f"{which}{chosen.extension}")
     if not made.exists():
         if request.method == "HEAD":
             headers = {"Accept-Ranges": "bytes", "Content-Disposition": f'attachment; filename="{name}"'}
@@ -72,7 +87,8 @@ async def volume_data(
         most = largest_bytes(volume["shape"], uploaded="job_id" not in volume)
         async with service.quota.reserved(tenant, made.name, most):
             try:
-                await while_connected(request, service.pictures.export(tenant, volume, path, made, format))
+                work = service.pictures.export(tenant, volume, path, made, format, selection)
+                await while_connected(request, work)
             except InvalidInput:
                 # Report a volume that was deleted in the meantime as unknown.
                 await run_in_threadpool(service.volumes.get, tenant, volume["id"])

@@ -27,8 +27,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
         def __exit__(self, *_: object) -> None: ...
 
-        def download(self, volume: str, format: str, path: Path) -> None:  # noqa: A002
-            found.append((volume, format))
+        def download(self, volume: str, format: str, path: Path, **how: str) -> None:  # noqa: A002
+            found.append((volume, format, *how.values()))
             path.write_bytes(b"volume")
 
         def download_dataset(self, dataset: str, path: Path, told: Callable[[int, int], None]) -> None:
@@ -67,7 +67,7 @@ def test_a_format_by_its_name(bentray: Callable[..., Result], tmp_path: Path, as
     [
         ("mesh-1", "m.ply", "id: found 'mesh-1'"),
         (SCAN, "scan.mat", "a name ending in .h5"),
-        (VOLUME, "v.png", ".nii, .mha, .mat, .npy"),
+        (VOLUME, "v.png", ".nii, .mha, .nrrd, .mat, .vti, .zip, .dcm, .npy"),
         (SCAN, "there.h5", "(exists)"),
     ],
 )

@@ -18,7 +18,17 @@ from bentray_workers.files.volume import Volume, write_volume
 from ..conftest import FakeCluster, FakeFuture
 
 STREAM = {"Content-Type": "application/octet-stream"}
-FORMATS = {"hdf5": "h5", "nifti": "nii", "metaimage": "mha", "mat": "mat", "npy": "npy"}
+FORMATS = {
+    "hdf5": "h5",
+    "nifti": "nii",
+    "metaimage": "mha",
+    "nrrd": "nrrd",
+    "mat": "mat",
+    "vti": "vti",
+    "ome-zarr": "ome.zarr.zip",
+    "dicom": "dcm",
+    "npy": "npy",
+}
 
 
 @pytest.fixture
@@ -194,3 +204,19 @@ def test_a_part_beyond_the_end_is_refused(http, upload, part):
     body = answer.json()
     assert (answer.status_code, body["type"], body["field"]) == (416, "/problems/no-such-part", "Range")
     assert answer.headers["content-range"] == f"bytes */{size}"
+
+
+def test_quantity_and_unit_of_a_reconstruction(http, result, upload):
+    both = {"quantity": "attenuation", "attenuation": "dB/cm/MHz"}
+    refused = http.get(result, params={"format": "npy", **both})
+    assert refused.status_code == 422
+    # The simulated scan has no amplitudes, and an upload no quantities.
+    assert refused.json()["field"] == "quantity"
+    assert http.get(upload, params={"format": "npy", **both}).json()["field"] == "quantity"
+    assert http.get(result, params=both).json()["accepted"].startswith("speed and Np/m for hdf5")
+    plain, decibel = (http.get(result, params={"format": "npy", "attenuation": unit}) for unit in UNITS)
+    assert plain.content == decibel.content
+    assert plain.headers["etag"] != decibel.headers["etag"]
+
+
+UNITS = ("Np/m", "dB/cm/MHz")

@@ -156,7 +156,14 @@ def test_a_slice_takes_no_more_memory_than_planned(volumes, how):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name", ["npy", *(pytest.param(one, marks=pytest.mark.nightly) for one in ("nifti", "metaimage", "mat"))]
+    "name",
+    [
+        "npy",
+        *(
+            pytest.param(one, marks=pytest.mark.nightly)
+            for one in ("nifti", "metaimage", "nrrd", "mat", "vti", "ome-zarr", "dicom")
+        ),
+    ],
 )
 def test_an_export_takes_no_more_memory_than_planned(volumes, tmp_path, name):
     small = {"target": tmp_path / "small", "name": name}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -13,14 +14,66 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import FREQUENCY_HZ
 
 from .atomic import atomic_replace
+from .dicom_writing import write_dicom
 from .hdf5_reading import Limits, opened
 from .mat_writing import write_mat
 from .metaimage_writing import write_metaimage
 from .nifti_writing import write_nifti
+from .nrrd_writing import write_nrrd
+from .ome_zarr_writing import write_ome_zarr
 from .reconstruction import IMAGES, read_reconstruction
 from .volume import FORMAT, read_volume
+from .vti_writing import write_vti
+
+SPEED, ATTENUATION, ATTENUATION_DB = "speed_mps", "attenuation_np_m", "attenuation_db_cm_mhz"
+UNITS = {
+    SPEED: "m/s",
+    "coverage_m": "m",
+    ATTENUATION: "Np/m",
+    ATTENUATION_DB: "dB/(cm.MHz)",
+    "recovery": "1",
+}
+TITLES = {
+    SPEED: "Speed of sound, m/s",
+    ATTENUATION: "Attenuation, Np/m",
+    ATTENUATION_DB: "Attenuation, dB/(cm MHz)",
+}
+QUANTITIES = ("speed", "attenuation")
+ATTENUATION_UNITS = ("Np/m", "dB/cm/MHz")
+# Entry of the provenance with the frequency of the attenuation.
+FREQUENCY = "frequency_hz"
+DB_CM_OF_NP_M = 20.0 / math.log(10.0) / 100.0
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What is exported of a reconstruction.
+
+    Attributes:
+        quantity: of formats with one image, of ``QUANTITIES``.
+        attenuation: unit of the attenuation, of ``ATTENUATION_UNITS``.
+        frequency_hz: for dB/cm/MHz; None: that of the scan.
+
+    Raises:
+        InvalidInput: naming the first invalid field.
+    """
+
+    quantity: str = "speed"
+    attenuation: str = "Np/m"
+    frequency_hz: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, value, accepted in (
+            ("quantity", self.quantity, QUANTITIES),
+            ("attenuation", self.attenuation, ATTENUATION_UNITS),
+        ):
+            if value not in accepted:
+                raise InvalidInput(name, repr(value)[:40], "one of " + ", ".join(accepted))
+        if self.frequency_hz is not None:
+            FREQUENCY_HZ.check("frequency", self.frequency_hz)
 
 
 @dataclass(frozen=True)
@@ -28,10 +81,11 @@ class Content:
     """Content of the file of a volume.
 
     Attributes:
-        values: (nx, ny[, nz]): the speed of a reconstruction, m/s, or the values of an upload.
+        values: (nx, ny[, nz]): the selected quantity of a reconstruction, or the values of an upload.
         spacing_m, origin_m: per axis, m; NaN for uneven heights.
         title: of the volume.
         images: all arrays by name, including the values.
+        seconds: time of the file, s since 1970.
     """
 
     values: NDArray[Any]
@@ -39,6 +93,7 @@ class Content:
     origin_m: Sequence[float]
     title: str
     images: Mapping[str, NDArray[Any]]
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -52,30 +107,39 @@ class Format:
 
 # Size of a number, and of headers.
 NUMBER_BYTES, HEADER_BYTES = 8, 64 * 2**10
+# Of the description of a slice in DICOM, and of a chunk of OME-Zarr.
+SLICE_BYTES = 8 * 2**10
 
 
 def largest_bytes(shape: Sequence[int], *, uploaded: bool) -> int:
     """Largest size of a volume of this shape in any of the formats, bytes."""
     images = 1 if uploaded else len(IMAGES)
-    return images * NUMBER_BYTES * math.prod(shape) + HEADER_BYTES
+    return images * (NUMBER_BYTES * math.prod(shape) + SLICE_BYTES * shape[-1]) + HEADER_BYTES
 
 
-def export_volume(volume: Path, *, target: Path, name: str) -> None:
+def export_volume(volume: Path, *, target: Path, name: str, selection: Selection | None = None) -> None:
     """Task: write a volume or reconstruction file in another format.
 
     Args:
         volume: its file.
         target: the exported file, replaced atomically.
         name: a key of ``FORMATS``.
+        selection: of quantity and unit; None: the speed, and Np/m.
 
     Raises:
-        InvalidInput: naming ``volume``, for content that the format cannot store, or a deleted volume.
+        InvalidInput: naming ``volume``, for content that the format cannot store, or a deleted volume; naming
+            the field of the selection, for a quantity that the volume does not have.
         OSError: where the folder cannot be written to or the disk is full.
     """
     with opened(volume, Limits()) as reader:
         uploaded = reader.text("", "format") == FORMAT
+    chosen = selection or Selection()
+    content = _uploaded(volume) if uploaded else _reconstructed(volume, chosen)
+    if uploaded and chosen != Selection():
+        found = f"{chosen.quantity}, {chosen.attenuation}"
+        raise InvalidInput("quantity", found, "none: an uploaded volume has values only")
     try:
-        FORMATS[name].write(target, _uploaded(volume) if uploaded else _reconstructed(volume))
+        FORMATS[name].write(target, content)
     except FileNotFoundError:
         # Deleting a volume removes its exports, also unfinished ones.
         if not target.parent.is_dir():
@@ -85,14 +149,40 @@ def export_volume(volume: Path, *, target: Path, name: str) -> None:
 
 def _uploaded(volume: Path) -> Content:
     own = read_volume(volume)
-    return Content(own.values, own.spacing_m, own.origin_m, own.title, {"values": own.values})
+    images = {"values": own.values}
+    return Content(own.values, own.spacing_m, own.origin_m, own.title, images, volume.stat().st_mtime)
 
 
-def _reconstructed(volume: Path) -> Content:
+def _reconstructed(volume: Path, chosen: Selection) -> Content:
     own = read_reconstruction(volume)
     held = {place: getattr(own, name) for name, place in IMAGES.items()}
     images = {place: image for place, image in held.items() if image is not None}
-    return Content(own.speed, own.spacing_m, own.origin_m, "Speed of sound, m/s", images)
+    if chosen.attenuation != "Np/m" and ATTENUATION in images:
+        frequency = _frequency(own.provenance, chosen)
+        factor = DB_CM_OF_NP_M / (frequency * 1e-6)
+        images = {
+            ATTENUATION_DB if name == ATTENUATION else name: factor * image if name == ATTENUATION else image
+            for name, image in images.items()
+        }
+    selected = next((name for name in images if name.startswith(chosen.quantity)), None)
+    if selected is None:
+        raise InvalidInput("quantity", f"{chosen.quantity} of a result without it", "speed")
+    return Content(
+        images[selected], own.spacing_m, own.origin_m, TITLES[selected], images, volume.stat().st_mtime
+    )
+
+
+def _frequency(provenance: Mapping[str, str], chosen: Selection) -> float:
+    """The frequency that an attenuation in dB/cm/MHz refers to, Hz."""
+    if chosen.frequency_hz is not None:
+        return chosen.frequency_hz
+    try:
+        frequency = float(provenance[FREQUENCY])
+        FREQUENCY_HZ.check(FREQUENCY, frequency)
+    except (KeyError, ValueError):
+        accepted = "Np/m, or a frequency: the result states none"
+        raise InvalidInput("attenuation", repr(chosen.attenuation), accepted) from None
+    return frequency
 
 
 def _npy(target: Path, content: Content) -> None:
@@ -113,11 +203,36 @@ def _mat(target: Path, content: Content) -> None:
     write_mat(target, {**content.images, **grid, "axes": axes, "title": content.title})
 
 
+def _vti(target: Path, content: Content) -> None:
+    active = next(name for name, image in content.images.items() if image is content.values)
+    write_vti(target, content.images, content.spacing_m, content.origin_m, active)
+
+
+def _ome_zarr(target: Path, content: Content) -> None:
+    write_ome_zarr(target, content.images, UNITS, content.spacing_m, content.origin_m, content.title)
+
+
+def _dicom(target: Path, content: Content) -> None:
+    write_dicom(
+        target,
+        content.images,
+        content.spacing_m,
+        content.origin_m,
+        content.title,
+        version("bentray"),
+        content.seconds,
+    )
+
+
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
         "npy": Format("npy", "application/octet-stream", _npy),
         "nifti": Format("nii", "application/octet-stream", _on_grid(write_nifti)),
         "metaimage": Format("mha", "application/octet-stream", _on_grid(write_metaimage)),
+        "nrrd": Format("nrrd", "application/octet-stream", _on_grid(write_nrrd)),
         "mat": Format("mat", "application/x-matlab-data", _mat),
+        "vti": Format("vti", "application/octet-stream", _vti),
+        "ome-zarr": Format("ome.zarr.zip", "application/zip", _ome_zarr),
+        "dicom": Format("dcm", "application/dicom", _dicom),
     }
 )

@@ -31,6 +31,7 @@ from ..files.dataset.traces import lacks_water, trace_samples
 from ..files.findings import ScanFindings, read_findings
 from ..files.reconstruction import write_reconstruction
 from ..files.reference import read_reference, reference_path
+from ..files.volume_export import FREQUENCY
 from .file_scan import FileScan, FileWaveScan
 from .picking_graph import PickingFiles, PickingGraph, PickingGuide, PickingSource
 
@@ -85,12 +86,17 @@ def reconstruct(
 
 
 def _estimated(job: _Job, findings: ScanFindings) -> dict[str, str]:
-    """Sentences of the provenance about what was estimated from the scan: water speed and pulse."""
+    """Entries of the provenance about the scan: frequency, and what was estimated of water and pulse."""
     scan = read_dataset(job.scan, traces=False)
     estimated = {}
+    frequency = scan.amplitude_frequency_hz or scan.center_frequency_hz
     spectrum = spectrum_of(job.scan, scan)
     if spectrum is not None:
         estimated["pulse"] = spectrum.summary
+        frequency = frequency or spectrum.center_frequency_hz
+    if frequency is not None:
+        # For exports of the attenuation in dB/cm/MHz.
+        estimated[FREQUENCY] = repr(float(frequency))
     shot = reference_path(job.folder, 0)
     if shot.exists():
         reference = read_reference(shot)

@@ -1,0 +1,82 @@
+"""`bentray export`: write a result or a volume in the format of another program."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bentray_kernels.errors import InvalidInput
+
+from .options.paths import check_apart, input_file, output_file
+from .output.terminal import AsJson, print_json, print_lines
+
+# Formats by suffix; OME-Zarr is a folder or a zip.
+SUFFIXES = {
+    ".h5": "hdf5",
+    ".hdf5": "hdf5",
+    ".npy": "npy",
+    ".nii": "nifti",
+    ".nrrd": "nrrd",
+    ".mha": "metaimage",
+    ".mat": "mat",
+    ".vti": "vti",
+    ".zarr": "ome-zarr",
+    ".ozx": "ome-zarr",
+    ".zip": "ome-zarr",
+    ".dcm": "dicom",
+}
+ACCEPTED = "a reconstruction.h5, its folder, or a volume of Bentray in HDF5"
+
+Quantity = Annotated[
+    str, typer.Option(help="Quantity of .npy, .nii, .nrrd and .mha: speed or attenuation; others hold all.")
+]
+AttenuationUnit = Annotated[str, typer.Option("--attenuation", help="Its unit: Np/m or dB/cm/MHz.")]
+
+
+def export(
+    result: Annotated[Path, typer.Argument(help="reconstruction.h5, its folder, or a volume in HDF5.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File to write; the suffix is the format.")],
+    quantity: Quantity = "speed",
+    attenuation: AttenuationUnit = "Np/m",
+    frequency: Annotated[
+        float | None,
+        typer.Option(show_default="of the scan", help="Frequency for dB/cm/MHz, Hz."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write a result in the format of another program; the suffix of OUTPUT selects it.
+
+    .h5 HDF5, .npy NumPy, .nii NIfTI, .nrrd NRRD, .mha MetaImage, .mat MATLAB, .vti VTK ImageData (ParaView),
+    .zarr, .ozx or .zip OME-Zarr 0.5 (a folder, or a zip), .dcm DICOM Parametric Map.
+
+    Example:  bentray export result/reconstruction.h5 -o speed.nii
+    """
+    source = input_file(result / "reconstruction.h5" if result.is_dir() else result, ACCEPTED)
+    name = SUFFIXES.get(output.suffix.lower())
+    if name is None:
+        raise InvalidInput("output", output, "a name ending in " + ", ".join(SUFFIXES))
+    if output.suffix.lower() == ".zarr" and output.exists():
+        raise InvalidInput("output", f"{output} (exists)", "a new folder, or a .zip with --force")
+    target = output_file(output, force=force)
+    check_apart({"output": target}, {"result": source})
+
+    from bentray_workers.files.atomic import atomic_replace
+    from bentray_workers.files.hdf5_reading import Limits, opened
+    from bentray_workers.files.volume_export import Selection, export_volume
+
+    selection = Selection(quantity, attenuation, frequency)
+    if name == "hdf5":
+        if selection.attenuation != "Np/m":
+            raise InvalidInput("attenuation", attenuation, "Np/m, which HDF5 results hold, or another format")
+        with opened(source, Limits()), atomic_replace(target) as partial:
+            shutil.copyfile(source, partial)
+    else:
+        export_volume(source, target=target, name=name, selection=selection)
+    if as_json:
+        print_json({"result": str(source), "output": str(target), "format": name})
+    else:
+        print_lines([str(target)])

@@ -1,0 +1,67 @@
+"""`bentray export`: the suffix selects the format; what cannot be written is named."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import nibabel
+import numpy as np
+import pytest
+from typer.testing import Result
+
+from bentray_service.cli.export import SUFFIXES
+from bentray_workers.files.reconstruction import read_reconstruction, write_reconstruction
+from bentray_workers.files.volume_export import FORMATS
+
+from ...workers.files.reconstructions import made
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    one = made(nodes=6)
+    provenance = {**one.provenance, "frequency_hz": "1e6"}
+    write_reconstruction(tmp_path / "reconstruction.h5", replace(one, provenance=provenance))
+    return tmp_path
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_every_suffix_is_written(bentray: Callable[..., Result], folder: Path, suffix: str) -> None:
+    target = folder / f"image{suffix}"
+    result = bentray("export", folder, "-o", target, "--json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["format"] == SUFFIXES[suffix]
+    assert target.exists()
+    if SUFFIXES[suffix] == "hdf5":
+        np.testing.assert_array_equal(read_reconstruction(target).speed, made(nodes=6).speed)
+    again = bentray("export", folder, "-o", target)
+    assert again.exit_code == 2
+    assert "exists" in again.stderr
+
+
+def test_every_format_has_a_suffix() -> None:
+    assert {*SUFFIXES.values()} == {"hdf5", *FORMATS}
+
+
+def test_quantity_and_unit_are_options(bentray: Callable[..., Result], folder: Path) -> None:
+    target, source = folder / "loss.nii", folder / "reconstruction.h5"
+    how = ("--quantity", "attenuation", "--attenuation", "dB/cm/MHz")
+    for more, factor in (((), 0.0868589), (("--frequency", 2e6, "--force"), 0.0434294)):
+        assert bentray("export", source, "-o", target, *how, *more).exit_code == 0
+        expected = factor * made(nodes=6).attenuation
+        np.testing.assert_allclose(nibabel.load(target).get_fdata(), expected, rtol=1e-5)
+
+
+def test_bad_input_is_named(bentray: Callable[..., Result], folder: Path) -> None:
+    for words, said in (
+        ((folder, "-o", folder / "image.tif"), "a name ending in .h5, .hdf5, .npy"),
+        ((folder / "none.h5", "-o", folder / "image.nii"), "no such file"),
+        ((folder, "-o", folder / "image.nii", "--quantity", "density"), "one of speed, attenuation"),
+        ((folder, "-o", folder / "image.h5", "--attenuation", "dB/cm/MHz"), "Np/m, which HDF5 results hold"),
+        ((folder, "-o", folder / "reconstruction.h5", "--force"), "the same file"),
+    ):
+        result = bentray("export", *words)
+        assert result.exit_code == 2, words
+        assert said in " ".join(result.stderr.split())

@@ -1,0 +1,194 @@
+"""Writing volumes as DICOM Parametric Maps, one frame for each slice and quantity."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.errors import InvalidInput
+
+from .atomic import atomic_replace
+from .bounded_reading import UNITS_M
+from .optional_library import import_optional
+
+# UCUM code and meaning of each quantity: name of the image, label, explanation.
+QUANTITIES = {
+    "speed_mps": ("SPEED", "Speed of sound", "m/s", "meter per second"),
+    "attenuation_np_m": ("ATTENUATION", "Attenuation", "Np/m", "neper per meter"),
+    "attenuation_db_cm_mhz": (
+        "ATTENUATION",
+        "Attenuation over frequency",
+        "dB/(cm.MHz)",
+        "decibel per centimeter and megahertz",
+    ),
+    "values": ("VALUES", "Values", "1", "no units"),
+}
+# Parametric maps have at most so many rows and columns.
+MOST_NODES = 2**16 - 1
+MAKER, MODEL, SCHEME = "Bentray", "bentray", "99BENTRAY"
+
+
+def write_dicom(
+    path: Path,
+    images: Mapping[str, NDArray[Any]],
+    spacing_m: Sequence[float],
+    origin_m: Sequence[float],
+    title: str,
+    version: str,
+    seconds: float,
+) -> None:
+    """Write the quantities of ``QUANTITIES`` as one Parametric Map; ``path`` is replaced atomically.
+
+    Frames are slices across z, rows are along y and columns along x; positions are those of the volume in mm,
+    in the patient axes of DICOM, without an orientation in the body. Patient and study are empty. The same
+    volume gives the same bytes.
+
+    Args:
+        path: of the file.
+        images: (nx, ny[, nz]) by name, stored as float32.
+        spacing_m, origin_m: per axis, m.
+        title: for the description.
+        version: of the software.
+        seconds: time of the content, s since 1970.
+
+    Raises:
+        InvalidInput: for uneven spacing, too many nodes, or without highdicom.
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    hd = import_optional("highdicom", "export", "DICOM")
+    names = [name for name in QUANTITIES if name in images]
+    first = images[names[0]]
+    if not np.isfinite(spacing_m).all():
+        found = f"uneven slices (spacing {tuple(float(step) for step in spacing_m)} m)"
+        raise InvalidInput("volume", found, "even spacing for DICOM; hdf5 holds any")
+    if max(first.shape) > MOST_NODES:
+        raise InvalidInput(
+            "volume", f"{max(first.shape)} nodes", f"at most {MOST_NODES} along an axis for DICOM"
+        )
+    # (frames, rows, columns, quantities).
+    pixels = np.stack([_frames(images[name]) for name in names], axis=-1)
+    steps = np.divide((*spacing_m, spacing_m[0])[:3], UNITS_M["mm"])
+    corner = np.divide((*origin_m, 0.0)[:3], UNITS_M["mm"])
+    digest = hashlib.sha256(pixels.tobytes() + repr((names, title, *steps, *corner)).encode()).hexdigest()
+    source = _source(digest, pixels.shape[1:3], steps, corner)
+    made = hd.pm.ParametricMap(
+        source_images=[source],
+        pixel_array=pixels,
+        series_instance_uid=_uid(digest, "series"),
+        series_number=1,
+        sop_instance_uid=_uid(digest, "instance"),
+        instance_number=1,
+        manufacturer=MAKER,
+        manufacturer_model_name=MODEL,
+        software_versions=version,
+        device_serial_number="0",
+        contains_recognizable_visual_features=False,
+        real_world_value_mappings=[[_mapping(hd, name, images[name])] for name in names],
+        voi_lut_transformations=[
+            hd.VOILUTTransformation(
+                window_center=float(np.mean([first.min(), first.max()])),
+                window_width=max(float(np.ptp(first)), 1.0),
+            )
+        ],
+        content_description=" ".join(title.split())[:64] or None,
+        content_label="BENTRAY",
+        pixel_measures=hd.PixelMeasuresSequence(
+            pixel_spacing=(_decimal(steps[1]), _decimal(steps[0])),
+            slice_thickness=_decimal(steps[2]),
+            spacing_between_slices=_decimal(steps[2]),
+        ),
+        plane_orientation=hd.PlaneOrientationSequence(
+            coordinate_system="PATIENT", image_orientation=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+        ),
+        plane_positions=[
+            hd.PlanePositionSequence(
+                coordinate_system="PATIENT",
+                image_position=(_decimal(corner[0]), _decimal(corner[1]), _decimal(corner[2] + k * steps[2])),
+            )
+            for k in range(len(pixels))
+        ],
+    )
+    _settle(made, digest, datetime.fromtimestamp(math.floor(seconds), UTC))
+    with atomic_replace(path) as partial, partial.open("wb") as file:
+        made.save_as(file)
+
+
+def _frames(image: NDArray[Any]) -> NDArray[np.float32]:
+    """(nz, ny, nx)."""
+    stacked = image[..., None] if image.ndim == 2 else image
+    return np.ascontiguousarray(stacked.transpose(2, 1, 0), dtype=np.float32)
+
+
+def _source(digest: str, shape: Sequence[int], steps: NDArray[Any], corner: NDArray[Any]) -> Any:
+    """An image of an anonymous patient in the frame of reference of the volume, which highdicom requires."""
+    from pydicom.dataset import Dataset
+    from pydicom.uid import UltrasoundImageStorage
+
+    source = Dataset()
+    source.SOPClassUID = UltrasoundImageStorage
+    source.SOPInstanceUID = _uid(digest, "scan")
+    source.StudyInstanceUID = _uid(digest, "study")
+    source.SeriesInstanceUID = _uid(digest, "scan series")
+    source.FrameOfReferenceUID = _uid(digest, "frame of reference")
+    source.Modality = "US"
+    source.Rows, source.Columns = (int(n) for n in shape)
+    source.SliceThickness = _decimal(steps[2])
+    source.PixelSpacing = [_decimal(steps[1]), _decimal(steps[0])]
+    source.ImageOrientationPatient = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+    source.ImagePositionPatient = [_decimal(value) for value in corner]
+    for name in ("PatientID", "PatientName", "PatientBirthDate", "PatientSex", "AccessionNumber", "StudyID"):
+        setattr(source, name, "")
+    for name in ("StudyDate", "StudyTime", "ReferringPhysicianName", "PositionReferenceIndicator"):
+        setattr(source, name, "")
+    return source
+
+
+def _settle(made: Any, digest: str, moment: datetime) -> None:
+    """Replace the time of this export by that of the content, and random identifiers; no source image."""
+    for word in ("Content", "InstanceCreation"):
+        setattr(made, f"{word}Date", moment.strftime("%Y%m%d"))
+        setattr(made, f"{word}Time", moment.strftime("%H%M%S"))
+    for equipment in made.ContributingEquipmentSequence:
+        equipment.ContributionDateTime = moment.strftime("%Y%m%d%H%M%S")
+    for organization in (*made.DimensionOrganizationSequence, *made.DimensionIndexSequence):
+        organization.DimensionOrganizationUID = _uid(digest, "dimensions")
+    # highdicom requires one, but there is none.
+    del made.ReferencedSeriesSequence, made.SourceImageSequence
+    for frame in made.PerFrameFunctionalGroupsSequence:
+        del frame.DerivationImageSequence
+
+
+def _mapping(hd: Any, name: str, image: NDArray[Any]) -> Any:
+    """Unit and meaning of a quantity; the values are stored as they are."""
+    from pydicom.sr.coding import Code
+
+    label, explanation, unit, meaning = QUANTITIES[name]
+    return hd.pm.RealWorldValueMapping(
+        lut_label=label,
+        lut_explanation=explanation,
+        unit=Code(unit, "UCUM", meaning),
+        value_range=(float(image.min()), float(image.max())),
+        slope=1.0,
+        intercept=0.0,
+        quantity_definition=Code(label, SCHEME, explanation),
+    )
+
+
+def _uid(digest: str, what: str) -> str:
+    from pydicom.uid import generate_uid
+
+    return str(generate_uid(entropy_srcs=[digest, what]))
+
+
+def _decimal(value: float) -> float:
+    """A number with at most 16 characters, as DICOM stores decimals."""
+    from pydicom.valuerep import format_number_as_ds
+
+    return float(format_number_as_ds(float(value)))

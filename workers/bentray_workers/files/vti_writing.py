@@ -1,0 +1,78 @@
+"""Writing volumes as VTK ImageData (.vti) for ParaView: XML with all images as appended raw data."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.errors import InvalidInput
+
+from .atomic import atomic_replace
+
+TYPES = {"u1": "UInt8", "u2": "UInt16", "f4": "Float32", "f8": "Float64"}
+SIZE = struct.Struct("<Q")
+
+
+def write_vti(
+    path: Path,
+    images: Mapping[str, NDArray[Any]],
+    spacing_m: Sequence[float],
+    origin_m: Sequence[float],
+    active: str,
+) -> None:
+    """Write images on one grid as point data; ``path`` is replaced atomically.
+
+    Args:
+        path: of the file.
+        images: (nx, ny[, nz]) by name, of a type of ``TYPES``.
+        spacing_m, origin_m: per axis, m; VTK has no unit, so lengths are in m.
+        active: name of the image that is shown first.
+
+    Raises:
+        InvalidInput: for uneven spacing, which ImageData cannot store.
+        OSError: where the folder cannot be written to or the disk is full.
+
+    Source:
+        "VTK XML Formats" of the VTK documentation: ``ImageData``, appended data, encoding raw.
+    """
+    if not np.isfinite(spacing_m).all():
+        found = f"uneven slices (spacing {tuple(float(step) for step in spacing_m)} m)"
+        raise InvalidInput("volume", found, "even spacing for VTI; hdf5 holds any")
+    shape = (*next(iter(images.values())).shape, 1)[:3]
+    extent = " ".join(f"0 {n - 1}" for n in shape)
+    # A plane has one layer; its thickness is not shown.
+    spacing, origin = (*spacing_m, spacing_m[0])[:3], (*origin_m, 0.0)[:3]
+    arrays, offset = [], 0
+    for name, image in images.items():
+        kind = TYPES[image.dtype.newbyteorder("<").str[1:]]
+        arrays.append(
+            f'<DataArray type="{kind}" Name={quoteattr(name)} format="appended" offset="{offset}"/>'
+        )
+        offset += SIZE.size + image.nbytes
+    header = (
+        '<?xml version="1.0"?>\n'
+        '<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
+        f'<ImageData WholeExtent="{extent}" Origin="{_row(origin)}" Spacing="{_row(spacing)}">\n'
+        f'<Piece Extent="{extent}"><PointData Scalars={quoteattr(active)}>\n'
+        + "\n".join(arrays)
+        + '\n</PointData></Piece></ImageData>\n<AppendedData encoding="raw">_'
+    )
+    with atomic_replace(path) as partial, partial.open("wb") as file:
+        file.write(header.encode())
+        for image in images.values():
+            file.write(SIZE.pack(image.nbytes))
+            stored = np.asarray(image, dtype=image.dtype.newbyteorder("<"))
+            # x varies fastest; one slice at a time, since transposing the whole would double the memory.
+            for k in range(stored.shape[-1] if stored.ndim == 3 else 1):
+                file.write((stored[..., k] if stored.ndim == 3 else stored).tobytes(order="F"))
+        file.write(b"</AppendedData>\n</VTKFile>\n")
+
+
+def _row(values: Sequence[float]) -> str:
+    return " ".join(repr(float(value)) for value in values)
