@@ -79,13 +79,13 @@ def reconstruct(
         path, findings, chosen, trials = _pick_with_guides(job, settings, progress)
         result = _reconstruct_picked(job, path, chosen, progress)
         result = replace(result, trials=trials or result.trials)
-        estimated = _estimated(job, findings)
+        estimated = _estimated(job, findings, attenuation=result.attenuation is not None)
     if settings.picking.examine or findings.findings:
         estimated["quality"] = findings.words(stacked=result.speed.ndim == 3)
     return replace(result, provenance={**result.provenance, **estimated})
 
 
-def _estimated(job: _Job, findings: ScanFindings) -> dict[str, str]:
+def _estimated(job: _Job, findings: ScanFindings, *, attenuation: bool) -> dict[str, str]:
     """Entries of the provenance about the scan: frequency, and what was estimated of water and pulse."""
     scan = read_dataset(job.scan, traces=False)
     estimated = {}
@@ -94,8 +94,8 @@ def _estimated(job: _Job, findings: ScanFindings) -> dict[str, str]:
     if spectrum is not None:
         estimated["pulse"] = spectrum.summary
         frequency = frequency or spectrum.center_frequency_hz
-    if frequency is not None:
-        # For exports of the attenuation in dB/cm/MHz.
+    if attenuation and frequency is not None:
+        # For exports in dB/cm/MHz.
         estimated[FREQUENCY] = repr(float(frequency))
     shot = reference_path(job.folder, 0)
     if shot.exists():
