@@ -74,8 +74,10 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     folder = tmp_path_factory.mktemp("service")
-    with running_service(folder / "data", folder / "log") as url:
-        yield url
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("BENTRAY_WORKERS", "1")
+        with running_service(folder / "data", folder / "log") as url:
+            yield url
 
 
 class Reader:

@@ -21,18 +21,23 @@ pytestmark = pytest.mark.slow
 
 PLAN = {"nodes": 64, "attenuation": {"enabled": False}}
 PLANS = [
-    {**PLAN, "method": "sart", "iterations": 100},
-    {**PLAN, "method": "gauss-newton", "iterations": 30, "gauss_newton": {"penalty_strength": 0.003}},
-    {**PLAN, "method": "sart", "iterations": 60, "resolution_check": True},
-    {**PLAN, "method": "auto", "iterations": 24},
+    {**PLAN, "method": "sart", "iterations": effort(40, 100)},
+    {
+        **PLAN,
+        "method": "gauss-newton",
+        "iterations": effort(12, 30),
+        "gauss_newton": {"penalty_strength": 0.003},
+    },
+    {**PLAN, "method": "sart", "iterations": effort(24, 60), "resolution_check": True},
+    {**PLAN, "method": "auto", "iterations": effort(10, 24)},
 ]
 
 EMISSIONS = 24
 WAVES = {"waveform": True, "frequency_hz": 4e5, "side_m": 0.05, "nodes": 32, "elements": 32, "snr": 20.0}
 
-# Of every kind one; at night the rest as it comes.
-KILLS = effort(4, 20)
-TARGETS = ["service", "service", "service", "a worker", "a worker", "workers", "scheduler"]
+# One of every kind; at night more, and all workers at once with the process above them.
+KILLS = effort(3, 20)
+TARGETS = ["service", "service", "service", "a worker", "a worker", "scheduler", *effort([], ["workers"])]
 
 
 def test_whatever_is_killed_nothing_is_lost(machine, scan, scan_file):

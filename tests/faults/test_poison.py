@@ -4,6 +4,7 @@ import os
 import threading
 from pathlib import Path
 
+import dask
 import numpy as np
 import pytest
 from distributed import Client, KilledWorker, LocalCluster
@@ -20,7 +21,7 @@ from bentray_workers.reconstruction import reconstruction_run
 
 pytestmark = pytest.mark.slow
 
-PLAN = Settings.of(nodes=48, attenuation=False, method="gauss-newton", iterations=20, penalty_strength=0.003)
+PLAN = Settings.of(nodes=48, attenuation=False, method="gauss-newton", iterations=8, penalty_strength=0.003)
 
 
 def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):
@@ -33,6 +34,8 @@ def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):
     how = {"threads_per_worker": THREADS, "resources": OFFERED, "local_directory": str(tmp_path / "scratch")}
     with (
         ours(),
+        # One death is enough for Dask to give a task up, so that fewer workers start again.
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
         LocalCluster(n_workers=2, dashboard_address=NO_DASHBOARD, **how) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from bentray_kernels.opencl import OpenCLFallbackWarning, choice, session_or_warning
-from bentray_kernels.splines import Spline, sampling_opencl
+from bentray_kernels.splines import FILTERS, Spline, sampling_opencl
 from bentray_kernels.splines.sampling_opencl import OpenCLSpline, fault_of, on_the_device
 
+from ...effort import effort
 from .every_filter import EveryFilter, rough_volume
 
 
 @pytest.mark.opencl
 class TestDouble(EveryFilter):
+    # A kernel is compiled for each filter and type: by day each filter in one of the types.
+    filters = effort(("bspline3", "catmull-rom", "trilinear"), tuple(FILTERS))
     tolerance = 2e-14
 
     def read(self, spline, points):
@@ -22,6 +25,7 @@ class TestDouble(EveryFilter):
 
 @pytest.mark.opencl
 class TestSingle(EveryFilter):
+    filters = effort(tuple(name for name in FILTERS if name not in TestDouble.filters), tuple(FILTERS))
     tolerance = 2e-6
 
     def made(self, volume, name, **how):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 from typer.testing import Result
 
@@ -17,8 +19,9 @@ SMALL = ("--nodes", 48, "--elements", 48)
 
 @pytest.mark.slow
 def test_the_whole_path_ends_with_bent_rays_ahead_and_a_picture(
-    bentray: Callable[..., Result], tmp_path: Path, drawn: Any
+    bentray: Callable[..., Result], tmp_path: Path, drawn: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setenv("BENTRAY_WORKERS", "1")
     result = bentray("demo", *SMALL, "-o", tmp_path / "out", "--json")
     assert result.exit_code == 0, result.stderr
     said = json.loads(result.stdout)
@@ -30,6 +33,12 @@ def test_the_whole_path_ends_with_bent_rays_ahead_and_a_picture(
     assert said["jobs"]["straight"]["settings"]["rays"] == "straight"
     assert said["picture"] == str(tmp_path / "out" / "comparison.png")
     assert Path(said["picture"]).read_bytes().startswith(b"\x89PNG\r\n")
+    log = (tmp_path / "out" / "service.log").read_text()
+    assert "Traceback" not in log
+    url = re.search(r"http://127\.0\.0\.1:\d+", log)
+    assert url is not None
+    with pytest.raises(httpx.TransportError):
+        httpx.get(f"{url[0]}/health/live", timeout=5)
 
 
 @pytest.mark.slow

@@ -117,6 +117,9 @@ def test_one_that_stays_silent_is_given_up(monkeypatch: pytest.MonkeyPatch, tmp_
         pytest.fail("it cannot have started")
 
 
+# `bentray demo` starts and stops one too.
+@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_real_service_answers_and_stops(tmp_path: Path) -> None:
     with running_service(tmp_path / "data", tmp_path / "log") as url:
         assert httpx.get(f"{url}/health/ready", timeout=30).json()["status"] == "ready"
