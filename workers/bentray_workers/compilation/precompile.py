@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
@@ -31,7 +32,7 @@ from bentray_kernels.splines import FILTERS
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.gauss_newton.penalties import PENALTIES
 
-from ..files.dataset import read_dataset, write_dataset
+from ..files.dataset import write_dataset
 from ..files.mesh import StoredMesh, write_mesh
 from ..files.volume import Volume
 from ..reconstruction import quality_report as quality
@@ -56,7 +57,6 @@ TIMES = SimulationSettings(nodes=16, elements=16, coupling_mps=1375.0, attenuati
 HEIGHTS = VolumeSimulationSettings(nodes=32, slices=2, elements=8, refinement=4, coupling_mps=1375.0)
 SPACE = replace(HEIGHTS, refinement=2, three_d=True)
 WAVES = WaveSimulationSettings(frequency_hz=2e5, side_m=0.05, elements=24, emissions=12, nodes=32)
-WAVES_FILE = "waves.h5"
 WAVES_IN_SPACE = VolumeWaveSettings(frequency_hz=1e5, side_m=0.03, elements=8, emissions=1, nodes=16)
 
 
@@ -110,21 +110,49 @@ def compile_rays(folder: Path) -> None:
         _reconstruct(folder / f"times-{number}.h5", scan, settings)
 
 
-def compile_pictures(folder: Path) -> None:
-    """Render volumes, trace a geometry field, and simulate waves: mostly without the kernels of rays."""
-    warmup.warm_up_rendering()
-    warmup.warm_up_tracing()
-    _refraction()
-    _field(folder)
-    simulate_emission(WAVES_IN_SPACE, 0)
-    write_dataset(folder / WAVES_FILE, simulate(WAVES))
-
-
 def compile_traces(folder: Path) -> None:
-    """Reconstruct from the waves of ``compile_pictures``, along the rays of ``compile_rays``."""
-    waves = read_dataset(folder / WAVES_FILE)
+    """Reconstruct from simulated waves, after ``compile_rays`` in the same process."""
+    waves = simulate(WAVES)
     for number, scan in enumerate((waves, digitised(waves))):
         _reconstruct(folder / f"traces-{number}.h5", scan, trace_settings())
+
+
+def compile_waves(_folder: Path) -> None:
+    """Simulate waves in two and three dimensions."""
+    simulate(WAVES)
+    simulate_emission(WAVES_IN_SPACE, 0)
+
+
+def compile_field(folder: Path) -> None:
+    """Compute a geometry field of a mesh, and trace rays through it."""
+    warmup.warm_up_tracing()
+    mesh, work = folder / "mesh.h5", folder / "field-work"
+    write_mesh(mesh, StoredMesh(bumpy_ball(320)))
+    work.mkdir()
+    settings = FieldSettings(samples=4, inner_samples=4, divisions=4, image_size=33)
+    geometry_field.build_field(None, mesh, settings, folder / "field", work)
+
+
+def compile_filter(name: str, _folder: Path) -> None:
+    """Render a ball with a filter, refracted and shaded, with all kinds of supersampling."""
+    warmup.warm_up_rendering()
+    filtered = filter_volume(Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3), name, 0.0)
+    for view in (
+        RefractionView(iso=(0.5,), supersampling="prss", degree=2, width=8, height=8),
+        RefractionView(iso=(0.5,), supersampling="real", degree=2, width=8, height=8),
+        RefractionView(iso=(0.5,), mode="shaded", supersampling="none", width=8, height=8),
+    ):
+        chosen = replace(view, filter=name)
+        draw_tile(build_scene(filtered, chosen.layers()), chosen, 0, 8)
+
+
+# Side by side in two processes, the longest first. Parts in one tuple follow each other in one process, as
+# traces need the kernels of rays; those of waves are compiled by then.
+PARTS: tuple[tuple[Callable[[Path], None], ...], ...] = (
+    (compile_rays, compile_traces),
+    (compile_waves, compile_field),
+    *((partial(compile_filter, name),) for name in FILTERS),
+)
 
 
 def _reconstruct(path: Path, scan: Dataset, wanted: Iterator[dict[str, Any]]) -> None:
@@ -134,35 +162,12 @@ def _reconstruct(path: Path, scan: Dataset, wanted: Iterator[dict[str, Any]]) ->
         reconstruct(None, path, Settings.of(nodes=NODES, iterations=1, **settings))
 
 
-def _refraction() -> None:
-    """Render a ball with every filter, refracted and shaded, with both kinds of supersampling."""
-    volume = Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3)
-    views = (
-        RefractionView(iso=(0.5,), supersampling="prss", degree=2, width=8, height=8),
-        RefractionView(iso=(0.5,), supersampling="real", degree=2, width=8, height=8),
-        RefractionView(iso=(0.5,), mode="shaded", supersampling="none", width=8, height=8),
-    )
-    for name in FILTERS:
-        filtered = filter_volume(volume, name, 0.0)
-        for view in views:
-            chosen = replace(view, filter=name)
-            draw_tile(build_scene(filtered, chosen.layers()), chosen, 0, 8)
-
-
-def _field(folder: Path) -> None:
-    """Compute a geometry field of a mesh."""
-    mesh, work = folder / "mesh.h5", folder / "field-work"
-    write_mesh(mesh, StoredMesh(bumpy_ball(320)))
-    work.mkdir()
-    settings = FieldSettings(samples=4, inner_samples=4, divisions=4, image_size=33)
-    geometry_field.build_field(None, mesh, settings, folder / "field", work)
-
-
-def compiled_in(part: Callable[[Path], None], folder: Path) -> int:
-    """How many kernels a part has compiled, in a process of its own."""
+def compiled_in(parts: tuple[Callable[[Path], None], ...], folder: Path) -> int:
+    """How many kernels these parts have compiled, in a process of its own."""
     warnings.simplefilter("ignore")
     with compiled_kernels() as kernels:
-        part(folder)
+        for part in parts:
+            part(folder)
     return len(kernels)
 
 
@@ -177,7 +182,7 @@ def marker() -> Path:
 
 
 def main() -> None:
-    """Two processes side by side, as compilation uses one core; then what needs the kernels of both."""
+    """Compile all parts in two processes side by side, as compilation uses one core."""
     done = marker()
     if done.exists():
         sys.stdout.write("All kernels are compiled already\n")
@@ -186,10 +191,8 @@ def main() -> None:
         tempfile.TemporaryDirectory() as name,
         ProcessPoolExecutor(2, get_context("spawn")) as processes,
     ):
-        folder = Path(name)
-        first = [processes.submit(compiled_in, part, folder) for part in (compile_rays, compile_pictures)]
-        total = sum(part.result() for part in first)
-        total += processes.submit(compiled_in, compile_traces, folder).result()
+        running = [processes.submit(compiled_in, parts, Path(name)) for parts in PARTS]
+        total = sum(part.result() for part in running)
     done.parent.mkdir(parents=True, exist_ok=True)
     done.touch()
     sys.stdout.write(f"{total} kernels compiled\n")
