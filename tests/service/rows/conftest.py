@@ -14,6 +14,8 @@ from bentray_service.rows.jobs import Jobs
 from bentray_service.rows.stored_tables import Datasets
 from bentray_service.rows.tenants import LOCAL
 
+from ... import postgresql
+
 SUMMARY = {
     "title": "",
     "source": "",
@@ -30,16 +32,21 @@ SUMMARY = {
 }
 
 
+@pytest.fixture(scope="session")
+def postgresql_database(postgresql_server: postgresql.Server) -> str:
+    """The address of one database of PostgreSQL for all tests here."""
+    return postgresql_server.new_database()
+
+
 @pytest.fixture(params=["sqlite", "postgresql"])
 def address(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
-    """The address of a new database of each kind."""
+    """The address of an empty database of each kind."""
     if request.param == "sqlite":
         yield f"sqlite:///{tmp_path / 'db.sqlite'}"
         return
-    server = request.getfixturevalue("postgresql_server")
-    found = server.new_database()
+    found = request.getfixturevalue("postgresql_database")
     yield found
-    server.drop(found)
+    request.getfixturevalue("postgresql_server").empty(found)
 
 
 @pytest.fixture

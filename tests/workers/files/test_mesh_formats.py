@@ -185,10 +185,11 @@ def test_obj_opens_no_material_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "secret.mtl").write_text("newmtl a\nmap_Kd picture.png\n")
     opened = []
-    monkeypatch.setattr("builtins.open", lambda *words, **more: opened.append(words))
+    monkeypatch.setattr("builtins.open", lambda name, *words, **more: opened.append(str(name)))
     data = b"mtllib secret.mtl\nusemtl a\n" + exported("obj")
     assert read_mesh(data).surface.genus == 1
-    assert opened == []
+    # A cluster in this process measures its memory meanwhile.
+    assert [name for name in opened if not name.startswith("/proc/")] == []
 
 
 def test_limits(monkeypatch):
