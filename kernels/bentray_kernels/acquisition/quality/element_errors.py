@@ -29,11 +29,14 @@ class ElementErrors(NamedTuple):
     Attributes:
         emission_delay_s, reception_delay_s: (elements,), s.
         displacement_m: (elements, 2), true minus stated position, m.
+        sigma_s: (elements, 4), standard deviations of displacement over the speed of the water, emission and
+            reception, s.
     """
 
     emission_delay_s: Floats
     reception_delay_s: Floats
     displacement_m: Floats
+    sigma_s: Floats
 
 
 def fit_element_errors(dataset: Dataset, residual_s: Floats) -> ElementErrors:
@@ -50,7 +53,7 @@ def fit_element_errors(dataset: Dataset, residual_s: Floats) -> ElementErrors:
     middle = float(np.nanmedian(residual_s)) if np.isfinite(residual_s).any() else 0.0
     left = residual_s - middle
     # Displacement over the speed of the water, and delays in emission and reception, s.
-    errors = np.zeros((elements, 4))
+    errors, sigma = np.zeros((elements, 4)), np.full((elements, 4), np.inf)
     few = np.zeros(elements, dtype=bool)
     for _ in range(ROUNDS):
         for k in range(elements):
@@ -61,13 +64,14 @@ def fit_element_errors(dataset: Dataset, residual_s: Floats) -> ElementErrors:
             few[k] = np.isfinite(values).sum() < FEWEST
             if few[k]:
                 continue
-            errors[k] = _robust_fit(rows[np.isfinite(values)], values[np.isfinite(values)])
+            errors[k], sigma[k] = _robust_fit(rows[np.isfinite(values)], values[np.isfinite(values)])
             values = values - rows @ errors[k]
             split = left[emission].size
-            left[emission] = values[:split].reshape(len(emission), -1)
-            left[:, reception] = values[split:].reshape(-1, len(reception))
+            left[emission] = values[:split].reshape(left[emission].shape)
+            left[:, reception] = values[split:].reshape(left[:, reception].shape)
     errors[few] = np.nan
-    return ElementErrors(errors[:, 2], errors[:, 3], errors[:, :2] * dataset.water_speed_mps)
+    displacement = errors[:, :2] * dataset.water_speed_mps
+    return ElementErrors(errors[:, 2], errors[:, 3], displacement, sigma)
 
 
 def _design(away: Floats, emission: Ints, reception: Ints) -> Floats:
@@ -79,15 +83,18 @@ def _design(away: Floats, emission: Ints, reception: Ints) -> Floats:
     return rows
 
 
-def _robust_fit(rows: Floats, values: Floats) -> Floats:
-    """Least squares, repeated without the values far from the previous fit."""
+def _robust_fit(rows: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Least squares, repeated without the values far from the previous fit, and its standard deviations."""
     # The first selection is about the median, because many values of a late element are far from zero.
     off = np.asarray(values - np.median(values), dtype=np.float64)
-    solution: Floats = np.zeros(rows.shape[1])
+    solution, sigma = np.zeros(rows.shape[1]), np.full(rows.shape[1], np.inf)
     for _ in range(SELECTIONS):
-        near = np.abs(off - np.median(off)) <= OUTLYING * robust_deviation(off) + 1e-12
+        scatter = robust_deviation(off)
+        near = np.abs(off - np.median(off)) <= OUTLYING * scatter + 1e-12
         if near.sum() < FEWEST:
             break
-        solution = np.asarray(np.linalg.lstsq(rows[near], values[near], rcond=UNDETERMINED)[0])
+        inverse = np.linalg.pinv(rows[near].T @ rows[near], rcond=UNDETERMINED**2, hermitian=True)
+        solution = np.asarray(inverse @ (rows[near].T @ values[near]))
+        sigma = np.asarray(scatter * np.sqrt(np.maximum(np.diag(inverse), 0.0)))
         off = np.asarray(values - rows @ solution, dtype=np.float64)
-    return solution
+    return solution, sigma

@@ -31,14 +31,14 @@ def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
         return []
     errors = fit_element_errors(dataset, residual_s)
     least_s = LEAST_DELAY / dataset.center_frequency_hz
-    roles: tuple[tuple[Role, Floats], ...] = (
-        ("emission", errors.emission_delay_s),
-        ("reception", errors.reception_delay_s),
+    roles: tuple[tuple[Role, Floats, Floats], ...] = (
+        ("emission", errors.emission_delay_s, errors.sigma_s[:, 2]),
+        ("reception", errors.reception_delay_s, errors.sigma_s[:, 3]),
     )
     findings = []
-    for role, delay in roles:
+    for role, delay, sigma in roles:
         off = delay - np.nanmedian(delay) if np.isfinite(delay).any() else delay
-        for run in _runs(_unusual(off, least_s), off):
+        for run in _runs(_unusual(off, sigma, least_s), off):
             value = float(np.median(off[run]))
             late = f"{'late' if value > 0.0 else 'early'} by {1e9 * abs(value):.0f} ns"
             findings.append(
@@ -55,7 +55,8 @@ def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
             )
     distance = np.linalg.norm(errors.displacement_m, axis=1)
     least_m = LEAST_DISPLACEMENT * dataset.water_speed_mps / dataset.center_frequency_hz
-    displaced = _unusual(distance, least_m)
+    sigma_m = np.hypot(*errors.sigma_s[:, :2].T) * dataset.water_speed_mps
+    displaced = _unusual(distance, sigma_m, least_m)
     if displaced.size:
         farthest = float(distance[displaced].max())
         findings.append(
@@ -72,12 +73,13 @@ def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
     return findings
 
 
-def _unusual(values: Floats, least: float) -> Ints:
-    """Indices of values far from the usual ones; none where most are."""
+def _unusual(values: Floats, sigma: Floats, least: float) -> Ints:
+    """Indices of values far from the usual ones, and certain; none where most are."""
     known = values[np.isfinite(values)]
     if not known.size:
         return np.array([], dtype=np.int64)
     beyond = np.abs(values) > max(least, float(np.median(known)) + UNUSUAL * robust_deviation(known))
+    beyond &= np.abs(values) > UNUSUAL * sigma
     return np.flatnonzero(beyond) if beyond.sum() <= MOST * known.size else np.array([], dtype=np.int64)
 
 

@@ -64,8 +64,9 @@ def estimate_from_pulses(
     reference = estimate_reference(dataset, chords, pulses, period_s)
     findings.append(find_estimated_water(dataset, reference))
     if examine:
-        speed = find_water_speed(dataset, reference.speed_mps, reference.speed_sigma_mps)
-        findings += [*speed, *sampling(apply(dataset, speed), reference.speed_mps)]
+        fitted = reference.speed_mps, reference.speed_sigma_mps
+        speed = find_water_speed(dataset, *fitted)
+        findings += [*speed, *sampling(apply(dataset, speed), *fitted)]
     return findings, reference
 
 

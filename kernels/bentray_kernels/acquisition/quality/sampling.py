@@ -11,19 +11,24 @@ from .finding import Finding
 # Largest accepted relative error of water speed, radius and clock together.
 LARGEST_SPEED_ERROR = 0.02
 
+# Standard deviations of the fitted speed that are accepted beyond it.
+CERTAIN = 5.0
+
 # Largest accepted factor between stated and measured centre frequency: the windows of pickers depend on it.
 LARGEST_FREQUENCY_FACTOR = 1.6
 
 
-def sampling(dataset: Dataset, speed_mps: float) -> list[Finding]:
+def sampling(dataset: Dataset, speed_mps: float, sigma_mps: float = 0.0) -> list[Finding]:
     """Inconsistent sampling rate, geometry or water speed: the scan is rejected.
 
     Args:
         dataset: of one slice.
         speed_mps: of the water, from the arrival times.
+        sigma_mps: its standard deviation.
     """
     ratio = speed_mps / dataset.water_speed_mps
-    if abs(ratio - 1.0) <= LARGEST_SPEED_ERROR:
+    uncertain = CERTAIN * sigma_mps / dataset.water_speed_mps
+    if abs(ratio - 1.0) <= LARGEST_SPEED_ERROR + uncertain:
         return []
     return [
         Finding(

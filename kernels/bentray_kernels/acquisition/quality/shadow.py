@@ -11,13 +11,16 @@ from .finding import Finding
 SCATTERER = "strong scatterer"
 
 # Logarithm of the amplitude, relative to the usual one, of a chord in the shadow.
-SHADOWED = -0.7
+SHADOWED = -1.0
 
 # Grid of places, over the width of the array, and the half-width of the chords through one, wavelengths.
 PLACES, HALF_WIDTH = 41, 0.5
 
+# Places beside the best one along each side, as far as its neighbours.
+REFINED = 7
+
 # Part of the chords through a place that are in its shadow; of those that pass it at a distance; of all.
-INSIDE, OUTSIDE, MOST = 0.6, 0.35, 0.2
+INSIDE, OUTSIDE, MOST = 0.7, 0.3, 0.2
 
 # The chords that pass it at a distance, in half-widths.
 BESIDE = (4.0, 6.0)
@@ -47,26 +50,34 @@ def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
     if not 0 < shadow.sum() <= MOST * known.sum():
         return []
     pairs = np.argwhere(known)
-    pairs = pairs[:: max(1, len(pairs) // MOST_PAIRS)]
+    pairs = pairs[:: -(-len(pairs) // MOST_PAIRS)]
     dark = shadow[pairs[:, 0], pairs[:, 1]]
+    normal, height = _lines(dataset)
+    normal, height = normal[pairs[:, 0], pairs[:, 1]], height[pairs[:, 0], pairs[:, 1]]
     width = HALF_WIDTH * dataset.water_speed_mps / dataset.center_frequency_hz
-    best, found = 0.0, None
-    for place in _places(dataset):
-        off = _offset(dataset, place)[pairs[:, 0], pairs[:, 1]]
+
+    def darkness(place: Floats) -> float:
+        """Part of the chords through a place in shadow; 0 where few cross it, or many beside it are dark."""
+        off = np.abs(normal @ place - height)
         through, beside = off <= width, (off >= BESIDE[0] * width) & (off <= BESIDE[1] * width)
-        if through.sum() < FEWEST or not beside.any():
-            continue
-        inside = float(dark[through].mean())
-        if inside > max(best, INSIDE) and dark[beside].mean() <= OUTSIDE:
-            best, found = inside, place
-    if found is None:
+        if through.sum() < FEWEST or not beside.any() or dark[beside].mean() > OUTSIDE:
+            return 0.0
+        return float(dark[through].mean())
+
+    coarse, spacing = _places(dataset)
+    found = max(coarse, key=darkness)
+    steps = np.linspace(-0.5, 0.5, REFINED)
+    found = max((found + spacing * np.array([x, y]) for x in steps for y in steps), key=darkness)
+    best = darkness(found)
+    if best < INSIDE:
         return []
-    crossing: Flags = shadow & (_offset(dataset, found) <= width)
+    normal, height = _lines(dataset)
+    crossing: Flags = shadow & (np.abs(normal @ found - height) <= width)
     return [
         Finding(
             SCATTERER,
             f"at ({1e3 * found[0]:.0f}, {1e3 * found[1]:.0f}) mm, such as a bubble: {int(crossing.sum())} "
-            "pairs through it have lost half of their amplitude",
+            "pairs through it have lost most of their amplitude",
             "an object without gas",
             "reported",
             pairs=crossing,
@@ -76,21 +87,22 @@ def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
     ]
 
 
-def _places(dataset: Dataset) -> Floats:
-    """Places inside the array, (n, 2), m."""
+def _places(dataset: Dataset) -> tuple[Floats, Floats]:
+    """Places inside the array, (n, 2), and their spacing, (2,), m."""
     position = dataset.element_position_m
     low, high = position.min(axis=0), position.max(axis=0)
     axes = [np.linspace(a, b, PLACES) for a, b in zip(low, high, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     centre = 0.5 * (low + high)
     radius = np.linalg.norm(position - centre, axis=1).min()
-    return np.asarray(grid[np.linalg.norm(grid - centre, axis=1) <= REACH * radius])
+    inside = grid[np.linalg.norm(grid - centre, axis=1) <= REACH * radius]
+    return np.asarray(inside), np.asarray((high - low) / (PLACES - 1))
 
 
-def _offset(dataset: Dataset, place: Floats) -> Floats:
-    """Distance of a place from each chord, (ntx, nrx), m."""
+def _lines(dataset: Dataset) -> tuple[Floats, Floats]:
+    """Unit normals of all chords, (ntx, nrx, 2), and their products with the points of the chord, m."""
     start = dataset.element_position_m[dataset.tx][:, None]
     along = dataset.element_position_m[dataset.rx][None] - start
-    length = np.maximum((along**2).sum(axis=-1), 1e-30)
-    part = np.clip(((place - start) * along).sum(axis=-1) / length, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(start + part[..., None] * along - place, axis=-1))
+    length = np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-12)
+    normal = np.stack((-along[..., 1], along[..., 0]), axis=-1) / length
+    return normal, np.asarray((normal * start).sum(axis=-1))

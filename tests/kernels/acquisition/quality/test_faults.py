@@ -49,7 +49,7 @@ def later(traces: np.ndarray, seconds: np.ndarray) -> np.ndarray:
 
 def found(dataset: Dataset) -> list[Finding]:
     """Findings in the traces, without picking them."""
-    measured = Measured.of(dataset, range(ELEMENTS))
+    measured = Measured.of(dataset, range(len(dataset.tx)))
     findings, _ = check_traces(dataset, measured)
     if measured.water is None:
         findings += estimate_water(apply(dataset, findings), measured.object)[0]
@@ -62,6 +62,17 @@ both = pytest.mark.parametrize("water", [True, False])
 @both
 def test_no_fault_is_found_where_none_is_planted(water):
     assert not found(with_traces(lambda traces: traces, water=water))
+
+
+def test_an_element_off_among_receivers_alone():
+    """Every fourth element emits; element 17 only receives."""
+    place = recorded().element_position_m.copy()
+    place[17] += 4e-4
+    some = np.arange(0, ELEMENTS, 4)
+    traces = recorded().waveform
+    emitted = Waveform(traces.object[some], traces.water[some])
+    (finding,) = found(replace(recorded(), tx=some, waveform=emitted, element_position_m=place))
+    assert (finding.check, finding.elements) == ("displaced elements", (17,))
 
 
 @both
@@ -146,7 +157,7 @@ def test_a_bubble(water):
     dataset = replace(recorded(), waveform=Waveform(shadowed, recorded().waveform.water))
     (finding,) = found(dataset if water else without_water(dataset))
     assert finding.check == "strong scatterer"
-    assert "(12, -5) mm" in finding.found
+    assert "(12, -4) mm" in finding.found
     assert (left[finding.pairs] < 0.6).all()
 
 
