@@ -8,7 +8,7 @@ from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 
-ELEMENTS = 12
+ELEMENTS = 8
 
 
 @pytest.mark.parametrize(("nodes", "radius_m"), [(160, 0.09), (160, 0.102)])

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.requirements import check_scan
 from bentray_service.cli.reconstruct import useful_workers
+from bentray_workers.cluster import connection
 from bentray_workers.files.reconstruction import read_reconstruction
 
 QUICK = ("--nodes", 32, "--iterations", 2)
@@ -67,9 +69,11 @@ def test_without_json_it_ends_with_a_table_and_the_paths(
     assert result.stderr == ""
 
 
-def test_worker_processes_give_the_same_bits(
-    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
+def test_several_workers_give_the_same_bits(
+    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # In this process: the bits of worker processes are in tests/workers/cluster/test_pipelines.py.
+    monkeypatch.setattr(connection, "open_cluster", partial(connection.open_cluster, processes=False))
     for workers in (1, 2):
         done = bentray("reconstruct", scan_file, "-o", tmp_path / str(workers), *QUICK, "--workers", workers)
         assert done.exit_code == 0

@@ -17,7 +17,7 @@ from .forked_reader import Read, read_all
 # Of resident memory: what the libraries take, and some hundred megabytes for a file of a few.
 MOST_BYTES = 700 * 2**20
 
-LEAST_REFUSED = effort(50, 200)
+LEAST_REFUSED = effort(25, 200)
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_a_scene_is_read_once(meshes, name):
 def test_damaged_scans_are_refused(folder, sound):
     files = []
     for name, content in damaged(
-        sound, flips=effort(70, 280), cuts=effort(15, 60), losses=effort(15, 60), seed=1
+        sound, flips=effort(35, 280), cuts=effort(8, 60), losses=effort(8, 60), seed=1
     ):
         path = folder / f"{name}.upload"
         path.write_bytes(content)
