@@ -26,7 +26,7 @@ def convert(
     """Convert a scan of another program into a dataset file.
 
     The documentation of scan files lists the formats with their variables and units: MATLAB, NumPy, k-Wave,
-    zea (OpenH-RF), openUSCT. They are detected by content, and the other commands accept them directly.
+    zea (OpenH-RF), openUSCT, KIT 3D USCT. They are detected by content; reconstruct and submit take them too.
 
     Own variables are named by --map, with a field of element_position, delta_tof, tof, sigma, object (the
     traces), water, time, sampling_rate, t0, tx, rx, center_frequency, temperature, sound_speed, log_ratio

@@ -12,6 +12,8 @@ from scipy.io import savemat
 from bentray_kernels.errors import InvalidInput
 from bentray_service.routes.upload_metadata import read_metadata
 
+from ...workers.foreign_scans.hdf5_scans import openusct_fields, write_fields, zea_fields
+from ...workers.foreign_scans.kit_measurement import write_measurement, zipped
 from ...workers.foreign_scans.scans import delta_tof, positions, travel_times, waveforms, write_matlab73
 
 BINARY = {"Content-Type": "application/octet-stream"}
@@ -47,6 +49,18 @@ def test_they_are_taken(start, tmp_path, kind):
     body = answer.json()
     assert (body["elements"], body["ntx"], body["nrx"]) == (8, 8, 8)
     assert (body["has_traces"], body["has_travel_times"]) == (kind == "traces", kind != "traces")
+
+
+@pytest.mark.parametrize("kind", ["zea", "openusct", "kit"])
+def test_scans_of_other_projects_are_taken(start, tmp_path, kind):
+    if kind == "kit":
+        source = zipped(write_measurement(tmp_path / "scan"), tmp_path / "scan.zip")
+    else:
+        source = write_fields(tmp_path / "scan", zea_fields() if kind == "zea" else openusct_fields())
+    answer = start().post("/v1/datasets", content=source.read_bytes(), headers=BINARY)
+    assert answer.status_code == 201, answer.text
+    body = answer.json()
+    assert (body["ntx"], body["dimension"], body["has_traces"]) == (3, 3 if kind == "kit" else 2, True)
 
 
 def test_the_field_at_fault_is_named(start):

@@ -1,4 +1,4 @@
-"""Scans in foreign formats, detected by content: MATLAB, NumPy, k-Wave, zea, openUSCT."""
+"""Scans in foreign formats, detected by content: MATLAB, NumPy, k-Wave, zea, openUSCT, KIT 3D USCT."""
 
 from .conversion import convert_dataset, is_upload_format
 from .given import Given

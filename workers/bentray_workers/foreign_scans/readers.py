@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bentray_kernels.errors import InvalidInput
 
-from . import kwave, layouts, openusct, zea
+from . import kit, kwave, layouts, openusct, zea
 from .open_scan import OpenScan
 from .scan_reader import ScanReader
 from .zip_checks import plain_name
@@ -13,6 +13,7 @@ from .zip_checks import plain_name
 READERS: tuple[ScanReader, ...] = (
     zea.READER,
     openusct.READER,
+    kit.READER,
     kwave.READER,
     layouts.FULL_DATASET,
     layouts.DELTA_TOF,

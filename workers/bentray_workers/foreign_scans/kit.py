@@ -1,0 +1,343 @@
+"""Measurements of KIT 3D USCT II and III: a folder, or a zip of it, of MATLAB files.
+
+Source:
+    ``USCT_data_convert.m`` of github.com/KIT-3DUSCT/3D-USCT-III-access-script, and that of USCT II; the
+    description of the data at the USCT data challenge of KIT.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.errors import InvalidInput
+
+from .arrays import LARGEST_ROW, read_small
+from .kit_signals import RATE_HZ, UNDERSAMPLING, compress, decode_float16, reconstruct_undersampled
+from .layouts import named_layout
+from .matlab5 import Matlab5
+from .measurement_folder import MeasurementFolder
+from .open_scan import OpenScan
+from .scan_reader import ScanReader, Variable
+from .streamed_scan import StreamedScan, Traces
+
+# The path of the A-scans of an emission; the aperture position is ``TASRotation``.
+EMISSION = re.compile(
+    r"(?P<root>.*/)?TAS(?P<tas>\d{3})/TASRotation(?P<place>\d{2})/Emitter(?P<one>\d{2})\.mat"
+)
+# Folders of the measurement with the object and of the empty one.
+OBJECT, EMPTY = ("object/", ""), ("water/", "empty/")
+INFO = ("Hardware", "AScanDatatype", "Bandpassundersampling")
+TEMPERATURES = ("TASTempComp.mat", "TASTemp.mat")
+# Delay of the electronics, s.
+DELAY_S = 2e-6
+CENTER_HZ = 2.5e6
+# Receivers whose traces are computed together.
+AT_ONCE = 128
+MOST_SAMPLES = 32_768
+
+
+class _Emission(NamedTuple):
+    """The file of one emission: transducer array (TAS) and emitter, counted from 1."""
+
+    name: str
+    tas: int
+    emitter: int
+
+
+class Measurement:
+    """One measurement at its first aperture position: elements, emissions and traces.
+
+    Attributes:
+        position: (elements, 3), m: receivers, then emitters if these are other elements.
+        tx: (ntx,), element of each emission.
+        rx: (nrx,), elements that received in any emission.
+        samples: of a trace at ``RATE_HZ``.
+        valid: (ntx, nrx), pairs that were recorded.
+        temperature_c: mean of the sensors; None if unknown.
+        positions: number of aperture positions in the files.
+    """
+
+    def __init__(self, files: MeasurementFolder, root: str) -> None:
+        self._files, self._root = files, root
+        self._info = files.description(f"{root}info.mat", INFO)
+        found = sorted(
+            (int(match["place"]), int(match["tas"]), int(match["one"]), match[0])
+            for match in map(EMISSION.fullmatch, files.names)
+            if match is not None and (match["root"] or "") == root
+        )
+        self.positions = len({place for place, *_ in found})
+        self._emissions = [
+            _Emission(name, tas, one) for place, tas, one, name in found if place == found[0][0]
+        ]
+        receivers, emitters = self._geometry()
+        apart = emitters is not receivers
+        elements = np.concatenate((*receivers, *(emitters if apart else [])))
+        self.position = self._moved(elements, found[0][0])
+        first = np.cumsum([0, *(len(one) for one in receivers), *(len(one) for one in emitters if apart)])
+        self._first = first
+        offset = len(receivers) if apart else 0
+        self.tx = np.array(
+            [
+                _element(first, offset, emission.tas, emission.emitter, emitters, emission.name)
+                for emission in self._emissions
+            ]
+        )
+        self._receivers = receivers
+        columns = [self._columns(emission) for emission in self._emissions]
+        self.rx = np.unique(np.concatenate([elements for elements, _ in columns]))
+        self.valid = np.array([np.isin(self.rx, elements) for elements, _ in columns])
+        self._recorded = {samples for _, samples in columns}
+        if len(self._recorded) != 1:
+            raise InvalidInput("AScans", f"{sorted(self._recorded)} samples", "as many in every emission")
+        (recorded,) = self._recorded
+        self._undersampled = _number(self._info, "Bandpassundersampling") == 1.0
+        self.samples = UNDERSAMPLING * (recorded + recorded % 2) if self._undersampled else recorded
+        self.temperature_c = self._temperature(found[0][0])
+        self._excitation = self._code()
+
+    def traces(self) -> Iterator[NDArray[np.float32]]:
+        """The (nrx, samples) traces of each emission; zeros where none was recorded."""
+        for emission in self._emissions:
+            with self._files.opened(emission.name) as arrays:
+                elements = self._elements(arrays, emission.name)
+                coded = _matrix(arrays, "AScans")
+                gain = read_small(arrays, "Amplification", "numbers, one a column of AScans")
+            gain = np.ones(len(elements)) if gain is None else np.asarray(gain, dtype=np.float64).ravel()
+            if len(gain) != len(elements) or not (np.isfinite(gain) & (gain != 0.0)).all():
+                raise InvalidInput(f"{emission.name}: Amplification", f"{len(gain)} numbers", "one a column")
+            rows = np.searchsorted(self.rx, elements)
+            traces = np.zeros((len(self.rx), self.samples), dtype=np.float32)
+            is_float = self._is_float16(emission.name)
+            for begin in range(0, len(elements), AT_ONCE):
+                some = slice(begin, begin + AT_ONCE)
+                values = decode_float16(coded[some]) if is_float else coded[some]
+                values = np.asarray(values, dtype=np.float64) / gain[some, None]
+                if self._undersampled:
+                    values = reconstruct_undersampled(values)
+                traces[rows[some]] = compress(values, self._excitation)
+            yield traces
+
+    def _geometry(self) -> tuple[list[NDArray[Any]], list[NDArray[Any]]]:
+        """Positions of receivers and emitters of each TAS, (n, 3) each; one list if they are the same."""
+        for name in sorted(self._files.names):
+            folder, _, leaf = name.rpartition("/")
+            if not leaf.endswith(".mat") or folder not in (self._root.rstrip("/"), ""):
+                continue
+            found = self._files.description(name, ("TASElements",)).get("TASElements")
+            if found is None:
+                continue
+            fields = found.dtype.names or ()
+            if "transducerPositions" in fields:
+                both = _places(found, "transducerPositions", name)
+                return both, both
+            if {"receiverPositions", "emitterPositions"} <= {*fields}:
+                return _places(found, "receiverPositions", name), _places(found, "emitterPositions", name)
+            accepted = "transducerPositions, or receiverPositions and emitterPositions"
+            raise InvalidInput(f"{name}: TASElements", f"the fields {', '.join(fields)}"[:120], accepted)
+        accepted = (
+            "the file of the geometry, with TASElements, beside info.mat; it comes with the access script"
+        )
+        raise InvalidInput("TASElements", "nothing", accepted)
+
+    def _moved(self, elements: NDArray[np.float64], place: int) -> NDArray[np.float64]:
+        """Elements at an aperture position: lifted along z and turned about it."""
+        name = f"{self._root}Movements.mat"
+        if name not in self._files.names:
+            return elements
+        moves = self._files.description(name, ("MovementsListreal",)).get("MovementsListreal")
+        if moves is None or moves.dtype.kind not in "iuf" or moves.ndim != 2 or moves.shape[1] < 2:
+            raise InvalidInput(f"{name}: MovementsListreal", "no list", "(positions, 2) rotations and lifts")
+        if not 1 <= place <= len(moves) or not np.isfinite(moves[place - 1, :2]).all():
+            return elements
+        angle, lift = np.deg2rad(float(moves[place - 1, 0])), float(moves[place - 1, 1])
+        cosine, sine = math.cos(angle), math.sin(angle)
+        turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        return np.asarray((elements + np.array([0.0, 0.0, lift])) @ turn.T)
+
+    def _temperature(self, place: int) -> float | None:
+        for leaf in TEMPERATURES:
+            name = f"{self._root}{leaf}"
+            found = self._files.description(name, ("TASTemperature",)) if name in self._files.names else {}
+            values = found.get("TASTemperature")
+            if values is not None and values.dtype.kind == "f" and values.size:
+                here = values[..., min(place, values.shape[-1]) - 1] if values.ndim == 3 else values
+                known = here[np.isfinite(here)]
+                return float(known.mean()) if known.size else None
+        return None
+
+    def _code(self) -> NDArray[np.float64] | None:
+        """The coded excitation at ``RATE_HZ``: measured, or as defined; None if there is none."""
+        measured = f"{self._root}CEMeasured.mat"
+        if measured in self._files.names:
+            code = self._files.description(measured, ("CEMeasured",)).get("CEMeasured")
+            if code is not None and code.dtype.kind in "iuf" and code.ndim == 2:
+                columns = code if code.shape[0] > 1 else code.T
+                is_float = _text(self._info, "AScanDatatype") == "float16" and columns.dtype.kind in "iu"
+                values = decode_float16(columns) if is_float else columns
+                rows = np.asarray(values, dtype=np.float64).T
+                rows = reconstruct_undersampled(rows) if self._undersampled else rows
+                return np.asarray(rows.mean(axis=0)[:MOST_SAMPLES])
+        defined = f"{self._root}CE.mat"
+        if defined not in self._files.names:
+            return None
+        found = self._files.description(defined, ("CE", "CE_SF"))
+        code, rate = found.get("CE"), _number(found, "CE_SF")
+        if code is None or code.dtype.kind not in "iuf" or not code.size or rate is None or rate <= 0.0:
+            return None
+        code = np.asarray(code, dtype=np.float64).ravel()[: MOST_SAMPLES * 16]
+        at = np.arange(0.0, (len(code) - 1) / rate, 1.0 / RATE_HZ)[:MOST_SAMPLES]
+        return np.asarray(np.interp(at, np.arange(len(code)) / rate, code))
+
+    def _columns(self, emission: _Emission) -> tuple[NDArray[np.int64], int]:
+        """Elements of the columns of an emission, and its number of samples."""
+        with self._files.opened(emission.name) as arrays:
+            declared = arrays.declared("AScans")
+            elements = self._elements(arrays, emission.name)
+        shape = () if declared is None else declared[0]
+        if len(shape) != 2 or shape[0] != len(elements) or not 2 <= shape[1] <= MOST_SAMPLES:
+            accepted = f"(samples, {len(elements)}), at most {MOST_SAMPLES} samples"
+            raise InvalidInput(f"{emission.name}: AScans", f"shape {shape[::-1]}", accepted)
+        return elements, shape[1]
+
+    def _elements(self, arrays: Matlab5, name: str) -> NDArray[np.int64]:
+        """Receiving elements of the columns of a file."""
+        listed = []
+        for variable in ("TASIndices", "receiverIndices"):
+            values = read_small(arrays, variable, "integers, one a column of AScans")
+            if values is None:
+                raise InvalidInput(f"{name}: {variable}", "nothing", "integers, one a column of AScans")
+            listed.append(np.asarray(values, dtype=np.int64).ravel())
+        tas, receiver = listed
+        if tas.shape != receiver.shape or not tas.size:
+            raise InvalidInput(f"{name}: receiverIndices", f"shape {receiver.shape}", f"shape {tas.shape}")
+        counts = np.array([len(one) for one in self._receivers])
+        wrong = (tas < 1) | (tas > len(counts)) | (receiver < 1)
+        wrong |= receiver > counts[np.clip(tas - 1, 0, len(counts) - 1)]
+        if wrong.any():
+            k = int(np.flatnonzero(wrong)[0])
+            found = f"receiver {receiver[k]} of TAS {tas[k]}"
+            raise InvalidInput(f"{name}: receiverIndices", found, "a receiver of the geometry, from 1")
+        return np.asarray(self._first[tas - 1] + receiver - 1, dtype=np.int64)
+
+    def _is_float16(self, name: str) -> bool:
+        own = self._files.description(name, ("AScanDatatype",))
+        return "float16" in (_text(own, "AScanDatatype"), _text(self._info, "AScanDatatype"))
+
+
+def _matrix(arrays: Matlab5, name: str) -> NDArray[Any]:
+    declared = arrays.declared(name)
+    assert declared is not None
+    if math.prod(declared[0]) * declared[1].itemsize > LARGEST_ROW:
+        raise InvalidInput(name, f"shape {declared[0]}", f"at most {LARGEST_ROW} bytes")
+    return arrays.whole(name)
+
+
+def _places(elements: NDArray[Any], name: str, file: str) -> list[NDArray[Any]]:
+    found = [np.asarray(one) for one in elements[name].ravel()]
+    if any(one.dtype.kind != "f" or one.ndim != 2 or one.shape[1] != 3 for one in found):
+        raise InvalidInput(f"{file}: TASElements.{name}", "no positions", "(n, 3) numbers in m for every TAS")
+    return [one.astype(np.float64) for one in found]
+
+
+def _element(
+    first: NDArray[Any], offset: int, tas: int, one: int, places: list[NDArray[Any]], name: str
+) -> int:
+    if not 1 <= tas <= len(places) or not 1 <= one <= len(places[tas - 1]):
+        raise InvalidInput(name, f"emitter {one} of TAS {tas}", "an emitter of the geometry")
+    return int(first[offset + tas - 1]) + one - 1
+
+
+def _number(found: dict[str, Any], name: str) -> float | None:
+    value = found.get(name)
+    return (
+        float(value.ravel()[0]) if value is not None and value.dtype.kind in "iufb" and value.size else None
+    )
+
+
+def _text(found: dict[str, Any], name: str) -> str:
+    value = found.get(name)
+    return str(value.ravel()[0]) if value is not None and value.dtype.kind == "U" and value.size else ""
+
+
+def _roots(names: frozenset[str]) -> list[str]:
+    """Folders with A-scans and ``info.mat``."""
+    found = {match["root"] or "" for match in map(EMISSION.fullmatch, names) if match is not None}
+    return sorted(root for root in found if f"{root}info.mat" in names)
+
+
+def _detect(scan: OpenScan) -> bool:
+    return bool(_roots(scan.members))
+
+
+def _read(scan: OpenScan) -> StreamedScan:
+    files = MeasurementFolder(scan)
+    roots = _roots(files.names)
+    empty = next((root for root in roots if root.endswith(EMPTY)), None)
+    others = [root for root in roots if root != empty]
+    if len(others) != 1:
+        accepted = "one measurement, and an empty one in a folder named water or empty"
+        raise InvalidInput("file", f"{len(others)} measurements: {', '.join(others)}"[:160], accepted)
+    one = Measurement(files, others[0])
+    shape = (len(one.tx), len(one.rx), one.samples)
+    traces = {"waveform/object": Traces(shape, np.dtype(np.float32), one.traces)}
+    if empty is not None:
+        water = Measurement(files, empty)
+        same = np.array_equal(water.tx, one.tx) and np.array_equal(water.rx, one.rx)
+        if not same or water.samples != one.samples or not np.allclose(water.position, one.position):
+            found = f"{len(water.tx)} emissions, {len(water.rx)} receivers, {water.samples} samples"
+            accepted = f"those of the object: {shape[0]}, {shape[1]} and {shape[2]}, at the same places"
+            raise InvalidInput(empty.rstrip("/"), found, accepted)
+        traces["waveform/water"] = Traces(shape, np.dtype(np.float32), water.traces)
+        one.valid &= water.valid
+    small = {
+        "geometry/element_position_m": one.position,
+        "acquisition/tx": one.tx,
+        "acquisition/rx": one.rx,
+        "acquisition/sampling_rate_hz": np.array(RATE_HZ),
+        "acquisition/center_frequency_hz": np.array(CENTER_HZ),
+        "acquisition/t0_s": np.array(DELAY_S),
+        "mask/valid": one.valid,
+    }
+    if one.temperature_c is not None:
+        small["water/temperature_c"] = np.array(one.temperature_c)
+    several = f", aperture position 1 of {one.positions}" if one.positions > 1 else ""
+    return StreamedScan(f"KIT 3D USCT{several}", small, traces)
+
+
+READER = ScanReader(
+    title="KIT 3D USCT II and III (folder or zip)",
+    about="A folder of MATLAB 5 files, or a zip of it, as `USCT_data_convert.m` in "
+    "github.com/KIT-3DUSCT/3D-USCT-III-access-script reads it, with the file of the geometry of that "
+    "script beside `info.mat`. The empty measurement is a second such folder, named `water` or `empty`, "
+    "beside that of the object. The first aperture position is read. A-scans are decoded, reconstructed "
+    "at 10 MHz if they are undersampled, divided by their amplification, and compressed with the coded "
+    "excitation; time zero is the delay of 2 µs in that script, the centre frequency 2.5 MHz. The scan "
+    "is in space: reconstruct it with `decomposition: volume`.",
+    variables=(
+        Variable("TASttt/TASRotationpp/Emitteree.mat: AScans", "(samples, n) int16", "any", "A-scans"),
+        Variable("TASIndices, receiverIndices", "(n,), from 1", "", "receiver of each A-scan"),
+        Variable("Amplification", "(n,)", "1", "gain of each A-scan", "no"),
+        Variable("AScanDatatype", "text", "", "float16: the format of KIT; also in info.mat", "no"),
+        Variable(
+            "info.mat: Bandpassundersampling", "number", "", "1: sampled at 10/3 MHz, else at 10 MHz", "no"
+        ),
+        Variable(
+            "*.mat: TASElements",
+            "structure: transducerPositions, or receiverPositions and emitterPositions, (n, 3)",
+            "m",
+            "elements of each TAS",
+        ),
+        Variable("Movements.mat: MovementsListreal", "(positions, 2)", "°, m", "rotation and lift", "no"),
+        Variable("TASTempComp.mat, TASTemp.mat: TASTemperature", "(1, TAS, positions)", "°C", "water", "no"),
+        Variable("CEMeasured.mat, or CE.mat: CE, CE_SF", "(n,), Hz", "any", "coded excitation", "no"),
+    ),
+    detect=_detect,
+    read=_read,
+    layout=named_layout,
+)

@@ -1,0 +1,88 @@
+"""Files of a measurement in a folder or in a zip, opened one at a time."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import Any
+
+from bentray_kernels.errors import InvalidInput
+
+from ..files.bounded_reading import rejecting_damage
+from .arrays import LARGEST_ROW
+from .matlab5 import Matlab5
+from .open_scan import OpenScan
+from .zip_checks import WHOLE, check_zip
+
+MOST_FILES = 65_536
+# Of a file with descriptions, of which single variables are read whole.
+LARGEST_DESCRIPTION = 64 * 2**20
+
+
+class MeasurementFolder:
+    """The MATLAB files of a measurement by their paths.
+
+    Args:
+        scan: an open zip or folder.
+
+    Raises:
+        InvalidInput: for too many files, or a damaged zip.
+    """
+
+    def __init__(self, scan: OpenScan) -> None:
+        self._scan = scan
+        if scan.archive is not None:
+            with rejecting_damage("file", WHOLE):
+                check_zip(scan.archive, MOST_FILES)
+        if len(scan.members) > MOST_FILES:
+            raise InvalidInput("file", f"{len(scan.members)} files", f"at most {MOST_FILES}")
+        self.names = scan.members
+
+    @contextmanager
+    def opened(self, name: str) -> Iterator[Matlab5]:
+        """The plain arrays of a file."""
+        with self._path(name, LARGEST_ROW) as path, _of(name):
+            yield Matlab5(path)
+
+    def description(self, name: str, variables: tuple[str, ...]) -> dict[str, Any]:
+        """Some variables of a small file, also texts and structures; absent ones are left out."""
+        from scipy.io import loadmat
+
+        with self._path(name, LARGEST_DESCRIPTION) as path, rejecting_damage(name, "a MATLAB 5 file"):
+            found = loadmat(path, variable_names=list(variables), appendmat=False, chars_as_strings=True)
+        return {variable: found[variable] for variable in variables if variable in found}
+
+    @contextmanager
+    def _path(self, name: str, most: int) -> Iterator[Path]:
+        """A file on disk, extracted up to ``most`` bytes."""
+        archive: zipfile.ZipFile | None = self._scan.archive
+        if archive is None:
+            assert self._scan.folder is not None
+            path = self._scan.folder / name
+            if path.stat().st_size > most:
+                raise InvalidInput(name, f"{path.stat().st_size} bytes", f"at most {most}")
+            yield path
+            return
+        with NamedTemporaryFile(dir=self._scan.scratch, suffix=".mat") as file:
+            with rejecting_damage(name, "a whole zip"), archive.open(name) as packed:
+                data = packed.read(most + 1)
+            declared = archive.getinfo(name).file_size
+            if len(data) > most or len(data) != declared:
+                raise InvalidInput(name, f"{len(data)} bytes, {declared} in the directory", f"at most {most}")
+            file.write(data)
+            file.flush()
+            yield Path(file.name)
+
+
+@contextmanager
+def _of(name: str) -> Iterator[None]:
+    """Add the name of the file to errors."""
+    try:
+        yield
+    except InvalidInput as error:
+        if error.field.startswith(name):
+            raise
+        raise InvalidInput(f"{name}: {error.field}", error.value, error.accepted) from None
