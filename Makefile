@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests and jobs start hundreds of Python processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install compiled install-dev install-docs demo test test-all serve lint docs bench lock clean
+.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint docs bench lock clean
 
 help: ## list the targets
 	@echo "Bentray: make TARGET"
@@ -30,10 +30,10 @@ demo: install ## simulate a scan, submit it to a service, compare straight and b
 serve: install ## start the service; HOST=127.0.0.1 PORT=8000
 	@$(BIN)/bentray serve --host $(HOST) --port $(PORT)
 
-test: install-dev compiled ## run the tests, up to four files at once; ARGS="tests/kernels -x" narrows them
+test: install-tests ## run the tests, up to four files at once; ARGS="tests/kernels -x" narrows them
 	@$(BIN)/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder -m "not nightly" $(ARGS)
 
-test-all: install-dev compiled ## run the tests, with the long searches and the soak tests; ARGS as above
+test-all: install-tests ## run the tests, with the long searches and the soak tests; ARGS as above
 	@HYPOTHESIS_PROFILE=nightly $(BIN)/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder $(ARGS)
 
 lint: install-dev ## check style, types and the import rules
@@ -76,6 +76,10 @@ endef
 	done; \
 	echo "Bentray requires Python 3.11 or newer with the venv module; none was found on the PATH." >&2; \
 	echo "On Debian or Ubuntu: apt-get install python3 python3-venv" >&2; exit 1
+
+# Kernels are compiled while the tools are downloaded: both need the packages of Bentray only.
+install-tests: install
+	@$(MAKE) --no-print-directory -j2 install-dev compiled
 
 # Once, in two processes: test processes that start together would each compile the same kernels.
 compiled: install

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import secrets
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import IO
@@ -29,18 +29,49 @@ settings.register_profile(
 )
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "push"))
 
-# A test marked slow takes about as long as so many others.
-SLOW = 80
+TESTS = Path(__file__).parent
+
+# Seconds of a test on an idle core: one marked slow, and the mean of the others.
+SLOW_S, USUAL_S = 10.0, 0.13
+# Files that take far longer than their number of tests suggests, s; they begin first, each in one process.
+LONG_S = {
+    "faults/test_kills.py": 60.0,
+    "deploy/test_installation.py": 40.0,
+    "service/web/test_viewer.py": 30.0,
+    "service/cli/test_worker.py": 25.0,
+    "service/test_schema.py": 25.0,
+    "faults/test_poison.py": 20.0,
+    "workers/cluster/test_pipelines.py": 20.0,
+    "workers/reconstruction/test_waveform.py": 20.0,
+    "service/test_app.py": 20.0,
+    "test_docs.py": 20.0,
+    "faults/test_uploads.py": 18.0,
+    "kernels/refraction/test_caster_opencl.py": 17.0,
+    "workers/images/test_report.py": 15.0,
+    "workers/rendering/test_geometry_field.py": 14.0,
+    "service/test_extremes.py": 12.0,
+    "service/test_generated_client.py": 12.0,
+    "workers/reconstruction/test_reconstruction_run.py": 12.0,
+    "workers/cluster/test_connection.py": 10.0,
+    "workers/cluster/test_supervision.py": 10.0,
+    "kernels/acquisition/reference/test_reference_shot.py": 10.0,
+    "kernels/isosurface/test_crossing.py": 10.0,
+    "kernels/tomography/test_attenuation.py": 10.0,
+    "kernels/tomography/waveform/test_refinement.py": 10.0,
+    "benchmarks/test_ideal_times.py": 8.0,
+}
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Where files are shared out over processes the long ones come first, so that all end together."""
     if not hasattr(config, "workerinput"):
         return
-    weight: Counter[Path] = Counter()
+    seconds: dict[Path, float] = defaultdict(float)
     for item in items:
-        weight[item.path] += SLOW if item.get_closest_marker("slow") else 1
-    items.sort(key=lambda item: -weight[item.path])
+        seconds[item.path] += SLOW_S if item.get_closest_marker("slow") else USUAL_S
+    for path in seconds:
+        seconds[path] = LONG_S.get(path.relative_to(TESTS).as_posix(), seconds[path])
+    items.sort(key=lambda item: -seconds[item.path])
 
 
 @pytest.hookimpl(wrapper=True)
