@@ -17,7 +17,7 @@ from bentray_workers.rendering.scene_cache import check_size
 from bentray_workers.simulation import simulation_planning
 from bentray_workers.simulation.request import PhantomScan
 
-from .rows.records import VolumeRow
+from .rows.typed_rows import VolumeRow
 
 
 def check_renderable(volume: VolumeRow) -> None:

@@ -17,7 +17,7 @@ from .files.orphans import Orphans
 from .ingest.append import UploadLocks, remove
 from .rows.ages import ExpiredItem, ExpiryMarks
 from .rows.observed_time import ObservedTime
-from .rows.records import UploadRow
+from .rows.typed_rows import UploadRow
 from .rows.uploads import Uploads
 
 log = logging.getLogger("bentray.housekeeping")

@@ -29,8 +29,8 @@ from bentray_workers.rendering.tiles import PictureTasks
 from .compute import Cluster
 from .errors import Busy, StorageFull
 from .picture_queue import LONG_S, PictureQueue
-from .rows.records import DatasetRow, FieldRow, VolumeRow
 from .rows.tenants import Tenant
+from .rows.typed_rows import DatasetRow, FieldRow, VolumeRow
 
 # Time limit of an image, s.
 RENDER_SECONDS = 120.0

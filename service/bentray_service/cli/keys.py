@@ -18,7 +18,7 @@ from .output.terminal import AsJson, print_json, print_lines, print_table, remar
 
 if TYPE_CHECKING:
     from ..rows.keys import Keys
-    from ..rows.records import KeyRow
+    from ..rows.typed_rows import KeyRow
 
 Data = Annotated[
     Path | None,

@@ -30,7 +30,7 @@ from .worker import Tls
 if TYPE_CHECKING:
     from bentray_kernels.tomography import Settings
 
-    from ..routes.models.records import JobRecord
+    from ..routes.models.job_records import JobRecord
 
 
 @with_settings_options

@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeAlias, TypeVar
 
 from pydantic import BaseModel
 
-from ..routes.models.records import DatasetRecord, JobRecord, VolumeRecord
+from ..routes.models.job_records import DatasetRecord, JobRecord, VolumeRecord
 from ..routes.models.surface_records import MeshRecord
 from .connection import Connection
 from .errors import ClientError

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..routes.models.records import VolumeRecord
+from ..routes.models.job_records import VolumeRecord
 from .errors import ClientError
 
 if TYPE_CHECKING:

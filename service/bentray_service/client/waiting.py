@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from ..routes.models.records import JobRecord
+from ..routes.models.job_records import JobRecord
 from .errors import ClientError, from_problem
 from .steps import EventStep, Flow, PauseStep, RequestStep
 

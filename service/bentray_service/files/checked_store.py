@@ -15,8 +15,8 @@ from pathlib import Path
 from ..errors import Damaged, DatabaseFull, DatabaseUnavailable, Deleted
 from ..rows.checksums import Checksums
 from ..rows.digests import Digest, digest_of, stamp_of
-from ..rows.records import ChecksumRow
 from ..rows.tenants import Tenant
+from ..rows.typed_rows import ChecksumRow
 from .store import Store
 from .tenant_files import KEPT
 

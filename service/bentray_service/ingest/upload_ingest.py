@@ -23,9 +23,9 @@ from ..access.quota import Quota
 from ..errors import StorageFull, StorageUnavailable, UnknownId
 from ..files.data_folder import Files
 from ..rows.digests import digest_of
-from ..rows.records import UploadRow
 from ..rows.stored_tables import UploadedTable
 from ..rows.tenants import Tenant
+from ..rows.typed_rows import UploadRow
 from ..rows.uploads import Uploads
 from ..web.errors import INTERNAL, make_problem, problem_of
 from ..web.problem import Problem

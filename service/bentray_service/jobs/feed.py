@@ -13,8 +13,8 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from ..errors import DatabaseUnavailable, TooManyStreams
 from ..rows.jobs import Jobs
-from ..rows.records import EventRow, JobProgress
 from ..rows.tenants import Tenant
+from ..rows.typed_rows import EventRow, JobProgress
 
 log = logging.getLogger("bentray.jobs")
 

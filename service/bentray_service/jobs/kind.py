@@ -15,9 +15,9 @@ from bentray_workers.cluster.task_pool import JobControl
 from ..compute import Compute
 from ..files.data_folder import Files
 from ..files.tenant_files import TenantFiles
-from ..rows.records import JobRow, Plain
 from ..rows.stored_tables import Datasets, Meshes, Volumes
 from ..rows.tenants import Tenant
+from ..rows.typed_rows import JobRow, Plain
 from ..settings_request import check_setting_names
 
 

@@ -29,8 +29,8 @@ from ..compute import check_renderable
 from ..files.tenant_files import TenantFiles
 from ..rows import schema
 from ..rows.ids import dataset_of, field_of, volume_of
-from ..rows.records import JobRow, Plain
 from ..rows.tenants import Tenant
+from ..rows.typed_rows import JobRow, Plain
 from .kind import JobRequest, JobRun, Kind, Order, Sources
 
 DEFAULTS = "Omitted settings take their defaults."

@@ -28,8 +28,8 @@ from ..files.disk import bytes_in
 from ..files.tenant_files import TenantFiles
 from ..logs import about
 from ..rows.job_queue import LEASE_S, Queue
-from ..rows.records import JobRow
 from ..rows.schema import ENDED
+from ..rows.typed_rows import JobRow
 from .failures import CRASHED, explain
 from .kind import JobRun, Kind
 from .kinds import KINDS

@@ -13,8 +13,8 @@ from ..wiring import CallerTenant, Service
 from . import quality
 from .bodies import Limit, accept_media_types
 from .downloads import download, download_of
-from .models.records import DatasetList, DatasetRecord
-from .records import dataset_record
+from .models.job_records import DatasetList, DatasetRecord
+from .record_conversion import dataset_record
 from .upload_metadata import scan_given
 from .uploads import body_of, receive_upload
 

@@ -12,7 +12,7 @@ from ..wiring import CallerTenant, Parts, Service
 from .bodies import Limit
 from .models.surface_records import FieldList, FieldRecord
 from .pictures import PICTURE, picture
-from .records import field_record
+from .record_conversion import field_record
 
 router = APIRouter(prefix="/v1/geometry-fields", tags=["geometry-fields"])
 

@@ -14,8 +14,8 @@ from ..web.errors import problems
 from ..wiring import CallerTenant, Service
 from .bodies import Limit, SmallBody, accept_media_types
 from .downloads import download, download_of
-from .models.records import JobList, JobRecord, State
-from .records import job_record
+from .models.job_records import JobList, JobRecord, State
+from .record_conversion import job_record
 
 log = logging.getLogger("bentray.jobs")
 

@@ -16,13 +16,13 @@ from bentray_workers.rendering.isosurface_mesh import MOST_STEP, check_nodes, la
 from ..compute import check_renderable
 from ..files.deletion import StoredItem
 from ..rows.ids import new_id
-from ..rows.records import MeshRow
+from ..rows.typed_rows import MeshRow
 from ..web.errors import problems
 from ..wiring import CallerTenant, CurrentCaller, Service
 from .bodies import Limit, accept_media_types
 from .models.surface_records import MeshList, MeshRecord
 from .pictures import while_connected
-from .records import mesh_record
+from .record_conversion import mesh_record
 from .uploads import body_of, receive_upload
 
 MEDIA_TYPES = (

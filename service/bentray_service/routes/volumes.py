@@ -13,8 +13,8 @@ from ..web.errors import problems
 from ..wiring import CallerTenant, Service
 from . import slices, volume_data
 from .bodies import Limit, accept_media_types
-from .models.records import VolumeList, VolumeRecord
-from .records import volume_record
+from .models.job_records import VolumeList, VolumeRecord
+from .record_conversion import volume_record
 from .upload_metadata import SHAPE, SPACING, volume_given
 from .uploads import body_of, receive_upload
 

@@ -10,9 +10,9 @@ from sqlalchemy import Connection, delete, insert, select, update
 
 from .database import Database
 from .digests import Digest
-from .records import ChecksumRow, Plain
 from .schema import checksums, datasets, geometry_fields, jobs, meshes, uploaded_volumes, volumes
 from .tenants import Tenant
+from .typed_rows import ChecksumRow, Plain
 
 # Tables whose rows have stored files; the file of a turntable belongs to its job.
 STORED = (datasets, uploaded_volumes, volumes, meshes, geometry_fields, jobs)

@@ -14,9 +14,9 @@ from sqlalchemy import ColumnElement, Connection, and_, func, insert, or_, selec
 from . import schema, usage
 from .database import Database
 from .job_states import RUNNING, change
-from .records import JobRow, Plain
 from .schema import ENDED, jobs, volumes
 from .tenants import Tenant
+from .typed_rows import JobRow, Plain
 
 MAX_ATTEMPTS = 3
 

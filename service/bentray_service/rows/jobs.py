@@ -16,10 +16,10 @@ from ..errors import JobFinished, KeyReused, QueueFull, UnknownId
 from . import schema, usage
 from .ids import checked, new_id
 from .job_states import append_event, change
-from .records import EventRow, JobProgress, JobRow, Plain
 from .schema import ENDED, jobs
 from .stored_tables import TenantTable
 from .tenants import Tenant
+from .typed_rows import EventRow, JobProgress, JobRow, Plain
 
 BATCH = 500
 

@@ -15,9 +15,9 @@ from bentray_kernels.errors import InvalidInput
 
 from .api_key import ApiKey
 from .database import Database
-from .records import KeyRow
 from .schema import keys
 from .tenants import Tenant
+from .typed_rows import KeyRow
 
 log = logging.getLogger("bentray.access")
 

@@ -11,9 +11,9 @@ from ..errors import UnknownId
 from . import schema
 from .database import Database
 from .ids import checked
-from .records import DatasetRow, FieldRow, MeshRow, Plain, VolumeRow
 from .schema import datasets, jobs, uploaded_volumes, volumes
 from .tenants import Tenant
+from .typed_rows import DatasetRow, FieldRow, MeshRow, Plain, VolumeRow
 from .usage import keep
 
 Record = TypeVar("Record")

@@ -11,10 +11,10 @@ from sqlalchemy import delete as delete_from
 from ..errors import RateLimited
 from . import usage
 from .ids import new_id
-from .records import Plain, UploadRow
 from .schema import uploads
 from .stored_tables import TenantTable
 from .tenants import Tenant
+from .typed_rows import Plain, UploadRow
 
 # Incomplete uploads of one tenant; they are deleted by the client or expire.
 MOST_BEGUN = 100

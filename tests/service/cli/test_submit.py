@@ -13,7 +13,7 @@ from typer.testing import Result
 
 from bentray_kernels.tomography import Settings
 from bentray_service.client import ClientError
-from bentray_service.routes.models.records import JobRecord
+from bentray_service.routes.models.job_records import JobRecord
 from bentray_service.web.problem import Problem
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction import reconstruction_run

@@ -7,7 +7,7 @@ import pytest
 from bentray_service.client.errors import ClientError, NoAnswer
 from bentray_service.client.steps import EventStep, PauseStep, RequestStep
 from bentray_service.client.waiting import STREAMS, wait_for
-from bentray_service.routes.models.records import JobRecord
+from bentray_service.routes.models.job_records import JobRecord
 
 JOB = {
     **dict.fromkeys(JobRecord.model_fields),

@@ -9,8 +9,8 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.rendering.refraction_view import check_even
 
 from ..jobs.kinds import KINDS, field_links
-from ..rows.records import DatasetRow, FieldRow, JobRow, MeshRow, UploadRow, VolumeRow
-from .models.records import DatasetRecord, JobRecord, VolumeRecord
+from ..rows.typed_rows import DatasetRow, FieldRow, JobRow, MeshRow, UploadRow, VolumeRow
+from .models.job_records import DatasetRecord, JobRecord, VolumeRecord
 from .models.surface_records import FieldRecord, FieldSeconds, MeshRecord
 from .models.upload_records import UploadRecord
 
