@@ -41,7 +41,8 @@ SETTINGS = {
     *("coupling_mps", "elements", "nodes", "snr"),
 }
 DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {
-    "POST /v1/datasets": {422: FILE},
+    # One variable for a field, and one unit of a kind.
+    "POST /v1/datasets": {422: {*FILE, "map", "unit"}},
     "POST /v1/meshes": {422: FILE},
     # Of raw bytes both or none, as many as the file has; the range of a number in a text.
     "POST /v1/volumes": {422: {*FILE, "shape", "dtype", "spacing_m"}},
@@ -56,6 +57,8 @@ DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {
         # value, of a reconstruction the others.
         422: {"axis", "index", "low", "high", "size", "quantity"}
     },
+    # Of a reconstruction with attenuation, and of a format with one image.
+    "GET /v1/volumes/{volume_id}/data": {422: {"quantity", "attenuation", "volume"}},
     "GET /v1/volumes/{volume_id}/refraction.png": {422: VIEW},
     "GET /v1/geometry-fields/{field_id}/image.png": {422: {"width, height, rays"}},
     # Within the volume's range; one that leaves two nodes.

@@ -11,7 +11,17 @@ import typer
 
 from bentray_kernels.picker_names import DEFAULT_PICKER
 
-from .options.paths import input_file, output_folder
+from .options.paths import output_folder
+from .options.scan_options import (
+    Frequency,
+    Map,
+    SoundSpeed,
+    Temperature,
+    Unit,
+    dataset_file,
+    given_of,
+    input_scan,
+)
 from .output.exit_codes import WorkFailed
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
@@ -24,7 +34,7 @@ class Water(StrEnum):
 
 
 def quality(
-    file: Annotated[Path, typer.Argument(help="Dataset file (HDF5, format uct-transmission).")],
+    file: Annotated[Path, typer.Argument(help="Dataset file, or a scan of another program.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
     picker: Annotated[str, typer.Option(help="Picker of first arrivals in raw traces.")] = DEFAULT_PICKER,
     calibrate: Annotated[
@@ -35,6 +45,11 @@ def quality(
             show_default="no calibration",
         ),
     ] = None,
+    map: Map = None,  # noqa: A002 - the name of the option
+    unit: Unit = None,
+    temperature: Temperature = None,
+    sound_speed: SoundSpeed = None,
+    frequency: Frequency = None,
     as_json: AsJson = False,
 ) -> None:
     """Check the data quality of a scan: report in OUTPUT/quality.json and .png, corrected scan in picked.h5.
@@ -45,18 +60,19 @@ def quality(
 
     Example:  bentray quality scan.h5 -o report
     """
-    source, folder = input_file(file), output_folder(output)
+    source, folder = input_scan(file), output_folder(output)
+    given = given_of(map, unit, temperature, sound_speed, frequency)
 
     from bentray_workers.files.atomic import write_bytes
     from bentray_workers.files.dataset import write_dataset
     from bentray_workers.reconstruction.quality_report import calibrate_file, examine_file
 
     calibration = None
-    with progress_bar("Examining") as step:
+    with dataset_file(source, given, folder) as scan, progress_bar("Examining") as step:
         if calibrate is None:
-            found = examine_file(source, picker, step)
+            found = examine_file(scan, picker, step)
         else:
-            found, calibration = calibrate_file(source, picker, step, fit_speed=calibrate is Water.fitted)
+            found, calibration = calibrate_file(scan, picker, step, fit_speed=calibrate is Water.fitted)
     paths = {kind: folder / f"quality.{kind}" for kind in ("json", "png")}
     if found.picked is not None:
         paths["h5"] = folder / "picked.h5"

@@ -7,6 +7,9 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Request, Response, status
 from pydantic import Field
 
+from bentray_kernels.limits import FREQUENCY_HZ, SPEED_MPS, TEMPERATURE_C
+from bentray_workers.foreign_scans.given import FIELDS, UNITS
+
 from ..files.deletion import StoredItem
 from ..web.errors import problems
 from ..wiring import CallerTenant, Service
@@ -21,6 +24,9 @@ from .uploads import body_of, receive_upload
 HDF5 = "application/x-hdf5"
 MEDIA_TYPES = (HDF5, "application/octet-stream")
 NONE: list[str] = []
+# Only described to FastAPI: the errors of ``Given`` name the accepted values.
+PAIR = "^(" + "|".join(FIELDS) + ")=[A-Za-z][A-Za-z0-9_]{0,60}$"
+UNIT = "^(" + "|".join(UNITS) + ")$"
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
 router.include_router(quality.router)
@@ -39,7 +45,7 @@ async def upload_dataset(
     service: Service,
     tenant: CallerTenant,
     map: Annotated[  # noqa: A002 - the name of the query parameter
-        list[Annotated[str, Field(max_length=300)]],
+        list[Annotated[str, Field(max_length=300, json_schema_extra={"pattern": PAIR})]],
         Query(
             max_length=40,
             description="Own variables of a MATLAB, HDF5 or NumPy file: FIELD=VARIABLE, as "
@@ -47,12 +53,20 @@ async def upload_dataset(
         ),
     ] = NONE,
     unit: Annotated[
-        list[Annotated[str, Field(max_length=20)]],
+        list[Annotated[str, Field(max_length=20, json_schema_extra={"pattern": UNIT})]],
         Query(max_length=2, description="Unit of lengths and of times in the file, as mm and us."),
     ] = NONE,
-    temperature_c: Annotated[float | None, Query(description="Temperature of the water, °C.")] = None,
-    sound_speed_mps: Annotated[float | None, Query(description="Speed of sound in the water, m/s.")] = None,
-    frequency_hz: Annotated[float | None, Query(description="Centre frequency, Hz.")] = None,
+    temperature_c: Annotated[
+        float | None,
+        Query(ge=TEMPERATURE_C.least, le=TEMPERATURE_C.most, description="Temperature of the water, °C."),
+    ] = None,
+    sound_speed_mps: Annotated[
+        float | None,
+        Query(ge=SPEED_MPS.least, le=SPEED_MPS.most, description="Speed of sound in the water, m/s."),
+    ] = None,
+    frequency_hz: Annotated[
+        float | None, Query(ge=FREQUENCY_HZ.least, le=FREQUENCY_HZ.most, description="Centre frequency, Hz.")
+    ] = None,
 ) -> DatasetRecord:
     """Upload a scan. A separate process validates it and stores it in the canonical format.
 

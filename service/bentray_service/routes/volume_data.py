@@ -67,8 +67,9 @@ async def volume_data(
     selection = Selection(quantity, attenuation)
     if format in ("hdf5", "h5"):
         if selection != Selection():
+            field = "quantity" if quantity != Selection().quantity else "attenuation"
             accepted = "speed and Np/m for hdf5, which holds all quantities in SI units"
-            raise InvalidInput("quantity, attenuation", f"{quantity}, {attenuation}", accepted)
+            raise InvalidInput(field, f"{quantity}, {attenuation}", accepted)
         return download(request, path, seed, HDF5)
     chosen = FORMATS[format]
     # Exports are deterministic, so the ETag is computed from the volume.

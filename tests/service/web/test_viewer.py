@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 import trimesh
 from playwright.sync_api import expect, sync_playwright
+from scipy.io import savemat
 
 from bentray_kernels.meshes.example_surfaces import torus
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.jobs import kinds
 from bentray_service.rows.api_key import ApiKey
+
+from ...workers.foreign_scans.scans import delta_tof, positions
 
 CHROMIUM = Path("/usr/bin/chromium")
 # A machine under load may be slow, and the first picture waits for kernels that are not compiled yet.
@@ -346,3 +349,19 @@ def test_a_simulated_scan_is_there_to_be_reconstructed(page, serve, monkeypatch)
     assert whole.is_hidden()
     job.get_by_text("Plan: 2 tasks").click()
     assert whole.is_visible()
+
+
+def test_own_variables_are_named_in_a_form_that_opens_when_a_file_is_refused(page, serve, tmp_path):
+    savemat(tmp_path / "scan.mat", {"pos": 1e3 * positions(), "dtof": 1e6 * delta_tof()})
+    page.goto(serve())
+    page.set_input_files("#scan-file", tmp_path / "scan.mat")
+    page.locator("#scan-error").wait_for()
+    assert "--map element_position=NAME" in page.locator("#scan-error").inner_text()
+    assert page.locator("#scan-own").get_attribute("open") is not None
+    page.get_by_label("Variables, FIELD=NAME").fill("element_position=pos, delta_tof=dtof")
+    page.get_by_label("Lengths").select_option("mm")
+    page.get_by_label("Times").select_option("us")
+    page.get_by_label("Water, °C").fill("24")
+    page.get_by_role("button", name="Send the file again").click()
+    page.get_by_text("scan.mat is stored").wait_for()
+    assert "water 1494" in page.locator("#dataset-facts").inner_text()

@@ -56,9 +56,9 @@ def convert_dataset(
         if not scan.claims_upload_format() and not (scan.is_upload_format() and not given.variables):
             arrays, layout = _read(scan, given)
             return _write(arrays, layout, target, on_size)
-    if given:
-        accepted = "none: files in the upload format state their units, water and frequency"
-        raise InvalidInput("map, unit, temperature, speed or frequency", "given for this file", accepted)
+        if given and scan.claims_upload_format():
+            accepted = "none: files in the upload format state their units, water and frequency"
+            raise InvalidInput("map, unit, temperature, speed or frequency", "given for this file", accepted)
     return copy_dataset(source, target, limits, on_size)
 
 
