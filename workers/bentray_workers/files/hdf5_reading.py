@@ -68,6 +68,13 @@ class Reader:
         """Whether a group or array of that path exists."""
         return self._object(path) is not None
 
+    def contains(self, path: str) -> bool:
+        """As ``has``, and false where an array has the name of a group on the path."""
+        parent = path.rpartition("/")[0]
+        if parent and not (self.contains(parent) and isinstance(self._object(parent), h5py.Group)):
+            return False
+        return self.has(path)
+
     def check_format(self, name: str, version: str) -> None:
         """Check the attributes ``format`` and ``format_version`` of the file.
 

@@ -36,7 +36,7 @@ class Matlab73:
         return self._reader.names()
 
     def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
-        stored = self._reader.checked(name, "iuf", NUMBERS)
+        stored = self._reader.checked(name, "iuf", NUMBERS) if self._reader.contains(name) else None
         if stored is None:
             return None
         # MATLAB marks empty arrays and stores their shape as numbers.

@@ -73,15 +73,23 @@ class OpenScan:
             return frozenset(name.removesuffix(npz.SUFFIX) for name in members)
         return frozenset() if self.arrays is None else frozenset(self.arrays.names())
 
+    def has(self, *paths: str) -> bool:
+        """Whether an HDF5 file has groups or arrays at all of these paths; links are not followed."""
+        if self.hdf5 is None:
+            return False
+        try:
+            return all(map(self.hdf5.contains, paths))
+        except InvalidInput:
+            # A link.
+            return False
+
     def is_upload_format(self) -> bool:
         """Whether this is a file in the upload format, or claims to be; also if it has no known format."""
         if self.hdf5 is None:
             return self.matlab is None and self.archive is None and self.folder is None
         format_name = self.hdf5.attribute("", "format")
         # Groups of the upload format in a file whose author forgot the attribute.
-        return format_name is not None or (
-            not self.is_matlab and self.hdf5.has("geometry/element_position_m")
-        )
+        return format_name is not None or (not self.is_matlab and self.has("geometry/element_position_m"))
 
     def claims_upload_format(self) -> bool:
         """Whether the attribute ``format`` names the upload format."""

@@ -28,7 +28,7 @@ MAJOR = "1."
 
 
 def _detect(scan: OpenScan) -> bool:
-    return scan.hdf5 is not None and scan.hdf5.has(POSITION) and scan.hdf5.has(DATA)
+    return scan.has(POSITION, DATA)
 
 
 def _read(scan: OpenScan) -> StreamedScan:

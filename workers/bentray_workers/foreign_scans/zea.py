@@ -38,17 +38,14 @@ FLAT = 1e-6
 
 
 def _detect(scan: OpenScan) -> bool:
-    reader = scan.hdf5
-    return reader is not None and any(
-        reader.has(track + RAW) and reader.has(f"{track}scan/sampling_frequency") for track in TRACKS
-    )
+    return any(scan.has(track + RAW, f"{track}scan/sampling_frequency") for track in TRACKS)
 
 
 def _read(scan: OpenScan) -> StreamedScan:
     assert scan.hdf5 is not None
     reader = scan.hdf5
-    track = next(track for track in TRACKS if reader.has(track + RAW))
-    if reader.has("tracks/track_1"):
+    track = next(track for track in TRACKS if scan.has(track + RAW))
+    if scan.has("tracks/track_1"):
         raise InvalidInput("tracks", "several tracks", "a file with one track")
     raw = reader.checked(track + RAW, "if", RAW_SHAPE)
     assert raw is not None
