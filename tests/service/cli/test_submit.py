@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import pytest
+from scipy.io import savemat
 from typer.testing import Result
 
 from bentray_kernels.tomography import Settings
@@ -17,6 +18,8 @@ from bentray_service.routes.models.job_records import JobRecord
 from bentray_service.web.problem import Problem
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction import reconstruction_run
+
+from ...workers.foreign_scans.scans import delta_tof, positions
 
 
 class StandIn:
@@ -103,6 +106,19 @@ def test_it_sends_the_scan_and_fetches_three_files(
     assert said["truth"]["rmse_mps"] > 0
     for kind in ("h5", "png", "json"):
         assert (tmp_path / f"reconstruction.{kind}").stat().st_size > 100
+
+
+def test_a_scan_of_another_program_is_converted_before_it_is_sent(
+    bentray: Callable[..., Result], client: type[StandIn], tmp_path: Path
+) -> None:
+    savemat(tmp_path / "own.mat", {"pos": 1e3 * positions(), "dtof": delta_tof()})
+    out = tmp_path / "out"
+    words = ("--map", "element_position=pos", "--map", "delta_tof=dtof", "--unit", "mm")
+    result = bentray("submit", tmp_path / "own.mat", "-o", out, *words)
+    assert result.exit_code == 0, result.stderr
+    assert "20 °C (1482.4 m/s) is assumed" in " ".join(result.stdout.split())
+    assert not client.scan.exists(), "the converted file is removed"
+    assert sorted(path.suffix for path in out.iterdir()) == [".h5", ".json", ".png"]
 
 
 @pytest.mark.parametrize(("words", "state"), [((), "succeeded"), (("--no-wait",), "queued")])
