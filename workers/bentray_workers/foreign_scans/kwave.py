@@ -169,7 +169,8 @@ READER = ScanReader(
     about="One HDF5 output for each emission, in the order of `tx` by name, of a sensor mask; beside them "
     "`geometry.npz`. k-Wave records in the order of its grid: `rx` lists the element of each receiver.",
     variables=(
-        Variable("geometry.npz: element_position_m, tx, rx", "as above", "m", "geometry and order"),
+        Variable("geometry.npz: element_position_m", "(elements, 2 or 3)", "m", "positions of the elements"),
+        Variable("geometry.npz: tx, rx", "(ntx,), (nrx,) integers", "", "elements, counted from 0"),
         Variable("object/*.h5: p", "(1, Nt, receivers) in HDF5", "Pa", "pressure"),
         Variable("object/*.h5: dt", "number", "s", "time step"),
         Variable("water/*.h5", "as object", "", "the same without the object", "no"),
