@@ -14,6 +14,12 @@ MARCZAK = (1.402385e3, 5.038813, -5.799136e-2, 3.287156e-4, -1.398845e-6, 2.7878
 RANGE_C = (0.0, 95.0)
 FASTEST_C = 74.0
 
+# Errors that are not faults: of a thermometer, °C, and of the size of an array, as a part.
+THERMOMETER_C, APERTURE = 1.0, 0.002
+
+# Change of the speed with the temperature, m/s per degree, of other media than pure water.
+USUAL_MPS_PER_DEGREE = 3.0
+
 
 def speed_from_temperature(temperature_c: float) -> float:
     """Speed of sound in water, m/s, by Marczak (1997) at atmospheric pressure.
@@ -51,6 +57,17 @@ def temperature_from_speed(speed_mps: float) -> float:
             low = middle
         else:
             high = middle
+
+
+def stated_deviation(speed_mps: float, temperature_c: float | None) -> float:
+    """Usual error of a stated speed, m/s, from those of a thermometer and of the size of the array."""
+    degree = USUAL_MPS_PER_DEGREE
+    low, high = RANGE_C
+    if temperature_c is not None and low + 0.5 <= temperature_c <= high - 0.5:
+        degree = abs(
+            speed_from_temperature(temperature_c + 0.5) - speed_from_temperature(temperature_c - 0.5)
+        )
+    return math.hypot(THERMOMETER_C * degree, APERTURE * speed_mps)
 
 
 def describe_assumption(temperature_c: float) -> str:

@@ -189,7 +189,8 @@ def _pick(
 
 def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _JobProgress) -> Reconstruction:
     # A scan with travel times and without a water shot has no estimated one, unless waves are requested.
-    bare = lacks_water(job.scan) and not reference_path(job.folder, 0).exists()
+    lacking = lacks_water(job.scan)
+    bare = lacking and not reference_path(job.folder, 0).exists()
     stamp, recorded = path.stat().st_mtime_ns, job.scan.stat().st_mtime_ns
     faults = PickingFiles.of(job.folder).findings
 
@@ -210,7 +211,9 @@ def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _Jo
         settings,
         lambda plan, part: FileScan(path, stamp, plan, part),
         run_graphs,
-        lambda plan, index: FileWaveScan(job.scan, recorded, plan, index, faults),
+        lambda plan, index: FileWaveScan(
+            job.scan, recorded, replace(plan, estimates_source=lacking), index, faults
+        ),
         0 if bare else trace_samples(job.scan),
     )
 

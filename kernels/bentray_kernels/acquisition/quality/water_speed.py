@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 from ...errors import InvalidInput
 from ..dataset import Dataset
-from ..water import describe_assumption, speed_from_temperature, temperature_from_speed
+from ..water import describe_assumption, speed_from_temperature, stated_deviation, temperature_from_speed
 from .finding import Action, Finding
 
 WATER_SPEED = "water speed"
-
-# Errors that are not faults: of a thermometer, °C, and of the size of an array, as a part.
-THERMOMETER_C, APERTURE = 1.0, 0.002
 
 # Standard deviations of the fit within which it agrees.
 AGREEING = 3.0
@@ -22,9 +17,6 @@ ASSUMED_MPS = 15.0
 
 # Largest difference at which a speed and a temperature of the file mean the same, m/s.
 SAME_MPS = 0.5
-
-# Change of the speed with the temperature, m/s per degree, for other media than pure water.
-USUAL_MPS_PER_DEGREE = 3.0
 
 
 def find_water_speed(dataset: Dataset, speed_mps: float, sigma_mps: float) -> list[Finding]:
@@ -45,7 +37,9 @@ def find_water_speed(dataset: Dataset, speed_mps: float, sigma_mps: float) -> li
         action: Action = "corrected"
         accepted = "the temperature of the water in the file"
     else:
-        allowed = _explained(dataset) + AGREEING * sigma_mps
+        allowed = (
+            stated_deviation(dataset.water_speed_mps, dataset.water_temperature_c) + AGREEING * sigma_mps
+        )
         if abs(speed_mps - dataset.water_speed_mps) <= allowed:
             return []
         action = "reported"
@@ -108,19 +102,3 @@ def _with_temperature(speed_mps: float, text: str = "") -> str:
         return f"{text} ({temperature_from_speed(speed_mps):.1f} °C)"
     except InvalidInput:
         return text
-
-
-def _explained(dataset: Dataset) -> float:
-    """Difference of speeds that errors of thermometer and array size explain, m/s."""
-    return math.hypot(THERMOMETER_C * _per_degree(dataset), APERTURE * dataset.water_speed_mps)
-
-
-def _per_degree(dataset: Dataset) -> float:
-    """Change of the speed with the temperature, m/s per degree."""
-    celsius = dataset.water_temperature_c
-    if celsius is None:
-        return USUAL_MPS_PER_DEGREE
-    try:
-        return abs(speed_from_temperature(celsius + 0.5) - speed_from_temperature(celsius - 0.5))
-    except InvalidInput:
-        return USUAL_MPS_PER_DEGREE

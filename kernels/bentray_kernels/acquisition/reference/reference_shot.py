@@ -15,6 +15,7 @@ from ...errors import InvalidInput
 from ..dataset import Dataset
 from ..emissions import Emissions
 from ..noise import robust_deviation
+from ..water import stated_deviation
 from .chord_pulses import ChordPulses, window
 from .water_chords import FEWEST, WaterChords, find_water_chords
 
@@ -59,7 +60,8 @@ class ReferenceShot:
         emission_delay_s, reception_delay_s: (ntx,), (nrx,), s, of mean 0; 0 where no chord determines it.
         emission_gain, reception_gain: (ntx,), (nrx,), logarithms.
         chords: number of chords used.
-        speed_mps: phase speed at the centre frequency.
+        speed_mps: fitted phase speed at the centre frequency. The wave number is that of its mean with the
+            stated speed, weighted by their variances.
         speed_sigma_mps: its standard deviation: from the scatter of the arrivals, for the distances that the
             delays of elements leave, and half the difference from the group speed, which water does not have.
         scatter_s: robust standard deviation of the arrivals.
@@ -150,7 +152,11 @@ def estimate_reference(
     fit.keep(again.pairs)
     for _ in range(ROUNDS):
         fit.improve()
-    return fit.reference()
+    fitted = fit.fitted()
+    if not dataset.water_temperature_assumed:
+        usual = stated_deviation(dataset.water_speed_mps, dataset.water_temperature_c)
+        fit.weigh(fitted, dataset.water_speed_mps, usual)
+    return fit.reference(fitted)
 
 
 def chord_signs(dataset: Dataset, chords: WaterChords, pulses: ChordPulses, period_s: float) -> Floats:
@@ -244,20 +250,37 @@ class _Fit:
         at = np.flatnonzero(strong)
         self._wave_number -= np.interp(self._omega, self._omega[at], slope[at])
 
-    def reference(self) -> ReferenceShot:
-        """The result."""
-        frequency = 1.0 / self._period_s
-        wave_number = float(np.interp(2.0 * np.pi * frequency, self._omega, self._wave_number))
-        size = np.log(np.maximum(self.amplitude, np.finfo(np.float64).tiny) * np.sqrt(self._distance))
-        emission_gain, reception_gain = self._of_elements(size, centred=False)
-        known = self._pulses.noise[np.isfinite(self._pulses.noise)]
-        scatter = robust_deviation(self.lag_s[self.used])
-        speed = 2.0 * np.pi * frequency / wave_number
-        ends = 2.0 * np.pi * frequency * np.array((1.0 - GROUP, 1.0 + GROUP))
+    def fitted(self) -> tuple[float, float]:
+        """Phase speed at the centre frequency and its standard deviation, m/s; see ``ReferenceShot``."""
+        centre = 2.0 * np.pi / self._period_s
+        speed = centre / float(np.interp(centre, self._omega, self._wave_number))
+        ends = centre * np.array((1.0 - GROUP, 1.0 + GROUP))
         group = float(np.ptp(ends) / np.diff(np.interp(ends, self._omega, self._wave_number))[0])
         emission, reception = self._of_elements(self._distance, centred=False)
         left = self._distance - emission[self._pulses.emission] - reception[self._pulses.reception]
         spread = float(np.std(left[self.used])) * math.sqrt(self.used.sum())
+        scatter = robust_deviation(self.lag_s[self.used])
+        return speed, math.hypot(scatter / max(spread, 1e-9) * speed**2, 0.5 * (group - speed))
+
+    def weigh(self, fitted: tuple[float, float], stated_mps: float, deviation_mps: float) -> None:
+        """Use the mean of the fitted and the stated speed, weighted by their variances.
+
+        Chords near the object are diffracted by it, which the scatter of the arrivals does not show. The
+        arrival at the mean distance remains.
+        """
+        speed, sigma = fitted
+        weight = sigma**2 / (sigma**2 + deviation_mps**2)
+        change = 1.0 / (speed + weight * (stated_mps - speed)) - 1.0 / speed
+        self._wave_number = self._wave_number + self._omega * change
+        self._slowness += change
+        self._delay_s -= change * float(self._distance[self.used].mean())
+
+    def reference(self, fitted: tuple[float, float]) -> ReferenceShot:
+        """The result, with the fitted speed and its standard deviation."""
+        size = np.log(np.maximum(self.amplitude, np.finfo(np.float64).tiny) * np.sqrt(self._distance))
+        emission_gain, reception_gain = self._of_elements(size, centred=False)
+        known = self._pulses.noise[np.isfinite(self._pulses.noise)]
+        speed, sigma = fitted
         return ReferenceShot(
             frequency_hz=np.asarray(self._omega / (2.0 * np.pi), dtype=np.float64),
             spectrum=self._pulse,
@@ -269,8 +292,8 @@ class _Fit:
             reception_gain=reception_gain,
             chords=int(self.used.sum()),
             speed_mps=speed,
-            speed_sigma_mps=math.hypot(scatter / max(spread, 1e-9) * speed**2, 0.5 * (group - speed)),
-            scatter_s=scatter,
+            speed_sigma_mps=sigma,
+            scatter_s=robust_deviation(self.lag_s[self.used]),
             noise=float(np.median(known)) if known.size else 0.0,
         )
 

@@ -168,6 +168,7 @@ def _refusal(chords: int) -> InvalidInput:
     return InvalidInput(
         "waveform/water",
         f"no traces, and {chords} chords of the object scan that pass through water alone",
-        f"a scan without the object, or at least {FEWEST} chords that miss the object "
-        f"(an apparent speed of {SLOWEST_MPS:g} to {FASTEST_MPS:g} m/s)",
+        "a scan without the object (waveform/water) or travel times (traveltime/delta_tof_s), if the object "
+        f"fills the array; else at least {FEWEST} chords that miss it, "
+        f"at {SLOWEST_MPS:g} to {FASTEST_MPS:g} m/s",
     )

@@ -36,10 +36,12 @@ class Model(NamedTuple):
     Attributes:
         speed: (nx, ny), m/s.
         attenuation: (nx, ny), beyond the water's, Np/m; None: zero.
+        wavelet: (steps,), the source, estimated anew for the band; None: that of the problem.
     """
 
     speed: Floats
     attenuation: Floats | None = None
+    wavelet: Floats | None = None
 
 
 class EmitterMisfit(NamedTuple):
@@ -126,7 +128,8 @@ def emitters(problem: WaveProblem) -> Ints:
 def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, some: Ints) -> EmitterMisfit:
     """Misfit of some of ``emitters(problem)``, and its gradient by the band's unknown."""
     held_out = set(problem.held.tolist())
-    medium, by = problem.medium(*model), problem.band.of
+    medium, by = problem.medium(model.speed, model.attenuation), problem.band.of
+    wavelet = problem.wavelet if model.wavelet is None else model.wavelet
     measure = settings.measure(by)
     misfit, held = 0.0, 0.0
     gradient, illumination = np.zeros_like(model.speed), np.zeros_like(model.speed)
@@ -136,13 +139,11 @@ def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, some: I
         window = problem.window(emitter, valid, settings.window_s)
         at, receivers = problem.emitters[emitter], problem.receivers[valid]
         if emitter in held_out:
-            traces = simulate(medium, at, receivers, problem.wavelet, poll=problem.poll)
+            traces = simulate(medium, at, receivers, wavelet, poll=problem.poll)
             held += measure(traces, recorded, window)[0]
             continue
         compare = partial(measure, recorded=recorded, weight=window)
-        one = misfit_gradient(
-            medium, at, receivers, problem.wavelet, compare, problem.every, by, problem.poll
-        )
+        one = misfit_gradient(medium, at, receivers, wavelet, compare, problem.every, by, problem.poll)
         misfit += one.misfit
         gradient += one.gradient
         illumination += one.illumination

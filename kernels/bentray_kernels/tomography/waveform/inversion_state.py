@@ -59,19 +59,21 @@ class ActiveBand:
         origin: of its grid, m.
         emitters: number evaluated in each iteration.
         frozen: (nx, ny), the fixed speed while the attenuation is refined, m/s; else None.
+        wavelet: (steps,), the source, if it was estimated anew with the image reached so far.
     """
 
     state: InversionState
     origin: tuple[float, float]
     emitters: int
     frozen: Floats | None = None
+    wavelet: Floats | None = None
 
     @property
     def model(self) -> Model:
         """The model to evaluate next."""
         if self.frozen is None:
-            return Model(self.state.image)
-        return Model(self.frozen, self.state.image)
+            return Model(self.state.image, None, self.wavelet)
+        return Model(self.frozen, self.state.image, self.wavelet)
 
 
 @dataclass(frozen=True)

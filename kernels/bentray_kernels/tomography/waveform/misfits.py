@@ -30,6 +30,9 @@ def least_squares(simulated: Floats, recorded: Floats, weight: Floats) -> tuple[
 def correlation(simulated: Floats, recorded: Floats, weight: Floats) -> tuple[float, Floats]:
     """One minus the normalised correlation, averaged over traces; independent of the amplitude of each trace.
 
+    The gains of emitters and receivers are so projected out. Where the source is estimated anew from the same
+    traces (``source_estimation``), the misfit is also blind to a filter that all traces have in common.
+
     Args:
         simulated, recorded: (nrx, nt).
         weight: (nrx, nt) or (nrx, 1), >= 0; both traces are windowed by its square root.

@@ -17,6 +17,7 @@ from . import band_inversion
 from .band_inversion import EmitterMisfit, InversionState, Model
 from .inversion_state import ActiveBand, BandEnd, Image, RefinementCheckpoint
 from .iterations import iteration_records
+from .source_estimation import estimate_source
 from .waveform_problem import WaveProblem
 from .waveform_settings import WaveSettings
 
@@ -183,9 +184,12 @@ def start_band(scan: WaveScan, number: int, image: Image) -> ActiveBand | None:
     if problem.water_correlation < LEAST_WATER_CORRELATION:
         return None
     speed, count = on_grid(image, problem), len(band_inversion.emitters(problem))
+    wavelet = None
+    if scan.settings().estimates_source:
+        wavelet = estimate_source(problem, speed, scan.settings().window_s)
     if problem.band.of == "speed":
-        return ActiveBand(band_inversion.begin(speed), problem.origin, count)
-    return ActiveBand(band_inversion.begin(np.zeros_like(speed)), problem.origin, count, speed)
+        return ActiveBand(band_inversion.begin(speed), problem.origin, count, None, wavelet)
+    return ActiveBand(band_inversion.begin(np.zeros_like(speed)), problem.origin, count, speed, wavelet)
 
 
 def evaluate_emitter(scan: WaveScan, number: int, model: Model, place: int) -> EmitterMisfit:

@@ -74,7 +74,7 @@ def with_normalised_amplitudes(problem: WaveProblem, shots: WaterShots) -> WaveP
     medium = problem.medium(np.full(problem.region.shape, problem.water.speed))
     distance = np.linalg.norm(problem.emitters[:, None] - problem.receivers[None], axis=-1)
     apart, size = [], []
-    for emitter in _calibration_emitters(problem):
+    for emitter in calibration_emitters(problem):
         valid = problem.valid_receivers(emitter)
         model = simulate(
             medium, problem.emitters[emitter], problem.receivers[valid], problem.wavelet, poll=problem.poll
@@ -103,7 +103,7 @@ def _energy(problem: WaveProblem, shots: WaterShots, emitter: int, valid: Ints, 
     return np.asarray((window * traces.astype(np.float64) ** 2).sum(axis=1))
 
 
-def _calibration_emitters(problem: WaveProblem) -> Ints:
+def calibration_emitters(problem: WaveProblem) -> Ints:
     """The emitters whose water shots are simulated."""
     return problem.used[:: max(1, problem.used.size // SHOTS)][:SHOTS]
 
@@ -118,7 +118,7 @@ def _with_wavelet(problem: WaveProblem, shots: WaterShots, water: Water) -> Wave
     impulse[min(samples.size // 2, max(ahead, 0))] = 1.0
     pulse = impulse @ sampler.astype(np.float64)
     medium = problem.medium(np.full(problem.region.shape, water.speed))
-    emitters = _calibration_emitters(problem)
+    emitters = calibration_emitters(problem)
 
     parts = []
     for emitter in emitters:

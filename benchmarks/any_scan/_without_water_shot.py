@@ -1,0 +1,143 @@
+"""A1: a scan with its water shot and without, beside constants and straight rays."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.tomography import Reconstruction, Settings
+from bentray_service.cli.output.benchmark_row import Row
+from bentray_service.cli.output.terminal import Step
+from bentray_workers.cluster.connection import open_cluster
+from bentray_workers.files.dataset import read_dataset, write_dataset
+from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
+from bentray_workers.images.truth_comparison import compare
+from bentray_workers.reconstruction import reconstruction_run
+from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.waves import WaveSimulationSettings
+
+from ..shared._small_png import small_png
+from ._planted_scan import planted, without_water_shot
+
+RESULTS = Path(__file__).parents[1] / "results"
+
+# A scan simulated by another solver, not in the repository.
+OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
+
+WORKERS = 2
+
+# Largest error without the water shot, relative to that with it.
+GOALS = {"auto": 1.05, "waveform": 1.15}
+
+WAYS: dict[str, dict[str, Any]] = {
+    "straight": {"method": "sart", "rays": "straight"},
+    "bent": {"method": "sart"},
+    "auto": {"method": "auto"},
+    "waveform": {"method": "waveform"},
+}
+SHOWN = ("straight, none", "bent, none", "waveform, with", "waveform, none")
+
+
+@dataclass(frozen=True)
+class Made:
+    """An image with its error, m/s, and time, s."""
+
+    result: Reconstruction
+    rms: float
+    seconds: float
+
+
+def rows(quick: bool, progress: Step) -> Iterable[Row]:
+    """A1 for each scan; the picture of all of them, unless quick."""
+    shown: dict[str, tuple[Dataset, dict[str, Made]]] = {}
+    for name, dataset in scans(quick, progress):
+        images = {}
+        for way, changes in WAYS.items():
+            settings = Settings.of(
+                attenuation=False, **({"nodes": 48, "bands": 2} if quick else {}), **changes
+            )
+            for shot, scan in (("with", dataset), ("none", without_water_shot(dataset))):
+                images[f"{way}, {shot}"] = reconstruct(scan, settings, progress)
+        shown[name] = dataset, images
+        yield from scan_rows(name, dataset, images)
+    if not quick:
+        (RESULTS / "any_scan_without_water_shot.png").write_bytes(picture(shown))
+
+
+def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
+    """Names and scans, with traces of object and water."""
+    asked = WaveSimulationSettings(3e5, 0.12, 128, 48, nodes=128, snr=30.0)
+    if quick:
+        asked = WaveSimulationSettings(3e5, 0.1, 64, 32, nodes=64, snr=30.0)
+    made = simulate(asked, lambda now: progress(now.done, now.total, "simulation"))
+    yield f"simulated {1e-3 * asked.frequency_hz:.0f} kHz, planted", planted(made, 1)
+    if not quick and OTHERS.exists():
+        yield "ring_wave_a 400 kHz", read_dataset(OTHERS)
+
+
+def reconstruct(dataset: Dataset, settings: Settings, progress: Step) -> Made:
+    """Reconstruct as the service does: from a file, by worker processes."""
+    assert dataset.truth is not None
+    with TemporaryDirectory() as folder, open_cluster(workers=WORKERS) as cluster:
+        path = Path(folder) / "scan.h5"
+        write_dataset(path, dataset)
+        begun = time.perf_counter()
+        result = reconstruction_run.reconstruct(
+            cluster.client, path, settings, lambda now: progress(now.done, now.total, settings.method)
+        )
+        seconds = time.perf_counter() - begun
+    return Made(result, compare(result, dataset.truth, dataset.roi).rmse_mps, seconds)
+
+
+def scan_rows(name: str, dataset: Dataset, images: Mapping[str, Made]) -> Iterable[Row]:
+    """The rows of one scan."""
+    detail = ", ".join(f"{way} {error:.1f}" for way, error in constants(dataset, images).items())
+    detail += ", " + ", ".join(f"{way} {one.rms:.1f} in {one.seconds:.0f} s" for way, one in images.items())
+    detail += f" (m/s; water shot with or none); load at the end {os.getloadavg()[0]:.1f}"
+    for way, goal in GOALS.items():
+        ratio = images[f"{way}, none"].rms / images[f"{way}, with"].rms
+        yield Row(f"A1 {name}, {way}: error without over with water shot", ratio, goal, "<=", "", detail)
+
+
+def constants(dataset: Dataset, images: Mapping[str, Made]) -> dict[str, float]:
+    """Errors of the best constant and of water alone, m/s."""
+    assert dataset.truth is not None
+    result = images["straight, with"].result
+    errors = {}
+    found = compare(result, dataset.truth, dataset.roi)
+    best = float(np.mean(found.true_speed_mps[found.region]))
+    for name, speed in (("best constant", best), ("water alone", dataset.water_speed_mps)):
+        flat = replace(result, speed=np.full_like(result.speed, speed))
+        errors[name] = compare(flat, dataset.truth, dataset.roi).rmse_mps
+    return errors
+
+
+def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Made]]]) -> bytes:
+    """PNG: the truth and the images of each scan."""
+    with drawing():
+        figure = new_figure(15.0, 3.1 * len(scans) + 0.4)
+        figure.suptitle("Images with the water shot, and with one estimated from the scan (none)")
+        panels = figure.subplots(len(scans), 1 + len(SHOWN), squeeze=False)
+        for row, (name, (dataset, images)) in zip(panels, scans.items(), strict=True):
+            truth = dataset.truth
+            assert truth is not None
+            limits = robust_limits([truth.sound_speed_mps])
+            grid = truth.spacing_m, truth.origin_m
+            title = f"{name}: truth"
+            maps = [draw_map(row[0], truth.sound_speed_mps, *grid, limits, colormap=SPEED, title=title)]
+            for axes, way in zip(row[1:], SHOWN, strict=True):
+                one = images[way]
+                title = f"{way}: {one.rms:.1f} m/s, {one.seconds:.0f} s"
+                grid = (one.result.spacing_m, one.result.origin_m)
+                maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=title))
+            draw_bar(maps, "speed (m/s)")
+        return small_png(to_png(figure))

@@ -1,0 +1,19 @@
+"""Any scan with default settings: targets A1 to A3, one file for each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from bentray_service.cli.output.benchmark_row import Row
+from bentray_service.cli.output.terminal import Step
+
+from . import _without_water_shot
+
+# Each measures the rows of one target.
+TARGETS = (_without_water_shot.rows,)
+
+
+def rows(quick: bool, progress: Step) -> Iterable[Row]:
+    """The rows of all targets."""
+    for target in TARGETS:
+        yield from target(quick, progress)
