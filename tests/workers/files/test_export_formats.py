@@ -22,7 +22,7 @@ from scipy.io import loadmat
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction
-from bentray_workers.files import optional_library
+from bentray_workers.files.export import optional_library
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.files.volume_export import FORMATS, Selection, export_volume, largest_bytes

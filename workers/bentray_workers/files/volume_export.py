@@ -17,16 +17,16 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import FREQUENCY_HZ
 
 from .atomic import atomic_replace
-from .dicom_writing import write_dicom
+from .export.dicom_writing import write_dicom
+from .export.mat_writing import write_mat
+from .export.metaimage_writing import write_metaimage
+from .export.nifti_writing import write_nifti
+from .export.nrrd_writing import write_nrrd
+from .export.ome_zarr_writing import write_ome_zarr
+from .export.vti_writing import write_vti
 from .hdf5_reading import Limits, opened
-from .mat_writing import write_mat
-from .metaimage_writing import write_metaimage
-from .nifti_writing import write_nifti
-from .nrrd_writing import write_nrrd
-from .ome_zarr_writing import write_ome_zarr
 from .reconstruction import IMAGES, read_reconstruction
 from .volume import FORMAT, read_volume
-from .vti_writing import write_vti
 
 SPEED, ATTENUATION, ATTENUATION_DB = "speed_mps", "attenuation_np_m", "attenuation_db_cm_mhz"
 UNITS = {

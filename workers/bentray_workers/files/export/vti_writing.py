@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .atomic import atomic_replace
+from ..atomic import atomic_replace
 
 TYPES = {"u1": "UInt8", "u2": "UInt16", "f4": "Float32", "f8": "Float64"}
 SIZE = struct.Struct("<Q")

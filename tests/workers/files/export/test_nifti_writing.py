@@ -7,11 +7,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.nifti_writing import write_nifti
+from bentray_workers.files.export.nifti_writing import write_nifti
 from bentray_workers.files.volume_formats import import_volume
 
-from ...effort import effort
-from .volumes import ramp
+from ....effort import effort
+from ..volumes import ramp
 
 SPACING, ORIGIN = (1e-3, 2e-3, 3e-3), (-0.01, 0.0, 0.02)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .atomic import atomic_replace
+from ..atomic import atomic_replace
 from .optional_library import import_optional
 
 VERSION = "0.5"

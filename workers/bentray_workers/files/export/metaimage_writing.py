@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .atomic import atomic_replace
-from .bounded_reading import UNITS_M
+from ..atomic import atomic_replace
+from ..bounded_reading import UNITS_M
 
 # Names of the types of volumes.
 ELEMENTS = {"u1": "MET_UCHAR", "u2": "MET_USHORT", "f4": "MET_FLOAT", "f8": "MET_DOUBLE"}

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .atomic import atomic_replace
-from .bounded_reading import UNITS_M
+from ..atomic import atomic_replace
+from ..bounded_reading import UNITS_M
 
 TYPES = {"u1": "uint8", "u2": "uint16", "f4": "float", "f8": "double"}
 

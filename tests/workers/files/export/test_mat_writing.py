@@ -5,8 +5,8 @@ import pytest
 from scipy.io import loadmat
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files import mat_writing
-from bentray_workers.files.mat_writing import write_mat
+from bentray_workers.files.export import mat_writing
+from bentray_workers.files.export.mat_writing import write_mat
 
 ARRAYS = {
     "speed_mps": np.arange(24.0).reshape(2, 3, 4),

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .atomic import atomic_replace
-from .bounded_reading import UNITS_M
+from ..atomic import atomic_replace
+from ..bounded_reading import UNITS_M
 
 # Largest number of nodes along an axis in the header of NIfTI-1.
 MOST_NODES = 2**15 - 1

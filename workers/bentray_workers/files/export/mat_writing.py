@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .atomic import atomic_replace
+from ..atomic import atomic_replace
 
 # Of one array: the limit of this version of the format.
 LARGEST_BYTES = 2**31 - 1

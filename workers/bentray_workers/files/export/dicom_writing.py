@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .atomic import atomic_replace
-from .bounded_reading import UNITS_M
+from ..atomic import atomic_replace
+from ..bounded_reading import UNITS_M
 from .optional_library import import_optional
 
 # UCUM code and meaning of each quantity: name of the image, label, explanation.

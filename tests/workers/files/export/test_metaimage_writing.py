@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.metaimage_writing import ELEMENTS, write_metaimage
+from bentray_workers.files.export.metaimage_writing import ELEMENTS, write_metaimage
 
-from ...effort import effort
+from ....effort import effort
 
 steps = st.floats(1e-6, 1e-1)
 places = st.floats(-1.0, 1.0)

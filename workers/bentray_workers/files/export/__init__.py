@@ -1,0 +1,1 @@
+"""Writers of volumes in the formats of other programs."""
