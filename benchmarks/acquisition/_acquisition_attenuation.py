@@ -70,9 +70,11 @@ def invert_amplitudes(dataset: Dataset, nodes: int, progress: Step) -> dict[str,
     """Along straight and bent rays: log ratios, these with the focusing of ray tubes off, and by spectra."""
     picked = replace(pick(dataset), waveform=dataset.waveform)
     ways = {
-        "ratios": Settings.of(nodes=nodes, amplitudes="ratio"),
-        "ratios, focusing taken off": Settings.of(nodes=nodes, amplitudes="ratio", focusing=True),
-        "spectra": Settings.of(nodes=nodes, amplitudes="spectrum"),
+        "ratios": Settings.of(method="sart", nodes=nodes, amplitudes="ratio"),
+        "ratios, focusing taken off": Settings.of(
+            method="sart", nodes=nodes, amplitudes="ratio", focusing=True
+        ),
+        "spectra": Settings.of(method="sart", nodes=nodes, amplitudes="spectrum"),
     }
     found: dict[str, Reconstruction] = {}
     for rays in ("straight", "curved"):

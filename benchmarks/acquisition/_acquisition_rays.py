@@ -76,7 +76,7 @@ def noisy(dataset: Dataset, snr: float) -> Dataset:
 def scan_rows(name: str, dataset: Dataset, nodes: int) -> Iterable[Row]:
     """The rows of one scan."""
     picked = replace(pick(dataset), waveform=None)
-    plan = Settings.of(nodes=nodes, attenuation=False)
+    plan = Settings.of(method="sart", nodes=nodes, attenuation=False)
     all_at_once = {"method": "gauss-newton"}
     straight_finite_frequency, bent_finite_frequency, _ = finite_frequency_candidates(picked, plan)
     ways: Mapping[str, Mapping[str, Any]] = {

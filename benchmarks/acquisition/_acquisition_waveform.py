@@ -84,17 +84,21 @@ def made(name: str, dataset: Dataset, nodes: int, progress: Step) -> dict[str, M
     """The image of each method for one scan; rays share their picks, ``ideal`` has exact times."""
     picked = pick(dataset)
     found = {}
-    _, bent_finite_frequency, _ = finite_frequency_candidates(picked, Settings(nodes=nodes))
+    _, bent_finite_frequency, _ = finite_frequency_candidates(picked, Settings(method="sart", nodes=nodes))
     for way, changes in {**RAYS, "bent, finite frequency": bent_finite_frequency}.items():
         found[way] = reconstruct_on_workers(
-            replace(picked, waveform=None), Settings.of(nodes=nodes, **changes), progress
+            replace(picked, waveform=None),
+            Settings.of(nodes=nodes, **{"method": "sart", **changes}),
+            progress,
         )
     found["ideal times"] = reconstruct_on_workers(
         replace(picked, delta_tof_s=ideal(dataset), sigma_s=None),
-        Settings.of(nodes=nodes, **RAYS["bent, Gauss-Newton"]),
+        Settings.of(nodes=nodes, **{"method": "sart", **RAYS["bent, Gauss-Newton"]}),
         progress,
     )
-    found["waveform"] = reconstruct_on_workers(dataset, Settings.of(nodes=nodes, **WAVES), progress)
+    found["waveform"] = reconstruct_on_workers(
+        dataset, Settings.of(nodes=nodes, **{"method": "sart", **WAVES}), progress
+    )
     return found
 
 

@@ -60,7 +60,7 @@ def of_a_slice(nodes: int, elements: int, sweeps: int) -> Work:
         path = Path(folder) / "slice.h5"
         write_dataset(path, simulate(SimulationSettings(nodes=nodes, elements=elements)))
         stamp = path.stat().st_mtime_ns
-        settings = Settings(nodes=nodes, iterations=sweeps)
+        settings = Settings(method="sart", nodes=nodes, iterations=sweeps)
         # A few nodes, to compile and read.
         for asked in (replace(settings, nodes=16, iterations=1), settings):
             seconds.clear(), sent.clear(), returned.clear()

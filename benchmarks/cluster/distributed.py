@@ -60,7 +60,7 @@ def measured(quick: bool, progress: Step) -> Iterable[Row]:
 def scaling(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
     """Time on one worker over that on two, of slices and of one slice's emitters; R5's volume by SART."""
     nodes, elements = (64, 64) if quick else (128, 256)
-    sart = Settings(nodes=nodes, iterations=2 if quick else 3)
+    sart = Settings(method="sart", nodes=nodes, iterations=2 if quick else 3)
     newton = Settings(nodes=nodes, iterations=4, method="gauss-newton")
     ways = {
         "SART slices": (8 if quick else 40, sart),
@@ -113,10 +113,12 @@ def rendering(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Ro
     nodes, elements, slices = (64, 64, 8) if quick else (128, 256, 16)
     path = made_up_scan(folder / "beside.h5", elements, slices)
     picture = folder / "picture.h5"
-    write_reconstruction(picture, reconstruct(cluster.client, path, Settings(nodes=nodes, iterations=1)))
+    write_reconstruction(
+        picture, reconstruct(cluster.client, path, Settings(method="sart", nodes=nodes, iterations=1))
+    )
     compute = Compute(cluster, lambda path: path)
     stop, taken = threading.Event(), []
-    settings = Settings(nodes=nodes, iterations=1000)
+    settings = Settings(method="sart", nodes=nodes, iterations=1000)
 
     def work() -> None:
         try:
@@ -146,7 +148,7 @@ def resuming(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Row
     """Time of a run that is interrupted half-way and resumed, over that of an uninterrupted one."""
     nodes = 64 if quick else 128
     path = made_up_scan(folder / "torn.h5", 64 if quick else 256, 8 if quick else 16)
-    settings = Settings(nodes=nodes, iterations=3 if quick else 6)
+    settings = Settings(method="sart", nodes=nodes, iterations=3 if quick else 6)
     progress(0, 1, "resuming")
     whole = seconds(lambda: reconstruct(cluster.client, path, settings, work_dir=folder / "whole"))
 

@@ -101,7 +101,7 @@ class PhantomScan:
     def run(self, progress: Step, what: str, **changes: object) -> ReconstructionError:
         """Reconstruct with some settings and compare."""
         scan, nodes, elements = self.scan, self.scan.nodes, self.scan.ring.elements
-        settings = Settings.of(**{"nodes": nodes, "side_m": scan.side_m, **changes})
+        settings = Settings.of(**{"method": "sart", "nodes": nodes, "side_m": scan.side_m, **changes})
 
         def show(p: Progress) -> None:
             progress(p.done, p.total, what)

@@ -100,7 +100,7 @@ def run_ours(dataset: Dataset, tiny: Dataset, settings: dict[str, object], progr
     def speed(of: Dataset, report: Callable[[Progress], None] | None) -> np.ndarray:
         assert of.truth is not None
         nodes = len(of.truth.sound_speed_mps)
-        asked = Settings.of(nodes=nodes, side_m=SIDE_M, attenuation=False, **settings)  # type: ignore[arg-type]
+        asked = Settings.of(nodes=nodes, side_m=SIDE_M, attenuation=False, **{"method": "sart", **settings})  # type: ignore[arg-type]
         return reconstruct(of, asked, report).speed
 
     speed(tiny, None)

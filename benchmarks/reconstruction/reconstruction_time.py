@@ -69,7 +69,12 @@ def volume(nodes: int, slices: int, elements: int, distinct: int, progress: Step
         seconds, error = {}, {}
         for rays in ("straight", "curved"):
             settings = Settings.of(
-                rays=rays, nodes=nodes, side_m=TABLE7_SIDE_M, iterations=SWEEPS, attenuation=False
+                method="sart",
+                rays=rays,
+                nodes=nodes,
+                side_m=TABLE7_SIDE_M,
+                iterations=SWEEPS,
+                attenuation=False,
             )
             seconds[rays], speed = timed(cluster, dataset, settings, progress, f"{nodes}², {rays} rays")
             error[rays] = rmse(speed, truth, inside) / float(np.ptp(truth[inside]))
@@ -163,7 +168,7 @@ def sweep(nodes: int, elements: int) -> tuple[float, int]:
     everyone = np.arange(elements)
     random = np.random.default_rng(0).normal(0.0, 2e-7, (elements, elements))
     dataset = Dataset(ring.positions(), everyone, everyone, COUPLING_MPS, delta_tof_s=random + random.T)
-    settings = Settings(nodes=nodes, side_m=TABLE7_SIDE_M, iterations=2)
+    settings = Settings(method="sart", nodes=nodes, side_m=TABLE7_SIDE_M, iterations=2)
     problem = Problem.of(dataset, settings)
     state = advance(problem, settings, begin(initial_slowness(problem, None)), elements)
     started = time.perf_counter()

@@ -30,9 +30,9 @@ pytestmark = [
     pytest.mark.skipif(postgresql.programs() is None, reason=postgresql.SKIPPED),
 ]
 
-QUICK = Settings(nodes=32, iterations=1)
+QUICK = Settings(method="sart", nodes=32, iterations=1)
 # Some seconds of work, to be in the middle of when something dies.
-LONG = Settings(nodes=64, iterations=80, rays="straight")
+LONG = Settings(method="sart", nodes=64, iterations=80, rays="straight")
 
 
 @pytest.fixture(scope="module")

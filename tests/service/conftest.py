@@ -145,7 +145,7 @@ class FakeWork:
             on_progress(Progress(8 * len(history), 8 * len(passes), history))
         if self.error is not None:
             raise self.error
-        x = np.linspace(-1.0, 1.0, settings.nodes)
+        x = np.linspace(-1.0, 1.0, settings.nodes or 32)
         speed = 1500.0 + 40.0 * (x[:, None] ** 2 + 0.5 * x[None, :] < 0.3)
         if self.spoil is not None:
             speed[0, 0] = self.spoil
@@ -253,7 +253,7 @@ def submitted() -> Callable[..., dict[str, Any]]:
         asked = {
             "kind": "reconstruction",
             "dataset": dataset,
-            "settings": {"nodes": 16, "iterations": 3, **settings},
+            "settings": {"method": "sart", "nodes": 16, "iterations": 3, **settings},
         }
         answer = http.post("/v1/jobs", json=asked)
         assert answer.status_code == 202, answer.text

@@ -59,7 +59,11 @@ def test_it_compiles_uploads_and_runs_a_job(generated, serve, work, scan, monkey
         )
         assert (dataset.title, dataset.elements) == ("Sixteen elements", 16)
         asked = models.ReconstructionRequest.from_dict(
-            {"kind": "reconstruction", "dataset": dataset.id, "settings": {"nodes": 16, "iterations": 2}}
+            {
+                "kind": "reconstruction",
+                "dataset": dataset.id,
+                "settings": {"method": "sart", "nodes": 16, "iterations": 2},
+            }
         )
         job = ask("jobs.start_job_v1_jobs_post", client=client, body=asked)
         deadline = time.monotonic() + PATIENCE_S

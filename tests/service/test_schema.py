@@ -88,7 +88,11 @@ def attack(serve, scan, tmp_path) -> Callable[..., tuple[int, str]]:
             answer = http.post(path, content=content, headers=STREAM)
             assert answer.status_code == 201, answer.text
             found[name] = answer.json()["id"]
-        asked = {"kind": "reconstruction", "dataset": found["dataset_id"], "settings": {"nodes": 16}}
+        asked = {
+            "kind": "reconstruction",
+            "dataset": found["dataset_id"],
+            "settings": {"method": "sart", "nodes": 16},
+        }
         found["job_id"] = http.post("/v1/jobs", json=asked).json()["id"]
     ids = ", ".join(f'"path.{name}" = "{value}"' for name, value in found.items())
     given = CONFIG.format(address=address, key=token.shown(), ids=ids)

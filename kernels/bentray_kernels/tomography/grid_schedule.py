@@ -22,8 +22,8 @@ def stages(dataset: Dataset, settings: Settings) -> tuple[Settings, ...]:
     coarser, straight = settings.numerics.coarser_grids, settings.numerics.straight_iterations
     last = settings.changed(coarser_grids=0, straight_iterations=0)
     if coarser and settings.side_m is None:
-        last = replace(last, side_m=image_side(dataset, settings.nodes))
-    plans = [replace(last, nodes=-(-settings.nodes // 2**k)) for k in range(coarser, -1, -1)]
+        last = replace(last, side_m=image_side(dataset, settings.grid_nodes))
+    plans = [replace(last, nodes=-(-settings.grid_nodes // 2**k)) for k in range(coarser, -1, -1)]
     if straight and settings.rays != "straight":
         plans.insert(0, replace(plans[0], rays="straight", iterations=straight))
     return tuple(plans)

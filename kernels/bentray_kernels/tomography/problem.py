@@ -75,11 +75,11 @@ class Problem:
         reach = float(np.abs(flat - centre).max())
         side = settings.side_m
         if side is None:
-            side = image_side(dataset, settings.nodes)
+            side = image_side(dataset, settings.grid_nodes)
         if side < 2.0 * reach:
             raise InvalidInput("side_m", side, f"at least {2.0 * reach:g} m, to hold the array")
-        spacing = side / (settings.nodes - 1)
-        axis = np.arange(settings.nodes) * spacing
+        spacing = side / (settings.grid_nodes - 1)
+        axis = np.arange(settings.grid_nodes) * spacing
         nearest = float(np.linalg.norm(flat - centre, axis=1).min()) - RIM_NODES * spacing
         region = np.hypot(axis[:, None] - 0.5 * side, axis[None, :] - 0.5 * side) <= nearest
         if reach == 0.0 or not region.any():

@@ -10,12 +10,14 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from ..acquisition import Dataset
+from ..acquisition.element_pitch import element_pitch
 from ..acquisition.picking.amplitudes import with_log_ratios
 from ..arrays import Floats
 from ..errors import InvalidInput
 from ..task_graph import ThreadPool, run
 from . import pairs
 from .grid_schedule import stages
+from .image_grid import automatic_nodes
 from .model_selection.held_out import Part, part_of
 from .model_selection.selection import select_model
 from .numerics import recorded
@@ -102,6 +104,7 @@ def run_reconstruction(
     Raises:
         InvalidInput: from the dataset or a setting that does not fit it, and errors of ``run_graphs``.
     """
+    settings = with_nodes(dataset, settings)
     count = pairs.count(dataset, settings)
     trials: tuple[Trial, ...] = ()
     before = 0
@@ -135,6 +138,20 @@ def _refinement(
         if settings.method == "waveform":
             raise
         return None
+
+
+def with_nodes(dataset: Dataset, settings: Settings) -> Settings:
+    """The settings with the number of nodes that is used: the given one, or that of the scan."""
+    if settings.nodes is not None:
+        return settings
+    position, water = dataset.element_position_m, dataset.water_speed_mps
+    frequency = dataset.center_frequency_hz
+    width = float(np.ptp(position[:, :2], axis=0).max())
+    wavelength = None if frequency is None else water / frequency
+    noise = travel_time_noise(dataset) if wavelength is None else 0.0
+    pitch, elements = element_pitch(position), len(position)
+    nodes = automatic_nodes(settings, width, pitch, wavelength, noise, water, elements)
+    return settings.changed(nodes=nodes)
 
 
 class MemoryScan:

@@ -142,13 +142,15 @@ class Settings:
     __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
     method: Literal["sart", "gauss-newton", "auto", "waveform"] = setting(
-        "sart",
-        "sart: one emitter after the other; gauss-newton: all emitters at once, regularised; auto: method "
-        "and rays are chosen by held-out validation; waveform: full-waveform refinement of the image of "
-        "auto, for slices with traces of object and water.",
+        "auto",
+        "auto: method, rays and coarser grids are chosen by held-out validation; sart: one emitter after the "
+        "other; gauss-newton: all emitters at once, regularised; waveform: full-waveform refinement of the "
+        "image of auto, for slices with traces.",
     )
     rays: Literal["curved", "straight"] = setting(
-        "curved", "curved: corrected for refraction; straight: without refraction."
+        "curved",
+        "curved: corrected for refraction; straight: without refraction. Method auto compares both, unless "
+        "straight is requested.",
     )
     eikonal: Literal["deviation", "fmm", "fmm-untidy", "hafmm", "fsm", "fim", "fim-opencl", "accurate"] = (
         setting(
@@ -159,7 +161,12 @@ class Settings:
     decomposition: Literal["slices", "volume"] = setting(
         "slices", "slices: each height of the ring by itself; volume: all heights together, in 3-D."
     )
-    nodes: int = setting(128, "Nodes along each side of the image.", Range(LEAST_NODES, 2048))
+    nodes: int | None = setting(
+        None,
+        "Nodes along each side of the image.",
+        Range(LEAST_NODES, 2048),
+        unset="from the width of the array, the pitch of its elements and the wavelength",
+    )
     side_m: float | None = setting(
         None, "Side of the image, m.", Range(1e-4, 100.0, unit="m"), unset="the array and a margin"
     )
@@ -202,7 +209,7 @@ class Settings:
         check(self)
         _check_speeds("speed_bounds_mps", self.speed_bounds_mps)
         if self.method != "sart" and self.sart.speed_range_mps is not None:
-            accepted = f"null, with method {self.method}"
+            accepted = f"null with method {self.method}, or method sart"
             raise InvalidInput("sart.speed_range_mps", self.sart.speed_range_mps, accepted)
         if self.method == "waveform" and self.decomposition == "volume":
             raise InvalidInput("decomposition", "'volume'", "slices, with method waveform")
@@ -246,6 +253,17 @@ class Settings:
         return AUTOMATIC
 
     @property
+    def grid_nodes(self) -> int:
+        """Nodes along each side of the image, once they are known.
+
+        Raises:
+            ValueError: before ``image_grid.with_nodes`` has set them.
+        """
+        if self.nodes is None:
+            raise ValueError("the number of nodes is not set yet")
+        return self.nodes
+
+    @property
     def selects_model(self) -> bool:
         """Whether rays and method are chosen by held-out validation."""
         return self.method in ("auto", "waveform")
@@ -276,7 +294,7 @@ class FixedSettings(Settings):
         fixed = self.numerics
         if fixed.guided_rounds and self.decomposition == "volume":
             raise InvalidInput("guided_rounds", fixed.guided_rounds, "0, with decomposition volume")
-        if fixed.coarser_grids and self.nodes >> fixed.coarser_grids < LEAST_NODES:
+        if fixed.coarser_grids and self.nodes and self.nodes >> fixed.coarser_grids < LEAST_NODES:
             accepted = f"few enough that the coarsest of {self.nodes} nodes has {LEAST_NODES}"
             raise InvalidInput("coarser_grids", fixed.coarser_grids, accepted)
         if fixed.ray_width_m > 0.0 and self.method != "gauss-newton":

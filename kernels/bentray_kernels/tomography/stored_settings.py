@@ -24,6 +24,8 @@ RENAMED = MappingProxyType(
 REMOVED = ("huber_s", "speed_update", "wave_misfit", "wave_variation")
 # Removed values, by setting, and what replaces them.
 INSTEAD = {"rays": {"adjoint": "curved"}, "amplitudes": {"centroid": "spectrum"}}
+# Where no value was stored.
+EARLIER_DEFAULTS = MappingProxyType({"method": "sart", "nodes": 128})
 # Where 0 meant what None means now.
 ZERO_IS_NONE = ("emitters", "minutes", "stop_rms_s")
 
@@ -49,6 +51,7 @@ def from_stored(values: Mapping[str, Any], numerics: Mapping[str, Any] | None = 
             instead = INSTEAD.get(name, {})
             current[RENAMED.get(name, name)] = _plain(instead.get(value, value) if instead else value)
     if flat:
+        current = {**EARLIER_DEFAULTS, **current}
         current |= {name: None for name in ZERO_IS_NONE if current.get(name) == 0}
         if values.get("speed_update") != "data-driven":
             current.pop("speed_range_mps", None)

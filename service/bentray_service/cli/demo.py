@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from ..client import Client
 
 # Settings of the two jobs; all others have their defaults.
-JOBS: dict[str, dict[str, Any]] = {"straight": {"rays": "straight"}, "bent": {"rays": "curved"}}
+JOBS: dict[str, dict[str, Any]] = {
+    "straight": {"method": "sart", "rays": "straight"},
+    "bent": {"method": "sart", "rays": "curved"},
+}
 
 
 def demo(

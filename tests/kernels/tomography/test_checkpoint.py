@@ -21,7 +21,7 @@ from bentray_kernels.tomography.reconstruction_graph import (
 )
 
 PLANS = {
-    "sart": Settings(nodes=32, side_m=TABLE6_SIDE_M, iterations=2, resolution_check=True),
+    "sart": Settings(method="sart", nodes=32, side_m=TABLE6_SIDE_M, iterations=2, resolution_check=True),
     "gauss-newton": Settings.of(
         method="gauss-newton",
         nodes=32,

@@ -13,7 +13,7 @@ from bentray_kernels.tomography.grid_schedule import initial_slowness, stages
 
 WATER = 1375.0
 RING = Ring(32, 0.09)
-PLAN = Settings(nodes=48, iterations=2)
+PLAN = Settings(method="sart", nodes=48, iterations=2)
 
 
 @pytest.fixture(scope="module")

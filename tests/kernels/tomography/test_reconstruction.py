@@ -159,7 +159,7 @@ def test_progress_rises_to_the_end(scan, method):
 )
 def test_bad_settings_are_named(scan, change, field):
     with pytest.raises(InvalidInput) as refusal:
-        reconstruct(scan, Settings.of(**{"nodes": NODES, **change}))
+        reconstruct(scan, Settings.of(**{"method": "sart", "nodes": NODES, **change}))
     assert refusal.value.field == field
 
 
@@ -185,7 +185,7 @@ def test_the_slice_without_a_valid_pair_is_named(scan, method):
 )
 def test_an_array_that_surrounds_no_image_is_refused(scan, position):
     with pytest.raises(InvalidInput) as refusal:
-        reconstruct(replace(scan, element_position_m=position), Settings(nodes=32))
+        reconstruct(replace(scan, element_position_m=position), Settings(method="sart", nodes=32))
     assert refusal.value.field == "geometry/element_position_m"
 
 

@@ -10,7 +10,7 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings, reconstruct
 
 RING, WATER = Ring(96, 0.08), 1500.0
-PLAN = Settings(nodes=48, iterations=1, rays="straight", resolution_check=True)
+PLAN = Settings(method="sart", nodes=48, iterations=1, rays="straight", resolution_check=True)
 
 
 def scan(keep=None):

@@ -54,13 +54,17 @@ FLAT = {
 
 
 def test_settings_of_today_come_back():
-    settings = Settings.of(nodes=32, speed_bounds_mps=(1400.0, 1600.0), relaxation=0.3, attenuation=False)
+    settings = Settings.of(
+        method="sart", nodes=32, speed_bounds_mps=(1400.0, 1600.0), relaxation=0.3, attenuation=False
+    )
     assert from_stored(json.loads(json.dumps(settings.to_dict()))) == settings
-    assert from_stored(Settings().to_dict(), {"subset": 4, "stop_rms_s": None}) == Settings.of(subset=4)
+    assert from_stored(Settings(method="sart").to_dict(), {"subset": 4, "stop_rms_s": None}) == Settings.of(
+        method="sart", subset=4
+    )
 
 
-def test_the_defaults_of_the_flat_record_are_those_of_today():
-    assert from_stored(FLAT) == from_stored({}) == Settings()
+def test_the_defaults_of_the_flat_record_are_those_of_its_time():
+    assert from_stored(FLAT) == from_stored({}) == Settings(method="sart", nodes=128)
 
 
 def test_every_name_of_the_flat_record_has_its_place():
@@ -92,8 +96,9 @@ def test_every_name_of_the_flat_record_has_its_place():
     ],
 )
 def test_the_flat_record_is_mapped(old, new):
-    assert from_stored(old) == Settings.of(**new)
-    assert from_stored({**FLAT, **old}) == Settings.of(**new)
+    expected = Settings.of(**{"method": "sart", "nodes": 128, **new})
+    assert from_stored(old) == expected
+    assert from_stored({**FLAT, **old}) == expected
 
 
 def test_a_name_that_no_version_had_is_refused():

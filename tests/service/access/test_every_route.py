@@ -109,7 +109,7 @@ def _stored(app: FastAPI, http: TestClient, auth: dict[str, str]) -> dict[str, s
     for path in (files.dataset(dataset), files.mesh(mesh)):
         path.write_bytes(b"of acme")
     ones = np.ones((4, 4, 4))
-    result = Reconstruction(ones, ones, (1.0,) * 3, (0.0,) * 3, 1.0, Settings())
+    result = Reconstruction(ones, ones, (1.0,) * 3, (0.0,) * 3, 1.0, Settings(method="sart"))
     write_reconstruction(files.volume(volume_of(job)), result)
     name = base64.b64encode(b"dataset").decode()
     begun = http.post(

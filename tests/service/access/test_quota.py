@@ -145,7 +145,11 @@ def test_jobs_reserve_what_they_will_store(start, uploaded, submitted, work, unt
     job = submitted(http, dataset, nodes=64)
     assert job["plan"]["stored_bytes"] >= 4 * 64 * 64 * 8
     assert used(http) == (stored, job["plan"]["stored_bytes"])
-    asked = {"kind": "reconstruction", "dataset": dataset, "settings": {"nodes": 200, "iterations": 1}}
+    asked = {
+        "kind": "reconstruction",
+        "dataset": dataset,
+        "settings": {"method": "sart", "nodes": 200, "iterations": 1},
+    }
     refused(http.post("/v1/jobs", json=asked))
     work.hold.set()
     until(http, job["id"])

@@ -16,7 +16,7 @@ from typer.testing import Result
 from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.files.reconstruction import read_reconstruction
 
-QUICK = ("--nodes", 24, "--iterations", 1, "--rays", "straight")
+QUICK = ("--method", "sart", "--nodes", 24, "--iterations", 1, "--rays", "straight")
 
 
 @pytest.fixture(scope="module")

@@ -108,10 +108,10 @@ def heights(slices: int) -> Dataset:
 @pytest.mark.parametrize(
     ("slices", "settings", "workers"),
     [
-        (1, Settings(), 1),
-        (3, Settings(), 3),
-        (9, Settings(), 4),
-        (9, Settings(decomposition="volume"), 1),
+        (1, Settings(method="sart"), 1),
+        (3, Settings(method="sart"), 3),
+        (9, Settings(method="sart"), 4),
+        (9, Settings(method="sart", decomposition="volume"), 1),
         (9, Settings(decomposition="volume", method="gauss-newton"), 4),
         (1, Settings(method="gauss-newton"), 1),
         (3, Settings(method="gauss-newton"), 3),
@@ -134,10 +134,10 @@ def test_a_volume_of_one_height_is_refused_before_any_worker_starts() -> None:
     ("settings", "field"),
     [
         (Settings(method="waveform"), "waveform' for a scan without traces"),
-        (Settings.of(amplitudes="ratio"), "waveform/object"),
-        (Settings(roi=True), "mask/roi"),
-        (Settings(speed_bounds_mps=(1600.0, 1800.0)), "speed_bounds_mps"),
-        (Settings(decomposition="volume"), "decomposition"),
+        (Settings.of(method="sart", amplitudes="ratio"), "waveform/object"),
+        (Settings(method="sart", roi=True), "mask/roi"),
+        (Settings(method="sart", speed_bounds_mps=(1600.0, 1800.0)), "speed_bounds_mps"),
+        (Settings(method="sart", decomposition="volume"), "decomposition"),
     ],
 )
 def test_what_the_header_shows_is_refused_before_anything_starts(settings: Settings, field: str) -> None:

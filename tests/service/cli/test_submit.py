@@ -55,7 +55,10 @@ class StandIn:
     def download(self, volume: str, format: str, path: Path) -> Path:  # noqa: A002
         assert (volume, format) == ("volume-1", "hdf5")
         write_reconstruction(
-            path, reconstruction_run.reconstruct(None, StandIn.scan, Settings(nodes=24, iterations=1))
+            path,
+            reconstruction_run.reconstruct(
+                None, StandIn.scan, Settings(method="sart", nodes=24, iterations=1)
+            ),
         )
         return path
 

@@ -89,7 +89,7 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
 
 @pytest.mark.slow
 def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path) -> None:
-    settings = Settings(nodes=32, iterations=1)
+    settings = Settings(method="sart", nodes=32, iterations=1)
     with open_cluster(machine.address) as cluster:
         wait_for_workers(cluster, 1)
         (facts,) = cluster.client.scheduler_info(n_workers=-1)["workers"].values()

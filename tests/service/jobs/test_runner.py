@@ -44,7 +44,10 @@ def test_another_tenants_job_begins_beside_jobs_of_hours(start, uploaded, work):
     """Of one tenant as many run as may at a time, of each other one in any case, up to so many in all."""
     http = start(jobs_at_once=2, tenants_at_once=4)
     dataset, parts = uploaded(http), http.app.state.parts
-    settings, mine = Settings(nodes=16, iterations=1).to_dict(), parts.files.of(LOCAL).dataset(dataset)
+    settings, mine = (
+        Settings(method="sart", nodes=16, iterations=1).to_dict(),
+        parts.files.of(LOCAL).dataset(dataset),
+    )
     for tenant in "abcd":
         its = parts.files.of(Tenant(tenant)).dataset(dataset)
         shutil.copy(mine, its)

@@ -62,7 +62,7 @@ def test_the_plan_is_stored_and_told(http, dataset):
     job = ask(http, dataset, {"nodes": 16}).json()
     found = http.get(f"/v1/jobs/{job['id']}").json()["plan"]
     assert found == job["plan"]
-    assert (found["decomposition"], found["lane"], found["workers"]) == ("slices", "recon", 1)
+    assert (found["decomposition"], found["lane"], found["workers"]) == ("emitters", "recon", 1)
     assert found["largest_bytes"] == max(found["call_bytes"].values()) > 0
     assert "1 of 1 workers can run it" in found["why"]
 
@@ -97,7 +97,7 @@ def test_what_auto_chose_is_told_at_the_end(http, dataset, work, until):
     job = ask(http, dataset, {"nodes": 16, "method": "auto"}).json()
     assert job["advice"] is None
     told = until(http, job["id"])["advice"]
-    assert told.startswith("auto chose straight sart 20 ns")
+    assert told.startswith("auto chose straight rays, SART: bent rays do not")
 
 
 def test_newest_first(http, dataset):
@@ -214,11 +214,11 @@ def test_cancel_an_ended_job(http, dataset, until):
 def test_the_same_request_twice_makes_one_job(http, dataset, work):
     work.hold.clear()
     key = {"Idempotency-Key": "scan 7, first try"}
-    asked = {"kind": "reconstruction", "dataset": dataset, "settings": {"nodes": 16}}
+    asked = {"kind": "reconstruction", "dataset": dataset, "settings": {"method": "sart", "nodes": 16}}
     first, again = (http.post("/v1/jobs", json=asked, headers=key) for _ in range(2))
     assert (first.status_code, again.status_code) == (202, 202)
     assert first.json()["id"] == again.json()["id"]
-    other = http.post("/v1/jobs", json={**asked, "settings": {"nodes": 17}}, headers=key)
+    other = http.post("/v1/jobs", json={**asked, "settings": {"method": "sart", "nodes": 17}}, headers=key)
     assert (other.status_code, problem(other)["field"]) == (409, "Idempotency-Key")
     assert http.post("/v1/jobs", json=asked).json()["id"] != first.json()["id"]
     assert len(http.get("/v1/jobs").json()["jobs"]) == 2
@@ -227,7 +227,7 @@ def test_the_same_request_twice_makes_one_job(http, dataset, work):
 
 
 def test_many_at_once_with_one_key_make_one_job(http, dataset):
-    asked = {"kind": "reconstruction", "dataset": dataset, "settings": {"nodes": 16}}
+    asked = {"kind": "reconstruction", "dataset": dataset, "settings": {"method": "sart", "nodes": 16}}
     with ThreadPoolExecutor(16) as pool:
         send = lambda _: http.post("/v1/jobs", json=asked, headers={"Idempotency-Key": "k"}).json()["id"]  # noqa: E731
         assert len(set(pool.map(send, range(50)))) == 1

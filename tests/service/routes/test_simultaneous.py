@@ -13,7 +13,11 @@ def at_once(ask):
 
 def test_fifty_submits_under_one_key_make_one_job(start, work, uploaded):
     http = start()
-    asked = {"kind": "reconstruction", "dataset": uploaded(http), "settings": {"nodes": 16, "iterations": 1}}
+    asked = {
+        "kind": "reconstruction",
+        "dataset": uploaded(http),
+        "settings": {"method": "sart", "nodes": 16, "iterations": 1},
+    }
     answers = at_once(lambda _: http.post("/v1/jobs", json=asked, headers={"Idempotency-Key": "once"}))
     assert {answer.status_code for answer in answers} == {202}
     assert len({answer.json()["id"] for answer in answers}) == 1

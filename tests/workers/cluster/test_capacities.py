@@ -11,7 +11,7 @@ from bentray_workers.cluster.resources import OPENCL
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction import reconstruction_run
 
-WITH_DEVICE = Settings(nodes=16, iterations=1, eikonal="fim-opencl")
+WITH_DEVICE = Settings(method="sart", nodes=16, iterations=1, eikonal="fim-opencl")
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def test_memory_and_lanes_are_told(cluster):
 
 def test_no_device_is_tried_unless_one_is_wanted(fresh, monkeypatch):
     monkeypatch.setattr(capacities, "_has_device", lambda: pytest.fail("tried"))
-    assert capacities.resources_for(fresh, Settings()) == {"recon": 1}
+    assert capacities.resources_for(fresh, Settings(method="sart")) == {"recon": 1}
     assert lanes(fresh) == {"recon", "render"}
 
 

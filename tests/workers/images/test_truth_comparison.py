@@ -25,7 +25,7 @@ def image(speed: np.ndarray, origin: tuple[float, ...] = (0.0, 0.0)) -> Reconstr
         spacing_m=(STEP,) * speed.ndim,
         origin_m=origin,
         water_speed_mps=WATER,
-        settings=Settings(nodes=16),
+        settings=Settings(method="sart", nodes=16),
     )
 
 

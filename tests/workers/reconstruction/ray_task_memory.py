@@ -71,9 +71,9 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
 
 
 def main(settings: dict[str, Any], elements: int, heights: int) -> None:
-    asked = Settings.of(**settings)
+    asked = Settings.of(**{"method": "sart", **settings})
     # Loading compiled code takes memory too, here and not in the forks.
-    small = Settings.of(**{**settings, "nodes": 16})
+    small = Settings.of(**{"method": "sart", **settings, "nodes": 16})
     for _ in range(2):
         bytes_of(scan(8, heights and 2), small)
     sys.stdout.write(json.dumps(bytes_of(scan(elements, heights), asked)) + "\n")

@@ -19,7 +19,7 @@ from bentray_workers.reconstruction.memory import picking_memory
 from ...kernels.acquisition.traces import FREQUENCY_HZ, RATE_HZ, absorbed, blob_delay, scan
 
 ELEMENTS = 16
-PLAN = Settings.of(nodes=24, iterations=1, rays="straight", examine=False)
+PLAN = Settings.of(method="sart", nodes=24, iterations=1, rays="straight", examine=False)
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +55,6 @@ def test_a_scan_without_traces_and_focusing_of_spectra_are_refused(lossy, tmp_pa
     with pytest.raises(InvalidInput, match="waveform/object"):
         reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN.changed(amplitudes="ratio"))
     with pytest.raises(InvalidInput, match="focusing"):
-        Settings.of(amplitudes="spectrum", focusing=True)
+        Settings.of(method="sart", amplitudes="spectrum", focusing=True)
     with pytest.raises(InvalidInput, match="amplitudes"):
-        Settings.of(amplitudes="height")
+        Settings.of(method="sart", amplitudes="height")

@@ -104,4 +104,4 @@ def test_times_that_came_with_the_scan_are_not_sought_again(tmp_path):
 @pytest.mark.parametrize(("rounds", "decomposition"), [(-1, "slices"), (11, "slices"), (1, "volume")])
 def test_what_cannot_be_guided_is_refused(rounds, decomposition):
     with pytest.raises(InvalidInput, match="guided_rounds"):
-        Settings.of(guided_rounds=rounds, decomposition=decomposition)
+        Settings.of(method="sart", guided_rounds=rounds, decomposition=decomposition)

@@ -33,7 +33,7 @@ from ...kernels.tomography.waveform.scans import SETTINGS
 from ...kernels.tomography.waveform.scans import scan as wave_scan
 
 ELEMENTS = 16
-PLAN = Settings(nodes=24, iterations=1)
+PLAN = Settings(method="sart", nodes=24, iterations=1)
 
 
 @cache

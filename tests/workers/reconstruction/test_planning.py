@@ -69,7 +69,7 @@ def test_calls_take_what_the_plan_says(asked, elements, heights):
     command = [sys.executable, str(PROGRAM), json.dumps(settings), str(elements), str(heights)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     measured = json.loads(done.stdout)
-    told = plan(ring(elements, heights), Settings.of(**settings), []).call_bytes
+    told = plan(ring(elements, heights), Settings.of(**{"method": "sart", **settings}), []).call_bytes
     assert set(told) == set(measured)
     # Of the smallest calls a few pages more or less that a fork happens to touch are a third.
     wrong = {
@@ -102,7 +102,7 @@ def test_no_limit_is_none():
 
 
 def test_a_device_lane_needs_a_worker_that_offers_it():
-    asked = Settings(eikonal="fim-opencl")
+    asked = Settings(method="sart", eikonal="fim-opencl")
     with pytest.raises(InvalidInput, match="eikonal"):
         plan(RING, asked, [LARGE])
     found = plan(RING, asked, [LARGE, WorkerCapacity(0, (*BOTH, "opencl"))])
@@ -122,7 +122,7 @@ def test_a_device_lane_needs_a_worker_that_offers_it():
 )
 def test_the_choice_is_told_in_a_sentence(changes, decomposition, words):
     scan = replace(RING, slices=40, pairs=40 * 256**2, height_m=0.05)
-    found = plan(scan, Settings.of(**changes), [WorkerCapacity(0, BOTH)])
+    found = plan(scan, Settings.of(**{"method": "sart", **changes}), [WorkerCapacity(0, BOTH)])
     assert found.decomposition == decomposition
     assert words in found.why
     assert found.why.endswith(".")
@@ -133,17 +133,20 @@ def test_the_choice_is_told_in_a_sentence(changes, decomposition, words):
 def test_traces_are_planned_for():
     heard = Traces(256, 256, 12_000, 2, 5e7, 2.5e6, 1500.0)
     scan = replace(RING, traces=heard, traces_bytes=2 * heard.bytes_of(heard.emissions))
-    found = plan(scan, Settings(nodes=64), [])
+    found = plan(scan, Settings(method="sart", nodes=64), [])
     assert {"measure_traces", "examine_slice", "pick_emissions", "finish_slice", "write_picked"} < set(
         found.call_bytes
     )
-    assert found.tasks > plan(RING, Settings(nodes=64), []).tasks + 2 * 64
+    assert found.tasks > plan(RING, Settings(method="sart", nodes=64), []).tasks + 2 * 64
     # No call holds more than an emission of what is 3 GiB.
     assert found.largest[1] < scan.traces_bytes / 8
-    unseen = plan(scan, Settings.of(nodes=64, examine=False), [])
+    unseen = plan(scan, Settings.of(method="sart", nodes=64, examine=False), [])
     assert "measure_traces" not in unseen.call_bytes
-    assert "finish_slice" in plan(replace(RING, period=True), Settings(), []).call_bytes
-    assert "finish_slice" not in plan(replace(RING, period=True), Settings.of(examine=False), []).call_bytes
+    assert "finish_slice" in plan(replace(RING, period=True), Settings(method="sart"), []).call_bytes
+    assert (
+        "finish_slice"
+        not in plan(replace(RING, period=True), Settings.of(method="sart", examine=False), []).call_bytes
+    )
 
 
 def test_waves_are_planned_for():

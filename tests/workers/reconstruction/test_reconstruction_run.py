@@ -19,7 +19,7 @@ from bentray_workers.reconstruction import picking_graph, reconstruction_run
 
 from ..cluster.tearing import torn_runs
 
-PLAN = Settings(nodes=32, iterations=2)
+PLAN = Settings(method="sart", nodes=32, iterations=2)
 METHODS = [PLAN, replace(PLAN, method="gauss-newton", iterations=3)]
 OTHERS = {
     "auto": replace(PLAN, method="auto"),
@@ -115,7 +115,7 @@ def test_a_file_that_was_rewritten_is_read_again(cluster, scan, path):
 
 def test_bad_input_crosses_the_cluster_as_itself(cluster, path):
     with pytest.raises(InvalidInput, match="side_m"):
-        reconstruction_run.reconstruct(cluster.client, path, Settings(side_m=0.01))
+        reconstruction_run.reconstruct(cluster.client, path, Settings(method="sart", side_m=0.01))
 
 
 def test_missing_file_is_named(cluster, tmp_path):

@@ -36,7 +36,7 @@ def scans():
 def test_what_runs_is_what_was_chosen(scans, monkeypatch, rays, cut, eikonal):
     if eikonal in ON_DEVICE:
         pytest.skip("its fallback on the CPU is tested with the device")
-    settings = Settings(nodes=16, iterations=1, rays=rays, decomposition=cut, eikonal=eikonal)
+    settings = Settings(method="sart", nodes=16, iterations=1, rays=rays, decomposition=cut, eikonal=eikonal)
     problem = Problem.of(scans[cut], settings, 0)
     chosen = solver_of(settings, problem.region.ndim)
     solved, passed = [], []
@@ -65,10 +65,10 @@ def test_what_runs_is_what_was_chosen(scans, monkeypatch, rays, cut, eikonal):
 def test_the_plan_counts_the_arrays_of_what_runs(rays, eikonal):
     scan = Summary(1024, 1024, 1024**2, 1, False, 0.0, 0.2, 0, False)
     size = {
-        name: call_bytes(scan, Settings(nodes=1024, rays=rays, eikonal=name))["update_sart"]
+        name: call_bytes(scan, Settings(method="sart", nodes=1024, rays=rays, eikonal=name))["update_sart"]
         for name in (eikonal, DEVIATION)
     }
-    settings = Settings(nodes=1024, rays=rays, eikonal=eikonal)
+    settings = Settings(method="sart", nodes=1024, rays=rays, eikonal=eikonal)
     if solver_of(settings, 2).compiled:
         # Whatever the wave front would be tracked by: it is the same compiled call.
         assert size[eikonal] == size[DEVIATION]

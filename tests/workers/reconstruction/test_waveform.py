@@ -129,7 +129,7 @@ def test_without_a_water_shot_the_image_is_nearly_as_good(picked, tmp_path, expe
 
 def test_an_estimated_water_shot_is_the_same_on_a_cluster(cluster, tmp_path):
     write_dataset(tmp_path / "bare.h5", replace(scan(), waveform=Waveform(scan().waveform.object)))
-    rays = Settings.of(nodes=32, iterations=2)
+    rays = Settings.of(method="sart", nodes=32, iterations=2)
     here, there = (
         reconstruction_run.reconstruct(client, tmp_path / "bare.h5", rays)
         for client in (None, cluster.client)
@@ -152,7 +152,7 @@ def test_times_do_not_need_a_water_shot_that_cannot_be_estimated(tmp_path):
 @pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:-900])])
 def test_a_lost_reference_is_made_again_and_reported_without_an_examination(tmp_path, damage):
     write_dataset(tmp_path / "bare.h5", replace(scan(), waveform=Waveform(scan().waveform.object)))
-    rays = Settings.of(nodes=32, iterations=2, examine=False)
+    rays = Settings.of(method="sart", nodes=32, iterations=2, examine=False)
     work = tmp_path / "work"
     work.mkdir()
     first = reconstruction_run.reconstruct(None, tmp_path / "bare.h5", rays, work_dir=work)

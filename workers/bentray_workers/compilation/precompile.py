@@ -159,7 +159,9 @@ def _reconstruct(path: Path, scan: Dataset, wanted: Iterator[dict[str, Any]]) ->
     write_dataset(path, scan)
     quality.quality_report(path, "aic")
     for settings in wanted:
-        reconstruct(None, path, Settings.of(nodes=NODES, iterations=1, **settings))
+        reconstruct(
+            None, path, Settings.of(**{"method": "sart", "nodes": NODES, "iterations": 1, **settings})
+        )
 
 
 def compiled_in(parts: tuple[Callable[[Path], None], ...], folder: Path) -> int:

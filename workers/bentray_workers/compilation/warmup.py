@@ -47,8 +47,8 @@ def warm_up() -> None:
     water = Dataset(Ring(8, 0.01).positions(), elements, elements, 1500.0, delta_tof_s=np.zeros((8, 8)))
     for method in methods():
         if "opencl" not in method:
-            reconstruct(water, Settings.of(eikonal=method, nodes=16, iterations=1))
-    reconstruct(water, Settings(rays="straight", nodes=16, iterations=1))
+            reconstruct(water, Settings.of(method="sart", eikonal=method, nodes=16, iterations=1))
+    reconstruct(water, Settings(method="sart", rays="straight", nodes=16, iterations=1))
 
 
 def warm_up_rendering() -> None:

@@ -60,8 +60,9 @@ def _of_rays(result: Reconstruction) -> Settings:
 def stage_names(result: Reconstruction) -> tuple[str, ...]:
     """Names of the stages of ``tomography.grid_schedule`` and of frequency bands; empty for one stage."""
     settings = _of_rays(result)
-    grids = [-(-settings.nodes // 2**k) for k in range(settings.numerics.coarser_grids, -1, -1)]
-    names = [f"{nodes} nodes" for nodes in grids]
+    nodes = settings.nodes or result.speed.shape[0]
+    grids = [-(-nodes // 2**k) for k in range(settings.numerics.coarser_grids, -1, -1)]
+    names = [f"{one} nodes" for one in grids]
     if settings.numerics.straight_iterations and settings.rays != "straight":
         names.insert(0, "straight")
     bands = {

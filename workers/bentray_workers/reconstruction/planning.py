@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import WIDTH_M
-from bentray_kernels.tomography.model_selection.selection import CANDIDATES
+from bentray_kernels.tomography.model_selection.selection import CANDIDATES, final_settings
 from bentray_kernels.tomography.requirements import check_waveform
 from bentray_kernels.tomography.settings import LEAST_NODES, Settings
 from bentray_kernels.tomography.stage_graphs import BATCH
@@ -91,6 +91,8 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
             with the bytes found and accepted), and for an array without width, stored by earlier versions.
     """
     _check_extent(scan)
+    if settings.nodes is None:
+        settings = settings.changed(nodes=scan.nodes)
     lane: Lane = "opencl" if resource_of(settings) == "opencl" else "recon"
     fitting = [one for one in capacities if lane in one.resources]
     if capacities and not fitting:
@@ -99,7 +101,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
         )
     methods = [settings]
     if settings.selects_model:
-        methods = [settings.changed(**changes) for changes in CANDIDATES]
+        methods = [final_settings(settings, changes) for changes in CANDIDATES]
     calls: dict[str, int] = {}
     for method in methods:
         for name, size in call_bytes(scan, method).items():
@@ -193,7 +195,7 @@ def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
     if settings.method == "gauss-newton":
         each = passes * (parts + 1)
     else:
-        batch = max(1.0, NODES_IN_A_TASK / (math.prod(shape) * 2.0 + scan.receivers * settings.nodes))
+        batch = max(1.0, NODES_IN_A_TASK / (math.prod(shape) * 2.0 + scan.receivers * settings.grid_nodes))
         each = passes * math.ceil(emitters / batch)
     each += (parts + 1) * (bool(settings.attenuation.enabled and scan.amplitudes) + settings.resolution_check)
     return problems * each + 1
@@ -215,7 +217,7 @@ def _advice(scan: Summary, settings: Settings, limit: float) -> str:
 
     if settings.selects_model or not fits(LEAST_NODES):
         return ""
-    low, high = LEAST_NODES, settings.nodes
+    low, high = LEAST_NODES, settings.grid_nodes
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if fits(middle) else (low, middle)

@@ -28,37 +28,46 @@ PAIRS: tuple[Part, Part] = ("shown", "held-out")
 VIEWS: tuple[Part, Part] = ("shown-views", "held-out-views")
 
 # Candidates with thin rays: bent ones lose where picked times are not solutions of the Eikonal equation.
-CANDIDATES: tuple[dict[str, Any], ...] = (
+SIMPLE: tuple[dict[str, Any], ...] = (
     {"rays": "straight", "method": "sart"},
-    {"rays": "straight", "method": "gauss-newton"},
     {"rays": "curved", "method": "sart"},
     {"rays": "curved", "method": "sart", "front_smoothing_nodes": 4.0},
     {"rays": "curved", "method": "gauss-newton"},
-    {"rays": "curved", "method": "gauss-newton", "edge_mps": 7.0},
 )
 
-# The same for a known frequency where finite-frequency rays do not explain the times: straight rays by SART
-# alone, which fits less closely. Gauss–Newton predicts scattered pairs better, but its image is worse (33
-# against 27 m/s).
-BANDED: tuple[dict[str, Any], ...] = tuple(
-    changes for changes in CANDIDATES if changes != {"rays": "straight", "method": "gauss-newton"}
+# Not where the frequency is known and finite-frequency rays do not explain the times: Gauss-Newton predicts
+# scattered pairs better than SART, which fits less closely, but its image is worse (33 against 27 m/s).
+STRAIGHT_LINES: tuple[dict[str, Any], ...] = ({"rays": "straight", "method": "gauss-newton"},)
+
+# Tried where bent rays are clearly better: exact times allow a weaker penalty, phantoms of flat parts sharper
+# edges. These cost several times as much as SART.
+SHARPER: tuple[dict[str, Any], ...] = (
+    {"rays": "curved", "method": "gauss-newton", "penalty_strength": 0.1},
+    {"rays": "curved", "method": "gauss-newton", "edge_mps": 7.0},
 )
+CANDIDATES = (*SIMPLE, *STRAIGHT_LINES, *SHARPER)
 
 # Candidates are reconstructed on half the nodes, but not fewer than this.
 TRIAL_NODES = 64
 
-# Bent rays must predict held-out pairs this much better than straight ones, the simpler model. On a wave
-# simulation whose bent image was 2 m/s worse than the straight one the ratio was 0.95; on Eikonal times
-# from 0.9 (water faster than a fat ring) down to 0.35.
+# Bent rays must predict held-out pairs this much better than straight ones, the simpler model, and sharper
+# images than smoother ones. On a wave simulation whose bent image was 2 m/s worse than the straight one the
+# ratio was 0.95; on Eikonal times from 0.9 (water faster than a fat ring) down to 0.35.
 CLEARLY = 0.92
+
+# Thin bent rays start on coarser grids, each of half the nodes of the next, down to this many nodes.
+COARSEST_NODES = 40
+
+# Without enough pairs to hold some out.
+UNVALIDATED: dict[str, Any] = {"rays": "curved", "method": "sart"}
 
 
 def candidate_settings(
     settings: Settings, candidates: Sequence[dict[str, Any]] = CANDIDATES
 ) -> list[Settings]:
     """The settings of each candidate, on a coarser grid."""
-    nodes = min(settings.nodes, max(TRIAL_NODES, -(-settings.nodes // 2)))
-    coarser = nodes / settings.nodes
+    nodes = min(settings.grid_nodes, max(TRIAL_NODES, -(-settings.grid_nodes // 2)))
+    coarser = nodes / settings.grid_nodes
     plans = []
     for changes in candidates:
         plan = settings.changed(**changes, attenuation=False, resolution_check=False)
@@ -69,6 +78,17 @@ def candidate_settings(
             plan.changed(nodes=nodes, coarser_grids=0, front_smoothing_nodes=front, penalty_strength=strength)
         )
     return plans
+
+
+def final_settings(settings: Settings, changes: dict[str, Any]) -> Settings:
+    """The settings of the reconstruction by a candidate: thin bent rays start on coarser grids."""
+    chosen = settings.changed(**changes)
+    if chosen.rays == "straight" or chosen.numerics.ray_width_m > 0.0 or chosen.numerics.coarser_grids:
+        return chosen
+    grids = 0
+    while chosen.grid_nodes >> (grids + 1) >= COARSEST_NODES:
+        grids += 1
+    return chosen.changed(coarser_grids=grids)
 
 
 def select_model(
@@ -83,8 +103,9 @@ def select_model(
 
     Where the frequency is known, finite-frequency rays are tried first, straight and bent, on held-out views,
     see ``choose_finite_frequency``. Otherwise, or where these rays do not explain the times, thin rays are
-    tried on held-out pairs, see ``choose``. The reconstruction then stops at the noise of the times
-    (discrepancy principle of Morozov), unless the candidate shows that the noise is lower.
+    tried on held-out pairs, see ``choose``; those that cost most only where bent rays are clearly better.
+    The reconstruction then stops at the noise of the times (discrepancy principle of Morozov), unless the
+    candidate shows that the noise is lower.
 
     Args:
         dataset: for its frequency and the noise of its times.
@@ -95,32 +116,51 @@ def select_model(
         after: emitter passes that come after the reconstruction, at most.
 
     Returns:
-        The settings; the trials, the chosen one first and the others by their misfit; and the emitter passes
-        that they took.
+        The settings; the trials, the chosen one first and the others by their misfit, none with too few pairs
+        to hold some out; and the emitter passes that they took.
 
     Raises:
-        InvalidInput: for a slice without pairs, or with too few to hold some out.
+        InvalidInput: for a slice without pairs.
     """
     wide = finite_frequency_candidates(dataset, settings)
-    thin = BANDED if wide else CANDIDATES
     rest = passes_to_come(dataset, settings) + after
     trials: list[Trial] = []
     chosen, before = None, 0
+
+    def run(candidates: Sequence[dict[str, Any]], parts: tuple[Part, Part], later: int) -> list[Trial]:
+        nonlocal before
+        graphs = _graphs(settings, candidates, index, parts, scan_of)
+        run_graphs(graphs, before, later + rest)
+        before += sum(graph.total for graph in graphs)
+        return _trials(candidates, graphs)
+
+    def passes(candidates: Sequence[dict[str, Any]]) -> int:
+        return sum(graph.total for graph in _graphs(settings, candidates, index, PAIRS, scan_of))
+
     if wide and not _missing_part(VIEWS, settings, index, scan_of):
-        graphs = _graphs(settings, wide, index, VIEWS, scan_of)
-        thin_passes = sum(graph.total for graph in _graphs(settings, thin, index, PAIRS, scan_of))
-        run_graphs(graphs, 0, thin_passes + rest)
-        trials, before = _trials(wide, graphs), sum(graph.total for graph in graphs)
-        chosen = choose_finite_frequency(trials, mean_time(dataset))
+        bent_rays = settings.rays != "straight"
+        trials = run(wide if bent_rays else wide[:1], VIEWS, passes(SIMPLE) + passes(SHARPER))
+        chosen = choose_finite_frequency(trials, mean_time(dataset)) if bent_rays else trials[0]
     if chosen is None:
-        _check_parts(settings, index, scan_of)
-        graphs = _graphs(settings, thin, index, PAIRS, scan_of)
-        run_graphs(graphs, before, rest)
-        trials, before = _trials(thin, graphs), before + sum(graph.total for graph in graphs)
+        if _missing_part(PAIRS, settings, index, scan_of):
+            return final_settings(settings, {**UNVALIDATED, "rays": settings.rays}), (), before
+        simple = SIMPLE if wide else (*SIMPLE, *STRAIGHT_LINES)
+        trials = run(_allowed(simple, settings), PAIRS, passes(SHARPER))
         chosen = choose(trials)
+        if chosen.settings["rays"] == "curved":
+            sharper = run(SHARPER, PAIRS, 0)
+            trials += sharper
+            best = min(sharper, key=lambda trial: trial.held_out_rms_s)
+            # Noise in the times becomes structure more easily with these.
+            chosen = best if best.held_out_rms_s < CLEARLY * chosen.held_out_rms_s else chosen
     others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
-    selected = settings.changed(**chosen.settings)
+    selected = final_settings(settings, chosen.settings)
     return stop_at_noise(selected, chosen, travel_time_noise(dataset)), (chosen, *others), before
+
+
+def _allowed(candidates: Sequence[dict[str, Any]], settings: Settings) -> list[dict[str, Any]]:
+    """Candidates with the requested rays: all of them, unless straight rays are requested."""
+    return [one for one in candidates if settings.rays == "curved" or one["rays"] == "straight"]
 
 
 def _graphs(
@@ -145,20 +185,12 @@ def _trials(candidates: Sequence[dict[str, Any]], graphs: Sequence[CandidateGrap
 def passes_to_come(dataset: Dataset, settings: Settings) -> int:
     """Emitter passes that a reconstruction takes at most, whichever candidate is chosen."""
     every = (*CANDIDATES, *finite_frequency_candidates(dataset, settings))
-    plans = [stages(dataset, settings.changed(**changes)) for changes in every]
+    plans = [stages(dataset, final_settings(settings, changes)) for changes in every]
     each = max(sum(plan.iterations for plan in grids) for grids in plans)
     each += settings.attenuation.enabled and dataset.log_ratio_np is not None
     each += settings.resolution_check
     problems = range(pairs.count(dataset, settings))
     return each * sum(len(pairs.of(dataset, settings, index).emitters) for index in problems)
-
-
-def _check_parts(settings: Settings, index: int, scan_of: Callable[[Settings, Part], Scan]) -> None:
-    plan = candidate_settings(settings)[0]
-    scan_of(plan, "all").problem(index)
-    if part := _missing_part(PAIRS, settings, index, scan_of):
-        accepted = f"sart or gauss-newton, for slice {index} has no pair that is {part}"
-        raise InvalidInput("method", repr(settings.method), accepted)
 
 
 def _missing_part(
@@ -184,24 +216,40 @@ def choose(trials: Sequence[Trial]) -> Trial:
 
 
 def explain_trials(trials: Sequence[Trial]) -> str:
-    """One sentence: the chosen candidate, the rule, and the misfits of all; empty without trials."""
+    """One sentence: the chosen candidate, and why; empty without trials."""
     if not trials:
         return ""
+    chosen, misfit = trials[0], _misfit_of(trials)
     wide = [trial for trial in trials if "ray_width_m" in trial.settings]
-    misfits = [mean_misfit(t) if wide else t.held_out_rms_s for t in trials]
-    labels = [
-        f"{_label(t.settings)} {1e9 * misfit:.0f} ns" for t, misfit in zip(trials, misfits, strict=True)
-    ]
-    if wide:
-        rule = "mean misfit of held-out views, finite-frequency rays"
-        if misfits[0] > min(mean_misfit(trial) for trial in wide):
-            needed = f"{100.0 * (1.0 - STRAIGHT):.0f} % better"
-            rule += f"; where both explain the times, straight rays must be {needed}"
+    what = "held-out views" if wide else "held-out pairs"
+    others = [t for t in wide or trials if t.settings["rays"] != chosen.settings["rays"]]
+    if not others:
+        return f"auto chose {label(chosen.settings)}: the only candidate"
+    gain = 1.0 - misfit(chosen) / min(map(misfit, others))
+    if chosen.settings["rays"] == "straight":
+        reason = f"bent rays do not predict {what} better"
+        if gain < 0.0:
+            reason = f"bent rays must predict {what} {100.0 * (1.0 - CLEARLY):.0f} % better"
     else:
-        rule = "misfit of held-out pairs"
-        if misfits[0] > min(misfits):
-            rule += f"; bent rays must be {100.0 * (1.0 - CLEARLY):.0f} % better"
-    return f"auto chose {labels[0]} ({rule}); the others: {', '.join(labels[1:])}"
+        reason = f"{100.0 * gain:.0f} % better than straight rays at predicting {what}"
+        if gain < 0.0:
+            reason = f"straight rays must predict {what} {100.0 * (1.0 - STRAIGHT):.0f} % better"
+    return f"auto chose {label(chosen.settings)}: {reason}"
+
+
+def trial_table(trials: Sequence[Trial]) -> list[tuple[str, str, str]]:
+    """Rows of a table of candidates: label, misfit of held-out pairs, and whether it was chosen."""
+    misfit = _misfit_of(trials)
+    return [
+        (label(trial.settings), f"{1e9 * misfit(trial):.0f} ns", "chosen" if k == 0 else "")
+        for k, trial in enumerate(trials)
+    ]
+
+
+def _misfit_of(trials: Sequence[Trial]) -> Callable[[Trial], float]:
+    """The misfit that decides: the mean one where finite-frequency rays were tried, else the rms."""
+    wide = any("ray_width_m" in trial.settings for trial in trials)
+    return mean_misfit if wide else lambda trial: trial.held_out_rms_s
 
 
 def advice_of(result: Reconstruction) -> str:
@@ -210,8 +258,17 @@ def advice_of(result: Reconstruction) -> str:
     return "; ".join(part for part in parts if part)
 
 
-def _label(changes: dict[str, Any]) -> str:
-    """As ``straight sart`` or ``curved sart (front_smoothing_nodes 4)``."""
-    more = [f"{name} {value:g}" for name, value in changes.items() if name not in ("rays", "method")]
-    plain = " ".join(str(changes[name]) for name in ("rays", "method") if name in changes)
-    return f"{plain} ({', '.join(more)})" if more else plain
+def label(changes: dict[str, Any]) -> str:
+    """As ``straight rays, SART`` or ``bent finite-frequency rays, Gauss-Newton``."""
+    rays = "straight" if changes["rays"] == "straight" else "bent"
+    wide = " finite-frequency" if changes.get("ray_width_m") else ""
+    parts = [f"{rays}{wide} rays"]
+    if "method" in changes:
+        parts.append({"sart": "SART", "gauss-newton": "Gauss-Newton"}[changes["method"]])
+    if changes.get("front_smoothing_nodes"):
+        parts.append("smoothed wave front")
+    if changes.get("edge_mps"):
+        parts.append("sharp edges")
+    if "penalty_strength" in changes and not wide:
+        parts.append(f"penalty {changes['penalty_strength']:g}")
+    return ", ".join(parts)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bentray_kernels.acquisition.dataset import Dataset, Truth
 from bentray_kernels.acquisition.quality.finding import NOTHING_FOUND
 from bentray_kernels.tomography import Reconstruction
-from bentray_kernels.tomography.model_selection.selection import advice_of
+from bentray_kernels.tomography.model_selection.selection import advice_of, trial_table
 from bentray_workers.images.residuals import within
 from bentray_workers.images.truth_comparison import NotComparable, compare
 
@@ -30,8 +30,8 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
     Returns:
         settings, residual history, speed range, time and provenance; ``residual_within_s``: quantiles of the
         absolute residuals of the last iteration by percentage; ``recovery_mean``: mean of the resolution
-        check inside the array; ``trials`` and ``reason``: candidate models and choice of ``auto``.
-        Missing values are None, missing trials and reasons are empty.
+        check inside the array; ``trials`` and ``reason``: candidate models and choice of ``auto``;
+        ``candidates``: rows of their table. Missing values are None, missing trials and reasons are empty.
     """
     return {
         "seconds": round(seconds, 3),
@@ -50,6 +50,7 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         "history": [asdict(sweep) for sweep in result.history],
         "recovery_mean": _recovery_mean(result),
         "reason": advice_of(result),
+        "candidates": trial_table(result.trials),
         "trials": [asdict(trial) for trial in result.trials],
         "truth": None if dataset.truth is None else errors(result, dataset.truth, dataset.roi),
         "settings": result.settings.to_dict(),

@@ -59,4 +59,6 @@ def show_results(title: str, found: dict[str, Any], *, as_json: bool) -> None:
     if "water" in found["provenance"]:
         print_lines([found["provenance"]["water"]])
     print_table(title, ("figure", "value"), summary(found))
+    if found["candidates"]:
+        print_table("", ("candidate", "held-out misfit", ""), found["candidates"], {"held-out misfit"})
     print_lines([*([found["reason"]] if found["reason"] else []), *found["outputs"].values()])

@@ -27,7 +27,7 @@ function titleOfJob(job) {
 
 function showFacts() {
   const dataset = datasets.get(at("dataset").value);
-  at("start").disabled = !dataset;
+  for (const id of ["start", "best", "start-own"]) at(id).disabled = !dataset;
   if (!dataset) return;
   const times = dataset.has_travel_times ? "travel times" : "raw traces";
   const slices = dataset.slices > 1 ? ` · ${dataset.slices} slices` : "";
@@ -72,17 +72,26 @@ async function cancel(job) {
   }
 }
 
+// Settings of the two buttons. Best may take half an hour of one processor core for full waveforms.
+const PRESETS = { fast: { method: "auto" }, best: { method: "auto", minutes: 30 } };
+
 function showMethod() {
   at("rays").disabled = new FormData(at("run")).get("method") === "auto";
 }
 
 function start(event) {
   event.preventDefault();
-  const form = new FormData(event.target);
-  const settings = { method: form.get("method"), nodes: Number(form.get("nodes")), iterations: Number(form.get("iterations")) };
+  const preset = PRESETS[event.submitter?.value ?? "fast"];
+  startJob({ kind: "reconstruction", dataset: at("dataset").value, settings: preset ?? ownSettings(event.target) }, "run-error", refresh);
+}
+
+function ownSettings(element) {
+  const form = new FormData(element);
+  const settings = { method: form.get("method"), iterations: Number(form.get("iterations")) };
+  if (form.get("nodes")) settings.nodes = Number(form.get("nodes"));
   // The method auto chooses the rays itself.
   if (form.has("rays")) settings.rays = form.get("rays");
-  startJob({ kind: "reconstruction", dataset: at("dataset").value, settings }, "run-error", refresh);
+  return settings;
 }
 
 // The default settings of jobs, from the OpenAPI description.

@@ -133,7 +133,8 @@ function summaryOf({ kind, settings }) {
     return ["Simulated scan", `${of}, ${settings.waveform ? "traces" : "travel times"}, ${settings.elements} elements`];
   }
   const { method, rays, nodes, iterations = settings.sweeps } = settings; // sweeps: of earlier versions
-  return [method === "auto" ? "Automatic" : RAYS[rays], `${METHODS[method]}, ${nodes} × ${nodes} nodes, ${iterations} iterations`];
+  const grid = nodes ? `${nodes} × ${nodes} nodes, ` : "";
+  return [method === "auto" ? "Automatic" : RAYS[rays], `${METHODS[method]}, ${grid}${iterations} iterations`];
 }
 
 // The plan in a line, with details on demand.

@@ -45,14 +45,14 @@ def dense(rows):
 
 
 def test_exact_data_leave_nothing(problem):
-    rows = linearise(problem, Settings(), medium(), np.arange(12))
+    rows = linearise(problem, Settings(method="sart"), medium(), np.arange(12))
     assert np.abs(rows.residual).max() < 1e-11
     assert rows.emitters == 12
 
 
 def test_one_by_one_is_all_at_once(problem):
-    whole = linearise(problem, Settings(), medium(), np.arange(12))
-    single = [linearise(problem, Settings(), medium(), np.array([k])) for k in range(12)]
+    whole = linearise(problem, Settings(method="sart"), medium(), np.arange(12))
+    single = [linearise(problem, Settings(method="sart"), medium(), np.array([k])) for k in range(12)]
     assert np.array_equal(np.concatenate([part.residual for part in single]), whole.residual)
     assert np.array_equal(np.concatenate([part.columns for part in single]), whole.columns)
     assert np.array_equal(np.concatenate([part.lengths for part in single]), whole.lengths)
@@ -62,8 +62,8 @@ def test_rows_are_the_derivative_of_the_times(problem):
     """Fermat: the times change by Σ length·δslowness, the path's own change being of second order."""
     x = np.linspace(-1.0, 1.0, NODES)
     change = 1e-3 / WATER * np.exp(-((x[:, None] - 0.2) ** 2 + (x[None, :] + 0.1) ** 2) / 0.2)
-    here = linearise(problem, Settings(), medium(), np.arange(12))
-    there = linearise(problem, Settings(), medium() + change, np.arange(12))
+    here = linearise(problem, Settings(method="sart"), medium(), np.arange(12))
+    there = linearise(problem, Settings(method="sart"), medium() + change, np.arange(12))
     predicted = dense(here) @ change.ravel() * SPACING
     moved = here.residual - there.residual
     assert np.abs(moved - predicted).max() < 5e-3 * np.abs(predicted).max()
@@ -71,7 +71,7 @@ def test_rows_are_the_derivative_of_the_times(problem):
 
 @pytest.mark.parametrize("kind", ["curved", "straight"])
 def test_rows_sum_to_the_length_of_the_ray(problem, kind):
-    rows = linearise(problem, Settings(rays=kind), medium(), np.array([3]))
+    rows = linearise(problem, Settings(method="sart", rays=kind), medium(), np.array([3]))
     lengths = np.add.reduceat(rows.lengths, rows.pointers[:-1]) * SPACING
     straight = np.linalg.norm(np.delete(problem.receivers[0], 3, axis=0) - problem.emitters[3], axis=1)
     assert (lengths >= straight * (1.0 - 1e-5)).all()
@@ -81,6 +81,6 @@ def test_rows_sum_to_the_length_of_the_ray(problem, kind):
 def test_pairs_without_data_have_no_row(problem):
     gaps = problem.delta_tof.copy()
     gaps[3, 5:] = np.nan
-    settings = Settings(rays="straight")
+    settings = Settings(method="sart", rays="straight")
     rows = linearise(replace(problem, delta_tof=gaps), settings, medium(), np.array([3]))
     assert len(rows.residual) == 4

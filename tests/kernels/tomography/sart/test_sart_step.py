@@ -25,7 +25,7 @@ def scan():
 
 
 def plan(**changes):
-    return Settings.of(nodes=NODES, side_m=SIDE, **changes)
+    return Settings.of(nodes=NODES, side_m=SIDE, **{"method": "sart", **changes})
 
 
 @given(cuts=st.lists(st.integers(1, 40), min_size=1, max_size=8))
@@ -36,7 +36,7 @@ def test_cutting_the_work_changes_no_bit(cuts):
     everyone = np.arange(16)
     delta = rng.normal(0.0, 2e-7, (16, 16))
     dataset = Dataset(ring.positions(), everyone, everyone, WATER, delta_tof_s=delta)
-    wanted = Settings(nodes=24, iterations=2)
+    wanted = Settings(method="sart", nodes=24, iterations=2)
     problem = Problem.of(dataset, wanted)
     whole = begin(initial_slowness(problem, None))
     while not whole.done:

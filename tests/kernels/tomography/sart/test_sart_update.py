@@ -26,14 +26,16 @@ def scan():
 
 
 def plan(**changes):
-    return Settings.of(nodes=NODES, side_m=TABLE6_SIDE_M, **{"iterations": 2, **changes})
+    return Settings.of(
+        **{"method": "sart", "nodes": NODES, "side_m": TABLE6_SIDE_M, "iterations": 2, **changes}
+    )
 
 
 def test_data_driven_update_stretches_the_range():
     region = np.ones((4, 4), bool)
     region[0] = False
     slowness = 1.0 / np.linspace(1480.0, 1520.0, 16).reshape(4, 4)
-    wanted = Settings.of(speed_range_mps=(1375.0, 1560.0))
+    wanted = Settings.of(method="sart", speed_range_mps=(1375.0, 1560.0))
     stretched = propagation_speed(slowness, region, wanted, warm=True)
     assert stretched[region].min() == pytest.approx(1375.0)
     assert stretched[region].max() == pytest.approx(1560.0)

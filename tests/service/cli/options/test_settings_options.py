@@ -32,7 +32,7 @@ CHOICES = [
     (["--minutes", "2.5"], "minutes", 2.5),
     (["--relaxation", "0.9"], "relaxation", 0.9),
     (["--smoothing", "1.5"], "smoothing_nodes", 1.5),
-    (["--speed-range", "1350", "1600"], "speed_range_mps", (1350.0, 1600.0)),
+    (["--method", "sart", "--speed-range", "1350", "1600"], "speed_range_mps", (1350.0, 1600.0)),
     (["--penalty", "laplacian"], "penalty", "laplacian"),
     (["--penalty-strength", "0.7"], "penalty_strength", 0.7),
     (["--edge", "7"], "edge_mps", 7.0),
@@ -69,7 +69,8 @@ def test_each_option_sets_its_own_setting_and_no_other(
     scan = tmp_path / "scan.h5"
     scan.touch()
     bentray("reconstruct", scan, "-o", tmp_path / "out", *words)
-    assert asked == [Settings.of(**{name: value})]
+    method = {"method": "sart"} if name == "speed_range_mps" else {}
+    assert asked == [Settings.of(**method, **{name: value})]
 
 
 def test_several_are_taken_together(

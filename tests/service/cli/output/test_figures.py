@@ -30,7 +30,7 @@ def image(speed: np.ndarray, origin: tuple[float, ...] = (0.0, 0.0)) -> Reconstr
         spacing_m=(STEP,) * speed.ndim,
         origin_m=origin,
         water_speed_mps=WATER,
-        settings=Settings(nodes=16),
+        settings=Settings(method="sart", nodes=16),
     )
 
 
@@ -112,7 +112,7 @@ def test_the_residual_is_that_of_the_last_sweep_over_all_slices() -> None:
     assert found["truth"] is None
     assert found["seconds"] == 1.25
     assert found["speed_range_mps"] == [1450.0, 1550.0]
-    assert from_stored(found["settings"]) == Settings(nodes=16)
+    assert from_stored(found["settings"]) == Settings(method="sart", nodes=16)
 
 
 def test_the_summary_tells_the_errors_and_their_region_only_with_a_truth() -> None:
@@ -156,7 +156,8 @@ def test_residuals_resolution_and_trials_are_told() -> None:
     }
     assert found["recovery_mean"] == pytest.approx(0.25)
     assert dict(summary(found))["resolution check"] == "25 % of a checkerboard recovered"
-    assert found["reason"].startswith("auto chose straight 40 ns")
+    assert found["reason"].startswith("auto chose straight rays: bent rays do not")
+    assert found["candidates"] == [["straight rays", "40 ns", "chosen"], ["bent rays", "60 ns", ""]]
     assert found["trials"][1] == {
         "settings": {"rays": "curved"},
         "held_out_rms_s": 6e-8,

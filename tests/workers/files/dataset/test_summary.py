@@ -17,7 +17,7 @@ from ..datasets import small
 def test_it_counts_what_a_problem_has(tmp_path, reciprocity):
     dataset, path = small(), tmp_path / "scan.h5"
     write_dataset(path, dataset)
-    asked = Settings.of(reciprocity=reciprocity)
+    asked = Settings.of(method="sart", reciprocity=reciprocity)
     found, pairs = summary_of(path, asked), of(dataset, asked, 0)
     assert (found.emitters, found.receivers) == pairs.delta_tof.shape
     assert (found.pairs, found.slices, found.in_space, found.height_m) == (12 * 24, 1, False, 0.0)
@@ -28,8 +28,8 @@ def test_it_counts_what_a_problem_has(tmp_path, reciprocity):
 def test_traces_that_must_be_picked_and_heights_count(tmp_path, scan):
     dataset, path = replace(small(), delta_tof_s=None), tmp_path / "traces.h5"
     write_dataset(path, dataset)
-    assert summary_of(path, Settings()).traces_bytes == 2 * 12 * 24 * 20 * 2
+    assert summary_of(path, Settings(method="sart")).traces_bytes == 2 * 12 * 24 * 20 * 2
     write_dataset(path, replace(scan, log_ratio_np=np.zeros_like(scan.delta_tof_s)))
-    found = summary_of(path, Settings())
+    found = summary_of(path, Settings(method="sart"))
     assert (found.slices, found.pairs, found.height_m) == (3, 3 * 24 * 24, 0.006)
     assert found.amplitudes

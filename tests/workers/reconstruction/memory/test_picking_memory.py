@@ -35,7 +35,7 @@ def test_calls_take_what_the_plan_says_and_never_the_traces(tmp_path, picker, el
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     measured = json.loads(done.stdout)
     traces = measured.pop("traces")
-    settings = Settings.of(picker=picker)
+    settings = Settings.of(method="sart", picker=picker)
     scan = summary_of(tmp_path / "scan.h5", settings)
     told = picking_task_bytes(scan.traces, scan.pairs, settings)
     assert set(told) == set(measured)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentray_kernels.acquisition.element_pitch import element_pitch
 from bentray_kernels.arrays import Floats, Ints
+from bentray_kernels.tomography.image_grid import automatic_nodes
 
 # These load compiled kernels, which takes seconds: the reader of an upload starts without them.
 if TYPE_CHECKING:
@@ -66,6 +69,7 @@ class Summary:
         amplitudes: whether there are amplitudes.
         traces: for a full-waveform refinement; None without traces of the object.
         period: whether the centre frequency is known, so that times are examined.
+        nodes: along each side of an image, at most, where the settings leave them open.
     """
 
     emitters: int
@@ -79,6 +83,7 @@ class Summary:
     amplitudes: bool
     traces: Traces | None = None
     period: bool = False
+    nodes: int = 128
 
 
 @dataclass(frozen=True)
@@ -98,6 +103,7 @@ class DatasetCounts:
         rate_hz, frequency_hz: sampling rate and centre frequency; None if unknown.
         water_mps: speed of sound in water.
         water_shot: whether there are traces of the water alone; older records do not state it.
+        pitch_m: median distance of neighbouring elements, m; 0: not stated, in older records.
     """
 
     emissions: int
@@ -116,6 +122,7 @@ class DatasetCounts:
     frequency_hz: float | None
     water_mps: float
     water_shot: bool = True
+    pitch_m: float = 0.0
 
     @classmethod
     def of(cls, dataset: Dataset) -> DatasetCounts:
@@ -157,7 +164,14 @@ class DatasetCounts:
             amplitudes=self.amplitudes or settings.reads_amplitudes,
             traces=self._traces() if self.water_shot or estimated else None,
             period=self.frequency_hz is not None,
+            nodes=self._nodes(settings),
         )
+
+    def _nodes(self, settings: Settings) -> int:
+        wavelength = self.water_mps / self.frequency_hz if self.frequency_hz else None
+        # The noise of the times, unknown here, may allow fewer.
+        pitch = self.pitch_m or math.pi * self.width_m / self.elements
+        return automatic_nodes(settings, self.width_m, pitch, wavelength)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; ``DatasetCounts(**plain)`` gives the same."""
@@ -196,4 +210,5 @@ def array_counts(position: Floats, tx: Ints, rx: Ints, heights: Floats | None) -
         "in_space": in_space,
         "height_m": float(np.ptp(z)),
         "width_m": float(np.ptp(position[:, :2], axis=0).max()),
+        "pitch_m": element_pitch(position),
     }

@@ -6,11 +6,13 @@ Of a scan without a centre frequency, some emissions are read to estimate it.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
+from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import check_size
 from bentray_kernels.tomography.settings import Settings
 
@@ -40,8 +42,10 @@ def counts_in(path: Path) -> DatasetCounts:
         water = reader.number("water", "sound_speed_mps", "m/s")
         frequency = reader.number("acquisition", "center_frequency_hz", "Hz")
         if frequency is None:
-            spectrum = spectrum_in(reader, stacked=heights is not None)
-            frequency = None if spectrum is None else spectrum.center_frequency_hz
+            # Traces without a pulse are rejected when they are read, not when they are counted.
+            with suppress(InvalidInput):
+                spectrum = spectrum_in(reader, stacked=heights is not None)
+                frequency = None if spectrum is None else spectrum.center_frequency_hz
         return DatasetCounts(
             **array_counts(position, tx, rx, heights),
             times=any(_bytes(reader, f"traveltime/{name}") for name in ("delta_tof_s", "tof_s")),

@@ -47,7 +47,7 @@ def field_bytes(shape: tuple[int, ...], method: str) -> int:
 
 def shape_of(scan: Summary, settings: Settings) -> tuple[int, ...]:
     """Shape of an image, as ``Problem.of`` makes it."""
-    nodes = settings.nodes
+    nodes = settings.grid_nodes
     if settings.decomposition == "slices":
         return nodes, nodes
     side = settings.side_m or scan.width_m * (nodes - 1) / (nodes - 1 - 2 * MARGIN_NODES)
@@ -69,7 +69,7 @@ def rays_of(scan: Summary, settings: Settings) -> int:
 def _entries(settings: Settings, in_space: bool) -> float:
     """Matrix entries per ray."""
     level = settings.decomposition == "slices" or (settings.rays == "straight" and not in_space)
-    return settings.nodes * (ENTRIES_LEVEL if level else ENTRIES_IN_SPACE)
+    return settings.grid_nodes * (ENTRIES_LEVEL if level else ENTRIES_IN_SPACE)
 
 
 def rows_bytes(scan: Summary, settings: Settings, rays: int) -> int:

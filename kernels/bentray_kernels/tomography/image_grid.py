@@ -1,0 +1,51 @@
+"""Nodes of the image where the settings leave them open: from aperture, elements, wavelength and noise."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .settings import Settings
+
+# Nodes lie half an element's pitch apart, the finest detail that the rays of a ring sample, and never closer
+# than half a wavelength, which rays cannot resolve.
+PITCHES = 0.5
+WAVELENGTHS = 0.5
+
+# A node of this contrast must change the mean time of as many rays as there are elements by its noise.
+CONTRAST = 0.03
+
+# Limits of an automatic grid, and of one in 3-D, whose cost grows with the cube. Multiples of ``STEP``.
+FEWEST, MOST, MOST_IN_SPACE, STEP = 96, 256, 128, 8
+
+
+def automatic_nodes(
+    settings: Settings,
+    width_m: float,
+    pitch_m: float,
+    wavelength_m: float | None,
+    noise_s: float = 0.0,
+    water_mps: float = 1500.0,
+    elements: int = 1,
+) -> int:
+    """Nodes along each side of an image.
+
+    Args:
+        settings: for the side of the image, and whether it is a volume.
+        width_m: of the array, m.
+        pitch_m: of the elements, m; see ``element_pitch``.
+        wavelength_m: in water, m; None if the frequency is unknown.
+        noise_s: standard deviation of the travel times, s; 0: unknown, or irrelevant beside the wavelength.
+        water_mps: speed of sound in water, m/s.
+        elements: number of elements.
+    """
+    side = settings.side_m or width_m
+    finest = max(
+        PITCHES * pitch_m,
+        WAVELENGTHS * (wavelength_m or 0.0),
+        noise_s * water_mps / (CONTRAST * math.sqrt(elements)),
+    )
+    most = MOST_IN_SPACE if settings.decomposition == "volume" else MOST
+    wanted = side / finest if finest > 0.0 else math.inf
+    return max(FEWEST, STEP * math.ceil(wanted / STEP)) if wanted < most else most
