@@ -100,7 +100,9 @@ def reconstruct(dataset: Dataset, settings: Settings, progress: Step) -> Made:
 
 def scan_rows(name: str, dataset: Dataset, images: Mapping[str, Made]) -> Iterable[Row]:
     """The rows of one scan."""
-    detail = ", ".join(f"{way} {error:.1f}" for way, error in constants(dataset, images).items())
+    detail = ", ".join(
+        f"{way} {error:.1f}" for way, error in constants(dataset, images["straight, with"].result).items()
+    )
     detail += ", " + ", ".join(f"{way} {one.rms:.1f} in {one.seconds:.0f} s" for way, one in images.items())
     detail += f" (m/s; water shot with or none); load at the end {os.getloadavg()[0]:.1f}"
     for way, goal in GOALS.items():
@@ -108,10 +110,9 @@ def scan_rows(name: str, dataset: Dataset, images: Mapping[str, Made]) -> Iterab
         yield Row(f"A1 {name}, {way}: error without over with water shot", ratio, goal, "<=", "", detail)
 
 
-def constants(dataset: Dataset, images: Mapping[str, Made]) -> dict[str, float]:
-    """Errors of the best constant and of water alone, m/s."""
+def constants(dataset: Dataset, result: Reconstruction) -> dict[str, float]:
+    """Errors of the best constant and of water alone on the grid of a result, m/s."""
     assert dataset.truth is not None
-    result = images["straight, with"].result
     errors = {}
     found = compare(result, dataset.truth, dataset.roi)
     best = float(np.mean(found.true_speed_mps[found.region]))

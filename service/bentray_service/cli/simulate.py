@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 
 
 class BreastPhantom(StrEnum):
-    """The breast phantoms (Li 2008)."""
+    """The breast phantoms."""
 
     TABLE6 = "table6"
+    DETAILED = "detailed"
     TABLE7 = "table7"
 
 
@@ -37,7 +38,9 @@ def simulate(
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset file to write (HDF5).")],
     phantom: Annotated[
         BreastPhantom,
-        typer.Option(help="2-D breast phantom (Li 2008, Table 6) or 3-D breast phantom (Table 7)."),
+        typer.Option(
+            help="2-D breast phantom (Li 2008, Table 6), 2-D with glandular texture, or 3-D (Table 7)."
+        ),
     ] = BreastPhantom.TABLE6,
     nodes: Annotated[int, typer.Option(help="Nodes per side of the image that the scan is made for.")] = 128,
     elements: Annotated[int, typer.Option(help="Transducers of a ring; each emits and receives.")] = 256,
@@ -61,7 +64,7 @@ def simulate(
     ] = False,
     noise_ns: Annotated[
         float | None,
-        typer.Option(show_default="0", help="table6: standard deviation of the travel-time noise, ns."),
+        typer.Option(show_default="0", help="2-D phantoms: standard deviation of the travel-time noise, ns."),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
     attenuation: Annotated[bool, typer.Option("--attenuation", help="Record amplitudes too.")] = False,

@@ -8,6 +8,7 @@ import pytest
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.simulation.plane import SimulationSettings
+from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_run import simulate
 
 SMALL = SimulationSettings(nodes=32, elements=20, coupling_mps=1400.0)
@@ -79,3 +80,12 @@ def test_bad_settings_are_named(change, field):
     with pytest.raises(InvalidInput) as refusal:
         replace(SMALL, **change)
     assert refusal.value.field == field
+
+
+def test_the_detailed_breast_is_simulated_by_its_name(tmp_path):
+    scan = simulate(replace(SMALL, phantom="detailed", coupling_mps=1480.0))
+    assert scan.title == "2-D breast phantom with glandular texture, coupling 1480 m/s"
+    assert scan.truth.sound_speed_mps.max() > 1500.0
+    with pytest.raises(InvalidInput, match="phantom"):
+        PhantomScan(phantom="detailed", waveform=True)
+    assert PhantomScan(phantom="detailed").plain()["phantom"] == "detailed"

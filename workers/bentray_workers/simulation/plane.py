@@ -1,8 +1,9 @@
-"""A travel-time scan of the 2-D breast phantom (Li 2008, Table 6): settings and dataset."""
+"""A travel-time scan of a 2-D breast phantom: settings and dataset."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -13,12 +14,19 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeSca
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPEED_MPS
-from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.phantoms import DETAILED_SIDE_M, TABLE6_SIDE_M, DetailedBreast, EllipsePhantom, table6
 from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
 from bentray_kernels.tomography.problem import MARGIN_NODES
 
 # The memory grows with its square; more gains less than the noise of any scan.
 MOST_REFINEMENT = 64
+
+PlanePhantom = Literal["table6", "detailed"]
+TITLES = {
+    "table6": "2-D breast phantom (Li 2008, Table 6)",
+    "detailed": "2-D breast phantom with glandular texture",
+}
+SIDES_M = {"table6": TABLE6_SIDE_M, "detailed": DETAILED_SIDE_M}
 
 # Of all kinds of simulated scans.
 NODES = Range(16, 1024)
@@ -27,9 +35,10 @@ SNR = Range(1e-6, 1e12)
 
 @dataclass(frozen=True)
 class SimulationSettings:
-    """A scan of the 2-D breast phantom (Li 2008, Table 6).
+    """A scan of a 2-D breast phantom.
 
     Attributes:
+        phantom: that of Li 2008, Table 6, or one with skin and glandular texture.
         nodes: nodes along a side of the truth image, and of the reconstruction it is meant for.
         elements: of the ring, each emitter and receiver.
         coupling_mps: speed of sound in the coupling medium around the breast, m/s.
@@ -41,6 +50,7 @@ class SimulationSettings:
             times and amplitudes alike; None: no such noise.
     """
 
+    phantom: PlanePhantom = "table6"
     nodes: int = ranged(128, NODES)
     elements: int = ranged(256, Range(3, 4096))
     coupling_mps: float = ranged(1500.0, SPEED_MPS)
@@ -58,8 +68,10 @@ class SimulationSettings:
 
     def scan(self) -> TravelTimeScan:
         """The scan; the ring leaves the margin that a reconstruction of as many nodes leaves."""
-        ring = Ring(self.elements, ring_radius(TABLE6_SIDE_M, self.nodes))
-        return TravelTimeScan(table6(self.coupling_mps), ring, TABLE6_SIDE_M, self.nodes, self.refinement)
+        side = SIDES_M[self.phantom]
+        ring = Ring(self.elements, ring_radius(side, self.nodes))
+        phantom = plane_phantom(self.phantom, self.coupling_mps)
+        return TravelTimeScan(phantom, ring, side, self.nodes, self.refinement)
 
     @property
     def scans(self) -> int:
@@ -82,6 +94,11 @@ class SimulationSettings:
     def elements_in_medium(self, scan: int) -> Floats:
         """(elements, 2), m, in the coordinates of the medium."""
         return self.scan().elements()
+
+
+def plane_phantom(name: PlanePhantom, coupling_mps: float) -> EllipsePhantom | DetailedBreast:
+    """A 2-D phantom in water of a speed, m/s."""
+    return table6(coupling_mps) if name == "table6" else DetailedBreast(coupling_mps)
 
 
 def ring_radius(side_m: float, nodes: int) -> float:
@@ -128,7 +145,7 @@ def scan_of(settings: SimulationSettings, delta: Floats, ratio: Floats | None) -
         ),
         radius_m=scan.ring.radius_m,
         picker=f"none: simulated travel times, factored fast marching, {scan.fine_nodes}² nodes",
-        title=f"2-D breast phantom (Li 2008, Table 6), coupling {settings.coupling_mps:g} m/s",
+        title=f"{TITLES[settings.phantom]}, coupling {settings.coupling_mps:g} m/s",
         source="made by bentray simulate",
         license="CC0-1.0",
     )

@@ -18,7 +18,7 @@ Simulated = SimulationSettings | VolumeSimulationSettings | WaveSimulationSettin
 
 KINDS = (SimulationSettings, VolumeSimulationSettings, WaveSimulationSettings, VolumeWaveSettings)
 
-CHOICES = {"phantom": ("table6", "table7")}
+CHOICES = {"phantom": ("table6", "detailed", "table7")}
 
 
 def range_of(name: str) -> Range:
@@ -36,7 +36,7 @@ def range_of(name: str) -> Range:
 # Settings of some kinds of scan only, and their condition.
 CONDITIONS = {
     "refinement": "waveform is false",
-    "noise_s": "phantom is table6 and waveform is false",
+    "noise_s": "phantom is table6 or detailed, and waveform is false",
     "slices": "phantom is table7 and waveform is false",
     "array": "phantom is table7 and waveform is false",
     "three_d": "phantom is table7 and waveform is false",
@@ -55,8 +55,10 @@ class PhantomScan:
         InvalidInput: naming the first field that is wrong, or belongs to another kind of scan.
     """
 
-    phantom: Literal["table6", "table7"] = setting(
-        "table6", "The breast of Table 6, in a plane, or that of Table 7, in space."
+    phantom: Literal["table6", "detailed", "table7"] = setting(
+        "table6",
+        "table6: 2-D breast phantom (Li 2008, Table 6); detailed: 2-D, with skin and glandular "
+        "texture, travel times only; table7: 3-D breast phantom (Li 2008, Table 7).",
     )
     waveform: bool = setting(
         False, "Simulate waves and record traces of object and water, not travel times; of table7 in space."
@@ -76,7 +78,7 @@ class PhantomScan:
     attenuation: bool | None = setting(None, "Travel times: record amplitudes too.")
     noise_s: float | None = setting(
         None,
-        "Travel times of table6: standard deviation of the noise on them, s; 0 by default.",
+        "Travel times of a 2-D phantom: standard deviation of the noise on them, s; 0 by default.",
         range_of("noise_s"),
     )
     slices: int | None = setting(
@@ -101,6 +103,8 @@ class PhantomScan:
     def chosen(self) -> Simulated:
         """The settings of the scan, with defaults for absent ones."""
         kind: type[Simulated] = SimulationSettings
+        if self.waveform and self.phantom == "detailed":
+            raise InvalidInput("phantom", repr(self.phantom), "table6 or table7, with waveform true")
         if self.waveform:
             kind = VolumeWaveSettings if self.phantom == "table7" else WaveSimulationSettings
         elif self.phantom == "table7":
@@ -111,6 +115,8 @@ class PhantomScan:
             for one in fields(self)
             if one.name not in ("phantom", "waveform") and getattr(self, one.name) is not None
         }
+        if kind is SimulationSettings:
+            values["phantom"] = self.phantom
         for name, value in values.items():
             if name not in known:
                 raise InvalidInput(name, value, f"nothing, unless {CONDITIONS[name]}")
@@ -119,4 +125,4 @@ class PhantomScan:
     def plain(self) -> dict[str, Any]:
         """All settings of this scan as JSON values, which give the same scan again."""
         values = {name: value for name, value in asdict(self.chosen()).items() if value is not None}
-        return {"phantom": self.phantom, "waveform": self.waveform, **values}
+        return {**values, "phantom": self.phantom, "waveform": self.waveform}

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import InvalidInput
-from ...phantoms import EllipsePhantom, PhantomSlice
+from ...phantoms import DetailedBreast, EllipsePhantom, PhantomSlice
 from .fine_medium import FineMedium
 
 
@@ -49,7 +49,7 @@ class TravelTimeScan:
             error of the inversion.
     """
 
-    phantom: EllipsePhantom | PhantomSlice
+    phantom: EllipsePhantom | PhantomSlice | DetailedBreast
     ring: Ring
     side_m: float
     nodes: int = 128

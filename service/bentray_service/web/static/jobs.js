@@ -129,7 +129,7 @@ function summaryOf({ kind, settings }) {
     return ["Turntable", `${settings.frames} frames of ${settings.width} × ${settings.height}, index ${settings.index.join(", ")}`];
   }
   if (kind === "simulation") {
-    const of = settings.phantom === "table7" ? "3-D breast phantom" : "2-D breast phantom";
+    const of = settings.phantom === "table7" ? "3-D breast phantom" : settings.phantom === "detailed" ? "Detailed 2-D breast phantom" : "2-D breast phantom";
     return ["Simulated scan", `${of}, ${settings.waveform ? "traces" : "travel times"}, ${settings.elements} elements`];
   }
   const { method, rays, nodes, iterations = settings.sweeps } = settings; // sweeps: of earlier versions

@@ -1,0 +1,100 @@
+"""A2: travel times through a detailed breast by the default settings, beside former ones and constants."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography.model_selection.selection import explain_trials
+from bentray_service.cli.output.benchmark_row import Row
+from bentray_service.cli.output.terminal import Step
+from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
+from bentray_workers.simulation.plane import SimulationSettings
+from bentray_workers.simulation.simulation_run import simulate
+
+from ..shared._small_png import small_png
+from ._without_water_shot import Made, constants, reconstruct
+
+RESULTS = Path(__file__).parents[1] / "results"
+
+# The target is 27 m/s where the truth differs from itself, blurred by this, m, by 19 m/s.
+BLUR_M = 1e-3
+GOAL, SECONDS = 27.0 / 19.0, 20.0
+
+WAYS: dict[str, dict[str, Any]] = {
+    "straight": {"method": "sart", "rays": "straight", "nodes": 128},
+    "former default": {"method": "sart", "nodes": 128},
+    "default": {},
+}
+
+# Standard deviations of the noise, s.
+NOISES_S = (0.0, 2e-8)
+
+
+def rows(quick: bool, progress: Step) -> Iterable[Row]:
+    """A2 without noise and with some; the picture of the first, unless quick."""
+    for noise in NOISES_S[: 1 if quick else None]:
+        asked = SimulationSettings(
+            "detailed",
+            nodes=64 if quick else 256,
+            elements=64 if quick else 256,
+            coupling_mps=1480.0,
+            noise_s=noise,
+        )
+        dataset = simulate(asked, lambda now: progress(now.done, now.total, "simulation"))
+        images = {
+            way: reconstruct(dataset, Settings.of(attenuation=False, **changes), progress)
+            for way, changes in WAYS.items()
+        }
+        default, blurred = images["default"], blurred_error(dataset)
+        named = {**constants(dataset, images["straight"].result), "truth blurred by 1 mm": blurred}
+        detail = ", ".join(f"{name} {error:.1f}" for name, error in named.items())
+        detail += ", " + ", ".join(
+            f"{way} {one.rms:.1f} in {one.seconds:.1f} s" for way, one in images.items()
+        )
+        nodes = default.result.settings.nodes
+        detail += f" (m/s); {nodes} nodes; {explain_trials(default.result.trials)}"
+        detail += f"; load at the end {os.getloadavg()[0]:.1f}"
+        name = f"A2 detailed breast, {asked.elements} elements, noise {1e9 * noise:.0f} ns"
+        yield Row(
+            f"{name}: error over that of the blurred truth", default.rms / blurred, GOAL, "<=", "", detail
+        )
+        yield Row(f"{name}: time on {os.cpu_count()} cores", default.seconds, SECONDS, "<=", "s", detail)
+        if not quick and not noise:
+            (RESULTS / "any_scan_default_settings.png").write_bytes(picture(dataset, images))
+
+
+def blurred_error(dataset: Dataset) -> float:
+    """Rms difference of the truth from itself blurred by ``BLUR_M``, in the region of interest, m/s."""
+    truth, roi = dataset.truth, dataset.roi
+    assert truth is not None
+    assert roi is not None
+    speed = truth.sound_speed_mps
+    difference = gaussian_filter(speed, BLUR_M / truth.spacing_m[0]) - speed
+    return float(np.sqrt((difference[roi] ** 2).mean()))
+
+
+def picture(dataset: Dataset, images: dict[str, Made]) -> bytes:
+    """PNG: the truth and the images."""
+    truth = dataset.truth
+    assert truth is not None
+    with drawing():
+        figure = new_figure(13.0, 3.5)
+        panels = figure.subplots(1, 1 + len(images))
+        limits = robust_limits([truth.sound_speed_mps])
+        grid = truth.spacing_m, truth.origin_m
+        maps = [draw_map(panels[0], truth.sound_speed_mps, *grid, limits, colormap=SPEED, title="truth")]
+        for axes, (way, one) in zip(panels[1:], images.items(), strict=True):
+            title = f"{way}: {one.rms:.1f} m/s, {one.seconds:.0f} s"
+            grid = one.result.spacing_m, one.result.origin_m
+            maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=title))
+        draw_bar(maps, "speed (m/s)")
+        return small_png(to_png(figure))
