@@ -159,4 +159,4 @@ def test_the_lines_that_write_a_scan_write_one_that_is_read_and_reconstructed(
     assert dataset.water_speed_mps == pytest.approx(1482.3, abs=0.1), "that of water of 20 degrees"
     assert np.isnan(dataset.differential_tof()[0, 1])
     exec(reconstruct, {})
-    assert capsys.readouterr().out.startswith("(128, 128) ")
+    assert capsys.readouterr().out.startswith("(96, 96) ")

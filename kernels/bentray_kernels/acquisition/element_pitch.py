@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..arrays import Floats
+
+# Elements whose nearest neighbour is searched; the median of so many is that of all.
+SEARCHED = 256
 
 
 def element_pitch(position_m: Floats) -> float:
@@ -18,7 +20,12 @@ def element_pitch(position_m: Floats) -> float:
         0 for a single element, for positions that are not finite, and where most elements share their place
         with another.
     """
-    if len(position_m) < 2 or not np.isfinite(position_m).all():
+    count = len(position_m)
+    if count < 2 or not np.isfinite(position_m).all():
         return 0.0
-    distance, _ = KDTree(position_m).query(position_m, k=2)
-    return float(np.median(distance[:, 1]))
+    nearest = []
+    for k in np.unique(np.linspace(0, count - 1, min(count, SEARCHED)).astype(int)):
+        square = ((position_m - position_m[k]) ** 2).sum(axis=1)
+        square[k] = np.inf
+        nearest.append(square.min())
+    return float(np.sqrt(np.median(nearest)))

@@ -9,9 +9,9 @@ import pytest
 from bentray_service.files import bucket, bucket_store
 
 from ... import s3
-from ..rows.conftest import address, database
+from ..rows.conftest import address, database, postgresql_database
 
-__all__ = ["address", "bucket_url", "database", "s3_server"]
+__all__ = ["address", "bucket_url", "database", "postgresql_database", "s3_server"]
 
 
 @pytest.fixture(scope="session")

@@ -32,6 +32,9 @@ OUTERMOST, OUTERMOST_SPAN = 0.06, 0.1
 # Distance from the first line within which the outermost chords are used, periods.
 SEARCHED = 0.3
 
+# The same where the outermost chords alone show the line.
+CLOSELY = 0.1
+
 # Largest distance from the line at which a chord agrees: robust deviations of the outermost chords, periods.
 AGREEING, LEAST_TOLERANCE = 4.0, 0.02
 
@@ -100,9 +103,14 @@ def find_water_chords(
     x, y = distance.ravel()[pairs], arrival_s.ravel()[pairs]
     order = np.argsort(-chord_offset(dataset).ravel()[pairs], kind="stable")
     groups = _groups(order, x, OUTERMOST_SPAN * float(distance.max()))
-    agreeing = next(groups)
-    slowness, delay = _densest_line(x, y, BIN * period_s)
-    agreeing = agreeing[np.abs(y[agreeing] - delay - slowness * x[agreeing]) <= SEARCHED * period_s]
+    outermost = next(groups)
+    agreeing = _near(_densest_line(x, y, BIN * period_s), x, y, outermost, SEARCHED * period_s)
+    if agreeing.size < FEWEST:
+        # Most chords may cross a large object of small contrast: then the outermost ones alone show the line,
+        # if they agree closely.
+        line = _densest_line(x[outermost], y[outermost], BIN * period_s)
+        closely = _near(line, x, y, outermost, CLOSELY * period_s)
+        agreeing = closely if closely.size >= LEAST_PART * outermost.size else agreeing
     if agreeing.size < FEWEST:
         raise _refusal(agreeing.size)
     slowness, delay = robust_line(x[agreeing], y[agreeing])
@@ -137,6 +145,12 @@ def chord_offset(dataset: Dataset) -> Floats:
     part = np.clip(-(start * along).sum(axis=-1) / length, 0.0, 1.0)
     nearest = np.linalg.norm(start + part[..., None] * along, axis=-1)
     return np.asarray(nearest / np.linalg.norm(place, axis=1).max())
+
+
+def _near(line: tuple[float, float], x: Floats, y: Floats, chords: Ints, reach: float) -> Ints:
+    """The chords within a distance, s, of a line of slowness and delay."""
+    slowness, delay = line
+    return np.asarray(chords[np.abs(y[chords] - delay - slowness * x[chords]) <= reach])
 
 
 def _densest_line(x: Floats, y: Floats, width: float) -> tuple[float, float]:
