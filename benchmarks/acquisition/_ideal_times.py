@@ -10,14 +10,14 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.eikonal import solve
 
 # Fewest nodes along a side of the true image, and width of the water around it for the ring.
-LEAST_NODES = 400
+MIN_NODES = 400
 
 
 def ideal(dataset: Dataset) -> NDArray[np.float64]:
     """(ntx, nrx), s, object minus water; both by the same solver, so that most of its error cancels."""
     assert dataset.truth is not None
     speed, spacing = dataset.truth.sound_speed_mps, dataset.truth.spacing_m[0]
-    factor = max(1, -(-LEAST_NODES // len(speed)))
+    factor = max(1, -(-MIN_NODES // len(speed)))
     speed = zoom(speed, factor, order=1, grid_mode=False)
     spacing *= (len(dataset.truth.sound_speed_mps) - 1) / (len(speed) - 1)
     origin = np.array(dataset.truth.origin_m)

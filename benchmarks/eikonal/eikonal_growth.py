@@ -22,13 +22,13 @@ SIDES = {2: (64, 128, 256, 512, 1024, 2048), 3: (32, 48, 64, 96, 128, 192)}
 QUICK_SIDES = {2: (64, 128, 256, 512), 3: (32, 48, 64)}
 
 # A fit of the memory leaves out grids whose arrays are lost among the pages of a process.
-LEAST_NODES_FOR_MEMORY = 200_000
+MIN_NODES_FOR_MEMORY = 200_000
 
 EXPONENT_GOAL = 1.15
 BYTES_GOAL = 200.0
 
 # A grid is solved until so much time has passed, and twice at least: the first solve of a size may be late.
-LEAST_SECONDS = 0.5
+MIN_SECONDS = 0.5
 
 
 def rows(quick: bool, progress: Step) -> Iterable[Row]:
@@ -58,12 +58,12 @@ def growth_of_time(name: str, ndim: int, sides: tuple[int, ...]) -> Row:
 
 
 def least_seconds(p: Problem, name: str) -> float:
-    """Least time of two or more solves that together take ``LEAST_SECONDS``.
+    """Least time of two or more solves that together take ``MIN_SECONDS``.
 
     It is CPU time, which does not depend on the load of the machine.
     """
     taken: list[float] = []
-    while len(taken) < 2 or sum(taken) < LEAST_SECONDS:
+    while len(taken) < 2 or sum(taken) < MIN_SECONDS:
         start = time.process_time()
         eikonal.solve(p.speed, p.spacing, p.source, name)
         taken.append(time.process_time() - start)
@@ -72,7 +72,7 @@ def least_seconds(p: Problem, name: str) -> float:
 
 def growth_of_memory(name: str, ndim: int, sides: tuple[int, ...]) -> Row:
     """Bytes that one node more takes at the peak: the slope of a straight line through the grids."""
-    large = [n for n in sides if n**ndim >= LEAST_NODES_FOR_MEMORY]
+    large = [n for n in sides if n**ndim >= MIN_NODES_FOR_MEMORY]
     grids = ["x".join([str(n)] * ndim) for n in large]
     script = Path(__file__).parents[1] / "shared" / "_peak_memory.py"
     done = subprocess.run(

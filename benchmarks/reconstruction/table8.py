@@ -18,7 +18,7 @@ SOURCES = 64
 SIDES = (128, 256)
 
 # A projection is timed until so many seconds have passed, and more than once.
-LEAST_SECONDS = 0.5
+MIN_SECONDS = 0.5
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def least_seconds(run: Callable[[], object]) -> float:
     """Least seconds of one run, after one that is not counted."""
     run()
     taken: list[float] = []
-    while len(taken) < 2 or sum(taken) < LEAST_SECONDS:
+    while len(taken) < 2 or sum(taken) < MIN_SECONDS:
         start = time.perf_counter()
         run()
         taken.append(time.perf_counter() - start)

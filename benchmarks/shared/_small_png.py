@@ -7,7 +7,7 @@ import io
 from PIL import Image
 
 # Bytes; the repository takes no file of more than 300,000.
-MOST_BYTES = 250_000
+MAX_BYTES = 250_000
 SHRINK = 0.9
 
 
@@ -18,7 +18,7 @@ def small_png(png: bytes) -> bytes:
     while True:
         buffer = io.BytesIO()
         shown.save(buffer, "png", optimize=True)
-        if buffer.tell() <= MOST_BYTES:
+        if buffer.tell() <= MAX_BYTES:
             return buffer.getvalue()
         size = round(SHRINK * shown.width), round(SHRINK * shown.height)
         shown = shown.resize(size, Image.Resampling.LANCZOS)

@@ -11,8 +11,8 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range, check_ranges, ranged
 
 # Of a side of a picture, and of the square of it in rays.
-MOST_PIXELS = 4096
-MOST_RAYS = MOST_PIXELS**2
+MAX_PIXELS = 4096
+MAX_RAYS = MAX_PIXELS**2
 
 
 def setting(

@@ -21,7 +21,7 @@ _IMPORT = re.compile(r"^[ \t]*from (\.+)([\w.]*) import (\([^)]*\)|[^\n]*)", re.
 # Digests of syntax trees by digests of their text: parsing the whole package takes a second.
 MEMORY = f"syntax-{sys.version_info.major}.{sys.version_info.minor}.json"
 # Most files remembered, from all checkouts and versions.
-MOST_REMEMBERED = 10_000
+MAX_ENTRIES = 10_000
 
 
 @cache
@@ -90,7 +90,7 @@ def _keep(memory: dict[str, str]) -> None:
     with suppress(OSError, RuntimeError):
         file = _memory_file()
         file.parent.mkdir(parents=True, exist_ok=True)
-        newest = dict(list(memory.items())[-MOST_REMEMBERED:])
+        newest = dict(list(memory.items())[-MAX_ENTRIES:])
         with tempfile.NamedTemporaryFile("w", dir=file.parent, delete=False, encoding="ascii") as partial:
             json.dump(newest, partial)
         Path(partial.name).replace(file)

@@ -7,7 +7,7 @@ import ctypes
 # Parameter of ``mallopt`` in <malloc.h>.
 M_ARENA_MAX = -8
 # In addition to the main arena; threads rarely allocate at the same time because of the GIL.
-MOST = 2
+MAX_ARENAS = 2
 
 
 def limit_arenas() -> None:
@@ -16,4 +16,4 @@ def limit_arenas() -> None:
         mallopt = ctypes.CDLL(None).mallopt
     except (AttributeError, OSError, TypeError):
         return
-    mallopt(M_ARENA_MAX, MOST)
+    mallopt(M_ARENA_MAX, MAX_ARENAS)

@@ -19,7 +19,7 @@ from .rows.tenants import Tenant
 # Maximum estimated waiting time of a new image, s.
 LATEST_S = 60.0
 # Maximum number of images in progress, per tenant and in total.
-MOST_OF_TENANT, MOST_IN_ALL = 64, 256
+MAX_PER_TENANT, MAX_IN_TOTAL = 64, 256
 # One worker is kept free of tasks that may take longer than this, s.
 LONG_S = 3.0
 # Maximum age of the list of workers, s.
@@ -137,9 +137,9 @@ class PictureQueue:
             found = f"{held} images of this tenant in progress, {all_of_them} in total"
             accepted = f"images that can be rendered in about {LATEST_S:g} s; see Retry-After"
             raise RateLimited("pictures", found, accepted, min(LATEST_S, max(1.0, late)))
-        if held >= MOST_OF_TENANT or all_of_them >= MOST_IN_ALL:
+        if held >= MAX_PER_TENANT or all_of_them >= MAX_IN_TOTAL:
             found = f"{held} images of this tenant in progress, {all_of_them} in total"
-            accepted = f"fewer than {MOST_OF_TENANT} per tenant and {MOST_IN_ALL} in total; see Retry-After"
+            accepted = f"fewer than {MAX_PER_TENANT} per tenant and {MAX_IN_TOTAL} in total; see Retry-After"
             raise RateLimited("pictures", found, accepted, 1.0)
 
     def _assign(self) -> None:

@@ -42,7 +42,7 @@ THREADS = 8
 ASK_S, LOOK_S = 5.0, 5.0
 FULL = (errno.ENOSPC, errno.EDQUOT)
 # Maximum number of attempts when workers leave.
-MOST_TRIES = 2
+MAX_TRIES = 2
 
 Found = TypeVar("Found")
 
@@ -230,7 +230,7 @@ class _Run:
 
     async def _ended(self, task: tuple[Any, ...]) -> Any:
         """Run a task; returns its future, or raises its error."""
-        for _ in range(MOST_TRIES):
+        for _ in range(MAX_TRIES):
             async with self._pictures._queue.place(self._tenant, self._fits, long=self._long) as address:
                 begun = time.monotonic()
                 future = await self._pictures._in_thread(partial(self._submit, address, task))
@@ -241,7 +241,7 @@ class _Run:
                         await self._result(future)
                     return future
                 future.release()
-        raise Busy("workers", f"{MOST_TRIES} that left during this task", "a later request, or more workers")
+        raise Busy("workers", f"{MAX_TRIES} that left during this task", "a later request, or more workers")
 
     async def _result(self, future: Any) -> Any:
         """The result of a task; its error is raised."""

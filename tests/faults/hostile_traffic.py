@@ -35,7 +35,7 @@ EXPENSIVE = (
     "width=512&height=512&depth=16&fresnel=true&iso=0.5",
     "width=4096&height=4096&depth=16&fresnel=true&iso=0.5",
 )
-MOST_LEFT_WAITING_S = 2.0
+MAX_WAIT_S = 2.0
 PLACES = {"dataset": "datasets", "volume": "volumes", "mesh": "meshes"}
 QUOTA_UPLOADS = 6
 
@@ -133,7 +133,7 @@ class HostileTraffic:
 
         def look(asked: str) -> None:
             with suppress(httpx.ReadTimeout):
-                self._once("GET", f"/v1/volumes/{volume}/refraction.png?{asked}", timeout=MOST_LEFT_WAITING_S)
+                self._once("GET", f"/v1/volumes/{volume}/refraction.png?{asked}", timeout=MAX_WAIT_S)
 
         with ThreadPoolExecutor(6) as pool:
             list(pool.map(look, 2 * EXPENSIVE))

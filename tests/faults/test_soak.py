@@ -47,16 +47,16 @@ LIVE_EVERY_S = 0.5
 # Memory: what the allocator keeps differs by ten MiB between spells. In 24 minutes, 29,000 answers, it went
 # from 251 MiB before the traffic to 294 after three spells, and was between 291 and 311 from there on: the
 # line rose by 10. A leak of 2 kB a request would be 38 on top.
-MOST_SERVICE_MIB = 32.0
-MOST_WORKERS_MIB = 96.0
+MAX_SERVICE_MIB = 32.0
+MAX_WORKERS_MIB = 96.0
 # Descriptors: pools may differ by a few at rest, a leak is one for each of thousands of requests.
 # Of 181 descriptors at the end, 64 are connections to the database and 16 fonts of the workers' threads, all
 # open after minutes; Dask's connections between parts, which it keeps, are as many as were ever used at once.
-MOST_DESCRIPTORS = 8.0
+MAX_DESCRIPTORS = 8.0
 # Threads: the forty that answer requests are there at rest or have gone, by chance; 42 to 81 were seen.
-MOST_THREADS = 40.0
+MAX_THREADS = 40.0
 # The log tells of what was refused at most once a minute a kind, or a line for a file that broke its reader.
-MOST_LOG_BYTES_A_MINUTE = 256 * 1024
+MAX_LOG_BYTES_A_MINUTE = 256 * 1024
 STOP_S = 30.0
 
 HONEST = ("ada", "bell")
@@ -147,7 +147,7 @@ def test_honest_work_is_done_and_nothing_grows(service, soak_scan, tmp_path, cap
         assert not ledger.told_to_two()
         said = service.log.read_text(errors="replace")
         assert "Traceback" not in said, said[said.index("Traceback") - 500 :][:4000]
-        assert samples[-1].log_bytes < MOST_LOG_BYTES_A_MINUTE * minutes
+        assert samples[-1].log_bytes < MAX_LOG_BYTES_A_MINUTE * minutes
         assert service.worker_pids() == workers
         check_stop(service, hostile)
         check_flat(samples)
@@ -202,10 +202,10 @@ def at_rest(service: LiveService) -> Footprint:
 def check_flat(samples: list[Footprint]) -> None:
     """Nothing grows after the warm-up, and nothing is left of what was deleted."""
     warm = samples[int(len(samples) * WARM_UP) :]
-    assert rise([one.service_mib for one in warm]) < MOST_SERVICE_MIB
-    assert rise([one.workers_mib for one in warm]) < MOST_WORKERS_MIB
-    assert rise([one.descriptors for one in warm]) < MOST_DESCRIPTORS
-    assert rise([one.threads for one in warm]) < MOST_THREADS
+    assert rise([one.service_mib for one in warm]) < MAX_SERVICE_MIB
+    assert rise([one.workers_mib for one in warm]) < MAX_WORKERS_MIB
+    assert rise([one.descriptors for one in warm]) < MAX_DESCRIPTORS
+    assert rise([one.threads for one in warm]) < MAX_THREADS
     assert {one.processes for one in samples} == {samples[0].processes}
     assert [one.rows for one in samples] == [{}] * len(samples)
     assert [one.bytes for one in samples] == [0] * len(samples)

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from bentray_service.malloc_arenas import MOST
+from bentray_service.malloc_arenas import MAX_ARENAS
 
 # Prints how many arenas there are once many threads have allocated.
 PROGRAM = """
@@ -50,5 +50,5 @@ def arenas(how: str) -> int:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc alone has arenas")
 def test_many_threads_share_few_arenas() -> None:
-    assert arenas("as ever") > MOST
-    assert arenas("limited") <= MOST
+    assert arenas("as ever") > MAX_ARENAS
+    assert arenas("limited") <= MAX_ARENAS

@@ -7,7 +7,7 @@ import pytest
 
 from bentray_service import picture_queue
 from bentray_service.errors import RateLimited
-from bentray_service.picture_queue import LATEST_S, MOST_IN_ALL, MOST_OF_TENANT, PictureQueue
+from bentray_service.picture_queue import LATEST_S, MAX_IN_TOTAL, MAX_PER_TENANT, PictureQueue
 from bentray_service.rows.tenants import Tenant
 from bentray_workers.cluster.capacities import WorkerCapacity
 
@@ -171,12 +171,12 @@ def test_what_would_be_late_is_refused_and_told_when_to_come_again():
 def test_the_number_of_pictures_is_bounded():
     async def go():
         run = Run()
-        held = [run.queue.admitted(A, 0.0) for _ in range(MOST_OF_TENANT)]
+        held = [run.queue.admitted(A, 0.0) for _ in range(MAX_PER_TENANT)]
         for one in held:
             await one.__aenter__()
-        with pytest.raises(RateLimited, match=f"fewer than {MOST_OF_TENANT} per tenant"):
+        with pytest.raises(RateLimited, match=f"fewer than {MAX_PER_TENANT} per tenant"):
             await run.queue.admitted(A, 0.0).__aenter__()
-        others = [run.queue.admitted(Tenant(f"t{k}"), 0.0) for k in range(MOST_IN_ALL - MOST_OF_TENANT)]
+        others = [run.queue.admitted(Tenant(f"t{k}"), 0.0) for k in range(MAX_IN_TOTAL - MAX_PER_TENANT)]
         for one in others:
             await one.__aenter__()
         with pytest.raises(RateLimited):

@@ -14,7 +14,7 @@ from .dataset import POSITION, Dataset
 BULK_MPS = (300.0, 6_000.0)
 
 # A scan is plausible if at least this fraction of its pairs is: single picks may be arbitrarily wrong.
-MOST_PAIRS = 0.5
+MAX_PAIRS = 0.5
 
 # Pairs nearer than this fraction of the array's width are ignored: picks of neighbours are often wrong.
 NEAR = 0.1
@@ -97,7 +97,7 @@ def _check_times(dataset: Dataset, place: str, times: Floats) -> None:
     def plausible(factor: float) -> bool:
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             speed = distance / (offset + factor * time)
-        return bool(np.mean((speed >= BULK_MPS[0]) & (speed <= BULK_MPS[1])) >= MOST_PAIRS)
+        return bool(np.mean((speed >= BULK_MPS[0]) & (speed <= BULK_MPS[1])) >= MAX_PAIRS)
 
     if plausible(1.0):
         return

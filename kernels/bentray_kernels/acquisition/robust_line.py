@@ -11,7 +11,7 @@ from .noise import robust_deviation
 ROUNDS, NEAR = 6, 4.0
 
 # Fewest points of a line, and least part of the width of all of them.
-FEWEST, SPAN = 8, 1e-6
+MIN_POINTS, SPAN = 8, 1e-6
 
 
 def robust_line(x: Floats, y: Floats) -> tuple[float, float]:
@@ -31,7 +31,7 @@ def robust_line(x: Floats, y: Floats) -> tuple[float, float]:
     for _ in range(ROUNDS):
         off = y - slope * x - intercept
         inliers = np.abs(off - np.median(off)) <= NEAR * robust_deviation(off) + 1e-12
-        if inliers.sum() < FEWEST or not np.ptp(x[inliers]) > least:
+        if inliers.sum() < MIN_POINTS or not np.ptp(x[inliers]) > least:
             break
         middle = x[inliers].mean()
         slope = float((x[inliers] - middle) @ y[inliers] / ((x[inliers] - middle) ** 2).sum())

@@ -23,7 +23,7 @@ SHORTEST = 1e-7
 # Most halvings of a ray, each with at most two evaluations of the field. Most rays need fewer than ten, a
 # grazing one about twenty at each surface, and one through noise, with surfaces everywhere, some hundreds. On
 # a plateau of the field at an iso-value they would not end.
-MOST_HALVINGS = 512
+MAX_HALVINGS = 512
 
 # How many of them the shortest piece counts for where nothing is proved of it. A ray that touches a surface
 # has two or three of these, one along a plateau nothing else.

@@ -16,7 +16,7 @@ from .cell_bounds import CellRanges
 Masks = NDArray[np.uint8]
 
 # One bit each in a mask of 8.
-MOST_ISOS = 8
+MAX_ISOS = 8
 
 
 class Octree(NamedTuple):
@@ -63,8 +63,8 @@ def octree_of(cells: CellRanges, isos: Sequence[float]) -> Octree:
     Raises:
         InvalidInput: for more than 8 iso-values.
     """
-    if len(isos) > MOST_ISOS:
-        raise InvalidInput("iso", f"{len(isos)} values", f"at most {MOST_ISOS}")
+    if len(isos) > MAX_ISOS:
+        raise InvalidInput("iso", f"{len(isos)} values", f"at most {MAX_ISOS}")
     shapes = [cells.low.shape]
     while max(shapes[-1]) > 1:
         x, y, z = shapes[-1]

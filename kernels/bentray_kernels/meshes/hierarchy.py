@@ -13,7 +13,7 @@ from ..compiled import kernel
 
 BINS = 16
 # Faces of a leaf; three bits of a child's word count them.
-MOST_IN_LEAF = 4
+MAX_LEAF_FACES = 4
 # From this level on ranges are halved, so that the stack of a ray cannot overflow.
 HALVED_FROM = 48
 
@@ -40,7 +40,7 @@ def build_hierarchy(
     faces = len(order)
     # First and last face of a range, the node that waits for it, which of its children it is, and its level.
     waiting = np.empty((faces + 2, 5), dtype=np.int64)
-    middle = _split(lows, highs, order, 0, faces) if faces > MOST_IN_LEAF else faces
+    middle = _split(lows, highs, order, 0, faces) if faces > MAX_LEAF_FACES else faces
     waiting[0] = (0, middle, 0, 0, 1)
     waiting[1] = (middle, faces, 0, 1, 1)
     depth, used = 2, 1
@@ -53,7 +53,7 @@ def build_hierarchy(
                 low = min(low, lows[order[k], axis])
                 high = max(high, highs[order[k], axis])
             nodes[parent, 6 * side + axis], nodes[parent, 6 * side + 3 + axis] = low, high
-        if last - first <= MOST_IN_LEAF:
+        if last - first <= MAX_LEAF_FACES:
             children[parent, 12 + side] = ~(8 * first + last - first)
             continue
         middle = (first + last) // 2

@@ -12,7 +12,7 @@ from ..errors import InvalidInput
 from .mesh import TriangleMesh
 
 # Least part of an edge on either side of the surface: triangles at a node on the surface keep an area.
-LEAST_PART = 0.01
+MIN_FRACTION = 0.01
 
 # The six tetrahedra of a cell, each from corner (0, 0, 0) along the axes in one order to (1, 1, 1). Two cells
 # cut their common face along the same diagonal, so that the surface has no cracks.
@@ -58,7 +58,7 @@ def isosurface_mesh(values: NDArray[np.floating | np.integer], spacing: Floats, 
     places = [np.column_stack(np.unravel_index(at, field.shape)).astype(np.float64) for at in (start, end)]
     # Outside of the volume nothing is above the iso-value: there the surface lies on the outermost nodes.
     outer = ((places[1] == 0) | (places[1] == shape - 1)).any(axis=1)
-    part = np.clip(np.where(outer, 0.0, part), LEAST_PART, 1.0 - LEAST_PART)[:, np.newaxis]
+    part = np.clip(np.where(outer, 0.0, part), MIN_FRACTION, 1.0 - MIN_FRACTION)[:, np.newaxis]
     vertices = (places[0] + part * (places[1] - places[0]) - 1.0) * spacing
     return TriangleMesh(vertices, inverse.reshape(-1, 3).astype(np.int32))
 

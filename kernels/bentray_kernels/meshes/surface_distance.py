@@ -11,7 +11,7 @@ from ..compiled import kernel
 from .mesh import TriangleMesh
 
 # Cells along the longest side of the box: about as long as three sides of a face, within these bounds.
-FEWEST_CELLS, MOST_CELLS = 4, 128
+MIN_CELLS, MAX_CELLS = 4, 128
 
 
 class SurfaceGrid:
@@ -26,7 +26,7 @@ class SurfaceGrid:
     def __init__(self, mesh: TriangleMesh) -> None:
         self._corners = np.ascontiguousarray(mesh.corners)
         low, high = self._corners.min(axis=(0, 1)), self._corners.max(axis=(0, 1))
-        cells = min(max(math.isqrt(len(mesh.faces)) // 3, FEWEST_CELLS), MOST_CELLS)
+        cells = min(max(math.isqrt(len(mesh.faces)) // 3, MIN_CELLS), MAX_CELLS)
         self._step = float(max((high - low).max() / cells, np.finfo(float).tiny))
         self._low = low
         self._shape = np.maximum(np.ceil((high - low) / self._step).astype(np.int64), 1)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Vector
 from ..compiled import kernel
-from ..isosurface.crossing import MOST_HALVINGS, Search, leave_interval
+from ..isosurface.crossing import MAX_HALVINGS, Search, leave_interval
 from ..isosurface.octree import Octree
 from ..isosurface.roots import Field, Ray, field_at, point_at, ray_of
 from ..splines.sampling import value_and_gradient_at
@@ -156,7 +156,7 @@ def _trace_ray(
 ) -> None:
     crossed, weight = 0, 1.0
     layer, entered, slope = 0, False, 0.0
-    halvings = MOST_HALVINGS
+    halvings = MAX_HALVINGS
     fate = MISSED
     while True:
         ray = in_nodes(medium, origin, direction)

@@ -220,7 +220,7 @@ class OpenCLCaster:
             f"HOW={_way(search)}",
             f"TOLERANCE={tolerance}",
             f"SHORTEST={shortest}",
-            f"MOST_HALVINGS={crossing.MOST_HALVINGS}",
+            f"MAX_HALVINGS={crossing.MAX_HALVINGS}",
             f"UNPROVED={crossing.UNPROVED}",
             f"DEEPEST={STEPS}",
         )

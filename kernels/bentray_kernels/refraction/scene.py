@@ -21,7 +21,7 @@ STRUCTURES = ("octree", "dda", "steps")
 
 # The largest coefficient of a field, in size. Cells are bounded in float32, with room for their bends above,
 # and below for differences between values.
-LEAST_BIGGEST, MOST_BIGGEST = 1e-30, 1e35
+MIN_PEAK, MAX_PEAK = 1e-30, 1e35
 
 
 @dataclass(frozen=True)
@@ -107,8 +107,8 @@ class Scene:
         if len(spline.shape) != 3:
             raise InvalidInput("volume", f"{len(spline.shape)} dimensions", "3 dimensions")
         biggest = float(max(spline.coefficients.max(), -spline.coefficients.min()))
-        if not (biggest == 0.0 or LEAST_BIGGEST <= biggest <= MOST_BIGGEST):
-            accepted = f"values up to {MOST_BIGGEST:g}, the largest at least {LEAST_BIGGEST:g}"
+        if not (biggest == 0.0 or MIN_PEAK <= biggest <= MAX_PEAK):
+            accepted = f"values up to {MAX_PEAK:g}, the largest at least {MIN_PEAK:g}"
             raise InvalidInput("volume", f"values behind its filter up to {biggest:g} in size", accepted)
         spacing = np.broadcast_to(np.asarray(spacing_m, dtype=np.float64), 3).copy()
         if not ((spacing > 0.0) & np.isfinite(spacing)).all():

@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Floats, Vector
 from ..compiled import kernel
 from ..errors import InvalidInput
-from ..isosurface.crossing import MOST_HALVINGS, Search, leave_interval
+from ..isosurface.crossing import MAX_HALVINGS, Search, leave_interval
 from .backdrop import Colours
 from .camera import Camera, affine
 from .caster import (
@@ -117,7 +117,7 @@ def _shade(
                 medium.levels[layer + 1],
                 (1 << layer) | (1 << layer >> 1),
                 0.0,
-                MOST_HALVINGS,
+                MAX_HALVINGS,
             )
             if side == 0:
                 continue

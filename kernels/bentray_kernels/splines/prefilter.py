@@ -18,7 +18,7 @@ from .filters import bspline
 LOCKSTEP = 32
 
 # Smooths over dozens of nodes; rounding errors grow with λ and reach 1e-8 here.
-MOST_SMOOTHING = 1e6
+MAX_SMOOTHING = 1e6
 
 
 def prefilter(values: ArrayLike, order: int, smoothing: float = 0.0) -> Floats:
@@ -43,8 +43,8 @@ def prefilter(values: ArrayLike, order: int, smoothing: float = 0.0) -> Floats:
     """
     if order not in range(1, 7):
         raise InvalidInput("order", order, "a whole number from 1 to 6")
-    if not 0.0 <= smoothing <= MOST_SMOOTHING:
-        raise InvalidInput("smoothing", smoothing, f"a number from 0 to {MOST_SMOOTHING:g}")
+    if not 0.0 <= smoothing <= MAX_SMOOTHING:
+        raise InvalidInput("smoothing", smoothing, f"a number from 0 to {MAX_SMOOTHING:g}")
     filtered = np.array(values, dtype=np.float64, order="C")
     numerator, denominator = symbols(int(order), smoothing)
     for axis, n in enumerate(filtered.shape):

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from ..arrays import Floats
 from ..errors import InvalidInput
-from .prefilter import MOST_SMOOTHING, sampled_bspline, symbols
+from .prefilter import MAX_SMOOTHING, sampled_bspline, symbols
 
 # Rounding to whole numbers leaves errors that are uniform over one step.
 ROUNDING = 1.0 / math.sqrt(12.0)
@@ -20,7 +20,7 @@ ROUNDING = 1.0 / math.sqrt(12.0)
 # A normal distribution's median distance from its mean, in standard deviations.
 MEDIAN_DEVIATION = 0.6745
 
-LEAST_SMOOTHING = 1e-9
+MIN_SMOOTHING = 1e-9
 
 
 def noise_of(volume: ArrayLike) -> float:
@@ -87,11 +87,11 @@ def smoothing_for_noise(volume: ArrayLike, order: int, sigma: float | None = Non
         passed = _passed(order, math.exp(log_smoothing), nodes.shape)
         return float((power * (1.0 - passed) ** 2).sum()) - sigma**2
 
-    least, most = math.log(LEAST_SMOOTHING), math.log(MOST_SMOOTHING)
+    least, most = math.log(MIN_SMOOTHING), math.log(MAX_SMOOTHING)
     if excess(least) >= 0.0:
         return 0.0
     if excess(most) <= 0.0:
-        return MOST_SMOOTHING
+        return MAX_SMOOTHING
     return math.exp(brentq(excess, least, most, xtol=1e-6))
 
 

@@ -28,7 +28,7 @@ PASSES, ROBUST_PASSES = 3, 12
 ZONES, TRACES_STRICTER = 3.0, 2.0
 
 # More than any tissue has at the frequencies that pass through it, Np/m.
-MOST_NP_M = 500.0
+MAX_NP_M = 500.0
 
 
 def active_emitters(problem: Problem) -> Ints:
@@ -100,7 +100,7 @@ def solve(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats
         remaining = [replace(part, residual=part.residual - part.project(image - water)) for part in parts]
         residual = np.concatenate([part.residual for part in remaining])
         limit = huber.limit(residual, spreads)
-        bounds = (0.0, MOST_NP_M * problem.spacing)
+        bounds = (0.0, MAX_NP_M * problem.spacing)
         misfit = huber.clipped_rms(residual, limit)
         image, dual = Linearised(
             remaining,

@@ -17,7 +17,7 @@ WAVELENGTHS = 0.5
 CONTRAST = 0.03
 
 # Limits of an automatic grid, and of one in 3-D, whose cost grows with the cube. Multiples of ``STEP``.
-FEWEST, MOST, MOST_IN_SPACE, STEP = 96, 256, 128, 8
+MIN_NODES, MAX_NODES, MAX_NODES_3D, STEP = 96, 256, 128, 8
 
 
 def automatic_nodes(
@@ -46,6 +46,6 @@ def automatic_nodes(
         WAVELENGTHS * (wavelength_m or 0.0),
         noise_s * water_mps / (CONTRAST * math.sqrt(elements)),
     )
-    most = MOST_IN_SPACE if settings.decomposition == "volume" else MOST
+    most = MAX_NODES_3D if settings.decomposition == "volume" else MAX_NODES
     wanted = side / finest if finest > 0.0 else math.inf
-    return max(FEWEST, STEP * math.ceil(wanted / STEP)) if wanted < most else most
+    return max(MIN_NODES, STEP * math.ceil(wanted / STEP)) if wanted < most else most

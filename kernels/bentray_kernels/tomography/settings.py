@@ -15,7 +15,7 @@ from .numerics import Numerics
 # The wave front of the compiled pass over a slice; see ``eikonal.deviation``.
 DEVIATION = "deviation"
 
-LEAST_NODES = 16
+MIN_NODES = 16
 # What a speed may be, as JSON Schema says it.
 SPEED = {"type": "number", **SPEED_MPS.schema}
 # What holds before the scan is known.
@@ -164,7 +164,7 @@ class Settings:
     nodes: int | None = setting(
         None,
         "Nodes along each side of the image.",
-        Range(LEAST_NODES, 2048),
+        Range(MIN_NODES, 2048),
         unset="from the width of the array, the pitch of its elements and the wavelength",
     )
     side_m: float | None = setting(
@@ -294,8 +294,8 @@ class FixedSettings(Settings):
         fixed = self.numerics
         if fixed.guided_rounds and self.decomposition == "volume":
             raise InvalidInput("guided_rounds", fixed.guided_rounds, "0, with decomposition volume")
-        if fixed.coarser_grids and self.nodes and self.nodes >> fixed.coarser_grids < LEAST_NODES:
-            accepted = f"few enough that the coarsest of {self.nodes} nodes has {LEAST_NODES}"
+        if fixed.coarser_grids and self.nodes and self.nodes >> fixed.coarser_grids < MIN_NODES:
+            accepted = f"few enough that the coarsest of {self.nodes} nodes has {MIN_NODES}"
             raise InvalidInput("coarser_grids", fixed.coarser_grids, accepted)
         if fixed.ray_width_m > 0.0 and self.method != "gauss-newton":
             raise InvalidInput("ray_width_m", fixed.ray_width_m, "0, unless method is gauss-newton")

@@ -23,7 +23,7 @@ Unknown = Literal["speed", "attenuation"]
 # Fewest nodes per shortest wavelength of a source. The spatial phase error is 6.3 % at 2.5 nodes, 2.2 % at 3,
 # 0.34 % at 4, 0.07 % at 5 (``stencil.phase_error``, which a test measures); resampling compensates that of
 # water, so that an inversion may work near the limit.
-LEAST_POINTS = 2.5
+MIN_POINTS = 2.5
 
 # The band of a source ends where its amplitude falls below this fraction of the highest.
 BAND_EDGE = 0.03
@@ -67,11 +67,11 @@ def place_scan(medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floa
         InvalidInput: elements outside the image, a wavelet with waves too short for the grid.
     """
     points = points_per_wavelength(medium, wavelet)
-    if points < LEAST_POINTS:
+    if points < MIN_POINTS:
         raise InvalidInput(
             "spacing",
             f"{points:.2f} nodes in the shortest wave",
-            f"at least {LEAST_POINTS:g}: a finer grid or a lower frequency",
+            f"at least {MIN_POINTS:g}: a finer grid or a lower frequency",
         )
     return place_elements(medium, np.atleast_2d(emitter)), place_elements(medium, receivers)
 

@@ -19,7 +19,7 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 15.0
 # Status codes of a proxy without its service, and of a service without its database.
 UNAVAILABLE = (502, 503, 504)
 # An internal error may be temporary, so it is retried a few times.
-ERROR, MOST_ERRORS = 500, 5
+ERROR, MAX_ERRORS = 500, 5
 
 
 def unavailable(error: ClientError) -> bool:
@@ -65,7 +65,7 @@ class Retries:
                 self._answered |= error.status is not None
                 errors += error.status == ERROR
                 pause = max(pause, error.retry_after_s or 0.0)
-                if not (self._answered and repeatable(step, error) and errors < MOST_ERRORS):
+                if not (self._answered and repeatable(step, error) and errors < MAX_ERRORS):
                     raise
                 if time.monotonic() + pause > last:
                     raise

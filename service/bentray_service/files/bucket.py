@@ -19,12 +19,12 @@ from ..errors import StorageUnavailable
 
 log = logging.getLogger("bentray.storage")
 
-# Size of the parts of an upload, larger for files with more than MOST_PARTS parts.
+# Size of the parts of an upload, larger for files with more than MAX_PARTS parts.
 PART_BYTES = 16 * 2**20
 PARTS_AT_ONCE = 4
-MOST_PARTS = 10_000
+MAX_PARTS = 10_000
 # Maximum number of objects per S3 delete request.
-MOST_REMOVED = 1000
+MAX_REMOVED = 1000
 # With retries, an unreachable bucket is given up after about ten seconds. The timeout of a file upload is
 # longer, since the bucket may take minutes to assemble the parts.
 CONNECT_S = 3.0
@@ -65,7 +65,7 @@ class Bucket:
 
     def put(self, path: Path, key: str, metadata: Mapping[str, str]) -> None:
         """Upload a file with metadata; the object is complete or absent."""
-        part = max(PART_BYTES, math.ceil(path.stat().st_size / MOST_PARTS))
+        part = max(PART_BYTES, math.ceil(path.stat().st_size / MAX_PARTS))
         with self._watched():
             self._s3.put_file(str(path), self._place(key), chunksize=part, Metadata=dict(metadata))
 
@@ -109,7 +109,7 @@ class Bucket:
         """Delete objects; missing ones are ignored."""
         left = [{"Key": self._prefix + key} for key in keys]
         while left:
-            batch, left = left[:MOST_REMOVED], left[MOST_REMOVED:]
+            batch, left = left[:MAX_REMOVED], left[MAX_REMOVED:]
             with self._watched():
                 response = self._call("delete_objects", Delete={"Objects": batch, "Quiet": True})
                 for failure in response.get("Errors", ()):

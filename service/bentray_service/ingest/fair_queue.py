@@ -15,7 +15,7 @@ from distributed.system import MEMORY_LIMIT
 from ..rows.tenants import Tenant
 
 # Minimum number of threads, so that one tenant cannot occupy all of them.
-LEAST_AT_ONCE = 3
+MIN_CONCURRENT = 3
 STOP_SECONDS = 30.0
 
 
@@ -24,7 +24,7 @@ def readers_at_once(memory_bytes: int) -> int:
 
     They use at most half of the memory, unless that allows less than the minimum number.
     """
-    return max(LEAST_AT_ONCE, min(int(CPU_COUNT), int(MEMORY_LIMIT) // (2 * memory_bytes)))
+    return max(MIN_CONCURRENT, min(int(CPU_COUNT), int(MEMORY_LIMIT) // (2 * memory_bytes)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,8 @@ from ..errors import Busy, RateLimited
 from ..rows.tenants import Tenant
 
 # Each upload has a connection and a reservation; only few are ingested at a time.
-MOST_OF_TENANT = 32
-MOST_IN_ALL = 256
+MAX_PER_TENANT = 32
+MAX_IN_TOTAL = 256
 # New resumable uploads of a tenant per minute.
 BEGUN_PER_MINUTE = 120
 # Suggested time before the next attempt, s.
@@ -25,8 +25,8 @@ class UploadLimits:
 
     def __init__(
         self,
-        of_tenant: int = MOST_OF_TENANT,
-        in_all: int = MOST_IN_ALL,
+        of_tenant: int = MAX_PER_TENANT,
+        in_all: int = MAX_IN_TOTAL,
         begun_per_minute: int = BEGUN_PER_MINUTE,
     ) -> None:
         self._of_tenant = of_tenant

@@ -20,7 +20,7 @@ log = logging.getLogger("bentray.jobs")
 
 INTERVAL_SECONDS = 0.3
 # Maximum number of iterations in a job record; the result file has all of them.
-MOST_SWEEPS = 500
+MAX_SWEEPS = 500
 # Interval between measurements of the disk usage of a job, s.
 MEASURE_SECONDS = 30.0
 
@@ -61,7 +61,7 @@ class Reporter:
         """Remember the progress, and store it if the last write is long enough ago."""
         self._pending = progress
         # Long histories are stored less often.
-        wait = INTERVAL_SECONDS * (1.0 + min(len(progress.history), MOST_SWEEPS) / 100.0)
+        wait = INTERVAL_SECONDS * (1.0 + min(len(progress.history), MAX_SWEEPS) / 100.0)
         if self._clock() - self._written < wait:
             return
         try:
@@ -117,8 +117,8 @@ class Reporter:
 
 
 def thin_history(history: Sequence[Iteration]) -> Sequence[Iteration]:
-    """At most ``MOST_SWEEPS`` entries of a history, evenly spaced, including the first and the last."""
-    if len(history) <= MOST_SWEEPS:
+    """At most ``MAX_SWEEPS`` entries of a history, evenly spaced, including the first and the last."""
+    if len(history) <= MAX_SWEEPS:
         return history
     last = len(history) - 1
-    return [history[k * last // (MOST_SWEEPS - 1)] for k in range(MOST_SWEEPS)]
+    return [history[k * last // (MAX_SWEEPS - 1)] for k in range(MAX_SWEEPS)]

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response, status
 from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.rendering.isosurface_mesh import MOST_STEP, check_nodes, largest_bytes
+from bentray_workers.rendering.isosurface_mesh import MAX_STEP, check_nodes, largest_bytes
 
 from ..compute import check_renderable
 from ..files.deletion import StoredItem
@@ -94,7 +94,7 @@ async def mesh_of_volume(
     iso: Annotated[
         float | None, Query(description="Iso-value in the unit of the volume; default: middle of its range.")
     ] = None,
-    step: Annotated[int, Query(ge=1, le=MOST_STEP, description="Use every n-th node: fewer faces.")] = 1,
+    step: Annotated[int, Query(ge=1, le=MAX_STEP, description="Use every n-th node: fewer faces.")] = 1,
 ) -> MeshRecord:
     """Extract an iso-surface of a volume as a mesh: the largest component, closed at the boundary."""
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)

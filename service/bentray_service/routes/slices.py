@@ -13,9 +13,9 @@ from bentray_workers.images.plane import check_plane
 from bentray_workers.images.slice_style import (
     COLORMAPS,
     COLOUR_VALUE,
-    LEAST_FRAMED,
-    LEAST_SIZE,
-    MOST_SIZE,
+    MAX_SIZE,
+    MIN_FRAMED_SIZE,
+    MIN_SIZE,
     SliceStyle,
 )
 
@@ -37,9 +37,9 @@ async def read_style(
     size: Annotated[
         int | None,
         Query(
-            description=f"Longest side in pixels, {LEAST_FRAMED} to {MOST_SIZE}, without a frame from "
-            f"{LEAST_SIZE}. Default: standard text size, and one pixel per node without a frame.",
-            json_schema_extra={"minimum": LEAST_SIZE, "maximum": MOST_SIZE},
+            description=f"Longest side in pixels, {MIN_FRAMED_SIZE} to {MAX_SIZE}, without a frame from "
+            f"{MIN_SIZE}. Default: standard text size, and one pixel per node without a frame.",
+            json_schema_extra={"minimum": MIN_SIZE, "maximum": MAX_SIZE},
         ),
     ] = None,
     interpolation: Annotated[

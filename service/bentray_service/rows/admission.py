@@ -11,12 +11,12 @@ from contextlib import contextmanager
 from ..errors import DatabaseUnavailable
 
 # The service answers requests with 40 threads; the rest stays free for requests without the database.
-MOST_AT_ONCE = 32
+MAX_CONCURRENT = 32
 # Longest wait for a place, s.
 PLACE_SECONDS = 2.0
 # A transaction that takes longer than this marks the database as slow; then fewer threads may wait, s.
 SLOW_SECONDS = 2.0
-MOST_WHILE_SLOW = 8
+MAX_CONCURRENT_WHEN_SLOW = 8
 
 
 class Admission:
@@ -37,9 +37,9 @@ class Admission:
             DatabaseUnavailable: when too many threads hold or wait for a place.
         """
         with self._changed:
-            if self._slow() and len(self._inside) >= MOST_WHILE_SLOW:
+            if self._slow() and len(self._inside) >= MAX_CONCURRENT_WHEN_SLOW:
                 raise DatabaseUnavailable(f"{len(self._inside)} requests waiting for a slow database")
-            if not self._changed.wait_for(lambda: len(self._inside) < MOST_AT_ONCE, PLACE_SECONDS):
+            if not self._changed.wait_for(lambda: len(self._inside) < MAX_CONCURRENT, PLACE_SECONDS):
                 raise DatabaseUnavailable(f"{len(self._inside)} requests waiting for the database")
             number = next(self._numbers)
             self._inside[number] = self._clock()

@@ -17,7 +17,7 @@ from bentray_kernels.errors import InvalidInput
 
 from ..errors import DatabaseFull, DatabaseUnavailable
 from . import schema
-from .admission import MOST_AT_ONCE, Admission
+from .admission import MAX_CONCURRENT, Admission
 from .migration import SQLITE_PRAGMAS, STEPS, migrate
 
 log = logging.getLogger("bentray.storage")
@@ -115,7 +115,8 @@ def open_database(address: str) -> Database:
 def _options(address: str) -> dict[str, Any]:
     if address.startswith("sqlite"):
         waiting: dict[str, Any] = {"connect_args": {"timeout": BUSY_SECONDS}}
-        return waiting if ":memory:" in address else {**waiting, "pool_size": MOST_AT_ONCE, "max_overflow": 0}
+        pool = {} if ":memory:" in address else {"pool_size": MAX_CONCURRENT, "max_overflow": 0}
+        return {**waiting, **pool}
     return {
         "pool_pre_ping": True,
         "pool_size": KEPT_CONNECTIONS,

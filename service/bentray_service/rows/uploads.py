@@ -17,7 +17,7 @@ from .tenants import Tenant
 from .typed_rows import Plain, UploadRow
 
 # Incomplete uploads of one tenant; they are deleted by the client or expire.
-MOST_BEGUN = 100
+MAX_INCOMPLETE = 100
 # Suggested time before the next attempt, s.
 AGAIN_S = 60.0
 
@@ -53,7 +53,7 @@ class Uploads(TenantTable[UploadRow]):
 
         Raises:
             QuotaExceeded: when less than ``length`` is available.
-            RateLimited: when the tenant has ``MOST_BEGUN`` incomplete uploads.
+            RateLimited: when the tenant has ``MAX_INCOMPLETE`` incomplete uploads.
         """
         upload_id, now = new_id("upload"), time.time()
         # The id of the result is fixed here, so that repeated ingestion writes the same file.
@@ -132,8 +132,8 @@ class Uploads(TenantTable[UploadRow]):
 def _check_begun(connection: Connection, tenant: Tenant) -> None:
     begun = uploads.c.tenant == tenant, uploads.c.state == "receiving"
     count = connection.execute(select(func.count()).where(*begun)).scalar_one()
-    if count >= MOST_BEGUN:
-        accepted = f"fewer than {MOST_BEGUN} incomplete uploads per tenant; delete those no longer needed"
+    if count >= MAX_INCOMPLETE:
+        accepted = f"fewer than {MAX_INCOMPLETE} incomplete uploads per tenant; delete those no longer needed"
         raise RateLimited("uploads", f"{count} incomplete uploads", accepted, AGAIN_S)
 
 

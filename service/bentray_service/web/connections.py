@@ -13,7 +13,7 @@ from .addresses import Network, within
 log = logging.getLogger("bentray.connections")
 
 # Maximum number of connections, independent of the number of file descriptors.
-MOST = 4096
+MAX_CONNECTIONS = 4096
 # Default limit per address, as a fraction of all connections.
 PART = 4
 # Additional connections for health checks and refusals.
@@ -37,7 +37,7 @@ class ConnectionLimits:
     @classmethod
     def of(cls, descriptors: int, in_use: int, of_address: int | None) -> ConnectionLimits:
         """The limits for a number of file descriptors, of which some are in use."""
-        most = max(1, min(MOST, (descriptors - in_use - KEPT - SPARE) // EACH))
+        most = max(1, min(MAX_CONNECTIONS, (descriptors - in_use - KEPT - SPARE) // EACH))
         return cls(most, min(most, of_address or max(1, most // PART)), SPARE)
 
 

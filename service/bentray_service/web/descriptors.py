@@ -11,14 +11,14 @@ from bentray_kernels.errors import InvalidInput
 # Enough for the maximum number of connections.
 WANTED = 65_536
 # Minimum for the database, Dask and some connections.
-LEAST = 512
+MIN_DESCRIPTORS = 512
 
 
 def raise_limit() -> int:
     """Raise the limit of open files as far as the system permits; returns it.
 
     Raises:
-        InvalidInput: when it is below ``LEAST``.
+        InvalidInput: when it is below ``MIN_DESCRIPTORS``.
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     target = WANTED if hard == resource.RLIM_INFINITY else min(hard, WANTED)
@@ -27,8 +27,8 @@ def raise_limit() -> int:
             resource.setrlimit(resource.RLIMIT_NOFILE, (target, hard))
             soft = target
     found = WANTED if soft == resource.RLIM_INFINITY else soft
-    if found < LEAST:
-        accepted = f"at least {LEAST}; raise the hard limit (ulimit -Hn, LimitNOFILE= of systemd)"
+    if found < MIN_DESCRIPTORS:
+        accepted = f"at least {MIN_DESCRIPTORS}; raise the hard limit (ulimit -Hn, LimitNOFILE= of systemd)"
         raise InvalidInput("open files", f"a limit of {found} for this process", accepted)
     return found
 

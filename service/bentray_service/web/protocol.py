@@ -14,7 +14,7 @@ from .unread_bodies import UnreadBodies, last
 
 # Time in which a client must read this many bytes of a response, or its rest, s.
 ANSWER_S = 60.0
-LEAST_BYTES = 64 * 1024
+MIN_BYTES = 64 * 1024
 
 SHORT = ("/health/live", "/health/ready")
 JOB = "/v1/jobs/job-"
@@ -68,7 +68,7 @@ class CountedProtocol(UnreadBodies):
 
     def _look_again(self, before: int) -> None:
         left = self._left()
-        if before - left < LEAST_BYTES:
+        if before - left < MIN_BYTES:
             self.transport.abort()
         else:
             self._stuck = self.loop.call_later(ANSWER_S, self._look_again, left)

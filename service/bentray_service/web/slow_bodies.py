@@ -9,11 +9,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from ..errors import BodyTimeout
 
 # Bytes of the body that must arrive within the time limit.
-LEAST_BYTES = 64 * 1024
+MIN_BYTES = 64 * 1024
 
 
 class SlowBodies:
-    """ASGI middleware: ``LEAST_BYTES`` or the end of each body must arrive in every period of ``seconds``.
+    """ASGI middleware: ``MIN_BYTES`` or the end of each body must arrive in every period of ``seconds``.
 
     Otherwise reading the body raises :class:`BodyTimeout`.
     """
@@ -39,11 +39,11 @@ class SlowBodies:
                     message = await receive()
             except TimeoutError:
                 found = f"{came} bytes in {self._seconds:g} s"
-                accepted = f"at least {LEAST_BYTES} bytes in {self._seconds:g} s (BENTRAY_UPLOAD_PATIENCE_S)"
+                accepted = f"at least {MIN_BYTES} bytes in {self._seconds:g} s (BENTRAY_UPLOAD_PATIENCE_S)"
                 raise BodyTimeout("body", found, accepted) from None
             came += len(message.get("body", b""))
             ended = not message.get("more_body", False)
-            if came >= LEAST_BYTES:
+            if came >= MIN_BYTES:
                 due, came = clock() + self._seconds, 0
             return message
 

@@ -19,7 +19,7 @@ HEAD_S = 10.0
 # Maximum length of the headers, and of trailers.
 LONGEST_HEAD = 32 * 1024
 # Maximum number of pipelined requests.
-MOST_PIPELINED = 8
+MAX_PIPELINED = 8
 # Bytes read at once; other connections wait while they are parsed.
 READ_BYTES = 64 * 1024
 # RFC 9112, section 3; the method is a token of RFC 9110, section 5.6.2.
@@ -140,9 +140,9 @@ class HeaderTimeout(HttpToolsProtocol):
         hosts = sum(name == b"host" for name, _ in self.headers)
         if hosts != 1 and self.parser.get_http_version() == "1.1":
             raise MalformedRequest("Host", f"{hosts} Host headers", "exactly one in HTTP/1.1")
-        if len(self.pipeline) >= MOST_PIPELINED:
-            accepted = f"at most {MOST_PIPELINED} pipelined requests"
-            raise MalformedRequest("requests", f"more than {MOST_PIPELINED} at once", accepted)
+        if len(self.pipeline) >= MAX_PIPELINED:
+            accepted = f"at most {MAX_PIPELINED} pipelined requests"
+            raise MalformedRequest("requests", f"more than {MAX_PIPELINED} at once", accepted)
         super().on_headers_complete()
 
     def on_message_complete(self) -> None:

@@ -19,7 +19,7 @@ LATEST_S = 0.02
 # After this many chunks, the mean chunk size must not be smaller than this. Parsing of each chunk
 # blocks other requests for about a microsecond.
 FREE_CHUNKS = 1024
-LEAST_MEAN_BYTES = 512
+MIN_MEAN_BYTES = 512
 
 
 class MergedChunks(HeaderTimeout):
@@ -49,10 +49,10 @@ class MergedChunks(HeaderTimeout):
             return
         self._chunks += 1
         self._came += len(body)
-        few = self._chunks <= FREE_CHUNKS or self._came >= LEAST_MEAN_BYTES * self._chunks
+        few = self._chunks <= FREE_CHUNKS or self._came >= MIN_MEAN_BYTES * self._chunks
         if self._chunked and not few:
             found = f"{self._chunks} chunks of {self._came / self._chunks:.0f} bytes on average"
-            accepted = f"at least {LEAST_MEAN_BYTES} bytes on average, or a Content-Length instead of chunks"
+            accepted = f"at least {MIN_MEAN_BYTES} bytes on average, or a Content-Length instead of chunks"
             raise TinyChunks("body", found, accepted)
         cycle.body += body
         if len(cycle.body) > HIGH_WATER_LIMIT:

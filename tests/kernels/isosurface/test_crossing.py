@@ -14,7 +14,7 @@ from bentray_kernels.isosurface.crossing import (
     BRENT,
     CERTAIN,
     CERTAIN_BRENT,
-    MOST_HALVINGS,
+    MAX_HALVINGS,
     Search,
     leave_interval,
 )
@@ -84,7 +84,7 @@ class Case:
             (start, 1.0),
             interval,
             slope,
-            MOST_HALVINGS,
+            MAX_HALVINGS,
         )
         assert left >= 0
         return s, side
@@ -263,7 +263,7 @@ def plateau(seed: int) -> Case:
     return case
 
 
-@pytest.mark.parametrize("halvings", [0, 20, MOST_HALVINGS])
+@pytest.mark.parametrize("halvings", [0, 20, MAX_HALVINGS])
 def test_a_ray_on_a_plateau_is_given_up_after_so_many_readings(monkeypatch, halvings):
     readings, given_up = [], 0
     read = crossing.field_at
@@ -290,5 +290,5 @@ def test_a_ray_on_a_plateau_is_given_up_after_so_many_readings(monkeypatch, halv
         assert side == 0 or left >= 0
         given_up += left < 0
         # Pieces of the shortest length, of which nothing is proved, use up the halvings sooner.
-        assert left >= 0 or len(readings) <= 2 * (69 + calls) + MOST_HALVINGS
+        assert left >= 0 or len(readings) <= 2 * (69 + calls) + MAX_HALVINGS
     assert given_up >= 5

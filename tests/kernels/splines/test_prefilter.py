@@ -8,7 +8,7 @@ from scipy.interpolate import BSpline
 from scipy.ndimage import spline_filter1d
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.splines.prefilter import MOST_SMOOTHING, prefilter, sampled_bspline, symbols
+from bentray_kernels.splines.prefilter import MAX_SMOOTHING, prefilter, sampled_bspline, symbols
 
 from ...effort import effort
 
@@ -108,7 +108,7 @@ def test_a_constant_is_its_own_spline(order, smoothing):
 def test_much_smoothing_leaves_the_mean():
     values = np.random.default_rng(0).uniform(0.0, 1.0, 12)
     weights = np.array([0.5, *[1.0] * 10, 0.5])
-    smooth = prefilter(values, 3, MOST_SMOOTHING)
+    smooth = prefilter(values, 3, MAX_SMOOTHING)
     assert smooth == pytest.approx(np.average(values, weights=weights), abs=1e-3)
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.splines import Spline, noise_of, smoothing_for_noise
-from bentray_kernels.splines.prefilter import MOST_SMOOTHING, symbols
+from bentray_kernels.splines.prefilter import MAX_SMOOTHING, symbols
 from bentray_kernels.splines.smoothing import ROUNDING, response
 
 
@@ -39,11 +39,11 @@ def test_the_residual_equals_the_noise(order, shape, share, seed):
     volume = np.random.default_rng(seed).normal(size=shape) + 5.0
     sigma = share * volume.std()
     smoothing = smoothing_for_noise(volume, order, sigma)
-    if 0.0 < smoothing < MOST_SMOOTHING:
+    if 0.0 < smoothing < MAX_SMOOTHING:
         assert missed(volume, order, smoothing) == pytest.approx(sigma, rel=1e-5)
     else:
-        assert smoothing == MOST_SMOOTHING
-        assert missed(volume, order, MOST_SMOOTHING) <= sigma
+        assert smoothing == MAX_SMOOTHING
+        assert missed(volume, order, MAX_SMOOTHING) <= sigma
 
 
 @pytest.mark.parametrize("order", range(2, 7))
@@ -59,7 +59,7 @@ def test_the_truth_comes_nearer(order):
 def test_no_noise_means_no_smoothing_and_nothing_else_all_of_it():
     volume = smooth_field((12, 12))
     assert smoothing_for_noise(volume, 3, 0.0) == 0.0
-    assert smoothing_for_noise(volume, 3, 100.0) == MOST_SMOOTHING
+    assert smoothing_for_noise(volume, 3, 100.0) == MAX_SMOOTHING
 
 
 @given(sigma=st.floats(1e-3, 1e2), seed=st.integers(0, 2**32 - 1))

@@ -18,7 +18,7 @@ from bentray_service.rows.tenants import LOCAL
 HDF5 = {"Content-Type": "application/x-hdf5"}
 BYTES = {"Content-Type": "application/octet-stream"}
 TUS = {"Tus-Resumable": "1.0.0"}
-MOST = 2_000_000
+QUOTA_BYTES = 2_000_000
 PATIENCE_S = 30.0
 
 
@@ -86,23 +86,23 @@ def test_what_is_refused_leaves_nothing_and_what_is_deleted_gives_its_room_back(
 
 
 def test_uploads_in_pieces_begun_at_once_do_not_come_together_beyond_it(start):
-    http, begin = start(max_tenant_bytes=MOST), Barrier(8)
+    http, begin = start(max_tenant_bytes=QUOTA_BYTES), Barrier(8)
 
     def ask(_):
         begin.wait()
-        return http.post("/v1/uploads", headers={**TUS, "Upload-Length": str(MOST // 3)}).status_code
+        return http.post("/v1/uploads", headers={**TUS, "Upload-Length": str(QUOTA_BYTES // 3)}).status_code
 
     with ThreadPoolExecutor(8) as pool:
         told = list(pool.map(ask, range(8)))
     assert sorted(told) == [201] * 3 + [507] * 5
-    assert used(http) == (0, MOST // 3 * 3)
+    assert used(http) == (0, QUOTA_BYTES // 3 * 3)
 
 
 @pytest.mark.ingest_process
 @pytest.mark.parametrize("in_pieces", [False, True])
 def test_a_packed_volume_counts_as_it_will_be_stored_before_it_is_written(start, in_pieces):
-    http, content = start(max_tenant_bytes=MOST), packed_zeros(11_000_000)
-    assert len(content) < MOST / 50
+    http, content = start(max_tenant_bytes=QUOTA_BYTES), packed_zeros(11_000_000)
+    assert len(content) < QUOTA_BYTES / 50
     if not in_pieces:
         said = refused(http.post("/v1/volumes", content=content, headers=BYTES))
     else:
@@ -120,13 +120,13 @@ def test_a_packed_volume_counts_as_it_will_be_stored_before_it_is_written(start,
 
 
 def test_exports_count(start):
-    http = start(max_tenant_bytes=MOST)
+    http = start(max_tenant_bytes=QUOTA_BYTES)
     name = volume(http, np.zeros((64, 64, 64), np.float32))
     place = f"/v1/volumes/{name}/data"
     told = {kind: http.get(place, params={"format": kind}).status_code for kind in ("npy", "nifti", "mat")}
     # A mesh of bytes is written as numbers of eight at worst: that is what is reserved meanwhile.
     assert told == {"npy": 507, "nifti": 507, "mat": 507}
-    http = start("larger", max_tenant_bytes=2 * MOST)
+    http = start("larger", max_tenant_bytes=2 * QUOTA_BYTES)
     name = volume(http, np.zeros((64, 64, 64), np.float32))
     place = f"/v1/volumes/{name}/data"
     told = [http.get(place, params={"format": kind}) for kind in ("npy", "npy", "nifti", "metaimage")]
@@ -138,7 +138,7 @@ def test_exports_count(start):
 
 def test_jobs_reserve_what_they_will_store(start, uploaded, submitted, work, until):
     """Of many that are submitted while the first runs, none goes beyond it; at its end it counts as it is."""
-    http = start(max_tenant_bytes=MOST)
+    http = start(max_tenant_bytes=QUOTA_BYTES)
     dataset = uploaded(http)
     stored, _ = used(http)
     work.hold.clear()
@@ -173,11 +173,11 @@ def test_geometry_fields_reserve_their_tables(start):
 
 
 def test_what_a_service_that_died_had_reserved_is_free_at_the_next_start(start):
-    http = start(max_tenant_bytes=MOST)
-    http.app.state.parts.quota.resize(LOCAL, new_id("dataset"), MOST)
-    assert used(http) == (0, MOST)
+    http = start(max_tenant_bytes=QUOTA_BYTES)
+    http.app.state.parts.quota.resize(LOCAL, new_id("dataset"), QUOTA_BYTES)
+    assert used(http) == (0, QUOTA_BYTES)
     http.__exit__()
-    assert used(start(max_tenant_bytes=MOST)) == (0, 0)
+    assert used(start(max_tenant_bytes=QUOTA_BYTES)) == (0, 0)
 
 
 def test_a_reservation_is_released_later_if_the_database_is_away(start, monkeypatch, caplog):

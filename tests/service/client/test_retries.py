@@ -92,7 +92,7 @@ def test_it_ends(walk: Walk) -> None:
         walk.ask(LOOK)
     assert 280.0 < sum(walk.pauses) <= 300.0
     with pytest.raises(ClientError, match="500"):
-        walk.ask(LOOK, *[answered(500)] * retries.MOST_ERRORS)
+        walk.ask(LOOK, *[answered(500)] * retries.MAX_ERRORS)
 
 
 def test_a_wait_with_an_end_of_its_own_ends_there(walk: Walk) -> None:

@@ -12,7 +12,7 @@ def test_lists_and_removals_go_beyond_a_page(bucket_url, monkeypatch):
     call = bucket._call
     short = lambda method, **how: call(method, **({"MaxKeys": 2} if "list" in method else {}), **how)  # noqa: E731
     monkeypatch.setattr(bucket, "_call", short)
-    monkeypatch.setattr(module, "MOST_REMOVED", 2)
+    monkeypatch.setattr(module, "MAX_REMOVED", 2)
     names = [f"a/{number}" for number in range(5)]
     for name in (*names, "b"):
         bucket.put_metadata(name, {})

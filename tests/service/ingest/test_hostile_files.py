@@ -15,9 +15,9 @@ from .damage import damaged
 from .forked_reader import Read, read_all
 
 # Of resident memory: what the libraries take, and some hundred megabytes for a file of a few.
-MOST_BYTES = 700 * 2**20
+MAX_BYTES = 700 * 2**20
 
-LEAST_REFUSED = effort(25, 200)
+MIN_REJECTED = effort(25, 200)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def check_refused(read: Read, field: str) -> None:
     assert error["field"] == field, error
     assert error["found"]
     assert error["accepted"]
-    assert read.most_bytes < MOST_BYTES
+    assert read.most_bytes < MAX_BYTES
 
 
 @pytest.mark.parametrize("name", hostile_datasets.REFUSED)
@@ -100,7 +100,7 @@ def test_damaged_scans_are_refused(folder, sound):
         files.append(("dataset", path, {}))
     reads = read_all(files, folder)
     refused = [read for read in reads if read.refused]
-    assert len(refused) >= LEAST_REFUSED
+    assert len(refused) >= MIN_REJECTED
     for read in refused:
         # HDF5 goes round in circles in a few of them, or crashes; the sandbox then refuses them as a whole.
         if read.status == 0:
@@ -111,4 +111,4 @@ def test_damaged_scans_are_refused(folder, sound):
     # The others were damaged where it does not show, and hold a scan of the same shape.
     for read in [one for one in reads if not one.refused]:
         assert (read.answer["ok"]["dimension"], read.answer["ok"]["ntx"]) == (2, 12)
-    assert max(read.most_bytes for read in reads) < MOST_BYTES
+    assert max(read.most_bytes for read in reads) < MAX_BYTES

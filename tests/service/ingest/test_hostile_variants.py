@@ -9,7 +9,7 @@ from bentray_kernels.errors import LONGEST_VALUE
 from . import hostile_variants
 from .forked_reader import Read, read_all
 
-MOST_BYTES = 700 * 2**20
+MAX_BYTES = 700 * 2**20
 # What stands in some of the files, and in no answer.
 SECRETS = ("passwd", "\\u001b", "..\\\\x")
 
@@ -34,4 +34,4 @@ def test_it_is_refused_by_name(reads, name):
     assert error["field"] == hostile_variants.REFUSED[name][-1], error
     assert 0 < len(error["found"]) <= LONGEST_VALUE
     assert not any(secret in hostile_variants.spoken(error) for secret in SECRETS)
-    assert read.most_bytes < MOST_BYTES
+    assert read.most_bytes < MAX_BYTES

@@ -328,7 +328,7 @@ def test_other_refusals_of_a_field(start, monkeypatch):
     mesh = put_mesh(http)
     both = {"kind": "geometry-field", "mesh": mesh, "volume": "vol-1"}
     assert http.post("/v1/jobs", json=both).json()["field"] == "volume"
-    monkeypatch.setattr(field_settings, "MOST_FACES", 100)
+    monkeypatch.setattr(field_settings, "MAX_FACES", 100)
     body = ask_field(http, mesh).json()
     assert (body["status"], body["field"]) == (422, "mesh")
 

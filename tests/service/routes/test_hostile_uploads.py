@@ -17,7 +17,7 @@ pytestmark = pytest.mark.ingest_process
 
 STREAM = {"Content-Type": "application/octet-stream"}
 # Resident memory that the service may gain while it refuses some dozens of files.
-MOST_GROWN = 100 * 2**20
+MAX_GROWTH = 100 * 2**20
 
 # Each starts a process; tests/service/ingest reads all kinds without the service.
 SCANS = (
@@ -60,7 +60,7 @@ def test_nothing_is_left_of_a_hostile_file(start, hostile):
         assert body["found"]
         assert body["accepted"]
     assert http.get("/health/live").status_code == 200
-    assert here.memory_info().rss - before < MOST_GROWN
+    assert here.memory_info().rss - before < MAX_GROWTH
     assert set(here.children()) <= children
     root = http.app.state.parts.files.root
     # The audit tells of the requests; it holds nothing of the files.

@@ -181,7 +181,7 @@ def test_refused_surfaces(http, query, field):
 
 
 def test_a_surface_that_is_too_large(http, monkeypatch):
-    monkeypatch.setattr(isosurface_mesh, "MOST_CROSSINGS", 50)
+    monkeypatch.setattr(isosurface_mesh, "MAX_CROSSINGS", 50)
     answer = http.post(f"{volume(http)}/mesh")
     assert (answer.status_code, answer.json()["field"]) == (422, "iso")
     assert "a larger step" in answer.json()["accepted"]

@@ -188,7 +188,7 @@ def test_a_volume_of_one_value(http):
 
 def test_a_volume_that_no_worker_can_hold(http, cluster, monkeypatch):
     here = put(http)
-    monkeypatch.setattr(scene_cache, "MOST_BUILDING_BYTES", 1000)
+    monkeypatch.setattr(scene_cache, "MAX_BUILDING_BYTES", 1000)
     body = http.get(here).json()
     assert (body["status"], body["field"]) == (422, "volume")
     assert "1000 bytes" in body["accepted"]

@@ -9,7 +9,7 @@ from starlette.requests import ClientDisconnect, Request
 
 from bentray_service.errors import Busy
 from bentray_service.ingest.fair_queue import FairQueue
-from bentray_service.ingest.upload_limits import MOST_OF_TENANT
+from bentray_service.ingest.upload_limits import MAX_PER_TENANT
 from bentray_service.routes import uploads
 from bentray_service.routes.uploads import run_in_turn
 from bentray_service.rows.tenants import LOCAL, Tenant
@@ -97,7 +97,7 @@ def test_a_tenant_with_too_many_on_their_way_is_told_when_to_come_again(start, s
     http = start()
     limits = http.app.state.parts.upload_limits
     with ExitStack() as stack:
-        for _ in range(MOST_OF_TENANT):
+        for _ in range(MAX_PER_TENANT):
             stack.enter_context(limits(LOCAL))
         answer = http.post("/v1/datasets", content=scan().read_bytes(), headers=HDF5)
         assert (answer.status_code, answer.headers["retry-after"]) == (429, "10")

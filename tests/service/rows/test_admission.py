@@ -7,7 +7,7 @@ import pytest
 
 from bentray_service.errors import DatabaseUnavailable
 from bentray_service.rows import admission
-from bentray_service.rows.admission import MOST_AT_ONCE, MOST_WHILE_SLOW, Admission
+from bentray_service.rows.admission import MAX_CONCURRENT, MAX_CONCURRENT_WHEN_SLOW, Admission
 
 
 class Clock:
@@ -20,7 +20,7 @@ class Clock:
 def test_many_at_once_while_it_is_quick():
     sign_in = Admission(Clock())
     with ExitStack() as stack:
-        for _ in range(MOST_AT_ONCE):
+        for _ in range(MAX_CONCURRENT):
             stack.enter_context(sign_in())
 
 
@@ -28,7 +28,7 @@ def test_few_once_the_oldest_has_taken_long():
     clock = Clock()
     sign_in = Admission(clock)
     with ExitStack() as stack:
-        for _ in range(MOST_WHILE_SLOW):
+        for _ in range(MAX_CONCURRENT_WHEN_SLOW):
             stack.enter_context(sign_in())
         clock.now = 2.5
         with pytest.raises(DatabaseUnavailable, match="8 requests waiting for a slow database"):
@@ -47,7 +47,7 @@ def test_one_more_waits_a_moment_for_a_place(monkeypatch):
             left.set()
 
     with ExitStack() as stack:
-        for _ in range(MOST_AT_ONCE):
+        for _ in range(MAX_CONCURRENT):
             stack.enter_context(sign_in())
         thread = threading.Thread(target=last)
         thread.start()
@@ -61,7 +61,7 @@ def test_the_one_after_all_places_is_refused(monkeypatch):
     monkeypatch.setattr(admission, "PLACE_SECONDS", 0.0)
     sign_in = Admission(Clock())
     with ExitStack() as stack:
-        for _ in range(MOST_AT_ONCE):
+        for _ in range(MAX_CONCURRENT):
             stack.enter_context(sign_in())
         with pytest.raises(DatabaseUnavailable, match="32 requests waiting for the database"):
             stack.enter_context(sign_in())

@@ -18,7 +18,7 @@ AT_ONCE = 50
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """More threads than a service has, on a machine that may be slow, are not to be sent away here."""
-    monkeypatch.setattr(admission, "MOST_AT_ONCE", AT_ONCE)
+    monkeypatch.setattr(admission, "MAX_CONCURRENT", AT_ONCE)
     monkeypatch.setattr(admission, "SLOW_SECONDS", 60.0)
 
 

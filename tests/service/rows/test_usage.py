@@ -63,7 +63,7 @@ def test_of_many_uploads_begun_at_once_as_many_are_allowed_as_fit(database):
 
 
 def test_of_many_uploads_begun_at_once_there_are_no_more_than_a_tenant_may_have(database, monkeypatch):
-    monkeypatch.setattr(uploading, "MOST_BEGUN", 5)
+    monkeypatch.setattr(uploading, "MAX_INCOMPLETE", 5)
     uploads = Uploads(database)
     assert at_once(lambda n: uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)).count(True) == 5
     with pytest.raises(RateLimited, match="5 incomplete uploads; accepted: fewer than 5") as refused:

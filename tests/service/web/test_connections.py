@@ -14,7 +14,7 @@ import pytest
 
 from bentray_service.web import descriptors, protocol
 from bentray_service.web.addresses import networks
-from bentray_service.web.connections import KEPT, MOST, SPARE, ConnectionLimits, Connections
+from bentray_service.web.connections import KEPT, MAX_CONNECTIONS, SPARE, ConnectionLimits, Connections
 
 from .speaking import connected, read_answer, read_to_end, served
 
@@ -97,8 +97,8 @@ def test_a_trusted_proxy_brings_many():
     ("allowed", "in_use", "of_address", "most", "each"),
     [
         (1024, 100, None, (1024 - 100 - KEPT - SPARE) // 2, (1024 - 100 - KEPT - SPARE) // 8),
-        (65536, 100, None, MOST, MOST // 4),
-        (65536, 100, 7, MOST, 7),
+        (65536, 100, None, MAX_CONNECTIONS, MAX_CONNECTIONS // 4),
+        (65536, 100, 7, MAX_CONNECTIONS, 7),
         (512, 600, None, 1, 1),
         (1024, 100, 10_000, 366, 366),
     ],

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from bentray_service.errors import BodyTimeout
-from bentray_service.web.slow_bodies import LEAST_BYTES, SlowBodies
+from bentray_service.web.slow_bodies import MIN_BYTES, SlowBodies
 
 HTTP = {"type": "http"}
 SECONDS = 0.5
@@ -36,7 +36,7 @@ def test_a_body_that_comes_is_read():
 
 
 def test_a_body_that_drips_is_broken_off():
-    with pytest.raises(BodyTimeout, match=f"at least {LEAST_BYTES} bytes in 0.5 s"):
+    with pytest.raises(BodyTimeout, match=f"at least {MIN_BYTES} bytes in 0.5 s"):
         run([b"x"] * 10_000, every=0.005)
 
 
@@ -47,7 +47,7 @@ def test_a_body_that_stops_is_broken_off():
 
 def test_enough_in_each_time_is_enough():
     # Longer in all than the time for one part of it, at any speed of this machine.
-    assert len(run([bytes(LEAST_BYTES)] * 220, every=0.01, seconds=2.0)) == 220
+    assert len(run([bytes(MIN_BYTES)] * 220, every=0.01, seconds=2.0)) == 220
 
 
 def test_who_waits_after_the_body_is_not_hurried():

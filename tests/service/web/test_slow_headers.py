@@ -154,7 +154,7 @@ def test_requests_at_once_are_answered_in_turn_and_bounded(telling):
     with connected(telling) as connection:
         connection.sendall(3000 * REQUEST)
         answers = read_to_end(connection).count(b"HTTP/1.1 ")
-        assert answers <= slow_headers.MOST_PIPELINED + 1
+        assert answers <= slow_headers.MAX_PIPELINED + 1
 
 
 def test_nothing_is_written_into_an_answer_that_is_being_made(server):

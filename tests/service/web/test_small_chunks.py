@@ -89,7 +89,7 @@ def test_a_few_are_taken_and_come_together(server):
 
 def test_any_number_of_large_ones_is_taken(server):
     # One that comes in two parts counts twice.
-    length, count = small_chunks.LEAST_MEAN_BYTES + 10, 8 * small_chunks.FREE_CHUNKS
+    length, count = small_chunks.MIN_MEAN_BYTES + 10, 8 * small_chunks.FREE_CHUNKS
     large = b"%x\r\n%b\r\n" % (length, bytes(length))
     status, (_, size) = answer(server, HEAD + count * large + END)
     assert (status, size) == (200, count * length)

@@ -6,7 +6,7 @@ from distributed import KilledWorker
 
 from bentray_kernels.task_graph import Task
 from bentray_workers.cluster import attempts
-from bentray_workers.cluster.attempts import MOST_DEATHS, Attempts, ResultsLostError, marked
+from bentray_workers.cluster.attempts import MAX_DEATHS, Attempts, ResultsLostError, marked
 
 
 class Future(distributed.Future):
@@ -62,7 +62,7 @@ def test_who_only_waited_is_tried_again_for_ever(made):
 
 def test_who_ran_is_given_up(made):
     future = made.submit(Task(print, (1,)))
-    for _ in range(MOST_DEATHS):
+    for _ in range(MAX_DEATHS):
         future, _ = made.result(future.killed(while_running=True))
         assert not future.work[0].exists()
     with pytest.raises(KilledWorker):

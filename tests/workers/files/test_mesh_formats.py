@@ -194,7 +194,7 @@ def test_obj_opens_no_material_file(tmp_path, monkeypatch):
 
 def test_limits(monkeypatch):
     data = exported("ply")
-    monkeypatch.setattr(mesh_formats, "MOST_FACES", 79)
+    monkeypatch.setattr(mesh_formats, "MAX_FACES", 79)
     with pytest.raises(InvalidInput, match="faces: found 80; accepted: at most 79"):
         read_mesh(data)
     monkeypatch.setattr(mesh_formats, "LARGEST_BYTES", len(data) - 1)

@@ -10,7 +10,7 @@ from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.images.plane import plane_of
-from bentray_workers.images.plane_picture import MOST_OF_WIDTH, plane_png, scale_of
+from bentray_workers.images.plane_picture import MAX_WIDTH_FRACTION, plane_png, scale_of
 from bentray_workers.images.slice_style import SliceStyle
 
 from .pixels import near, pixels
@@ -79,8 +79,8 @@ def test_the_scale_bar_is_as_long_as_it_says():
 @given(st.floats(1e-9, 1e6))
 def test_scales_are_round_and_short_enough(width):
     scale = scale_of(width)
-    assert scale <= MOST_OF_WIDTH * width
-    assert scale > 0.39 * MOST_OF_WIDTH * width
+    assert scale <= MAX_WIDTH_FRACTION * width
+    assert scale > 0.39 * MAX_WIDTH_FRACTION * width
     assert float(f"{scale:.1e}"[0]) in (1.0, 2.0, 5.0)
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.rendering.field_settings import MOST_FACES, FieldSettings, check_faces
+from bentray_workers.rendering.field_settings import MAX_FACES, FieldSettings, check_faces
 
 OTHER = {"samples": 12, "inner_samples": 8, "divisions": 4, "image_size": 129, "image_threshold": 1e-3}
 
@@ -39,6 +39,6 @@ def test_what_is_refused(name, value):
 
 
 def test_a_mesh_that_is_too_large():
-    check_faces(MOST_FACES)
+    check_faces(MAX_FACES)
     with pytest.raises(InvalidInput, match="mesh"):
-        check_faces(MOST_FACES + 1)
+        check_faces(MAX_FACES + 1)

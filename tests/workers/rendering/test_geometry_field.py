@@ -127,7 +127,7 @@ def test_what_is_refused(path, tmp_path, monkeypatch):
     settings = FieldSettings(samples=4, inner_samples=4, image_size=33, image_threshold=1e-9)
     with pytest.raises(InvalidInput, match="threshold"):
         made(path, tmp_path, settings=settings)
-    monkeypatch.setattr(field_tasks, "MOST_INNER", 100)
+    monkeypatch.setattr(field_tasks, "MAX_INNER", 100)
     with pytest.raises(InvalidInput, match="fewer divisions"):
         made(path, tmp_path)
     assert not (tmp_path / "field").exists()

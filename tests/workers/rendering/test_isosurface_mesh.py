@@ -58,9 +58,9 @@ def test_what_is_refused(tmp_path, iso, step, field):
 
 def test_a_large_surface_and_a_large_volume_are_refused(tmp_path, monkeypatch):
     path = balls(tmp_path, (11, 11, 11))
-    monkeypatch.setattr(isosurface_mesh, "MOST_CROSSINGS", 100)
+    monkeypatch.setattr(isosurface_mesh, "MAX_CROSSINGS", 100)
     with pytest.raises(InvalidInput, match="a larger step"):
         mesh_volume(path, 0.0, 1, tmp_path / "m.h5")
-    monkeypatch.setattr(isosurface_mesh, "MOST_NODES", 24**3 - 1)
+    monkeypatch.setattr(isosurface_mesh, "MAX_NODES", 24**3 - 1)
     with pytest.raises(InvalidInput, match="nodes"):
         mesh_volume(path, 0.0, 1, tmp_path / "m.h5")

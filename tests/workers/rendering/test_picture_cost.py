@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.request_fields import MOST_PIXELS
+from bentray_kernels.request_fields import MAX_PIXELS
 from bentray_workers.cluster.capacities import WorkerCapacity
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.files.volume_export import export_volume
@@ -34,10 +34,10 @@ LANES = ("recon", "render")
 
 def test_a_large_picture_of_smooth_glass_is_taken_and_a_deep_one_refused():
     stored = VolumeFile((128, 128, 128), 6)
-    large = RefractionView(width=MOST_PIXELS, height=MOST_PIXELS)
-    assert refraction_cost(stored, large).seconds < picture_cost.MOST_SECONDS + 1.0
+    large = RefractionView(width=MAX_PIXELS, height=MAX_PIXELS)
+    assert refraction_cost(stored, large).seconds < picture_cost.MAX_SECONDS + 1.0
     with pytest.raises(InvalidInput, match=r"width, height, depth: .* or submit a job of kind `refraction`"):
-        refraction_cost(stored, RefractionView(width=MOST_PIXELS, height=MOST_PIXELS, depth=256))
+        refraction_cost(stored, RefractionView(width=MAX_PIXELS, height=MAX_PIXELS, depth=256))
     # What is named as the largest is taken.
     with pytest.raises(InvalidInput) as refused:
         refraction_cost(stored, RefractionView(width=4000, height=2000, depth=200))
@@ -51,11 +51,9 @@ def test_a_large_picture_of_smooth_glass_is_taken_and_a_deep_one_refused():
 def test_the_page_may_draw_a_field_and_the_largest_picture_of_few_surfaces():
     page = field_cost({}, FieldView(width=512, height=512, rays=2))
     assert page.seconds < 5.0
-    assert (
-        field_cost({}, FieldView(width=MOST_PIXELS, height=MOST_PIXELS)).seconds < picture_cost.MOST_SECONDS
-    )
+    assert field_cost({}, FieldView(width=MAX_PIXELS, height=MAX_PIXELS)).seconds < picture_cost.MAX_SECONDS
     with pytest.raises(InvalidInput, match=r"width, height, rays, depth: .* or a smaller depth"):
-        field_cost({}, FieldView(width=MOST_PIXELS, height=MOST_PIXELS, depth=64))
+        field_cost({}, FieldView(width=MAX_PIXELS, height=MAX_PIXELS, depth=64))
 
 
 def test_it_grows_with_whatever_takes_longer():

@@ -115,7 +115,7 @@ def test_a_volume_that_no_worker_can_hold_is_refused_before_it_is_read(path, mon
     check_size((512, 512, 512))
     with pytest.raises(InvalidInput, match=r"shape \(1024, 1024, 1024\)"):
         check_size((1024, 1024, 1024))
-    monkeypatch.setattr(scene_cache, "MOST_BUILDING_BYTES", 1000)
+    monkeypatch.setattr(scene_cache, "MAX_BUILDING_BYTES", 1000)
     monkeypatch.setattr(scene_cache, "import_volume", None)
     with pytest.raises(InvalidInput, match="1000 bytes"):
         scene_at(path, RefractionView())

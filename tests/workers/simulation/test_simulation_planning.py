@@ -83,7 +83,7 @@ def test_what_no_worker_can_hold_is_refused(asked, field):
 def test_files_that_nobody_could_read_and_too_many_tasks_are_refused(monkeypatch):
     with pytest.raises(InvalidInput, match=r"elements: found .* a file of"):
         plan_simulation(PhantomScan(phantom="table7", elements=4096, slices=1000), [])
-    monkeypatch.setattr(simulation_planning, "MOST_TASKS", 20)
+    monkeypatch.setattr(simulation_planning, "MAX_TASKS", 20)
     with pytest.raises(InvalidInput, match="at most 20 tasks"):
         plan_simulation(WAVES, [])
 

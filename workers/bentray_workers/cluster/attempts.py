@@ -15,7 +15,7 @@ from .memory_cache import evict_for_job
 from .resources import RECONSTRUCTION
 
 # Deaths of workers while a task runs, after which it fails.
-MOST_DEATHS = 2
+MAX_DEATHS = 2
 
 
 class ResultsLostError(ConnectionError):
@@ -86,7 +86,7 @@ class Attempts:
         except KilledWorker as error:
             deaths = attempt.deaths + attempt.marker.exists()
             attempt.marker.unlink(missing_ok=True)
-            if deaths > MOST_DEATHS:
+            if deaths > MAX_DEATHS:
                 raise
             if any(needed.status == "error" for needed in _futures(attempt.task.arguments)):
                 raise ResultsLostError("results that a task needs were lost with their workers") from error

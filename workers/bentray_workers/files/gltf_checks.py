@@ -13,7 +13,7 @@ COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 NUMBERS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 # Of nodes, meshes, primitives, accessors, views and buffers.
-MOST_PARTS = 100_000
+MAX_PARTS = 100_000
 # Primitives: separate triangles, and a strip of them; points, lines and fans are not read.
 TRIANGLES, STRIP = 4, 5
 
@@ -53,8 +53,8 @@ def _objects(scene: Json, name: str) -> Sequence[Json]:
     objects = scene.get(name, [])
     if not isinstance(objects, list) or not all(isinstance(one, dict) for one in objects):
         raise InvalidInput(name, "no list of objects", "a list, as glTF 2.0 has it")
-    if len(objects) > MOST_PARTS:
-        raise InvalidInput(name, len(objects), f"at most {MOST_PARTS}")
+    if len(objects) > MAX_PARTS:
+        raise InvalidInput(name, len(objects), f"at most {MAX_PARTS}")
     return objects
 
 

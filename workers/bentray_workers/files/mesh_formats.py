@@ -27,7 +27,7 @@ from .off_checks import HEADERS, check_off
 ACCEPTED = "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB"
 
 LARGEST_BYTES = 256 * 2**20
-MOST_FACES = 2_000_000
+MAX_FACES = 2_000_000
 
 # Written before text by some editors.
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
@@ -65,7 +65,7 @@ def read_mesh(data: bytes) -> ReadMesh:
         data: the whole file.
 
     Raises:
-        InvalidInput: for other formats, more than ``LARGEST_BYTES`` or ``MOST_FACES``, damaged data, glTF
+        InvalidInput: for other formats, more than ``LARGEST_BYTES`` or ``MAX_FACES``, damaged data, glTF
             that refers to other files, and as ``meshes.defects.sound``.
     """
     if len(data) > LARGEST_BYTES:
@@ -82,8 +82,8 @@ def read_mesh(data: bytes) -> ReadMesh:
         loaded = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False)
         mesh = loaded.to_mesh()
         faces, vertices = np.asarray(mesh.faces), np.asarray(mesh.vertices)
-    if len(faces) > MOST_FACES:
-        raise InvalidInput("faces", len(faces), f"at most {MOST_FACES}")
+    if len(faces) > MAX_FACES:
+        raise InvalidInput("faces", len(faces), f"at most {MAX_FACES}")
     surface = sound(vertices, faces)
     return ReadMesh(kind, surface, _colours(mesh, surface))
 
@@ -146,7 +146,7 @@ def _without_materials(data: bytes, kind: str) -> bytes:
         if outside:
             # The name may be that of any file of this machine; it is not repeated.
             raise InvalidInput("buffers/uri", "data in another file", "data within the file")
-        check_gltf(scene, len(data), MOST_FACES)
+        check_gltf(scene, len(data), MAX_FACES)
         stripped = json.dumps(_stripped(scene)).encode()
     if kind == "gltf":
         return stripped

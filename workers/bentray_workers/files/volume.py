@@ -26,7 +26,7 @@ KEPT = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
 
 # Position of node 0; large values are harmless.
 ORIGIN_M = Range(-1e6, 1e6, unit="m")
-MOST_FLOAT32 = float(np.finfo(np.float32).max)
+MAX_FLOAT32 = float(np.finfo(np.float32).max)
 # Levels of its range that must be distinguishable in float32, as many as in 8 bits.
 LEVELS = 256
 Triple = tuple[float, float, float]
@@ -97,11 +97,9 @@ def _as_float32(values: NDArray[Any]) -> NDArray[np.float32]:
     """Convert to float32; raises InvalidInput if values become indistinguishable."""
     low, high = values.min().item(), values.max().item()
     biggest = max(abs(low), abs(high))
-    if MOST_FLOAT32 < biggest < math.inf:
+    if MAX_FLOAT32 < biggest < math.inf:
         found = low if abs(low) == biggest else high
-        raise InvalidInput(
-            "values", f"{found:g}, beyond float32", f"numbers up to {MOST_FLOAT32:.2g} in size"
-        )
+        raise InvalidInput("values", f"{found:g}, beyond float32", f"numbers up to {MAX_FLOAT32:.2g} in size")
     # Infinite values are rejected with the volume.
     with np.errstate(over="ignore"):
         stored = np.ascontiguousarray(values, dtype=np.float32)

@@ -12,7 +12,7 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 
 # Cosine between two axes; rounding in headers causes far less.
-MOST_SHEAR = 1e-3
+MAX_SHEAR = 1e-3
 # Squares of longer steps overflow; no grid has them.
 LARGEST = 1e100
 
@@ -38,7 +38,7 @@ def reorient(values: NDArray[Any], affine: Floats, field: str) -> tuple[NDArray[
         return values, affine
     axes = affine[:3, :3] / lengths
     cosine = float(np.abs(axes.T @ axes - np.eye(3)).max())
-    if cosine > MOST_SHEAR:
+    if cosine > MAX_SHEAR:
         angle = math.degrees(math.acos(min(cosine, 1.0)))
         accepted = "orthogonal axes; resample the volume on such a grid"
         raise InvalidInput(field, f"a sheared grid: axes {angle:.2f} degrees apart", accepted)

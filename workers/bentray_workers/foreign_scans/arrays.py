@@ -19,7 +19,7 @@ LARGEST_ROW = 256 * 2**20
 # Of all declared arrays of a file.
 LARGEST_TOTAL = 32 * 2**30
 
-MOST_AXES = 4
+MAX_AXES = 4
 
 # Fields of the upload format by names without groups, and by foreign names.
 PLACES = {place.rpartition("/")[2]: place for place in (*COUNTED, *OVER_PAIRS)} | {
@@ -90,8 +90,8 @@ def check_declared(
     """
     if dtype.kind not in "iufb" or dtype.itemsize > 8:
         raise InvalidInput(name, f"{dtype}", "real numbers of at most 8 bytes, or booleans")
-    if len(shape) > MOST_AXES or any(n < 0 for n in shape):
-        raise InvalidInput(name, f"shape {tuple(shape)}", f"at most {MOST_AXES} axes")
+    if len(shape) > MAX_AXES or any(n < 0 for n in shape):
+        raise InvalidInput(name, f"shape {tuple(shape)}", f"at most {MAX_AXES} axes")
     size = math.prod(int(n) for n in shape) * dtype.itemsize
     if size > LARGEST_TOTAL:
         raise InvalidInput(name, f"{size} bytes unpacked", f"at most {LARGEST_TOTAL} bytes")

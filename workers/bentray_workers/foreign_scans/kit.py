@@ -39,7 +39,7 @@ DELAY_S = 2e-6
 CENTER_HZ = 2.5e6
 # Receivers whose traces are computed together.
 AT_ONCE = 128
-MOST_SAMPLES = 32_768
+MAX_SAMPLES = 32_768
 
 
 class _Emission(NamedTuple):
@@ -182,7 +182,7 @@ class Measurement:
                 values = decode_float16(columns) if is_float else columns
                 rows = np.asarray(values, dtype=np.float64).T
                 rows = reconstruct_undersampled(rows) if self._undersampled else rows
-                return np.asarray(rows.mean(axis=0)[:MOST_SAMPLES])
+                return np.asarray(rows.mean(axis=0)[:MAX_SAMPLES])
         defined = f"{self._root}CE.mat"
         if defined not in self._files.names:
             return None
@@ -190,8 +190,8 @@ class Measurement:
         code, rate = found.get("CE"), _number(found, "CE_SF")
         if code is None or code.dtype.kind not in "iuf" or not code.size or rate is None or rate <= 0.0:
             return None
-        code = np.asarray(code, dtype=np.float64).ravel()[: MOST_SAMPLES * 16]
-        at = np.arange(0.0, (len(code) - 1) / rate, 1.0 / RATE_HZ)[:MOST_SAMPLES]
+        code = np.asarray(code, dtype=np.float64).ravel()[: MAX_SAMPLES * 16]
+        at = np.arange(0.0, (len(code) - 1) / rate, 1.0 / RATE_HZ)[:MAX_SAMPLES]
         return np.asarray(np.interp(at, np.arange(len(code)) / rate, code))
 
     def _columns(self, emission: _Emission) -> tuple[NDArray[np.int64], int]:
@@ -200,8 +200,8 @@ class Measurement:
             declared = arrays.declared("AScans")
             elements = self._elements(arrays, emission.name)
         shape = () if declared is None else declared[0]
-        if len(shape) != 2 or shape[0] != len(elements) or not 2 <= shape[1] <= MOST_SAMPLES:
-            accepted = f"(samples, {len(elements)}), at most {MOST_SAMPLES} samples"
+        if len(shape) != 2 or shape[0] != len(elements) or not 2 <= shape[1] <= MAX_SAMPLES:
+            accepted = f"(samples, {len(elements)}), at most {MAX_SAMPLES} samples"
             raise InvalidInput(f"{emission.name}: AScans", f"shape {shape[::-1]}", accepted)
         return elements, shape[1]
 

@@ -33,7 +33,7 @@ from .zip_checks import WHOLE, check_zip
 
 GEOMETRY = "geometry.npz"
 OUTPUT = re.compile(r"(object|water)/[^/]+\.(h5|hdf5)")
-MOST_OUTPUTS = 8192
+MAX_OUTPUTS = 8192
 PRESSURE = "(1, Nt, receivers) pressures of a sensor mask"
 RATE = "acquisition/sampling_rate_hz"
 
@@ -59,7 +59,7 @@ class KWave:
         self._zip = archive
         self._scratch = scratch
         with refusing_zip("file", WHOLE):
-            check_zip(archive, MOST_OUTPUTS)
+            check_zip(archive, MAX_OUTPUTS)
         names = archive.namelist()
         if GEOMETRY not in names:
             raise InvalidInput(GEOMETRY, "nothing", "positions, tx and rx beside the outputs of k-Wave")

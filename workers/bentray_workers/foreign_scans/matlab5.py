@@ -41,7 +41,7 @@ OTHERS = {
 }
 COMPLEX = 0x0800
 
-MOST_VARIABLES = 1000
+MAX_VARIABLES = 1000
 LONGEST_NAME = 200
 # Alignment after the numbers of an array.
 PADDING_BYTES = 8
@@ -138,7 +138,7 @@ class Matlab5:
 
     def _index(self, file: IO[bytes], size: int) -> Iterator[tuple[str, _Variable]]:
         at = HEADER_BYTES
-        for _ in range(MOST_VARIABLES):
+        for _ in range(MAX_VARIABLES):
             if at + 8 > size:
                 return
             file.seek(at)
@@ -148,7 +148,7 @@ class Matlab5:
             packed = kind == COMPRESSED
             yield self._variable(Stream(file, at + 8, length, packed, "file"), at + 8, length, packed)
             at += 8 + length
-        raise InvalidInput("file", f"more than {MOST_VARIABLES} variables", "fewer")
+        raise InvalidInput("file", f"more than {MAX_VARIABLES} variables", "fewer")
 
     def _variable(self, stream: Stream, offset: int, length: int, packed: bool) -> tuple[str, _Variable]:
         if packed:

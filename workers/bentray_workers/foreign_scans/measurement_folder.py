@@ -17,7 +17,7 @@ from .matlab5 import Matlab5
 from .open_scan import OpenScan
 from .zip_checks import WHOLE, check_zip
 
-MOST_FILES = 65_536
+MAX_FILES = 65_536
 # Of a file with descriptions, of which single variables are read whole.
 LARGEST_DESCRIPTION = 64 * 2**20
 
@@ -36,9 +36,9 @@ class MeasurementFolder:
         self._scan = scan
         if scan.archive is not None:
             with rejecting_damage("file", WHOLE):
-                check_zip(scan.archive, MOST_FILES)
-        if len(scan.members) > MOST_FILES:
-            raise InvalidInput("file", f"{len(scan.members)} files", f"at most {MOST_FILES}")
+                check_zip(scan.archive, MAX_FILES)
+        if len(scan.members) > MAX_FILES:
+            raise InvalidInput("file", f"{len(scan.members)} files", f"at most {MAX_FILES}")
         self.names = scan.members
 
     @contextmanager

@@ -19,7 +19,7 @@ from .zip_checks import PACKING, check_zip
 
 START = b"PK\x03\x04"
 SUFFIX = ".npy"
-MOST_MEMBERS = 1000
+MAX_MEMBERS = 1000
 
 WHOLE = "a whole .npz of plain arrays"
 
@@ -40,7 +40,7 @@ class Npz:
     def __init__(self, archive: zipfile.ZipFile | IO[bytes]) -> None:
         with rejecting_damage("file", WHOLE):
             self._zip = archive if isinstance(archive, zipfile.ZipFile) else zipfile.ZipFile(archive)
-            check_zip(self._zip, MOST_MEMBERS)
+            check_zip(self._zip, MAX_MEMBERS)
         self._members = {
             member.filename.removesuffix(SUFFIX): member
             for member in self._zip.infolist()

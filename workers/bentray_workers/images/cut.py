@@ -12,7 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction
 
 # Smallest number of slices for a vertical section.
-LEAST_HEIGHTS = 4
+MIN_HEIGHTS = 4
 
 Kind = TypeVar("Kind", bound=np.generic)
 
@@ -39,7 +39,5 @@ def cut(volume: NDArray[Kind], index: int) -> NDArray[Kind]:
 def has_section(result: Reconstruction) -> bool:
     """Whether there are enough evenly spaced slices for a vertical section."""
     return (
-        result.speed.ndim == 3
-        and result.speed.shape[2] >= LEAST_HEIGHTS
-        and math.isfinite(result.spacing_m[2])
+        result.speed.ndim == 3 and result.speed.shape[2] >= MIN_HEIGHTS and math.isfinite(result.spacing_m[2])
     )

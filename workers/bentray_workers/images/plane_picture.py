@@ -13,17 +13,17 @@ from matplotlib.ticker import MaxNLocator
 from .canvas import bare_figure, drawing, fit, open_figure, to_png
 from .maps import Limits, draw_bar, draw_map
 from .plane import Plane
-from .slice_style import INTERPOLATIONS, MOST_SIZE, SliceStyle
+from .slice_style import INTERPOLATIONS, MAX_SIZE, SliceStyle
 
 # Framed picture, inches: longest side of the image, and the colour bar.
 LONGEST_IN = 4.96
-BAR_IN, BAR_GAP_IN, LEAST_BAR_IN = 0.19, 0.075, 1.6
+BAR_IN, BAR_GAP_IN, MIN_BAR_IN = 0.19, 0.075, 1.6
 # Smallest space of a number along an axis.
 NUMBER_IN = 0.5
 # From the lower edge of the image, below the name of its axis.
 NOTE_POINTS = -36
 # Largest length of a scale bar, and its distance from the corner, relative to the width of the image.
-MOST_OF_WIDTH, MARGIN = 0.3, 0.05
+MAX_WIDTH_FRACTION, MARGIN = 0.3, 0.05
 
 
 def plane_png(plane: Plane, limits: Limits, style: SliceStyle, *, title: str, unit: str, note: str) -> bytes:
@@ -58,7 +58,7 @@ def _framed(plane: Plane, limits: Limits, style: SliceStyle, title: str, unit: s
         axis.set_major_locator(MaxNLocator(min(5, int(side / NUMBER_IN) + 1)))
     if style.colour_bar:
         # Beside a flat image the bar is higher, to fit its numbers.
-        beside = place(1.0 + width + BAR_GAP_IN, 1.0, BAR_IN, max(height, LEAST_BAR_IN))
+        beside = place(1.0 + width + BAR_GAP_IN, 1.0, BAR_IN, max(height, MIN_BAR_IN))
         draw_bar([shown], unit, beside)
     small: dict[str, Any] = {"fontsize": 8, "color": "#666666", "ha": "center", "va": "top"}
     axes.annotate(note, (0.5, 0.0), (0.0, NOTE_POINTS), "axes fraction", "offset points", **small)
@@ -67,7 +67,7 @@ def _framed(plane: Plane, limits: Limits, style: SliceStyle, title: str, unit: s
 
 
 def _bare(plane: Plane, limits: Limits, style: SliceStyle) -> bytes:
-    longest = style.size or min(max(plane.image.shape), MOST_SIZE)
+    longest = style.size or min(max(plane.image.shape), MAX_SIZE)
     figure = bare_figure(*(max(1, round(longest * side)) for side in _shares(plane)))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     _draw_image(axes, plane, limits, style, "")
@@ -95,8 +95,8 @@ def _draw_image(axes: Axes, plane: Plane, limits: Limits, style: SliceStyle, tit
 
 
 def scale_of(width_m: float) -> float:
-    """A round length of at most ``MOST_OF_WIDTH``, m: 1, 2 or 5 of some power of ten."""
-    most = MOST_OF_WIDTH * width_m
+    """A round length of at most ``MAX_WIDTH_FRACTION``, m: 1, 2 or 5 of some power of ten."""
+    most = MAX_WIDTH_FRACTION * width_m
     power = 10.0 ** math.floor(math.log10(most))
     return max(step * power for step in (0.5, 1.0, 2.0, 5.0) if step * power <= most)
 

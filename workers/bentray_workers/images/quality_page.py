@@ -24,7 +24,7 @@ PAGE_IN = (13.0, 8.4)
 LETTERS = 62
 
 # Findings in the list; further ones are counted.
-MOST_FINDINGS = 14
+MAX_FINDINGS = 14
 
 # Part of the peak of a trace that is shown as full black or white.
 GATHER_FULL = 0.5
@@ -171,13 +171,13 @@ def _list(axes: Axes, examined: Examined, findings: list[Finding]) -> None:
     if report.picker:
         lines[0] += f", picker {report.picker}"
     lines.append("")
-    for finding in findings[:MOST_FINDINGS]:
+    for finding in findings[:MAX_FINDINGS]:
         elements = ", ".join(map(str, finding.elements[:8])) + (", …" if len(finding.elements) > 8 else "")
         where = f" ({elements})" if elements else ""
         words = f"{finding.check}: {finding.found}{where}. {finding.action.capitalize()}."
         lines += textwrap.wrap(words, LETTERS, subsequent_indent="   ")
-    if len(findings) > MOST_FINDINGS:
-        lines.append(f"and {len(findings) - MOST_FINDINGS} more")
+    if len(findings) > MAX_FINDINGS:
+        lines.append(f"and {len(findings) - MAX_FINDINGS} more")
     if not findings:
         lines.append("No findings by: " + ", ".join(report.checked) + ".")
         lines[-1:] = textwrap.wrap(lines[-1], LETTERS)

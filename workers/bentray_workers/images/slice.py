@@ -17,7 +17,7 @@ from .plane_picture import plane_png
 from .slice_style import COLOUR_VALUE, SliceStyle
 
 # Smallest distance of the limits, relative to the larger of them.
-LEAST_SPAN = 1e-9
+MIN_SPAN = 1e-9
 
 
 def slice_png(
@@ -96,7 +96,7 @@ def requested_limits(limits: Limits, low: float | None, high: float | None) -> L
             COLOUR_VALUE.check(name, value)
     chosen = (limits[0] if low is None else low, limits[1] if high is None else high)
     # Colours need distinguishable steps between the limits.
-    least = max(LEAST_SPAN * max(map(abs, chosen)), sys.float_info.min)
+    least = max(MIN_SPAN * max(map(abs, chosen)), sys.float_info.min)
     if not chosen[1] - chosen[0] > least:
         if low is None:
             raise InvalidInput("high", high, f"a number above {chosen[0]:.6g}, or a low below it")

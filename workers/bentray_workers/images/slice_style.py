@@ -10,9 +10,9 @@ from bentray_kernels.ranges import Range
 COLORMAPS = ("viridis", "magma", "inferno", "plasma", "cividis", "gray", "bone", "turbo", "coolwarm")
 # Interpolation between nodes, and its name in Matplotlib.
 INTERPOLATIONS = {"nearest": "nearest", "cubic": "bicubic"}
-LEAST_SIZE, MOST_SIZE = 32, 4096
+MIN_SIZE, MAX_SIZE = 32, 4096
 # With a frame; text is illegible below this.
-LEAST_FRAMED = 200
+MIN_FRAMED_SIZE = 200
 # Values of the first and the last colour (float32).
 COLOUR_VALUE = Range(-3.4e38, 3.4e38)
 
@@ -47,6 +47,6 @@ class SliceStyle:
         ):
             if value not in choices:
                 raise InvalidInput(name, repr(value), "one of " + ", ".join(choices))
-        least = LEAST_FRAMED if self.frame else LEAST_SIZE
-        if self.size is not None and not least <= self.size <= MOST_SIZE:
-            raise InvalidInput("size", self.size, f"{least} to {MOST_SIZE} pixels")
+        least = MIN_FRAMED_SIZE if self.frame else MIN_SIZE
+        if self.size is not None and not least <= self.size <= MAX_SIZE:
+            raise InvalidInput("size", self.size, f"{least} to {MAX_SIZE} pixels")

@@ -11,7 +11,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import WIDTH_M
 from bentray_kernels.tomography.model_selection.selection import CANDIDATES, final_settings
 from bentray_kernels.tomography.requirements import check_waveform
-from bentray_kernels.tomography.settings import LEAST_NODES, Settings
+from bentray_kernels.tomography.settings import MIN_NODES, Settings
 from bentray_kernels.tomography.stage_graphs import BATCH
 
 from ..cluster.capacities import MIB, REAL, Lane, WorkerCapacity, resource_of
@@ -173,7 +173,7 @@ def blocks_of(shape: tuple[int, ...], capacities: Sequence[WorkerCapacity]) -> t
         kept = 3 * REAL * math.prod(block) * -(-math.prod(blocks) // together)
         if kept + field_bytes(block, "fsm") <= least:
             return tuple(blocks)
-        if max(block) <= LEAST_NODES or 3 * REAL * math.prod(shape) > together * least:
+        if max(block) <= MIN_NODES or 3 * REAL * math.prod(shape) > together * least:
             taken = 3 * REAL * math.prod(shape) + field_bytes(block, "fsm")
             raise InvalidInput("speed", f"shape {shape}, {taken} bytes", f"{together * least:.0f} bytes")
         blocks[block.index(max(block))] += 1
@@ -215,9 +215,9 @@ def _advice(scan: Summary, settings: Settings, limit: float) -> str:
     def fits(nodes: int) -> bool:
         return max(call_bytes(scan, settings.changed(nodes=nodes, coarser_grids=0)).values()) <= limit
 
-    if settings.selects_model or not fits(LEAST_NODES):
+    if settings.selects_model or not fits(MIN_NODES):
         return ""
-    low, high = LEAST_NODES, settings.grid_nodes
+    low, high = MIN_NODES, settings.grid_nodes
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if fits(middle) else (low, middle)

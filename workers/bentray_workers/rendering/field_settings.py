@@ -8,12 +8,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.geometry_field.tables.cube import MOST_SAMPLES
+from bentray_kernels.geometry_field.tables.cube import MAX_SAMPLES
 from bentray_kernels.ranges import Range
 from bentray_kernels.request_fields import check, setting
 
 # Largest mesh for the layout in one task; the time grows slightly faster than linearly.
-MOST_FACES = 300_000
+MAX_FACES = 300_000
 
 # Table entries: a face and a fraction; a face.
 OUTER_ENTRY_BYTES, INNER_ENTRY_BYTES = 8, 4
@@ -39,9 +39,9 @@ class FieldSettings:
     samples: int = setting(
         24,
         "Samples along an edge of the cube for rays from outside, n: the table has 36n⁴ entries.",
-        Range(4, MOST_SAMPLES),
+        Range(4, MAX_SAMPLES),
     )
-    inner_samples: int = setting(16, "The same for rays that start on the surface.", Range(4, MOST_SAMPLES))
+    inner_samples: int = setting(16, "The same for rays that start on the surface.", Range(4, MAX_SAMPLES))
     divisions: int = setting(
         16,
         "Cells along an edge of the cube, in each of which points of the surface are merged.",
@@ -93,5 +93,5 @@ def check_faces(faces: int) -> None:
     Raises:
         InvalidInput: naming ``mesh``.
     """
-    if faces > MOST_FACES:
-        raise InvalidInput("mesh", f"{faces} faces", f"a mesh of at most {MOST_FACES} faces")
+    if faces > MAX_FACES:
+        raise InvalidInput("mesh", f"{faces} faces", f"a mesh of at most {MAX_FACES} faces")

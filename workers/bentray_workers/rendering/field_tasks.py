@@ -36,7 +36,7 @@ from .field_accuracy import accuracy
 from .field_settings import FieldSettings, check_faces
 
 # Entries of the inner table, 4 bytes each.
-MOST_INNER = 2**28
+MAX_INNER = 2**28
 # Rays of one task: a second or two.
 TASK_RAYS = 2**21
 
@@ -69,9 +69,9 @@ def lay_out(mesh_path: Path, settings: FieldSettings, folder: Path) -> None:
     surface = surface_of(layout.chart)
     points, starts = spread_points(surface, settings.divisions)
     columns = 6 * settings.inner_samples**2
-    if len(points) * columns > MOST_INNER:
+    if len(points) * columns > MAX_INNER:
         taken = f"{settings.divisions}, {len(points)} points by {columns} directions"
-        accepted = f"at most {MOST_INNER} entries: fewer divisions or inner_samples"
+        accepted = f"at most {MAX_INNER} entries: fewer divisions or inner_samples"
         raise InvalidInput("divisions", taken, accepted)
     write_chart(files.chart, layout.chart)
     write_geometry_image(files.image, maps)

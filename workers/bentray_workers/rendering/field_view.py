@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range
-from bentray_kernels.request_fields import MOST_PIXELS, MOST_RAYS, check, setting
+from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, check, setting
 
 # Public names, and those of the kernels.
 LOOKUPS = {"nearest": "nearest", "linear": "linear", "accurate": "walk", "exact": "exact"}
@@ -61,16 +61,16 @@ class FieldView:
     )
     zoom: float = setting(1.0, "1 shows the whole scene, 2 half of it.", Range(0.05, 50.0))
     up: Literal["z", "y"] = setting("z", "Axis of the mesh that is up.")
-    width: int = setting(512, "Pixels.", Range(1, MOST_PIXELS))
-    height: int = setting(512, "Pixels.", Range(1, MOST_PIXELS))
+    width: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
+    height: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
     rays: int = setting(1, "Along each side of a pixel.", Range(1, 8))
     depth: int = setting(4, "Largest number of surfaces on a ray.", Range(0, 64))
 
     def __post_init__(self) -> None:
         check(self, CHOICES)
         count = self.width * self.height * self.rays**2
-        if count > MOST_RAYS:
-            raise InvalidInput("width, height, rays", f"{count} rays", f"at most {MOST_RAYS}")
+        if count > MAX_RAYS:
+            raise InvalidInput("width, height, rays", f"{count} rays", f"at most {MAX_RAYS}")
 
     @property
     def times(self) -> int:

@@ -19,10 +19,10 @@ from ..files.mesh import StoredMesh, summary_of, write_mesh
 from ..files.volume_formats import import_volume
 from .refraction_view import check_even
 
-MOST_NODES = 2**26
+MAX_NODES = 2**26
 # Grid edges cut by the surface; it has about eight triangles for each.
-MOST_CROSSINGS = 75_000
-MOST_STEP = 32
+MAX_CROSSINGS = 75_000
+MAX_STEP = 32
 # Per cut edge, without compression: eight triangles, and at most as many vertices.
 EDGE_BYTES = 8 * (3 * 4 + 3 * 8)
 HEADER_BYTES = 64 * 2**10
@@ -34,16 +34,16 @@ def check_nodes(shape: tuple[int, ...], step: int) -> None:
     Raises:
         InvalidInput: naming ``step`` or ``volume``.
     """
-    if not 1 <= step <= MOST_STEP:
-        raise InvalidInput("step", step, f"a whole number from 1 to {MOST_STEP}")
-    if np.prod(shape, dtype=np.int64) > MOST_NODES:
-        raise InvalidInput("volume", f"shape {tuple(shape)}", f"at most {MOST_NODES} nodes")
+    if not 1 <= step <= MAX_STEP:
+        raise InvalidInput("step", step, f"a whole number from 1 to {MAX_STEP}")
+    if np.prod(shape, dtype=np.int64) > MAX_NODES:
+        raise InvalidInput("volume", f"shape {tuple(shape)}", f"at most {MAX_NODES} nodes")
 
 
 def largest_bytes(shape: Sequence[int], step: int) -> int:
     """Largest size of the mesh of a volume of this shape, bytes."""
     nodes = math.prod(-(-n // step) for n in shape)
-    return min(MOST_CROSSINGS, len(shape) * nodes) * EDGE_BYTES + HEADER_BYTES
+    return min(MAX_CROSSINGS, len(shape) * nodes) * EDGE_BYTES + HEADER_BYTES
 
 
 def mesh_volume(path: Path, iso: float | None, step: int, target: Path) -> dict[str, Any]:
@@ -79,6 +79,6 @@ def mesh_volume(path: Path, iso: float | None, step: int, target: Path) -> dict[
 def _check_size(values: NDArray[Any], iso: float) -> None:
     above = values > iso
     cuts = sum(int(np.count_nonzero(np.diff(above, axis=axis))) for axis in range(3))
-    if cuts > MOST_CROSSINGS:
-        accepted = f"at most {MOST_CROSSINGS}: a larger step, or an iso-value of a smaller surface"
+    if cuts > MAX_CROSSINGS:
+        accepted = f"at most {MAX_CROSSINGS}: a larger step, or an iso-value of a smaller surface"
         raise InvalidInput("iso", f"{iso:g}, whose surface cuts {cuts} edges of the grid", accepted)

@@ -22,7 +22,7 @@ from .scene_cache import BUILDING_BYTES, needed_bytes
 from .tiles import TASK_RAYS
 
 # Of one interactive picture, s; longer ones need a job.
-MOST_SECONDS = 60.0
+MAX_SECONDS = 60.0
 
 # Part of the memory of a worker for a picture beside a task of a job. Jobs are planned for 80 % of it less
 # that of a warm worker, which has a margin of MARGIN_BYTES, and Dask kills a worker at 95 %.
@@ -80,7 +80,7 @@ def refraction_cost(stored: VolumeFile, view: RefractionView) -> Cost:
     """Cost of a refractive rendering of a volume.
 
     Raises:
-        InvalidInput: for a picture that takes more than ``MOST_SECONDS``.
+        InvalidInput: for a picture that takes more than ``MAX_SECONDS``.
     """
     rays, depth = _rays(view), 1 if view.mode == "shaded" else view.depth
     # Filters of a higher degree use more nodes per value.
@@ -107,7 +107,7 @@ def field_cost(figures: Mapping[str, Any], view: FieldView) -> Cost:
     """Cost of a scene with a geometry field with the sizes in ``figures``.
 
     Raises:
-        InvalidInput: for a picture that takes more than ``MOST_SECONDS``.
+        InvalidInput: for a picture that takes more than ``MAX_SECONDS``.
     """
     rays = _rays(view)
     ray_s = FIELD_RAY_S + FIELD_SURFACE_S * view.depth * (2 if view.lookup == "exact" else 1)
@@ -227,11 +227,11 @@ def _tile_bytes(view: RefractionView | FieldView) -> int:
 
 
 def _check_seconds(field: str, found: str, seconds: float, width: int, height: int, alternative: str) -> None:
-    if seconds > MOST_SECONDS:
-        shrink = math.sqrt(MOST_SECONDS / seconds)
+    if seconds > MAX_SECONDS:
+        shrink = math.sqrt(MAX_SECONDS / seconds)
         largest = f"{max(1, int(width * shrink))} x {max(1, int(height * shrink))} pixels of these"
         raise InvalidInput(
             field,
             f"{found}: about {seconds:.0f} s of a core",
-            f"at most {MOST_SECONDS:g} s, as {largest}{alternative}",
+            f"at most {MAX_SECONDS:g} s, as {largest}{alternative}",
         )

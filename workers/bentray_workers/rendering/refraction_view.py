@@ -7,12 +7,12 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.isosurface.octree import MOST_ISOS
+from bentray_kernels.isosurface.octree import MAX_ISOS
 from bentray_kernels.ranges import Range
 from bentray_kernels.refraction import Layers
-from bentray_kernels.request_fields import MOST_PIXELS, MOST_RAYS, check, setting
+from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, check, setting
 from bentray_kernels.splines import FILTERS
-from bentray_kernels.splines.prefilter import MOST_SMOOTHING
+from bentray_kernels.splines.prefilter import MAX_SMOOTHING
 
 INDEX = Range(0.01, 100.0)
 
@@ -38,18 +38,18 @@ class RefractionView:
     iso: tuple[float, ...] = setting(
         (),
         "Increasing iso-values, unit of the volume; by default the middle of its range after smoothing.",
-        schema={"maxItems": MOST_ISOS},
+        schema={"maxItems": MAX_ISOS},
     )
     index: tuple[float, ...] = setting(
         (1.5,),
         "Refractive index above each iso-value: one for each, or one.",
-        schema={"items": {"type": "number", **INDEX.schema}, "minItems": 1, "maxItems": MOST_ISOS},
+        schema={"items": {"type": "number", **INDEX.schema}, "minItems": 1, "maxItems": MAX_ISOS},
     )
     outside: float = setting(1.0, "Refractive index below the first iso-value.", INDEX)
     surroundings: int = setting(
         0,
         "Layer that surrounds the volume: 0 the one below the first iso-value, 1 the next, ...",
-        schema={"minimum": 0, "maximum": MOST_ISOS},
+        schema={"minimum": 0, "maximum": MAX_ISOS},
     )
     filter: str = setting(
         "bspline3",
@@ -59,7 +59,7 @@ class RefractionView:
     smoothing: float = setting(
         0.0,
         "Smoothing of a B-spline; 0 interpolates the nodes, 10 to 100 removes the steps of 8-bit data.",
-        Range(0.0, MOST_SMOOTHING),
+        Range(0.0, MAX_SMOOTHING),
     )
     camera: Literal["orthographic", "perspective"] = setting("orthographic", "Kind of camera.")
     azimuth_deg: float = setting(
@@ -85,8 +85,8 @@ class RefractionView:
     )
     fresnel: bool = setting(False, "Attenuate light by the Fresnel reflection at each surface.")
     mode: Literal["refract", "shaded"] = setting("refract", "refract, or shaded: the first surface, lit.")
-    width: int = setting(512, "Pixels.", Range(1, MOST_PIXELS))
-    height: int = setting(512, "Pixels.", Range(1, MOST_PIXELS))
+    width: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
+    height: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
     depth: int = setting(
         16,
         "Largest number of surfaces on a ray; beyond it the picture is dark grey.",
@@ -95,8 +95,8 @@ class RefractionView:
 
     def __post_init__(self) -> None:
         check(self, CHOICES)
-        if len(self.iso) > MOST_ISOS:
-            raise InvalidInput("iso", f"{len(self.iso)} iso-values", f"at most {MOST_ISOS}")
+        if len(self.iso) > MAX_ISOS:
+            raise InvalidInput("iso", f"{len(self.iso)} iso-values", f"at most {MAX_ISOS}")
         if len(self.index) != max(len(self.iso), 1):
             raise InvalidInput("index", self.index, f"{max(len(self.iso), 1)}: one for each iso-value")
         for index in self.index:
@@ -108,8 +108,8 @@ class RefractionView:
         if self.smoothing and not self.filter.startswith("bspline"):
             raise InvalidInput("smoothing", self.smoothing, "0, unless the filter is a B-spline")
         rays = self.width * self.height * self.times**2
-        if rays > MOST_RAYS:
-            raise InvalidInput("width, height, degree", f"{rays} rays", f"at most {MOST_RAYS}")
+        if rays > MAX_RAYS:
+            raise InvalidInput("width, height, degree", f"{rays} rays", f"at most {MAX_RAYS}")
 
     @property
     def times(self) -> int:

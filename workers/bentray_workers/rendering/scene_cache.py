@@ -28,7 +28,7 @@ SPLINE_BYTES, SCENE_BYTES, BUILDING_BYTES = 9, 15, 48
 BORDER = 6
 
 # Peak memory of making one scene: the largest volume has about 560³ nodes.
-MOST_BUILDING_BYTES = 8 * 2**30
+MAX_BUILDING_BYTES = 8 * 2**30
 # Memory of a process for cached scenes.
 KEPT_BYTES = 4 * 2**30
 
@@ -68,8 +68,8 @@ def check_size(shape: Sequence[int]) -> None:
         InvalidInput: naming ``volume``.
     """
     needed = needed_bytes(shape, BUILDING_BYTES)
-    if needed > MOST_BUILDING_BYTES:
-        most = f"volumes that need at most {MOST_BUILDING_BYTES} bytes, {BUILDING_BYTES} a node"
+    if needed > MAX_BUILDING_BYTES:
+        most = f"volumes that need at most {MAX_BUILDING_BYTES} bytes, {BUILDING_BYTES} a node"
         raise InvalidInput("volume", f"shape {tuple(shape)}, which needs {needed} bytes to render", most)
 
 

@@ -28,9 +28,9 @@ from .scene_cache import stored_shape
 from .tiles import stack_png, tile_rows
 
 FORMATS = ("zip", "apng")
-MOST_FRAMES = 720
+MAX_FRAMES = 720
 # Of all frames; writing an APNG holds most of them in memory.
-MOST_PIXELS = 2**27
+MAX_PIXELS = 2**27
 # Of an uncompressed pixel, and of the headers of a picture and of its entry in an archive.
 PIXEL_BYTES, PICTURE_BYTES = 4, 4096
 # Below interactive pictures.
@@ -49,7 +49,7 @@ class Turntable(RefractionView):
         InvalidInput: naming the first field that is wrong.
     """
 
-    frames: int = setting(36, "Number of frames.", Range(1, MOST_FRAMES))
+    frames: int = setting(36, "Number of frames.", Range(1, MAX_FRAMES))
     turn_deg: float = setting(
         360.0,
         "Rotation of the camera, degrees; the last frame is one step before the end.",
@@ -62,9 +62,9 @@ class Turntable(RefractionView):
         if self.format not in FORMATS:
             raise InvalidInput("format", repr(self.format), "one of " + ", ".join(FORMATS))
         pixels = self.frames * self.width * self.height
-        if pixels > MOST_PIXELS:
+        if pixels > MAX_PIXELS:
             raise InvalidInput(
-                "frames", f"{self.frames}, {pixels} pixels in total", f"at most {MOST_PIXELS} pixels"
+                "frames", f"{self.frames}, {pixels} pixels in total", f"at most {MAX_PIXELS} pixels"
             )
 
     @property

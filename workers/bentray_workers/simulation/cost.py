@@ -30,7 +30,7 @@ STEP_S = {2: 1e-9, 3: 2.1e-9}
 
 # Of a task with several emitters.
 TASK_S = 1.0
-MOST_EMITTERS = 64
+MAX_EMITTERS = 64
 
 
 def fine_nodes(settings: Timed) -> int:
@@ -43,7 +43,7 @@ def fine_nodes(settings: Timed) -> int:
 
 def emitters_a_task(settings: Timed) -> int:
     """Emitters that take about ``TASK_S``."""
-    return max(1, min(MOST_EMITTERS, int(TASK_S / (FRONT_S * fine_nodes(settings)))))
+    return max(1, min(MAX_EMITTERS, int(TASK_S / (FRONT_S * fine_nodes(settings)))))
 
 
 def task_bytes(settings: Timed | WaveSimulationSettings) -> dict[str, int]:

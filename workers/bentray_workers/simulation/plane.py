@@ -19,7 +19,7 @@ from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
 from bentray_kernels.tomography.problem import MARGIN_NODES
 
 # The memory grows with its square; more gains less than the noise of any scan.
-MOST_REFINEMENT = 64
+MAX_REFINEMENT = 64
 
 PlanePhantom = Literal["table6", "detailed"]
 TITLES = {
@@ -54,7 +54,7 @@ class SimulationSettings:
     nodes: int = ranged(128, NODES)
     elements: int = ranged(256, Range(3, 4096))
     coupling_mps: float = ranged(1500.0, SPEED_MPS)
-    refinement: int = ranged(4, Range(4, MOST_REFINEMENT))
+    refinement: int = ranged(4, Range(4, MAX_REFINEMENT))
     noise_s: float = ranged(0.0, Range(0.0, 1.0, below=True, unit="s"))
     seed: int = ranged(0, SEED)
     attenuation: bool = False

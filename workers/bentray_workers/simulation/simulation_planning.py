@@ -16,7 +16,7 @@ from .parts import count_of
 from .request import PhantomScan
 
 # Each part is a file that is written and read again.
-MOST_TASKS = 200_000
+MAX_TASKS = 200_000
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ def plan_simulation(request: PhantomScan, capacities: Sequence[WorkerCapacity]) 
         found = f"{getattr(settings, field):g}, for which a task ({name}) takes {largest} bytes"
         raise InvalidInput(field, found, f"settings whose tasks take at most {limit:.0f} bytes")
     tasks = count_of(settings) + 1
-    if tasks > MOST_TASKS:
-        raise InvalidInput("elements", f"{settings.elements}, {tasks} tasks", f"at most {MOST_TASKS} tasks")
+    if tasks > MAX_TASKS:
+        raise InvalidInput("elements", f"{settings.elements}, {tasks} tasks", f"at most {MAX_TASKS} tasks")
     able = [one for one in able if one.task_bytes >= largest]
     shared, each = cpu_seconds(settings)
     minutes = (shared / max(1, len(able)) + each) / 60.0

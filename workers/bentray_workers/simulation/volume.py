@@ -18,10 +18,10 @@ from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE7_FREQUENCY_HZ, TABLE7_GRIDS, TABLE7_SIDE_M, table7, table7_slices
 from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
 
-from .plane import MOST_REFINEMENT, NODES, SNR, ring_radius
+from .plane import MAX_REFINEMENT, NODES, SNR, ring_radius
 
 # The coarsest voxels in which the lesions of the phantom are separate.
-LEAST_NODES = min(nodes for nodes, _ in TABLE7_GRIDS)
+MIN_NODES = min(nodes for nodes, _ in TABLE7_GRIDS)
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class VolumeSimulationSettings:
     slices: int = ranged(40, Range(2, 1024))
     elements: int = ranged(256, Range(3, 4096))
     coupling_mps: float = ranged(1500.0, SPEED_MPS)
-    refinement: int = ranged(4, Range(2, MOST_REFINEMENT))
+    refinement: int = ranged(4, Range(2, MAX_REFINEMENT))
     three_d: bool = False
     array: Literal["moved", "rings"] = "moved"
     attenuation: bool = False
@@ -64,7 +64,7 @@ class VolumeSimulationSettings:
     def scan(self) -> VolumeScan:
         """The scan; the ring leaves the margin that a reconstruction of as many nodes leaves."""
         return VolumeScan(
-            table7(self.coupling_mps, max(self.nodes, LEAST_NODES)),
+            table7(self.coupling_mps, max(self.nodes, MIN_NODES)),
             Ring(self.elements, ring_radius(TABLE7_SIDE_M, self.nodes)),
             tuple(table7_slices(self.nodes, self.slices).tolist()),
             TABLE7_SIDE_M,

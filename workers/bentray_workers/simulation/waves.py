@@ -42,7 +42,7 @@ FREQUENCY_HZ = Range(1e4, 1e7, unit="Hz")
 EDGE_NODES = 40
 
 # Larger grids take too long.
-MOST_NODES = 8192**2
+MAX_NODES = 8192**2
 
 # Recorded samples in a period of the centre frequency.
 SAMPLES_A_PERIOD = 8
@@ -88,8 +88,8 @@ class WaveSimulationSettings:
         if not 1 <= self.emissions <= self.elements:
             raise InvalidInput("emissions", self.emissions, f"1 to {self.elements}")
         size = math.prod(self.grid)
-        if size > MOST_NODES:
-            most = self.frequency_hz * (MOST_NODES / size) ** (1.0 / self.dimensions)
+        if size > MAX_NODES:
+            most = self.frequency_hz * (MAX_NODES / size) ** (1.0 / self.dimensions)
             raise InvalidInput("frequency_hz", self.frequency_hz, f"at most {most:.3g} for this side")
 
     @property

@@ -17,7 +17,7 @@ from .result import Calibration
 
 # Iterations end when the largest move of an element is below this, m.
 SETTLED_M = 1e-8
-MOST_ITERATIONS = 30
+MAX_ITERATIONS = 30
 
 # No element moves further than this in one iteration, m.
 LONGEST_STEP_M = 2e-3
@@ -26,7 +26,7 @@ LONGEST_STEP_M = 2e-3
 OUTLYING = 4.0
 
 # Fewest pairs of an adjusted element: two coordinates, two delays, and one redundant pair.
-FEWEST = 6
+MIN_PER_ELEMENT = 6
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def calibrate(
     value = np.zeros(at.count)
     value[: at.emission] = dataset.element_position_m.ravel()
     value[-1] = 1.0 / dataset.water_speed_mps
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         rows, residual = _linear(dataset, at, value, emitter, receiver, time)
         # The median is the first estimate of the common delay.
         off = np.abs(residual - np.median(residual[used]))
@@ -123,13 +123,13 @@ def _used(dataset: Dataset, emitter: Ints, receiver: Ints) -> Flags:
     for _ in range(len(dataset.element_position_m)):
         emitted = np.bincount(emitter[used], minlength=len(dataset.tx))
         received = np.bincount(receiver[used], minlength=len(dataset.rx))
-        enough = used & (emitted[emitter] >= FEWEST) & (received[receiver] >= FEWEST)
+        enough = used & (emitted[emitter] >= MIN_PER_ELEMENT) & (received[receiver] >= MIN_PER_ELEMENT)
         if (enough == used).all():
             break
         used = enough
-    if used.sum() < 4 * FEWEST:
+    if used.sum() < 4 * MIN_PER_ELEMENT:
         raise InvalidInput(
-            "times_s", f"{int(used.sum())} usable times", f"at least {4 * FEWEST} of a water shot"
+            "times_s", f"{int(used.sum())} usable times", f"at least {4 * MIN_PER_ELEMENT} of a water shot"
         )
     return used
 

@@ -16,11 +16,11 @@ from .first_arrivals import ROUNDING, require_traces
 from .gate import Gate
 
 # Frequencies are used where the power of the pulse is this many times that of the noise in both traces.
-LEAST_SNR = 10.0
+MIN_SNR = 10.0
 
 # Values with a larger standard deviation are omitted, Np; the total absorption of a breast at 1 MHz is
 # similar.
-MOST_UNSURE_NP = 0.5
+MAX_UNCERTAINTY_NP = 0.5
 
 
 class Powers(NamedTuple):
@@ -79,7 +79,7 @@ def read_log_ratios(dataset: Dataset, emissions: Sequence[int], delta_s: Floats,
             value, sigma = WAYS[way](powers)
             if way == "ratio":
                 value = value + _gain(traces.water_scale, e) - _gain(traces.object_scale, e)
-        ratios[row] = np.where(sigma <= MOST_UNSURE_NP, value, np.nan)
+        ratios[row] = np.where(sigma <= MAX_UNCERTAINTY_NP, value, np.nan)
     ratios[~np.isfinite(ratios)] = np.nan
     return ratios
 
@@ -108,7 +108,7 @@ def log_ratio(powers: Powers) -> tuple[Floats, Floats]:
     """
     energies, variance = [], 0.0
     for power, noise in ((powers.water, powers.water_noise), (powers.object, powers.object_noise)):
-        clean = np.where(power.sum(axis=1, keepdims=True) > LEAST_SNR * power.shape[1] * noise, power, np.nan)
+        clean = np.where(power.sum(axis=1, keepdims=True) > MIN_SNR * power.shape[1] * noise, power, np.nan)
         energies.append((clean - noise).sum(axis=1))
         height = np.sqrt(power)
         moved = np.einsum("ri,ij,rj->r", height, powers.noise_correlation, height)
@@ -145,9 +145,7 @@ def spectral_ratio(powers: Powers) -> tuple[Floats, Floats]:
 
 def _clean(powers: Powers) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Powers of water and object minus the noise, and where both are well above the noise."""
-    detected = (powers.water > LEAST_SNR * powers.water_noise) & (
-        powers.object > LEAST_SNR * powers.object_noise
-    )
+    detected = (powers.water > MIN_SNR * powers.water_noise) & (powers.object > MIN_SNR * powers.object_noise)
     return powers.water - powers.water_noise, powers.object - powers.object_noise, detected
 
 

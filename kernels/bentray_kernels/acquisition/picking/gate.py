@@ -19,7 +19,7 @@ from .pulse import BEFORE, measured_pulse
 # Half the length of the gate, in standard deviations of the pulse's power over time, and at most in periods.
 # The gate is flat over its inner half. A shorter gate blurs the spectrum, which hides part of the loss; a
 # longer one includes later paths.
-HALF_SPREADS, MOST_PERIODS = 5.0, 4.0
+HALF_SPREADS, MAX_PERIODS = 5.0, 4.0
 
 # The band ends where the power of the pulse falls below this fraction of its maximum: two standard deviations
 # of a Gaussian spectrum.
@@ -66,7 +66,7 @@ class Gate:
             raise InvalidInput("waveform/water", "no signal", "traces that hold the pulse about its arrival")
         late = float(time @ power / power.sum())
         spread = math.sqrt(float((time - late) ** 2 @ power / power.sum()))
-        half = min(max(HALF_SPREADS * spread, period), MOST_PERIODS * period)
+        half = min(max(HALF_SPREADS * spread, period), MAX_PERIODS * period)
         power = np.abs(np.fft.rfft(pulse, 16 * pulse.size)) ** 2
         strong = np.flatnonzero(power >= BAND_FLOOR * power.max()) * rate / (16 * pulse.size)
         frequency = np.linspace(strong[0], strong[-1], FREQUENCIES)

@@ -10,7 +10,7 @@ from .finding import Finding
 from .measures import Measures
 
 # Fraction of clipped pairs above which the gain is too high.
-MOST_CLIPPED = 0.25
+MAX_CLIPPED = 0.25
 
 
 def find_broken(dataset: Dataset, measures: Measures, which: str, known: Flags) -> list[Finding]:
@@ -45,7 +45,7 @@ def find_clipped(dataset: Dataset, measures: Measures, which: str) -> list[Findi
         return []
     part = float(pairs.sum()) / max(int(measures.detected.sum()), 1)
     message = f"{which}: {int(pairs.sum())} traces clipped at their highest or lowest value"
-    message += ", the gain is too high" if part > MOST_CLIPPED else ""
+    message += ", the gain is too high" if part > MAX_CLIPPED else ""
     # Saturated channels, unless all of them are.
     often = pairs.sum(axis=0) > 0.5 * np.maximum(measures.detected.sum(axis=0), 1)
     saturated = dataset.rx[often] if often.sum() < 0.5 * often.size else dataset.rx[:0]

@@ -13,13 +13,13 @@ from .finding import Finding
 DRIFT = "water temperature drift"
 
 # Smallest change that is reported, m/s (0.2 °C), and in standard deviations.
-LEAST_MPS, CERTAIN = 0.6, 5.0
+MIN_MPS, CERTAIN = 0.6, 5.0
 
 # Change of the speed with the temperature at 20 °C, m/s per degree.
 MPS_PER_DEGREE = 2.9
 
 # Fewest chords of an emission, fewest emissions, and least spread of their distances, as a part of all.
-FEWEST_CHORDS, FEWEST_EMISSIONS, LEAST_SPREAD = 5, 12, 0.05
+MIN_CHORDS, MIN_EMISSIONS, MIN_SPREAD = 5, 12, 0.05
 
 
 def find_drift(dataset: Dataset, residual_s: Floats) -> list[Finding]:
@@ -33,18 +33,18 @@ def find_drift(dataset: Dataset, residual_s: Floats) -> list[Finding]:
     emissions, slopes = [], []
     for e, row in enumerate(residual_s):
         known = np.isfinite(row)
-        if known.sum() < FEWEST_CHORDS or np.std(distance[e][known]) < LEAST_SPREAD * distance.max():
+        if known.sum() < MIN_CHORDS or np.std(distance[e][known]) < MIN_SPREAD * distance.max():
             continue
         emissions.append(float(e))
         slopes.append(robust_line(distance[e][known], row[known])[0])
-    if len(emissions) < FEWEST_EMISSIONS:
+    if len(emissions) < MIN_EMISSIONS:
         return []
     order, slope = np.array(emissions), np.array(slopes)
     each, start = robust_line(order, slope)
     whole = (len(dataset.tx) - 1) * dataset.water_speed_mps**2
     sigma = robust_deviation(slope - each * order - start) / (np.std(order) * np.sqrt(order.size)) * whole
     change = -each * whole
-    if abs(change) <= max(LEAST_MPS, CERTAIN * sigma):
+    if abs(change) <= max(MIN_MPS, CERTAIN * sigma):
         return []
     warmer = "warms" if change > 0.0 else "cools"
     return [
@@ -52,7 +52,7 @@ def find_drift(dataset: Dataset, residual_s: Floats) -> list[Finding]:
             DRIFT,
             f"the water {warmer} by {abs(change) / MPS_PER_DEGREE:.1f} °C "
             f"({abs(change):.1f} ± {sigma:.1f} m/s) from the first to the last emission",
-            f"within {LEAST_MPS:g} m/s; speeds are uncertain by half of the change",
+            f"within {MIN_MPS:g} m/s; speeds are uncertain by half of the change",
             "reported",
             value=float(change),
             unit="m/s",

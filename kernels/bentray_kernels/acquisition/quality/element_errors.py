@@ -17,7 +17,7 @@ ROUNDS, SELECTIONS = 3, 4
 OUTLYING = 4.0
 
 # Fewest residuals of an element: two coordinates, two delays, and redundant ones.
-FEWEST = 12
+MIN_PAIRS = 12
 
 # Combinations of coordinates and delays that residuals determine worse than this part of the best remain 0.
 UNDETERMINED = 0.02
@@ -61,7 +61,7 @@ def fit_element_errors(dataset: Dataset, residual_s: Floats) -> ElementErrors:
             rows = _design(away, emission, reception)
             values = np.concatenate((left[emission].ravel(), left[:, reception].ravel()))
             values = np.asarray(values + rows @ errors[k], dtype=np.float64)
-            few[k] = np.isfinite(values).sum() < FEWEST
+            few[k] = np.isfinite(values).sum() < MIN_PAIRS
             if few[k]:
                 continue
             errors[k], sigma[k] = _robust_fit(rows[np.isfinite(values)], values[np.isfinite(values)])
@@ -91,7 +91,7 @@ def _robust_fit(rows: Floats, values: Floats) -> tuple[Floats, Floats]:
     for _ in range(SELECTIONS):
         scatter = robust_deviation(off)
         near = np.abs(off - np.median(off)) <= OUTLYING * scatter + 1e-12
-        if near.sum() < FEWEST:
+        if near.sum() < MIN_PAIRS:
             break
         inverse = np.linalg.pinv(rows[near].T @ rows[near], rcond=UNDETERMINED**2, hermitian=True)
         solution = np.asarray(inverse @ (rows[near].T @ values[near]))

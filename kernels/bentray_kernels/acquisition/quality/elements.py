@@ -13,10 +13,10 @@ from .finding import Finding, Role
 CLOCK, DISPLACED = "clock offset", "displaced elements"
 
 # Smallest delay and displacement that are reported, periods and wavelengths, and multiples of the usual ones.
-LEAST_DELAY, LEAST_DISPLACEMENT, UNUSUAL = 0.1, 0.08, 6.0
+MIN_DELAY, MIN_DISPLACEMENT, UNUSUAL = 0.1, 0.08, 6.0
 
 # Largest part of the elements: if more deviate, the drawing of the array is wrong, which is another finding.
-MOST = 0.4
+MAX_PART = 0.4
 
 
 def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
@@ -30,7 +30,7 @@ def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
     if dataset.element_position_m.shape[1] != 2:
         return []
     errors = fit_element_errors(dataset, residual_s)
-    least_s = LEAST_DELAY / dataset.center_frequency_hz
+    least_s = MIN_DELAY / dataset.center_frequency_hz
     roles: tuple[tuple[Role, Floats, Floats], ...] = (
         ("emission", errors.emission_delay_s, errors.sigma_s[:, 2]),
         ("reception", errors.reception_delay_s, errors.sigma_s[:, 3]),
@@ -54,7 +54,7 @@ def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
                 )
             )
     distance = np.linalg.norm(errors.displacement_m, axis=1)
-    least_m = LEAST_DISPLACEMENT * dataset.water_speed_mps / dataset.center_frequency_hz
+    least_m = MIN_DISPLACEMENT * dataset.water_speed_mps / dataset.center_frequency_hz
     sigma_m = np.hypot(*errors.sigma_s[:, :2].T) * dataset.water_speed_mps
     displaced = _unusual(distance, sigma_m, least_m)
     if displaced.size:
@@ -80,7 +80,7 @@ def _unusual(values: Floats, sigma: Floats, least: float) -> Ints:
         return np.array([], dtype=np.int64)
     beyond = np.abs(values) > max(least, float(np.median(known)) + UNUSUAL * robust_deviation(known))
     beyond &= np.abs(values) > UNUSUAL * sigma
-    return np.flatnonzero(beyond) if beyond.sum() <= MOST * known.size else np.array([], dtype=np.int64)
+    return np.flatnonzero(beyond) if beyond.sum() <= MAX_PART * known.size else np.array([], dtype=np.int64)
 
 
 def _runs(places: Ints, values: Floats) -> list[Ints]:

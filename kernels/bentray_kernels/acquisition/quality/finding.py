@@ -15,13 +15,13 @@ Action = Literal["left out", "corrected", "refused", "reported"]
 Role = Literal["emission", "reception", ""]
 
 # Most pairs listed in a report; of the others it gives the number.
-MOST_NAMED = 20
+MAX_LISTED = 20
 
 # Summary without findings.
 NOTHING_FOUND = "nothing found"
 
 # Most findings in a summary, and elements of each.
-MOST_SUMMARISED = 8
+MAX_SUMMARISED = 8
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Finding:
         if self.pairs is not None:
             where = np.argwhere(self.pairs)
             record["pair_count"] = len(where)
-            record["first_pairs"] = where[:MOST_NAMED].tolist()
+            record["first_pairs"] = where[:MAX_LISTED].tolist()
         return record
 
 
@@ -123,10 +123,10 @@ def words(findings: Sequence[Finding], *, stacked: bool = False) -> str:
     if not findings:
         return NOTHING_FOUND
     lines = []
-    for finding in findings[:MOST_SUMMARISED]:
+    for finding in findings[:MAX_SUMMARISED]:
         where = f"slice {finding.slice}: " if stacked else ""
-        more = ", …" if len(finding.elements) > MOST_SUMMARISED else ""
-        of = f" ({', '.join(map(str, finding.elements[:MOST_SUMMARISED]))}{more})" if finding.elements else ""
+        more = ", …" if len(finding.elements) > MAX_SUMMARISED else ""
+        of = f" ({', '.join(map(str, finding.elements[:MAX_SUMMARISED]))}{more})" if finding.elements else ""
         lines.append(f"{where}{finding.check}: {finding.found}{of}, {finding.action}")
     others = len(findings) - len(lines)
     return "; ".join(lines) + (f"; and {others} more" if others else "")

@@ -14,10 +14,10 @@ from .finding import Finding, Role
 REACH = 1.0
 
 # Fraction of an element's pulses that must be inverted.
-MOST = 0.6
+MIN_FRACTION = 0.6
 
 # Fewest pulses of an element for a decision.
-FEWEST = 4
+MIN_PAIRS = 4
 
 
 def find_inverted(dataset: Dataset, sign: Floats) -> list[Finding]:
@@ -101,4 +101,4 @@ def _majority(sign: Floats, axis: int) -> Floats:
     """-1 for rows (axis 1) or columns (axis 0) of which most are inverted, else 1."""
     known = np.isfinite(sign)
     down = ((sign < -0.3) & known).sum(axis=axis) / np.maximum(known.sum(axis=axis), 1)
-    return np.where((down > MOST) & (known.sum(axis=axis) >= FEWEST), -1.0, 1.0)
+    return np.where((down > MIN_FRACTION) & (known.sum(axis=axis) >= MIN_PAIRS), -1.0, 1.0)

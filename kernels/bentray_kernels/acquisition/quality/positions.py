@@ -16,7 +16,7 @@ from .water_line import WaterLine
 LARGEST_OFF = 0.05
 
 # Fewest pairs with times in both directions.
-FEWEST = 20
+MIN_PAIRS = 20
 
 
 def find_displaced(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> list[Finding]:
@@ -39,7 +39,7 @@ def find_displaced(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> li
     half = np.triu_indices(elements, 1)
     there, back = full[half], full.T[half]
     both = np.isfinite(there + back)
-    if both.sum() < FEWEST:
+    if both.sum() < MIN_PAIRS:
         return []
     alike, noise = (robust_deviation(0.5 * (there + sign * back)[both]) for sign in (1.0, -1.0))
     apart = math.sqrt(max(alike**2 - noise**2, 0.0)) * dataset.water_speed_mps

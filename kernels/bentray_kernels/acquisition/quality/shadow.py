@@ -20,19 +20,19 @@ PLACES, HALF_WIDTH = 41, 0.5
 REFINED = 7
 
 # Part of the chords through a place that are in its shadow; of those that pass it at a distance; of all.
-INSIDE, OUTSIDE, MOST = 0.7, 0.3, 0.2
+INSIDE, OUTSIDE, MAX_SHADOW = 0.7, 0.3, 0.2
 
 # The chords that pass it at a distance, in half-widths.
 BESIDE = (4.0, 6.0)
 
 # Fewest chords through a place.
-FEWEST = 12
+MIN_PAIRS = 12
 
 # Places outside this part of the array's radius are crossed by few chords.
 REACH = 0.85
 
 # Pairs that are compared, drawn evenly.
-MOST_PAIRS = 20_000
+MAX_PAIRS = 20_000
 
 
 def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
@@ -44,13 +44,13 @@ def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
     """
     assert dataset.center_frequency_hz is not None
     known = np.isfinite(log_ratio) & (dataset.tx[:, None] != dataset.rx[None, :])
-    if dataset.element_position_m.shape[1] != 2 or known.sum() < FEWEST:
+    if dataset.element_position_m.shape[1] != 2 or known.sum() < MIN_PAIRS:
         return []
     shadow = known & (log_ratio - np.median(log_ratio[known]) < SHADOWED)
-    if not 0 < shadow.sum() <= MOST * known.sum():
+    if not 0 < shadow.sum() <= MAX_SHADOW * known.sum():
         return []
     pairs = np.argwhere(known)
-    pairs = pairs[:: -(-len(pairs) // MOST_PAIRS)]
+    pairs = pairs[:: -(-len(pairs) // MAX_PAIRS)]
     dark = shadow[pairs[:, 0], pairs[:, 1]]
     normal, height = _lines(dataset)
     normal, height = normal[pairs[:, 0], pairs[:, 1]], height[pairs[:, 0], pairs[:, 1]]
@@ -60,7 +60,7 @@ def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
         """Part of the chords through a place in shadow; 0 where few cross it, or many beside it are dark."""
         off = np.abs(normal @ place - height)
         through, beside = off <= width, (off >= BESIDE[0] * width) & (off <= BESIDE[1] * width)
-        if through.sum() < FEWEST or not beside.any() or dark[beside].mean() > OUTSIDE:
+        if through.sum() < MIN_PAIRS or not beside.any() or dark[beside].mean() > OUTSIDE:
             return 0.0
         return float(dark[through].mean())
 

@@ -19,7 +19,7 @@ LARGEST_DELAY = 3.0
 
 # Pairs whose chord stays this fraction of the radius away from the centre are assumed to miss the object.
 OUTSIDE = 0.88
-FEWEST = 12
+MIN_PAIRS = 12
 
 # Largest accepted median of their times, fraction of a period; without a frequency, s.
 LARGEST_OFFSET = 0.1
@@ -51,7 +51,7 @@ def find_time_shift(dataset: Dataset, delta: Floats) -> list[Finding]:
         delta: (ntx, nrx), s.
     """
     missing = delta[(chord_offset(dataset) >= OUTSIDE) & np.isfinite(delta)]
-    if missing.size < FEWEST:
+    if missing.size < MIN_PAIRS:
         return []
     offset = float(np.median(missing))
     scatter = robust_deviation(missing)

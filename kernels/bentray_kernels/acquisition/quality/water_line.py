@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ..dataset import Dataset
-from ..robust_line import FEWEST, robust_line
+from ..robust_line import MIN_POINTS, robust_line
 
 # Nearer pairs than this part of the longest contain cross-talk and the near field.
 NEAR = 0.25
@@ -44,7 +44,7 @@ class WaterLine:
         """
         distance = dataset.distance_m()
         known = np.isfinite(strongest_s) & (distance > NEAR * distance.max())
-        if known.sum() < FEWEST or np.ptp(distance[known]) == 0.0:
+        if known.sum() < MIN_POINTS or np.ptp(distance[known]) == 0.0:
             return None
         x, y = distance[known], strongest_s[known]
         slope, _ = robust_line(x, y)

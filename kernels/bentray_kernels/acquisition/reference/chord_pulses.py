@@ -19,7 +19,7 @@ from .water_chords import WaterChords
 BEFORE, AFTER = 3.0, 4.0
 
 # Most chords that are kept, over all emissions, and of each emission; least of each emission.
-MOST_CHORDS, MOST_OF_EMISSION, LEAST_OF_EMISSION = 16384, 64, 8
+MAX_CHORDS, MAX_PER_EMISSION, MIN_PER_EMISSION = 16384, 64, 8
 
 
 class ChordPulses(NamedTuple):
@@ -51,7 +51,7 @@ class ChordPulses(NamedTuple):
 
 def chords_of_emission(emissions: int) -> int:
     """Most chords of each emission that are kept."""
-    return min(MOST_OF_EMISSION, max(LEAST_OF_EMISSION, MOST_CHORDS // emissions))
+    return min(MAX_PER_EMISSION, max(MIN_PER_EMISSION, MAX_CHORDS // emissions))
 
 
 def read_pulses(

@@ -17,7 +17,7 @@ from ..emissions import Emissions
 from ..noise import robust_deviation
 from ..water import stated_deviation
 from .chord_pulses import ChordPulses, window
-from .water_chords import FEWEST, WaterChords, find_water_chords
+from .water_chords import MIN_CHORDS, WaterChords, find_water_chords
 
 Spectrum = NDArray[np.complex128]
 
@@ -31,13 +31,13 @@ RECEIVERS_AT_ONCE = 32
 HIGHEST = 3.0
 
 # Least correlation of a chord's pulse with the common pulse.
-LEAST_CORRELATION = 0.8
+MIN_CORRELATION = 0.8
 
 # Frequencies with less of the largest amplitude do not determine phases.
 FAINT = 0.1
 
 # Pairs that determine the delay and the gain of an element.
-FEWEST_OF_ELEMENT = 4
+MIN_PER_ELEMENT = 4
 
 ROUNDS = 3
 
@@ -230,12 +230,12 @@ class _Fit:
         self.amplitude = across.real.sum(axis=1) / (np.abs(self._pulse) ** 2).sum()
         size = np.linalg.norm(aligned, axis=1) * np.linalg.norm(self._pulse)
         alike = across.real.sum(axis=1) / np.where(size > 0.0, size, 1.0)
-        self.used &= alike > LEAST_CORRELATION
-        if self.used.sum() < FEWEST:
+        self.used &= alike > MIN_CORRELATION
+        if self.used.sum() < MIN_CHORDS:
             raise InvalidInput(
                 "waveform/water",
                 f"no traces, and {int(self.used.sum())} chords through water with the same pulse",
-                f"a scan without the object, or at least {FEWEST} chords that miss the object",
+                f"a scan without the object, or at least {MIN_CHORDS} chords that miss the object",
             )
         phase = np.angle(across)
         self.lag_s = -(phase * power * self._omega).sum(axis=1) / (power * self._omega**2).sum()
@@ -340,10 +340,10 @@ def _median_spectrum(spectra: Spectrum) -> Spectrum:
 
 
 def _medians(rows: Floats) -> Floats:
-    """Median of each row without its NaN; 0 with fewer than ``FEWEST_OF_ELEMENT`` values."""
+    """Median of each row without its NaN; 0 with fewer than ``MIN_PER_ELEMENT`` values."""
     result = np.zeros(len(rows))
     for index, row in enumerate(rows):
         values = row[np.isfinite(row)]
-        if values.size >= FEWEST_OF_ELEMENT:
+        if values.size >= MIN_PER_ELEMENT:
             result[index] = np.median(values)
     return result

@@ -36,12 +36,12 @@ SEARCHED = 0.3
 CLOSELY = 0.1
 
 # Largest distance from the line at which a chord agrees: robust deviations of the outermost chords, periods.
-AGREEING, LEAST_TOLERANCE = 4.0, 0.02
+AGREEING, MIN_TOLERANCE = 4.0, 0.02
 
 # Least part of a group that agrees; the search ends at the second group in a row with less.
-LEAST_PART = 0.75
+MIN_FRACTION = 0.75
 
-FEWEST = 24
+MIN_CHORDS = 24
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class WaterChords:
 
 
 def find_water_chords(
-    dataset: Dataset, arrival_s: Floats, period_s: float, tolerance: float = LEAST_TOLERANCE
+    dataset: Dataset, arrival_s: Floats, period_s: float, tolerance: float = MIN_TOLERANCE
 ) -> WaterChords:
     """Find the chords that miss the object, without an assumption on its size.
 
@@ -98,20 +98,20 @@ def find_water_chords(
     if dataset.valid is not None:
         known &= dataset.valid
     pairs = np.flatnonzero(known)
-    if pairs.size < FEWEST:
+    if pairs.size < MIN_CHORDS:
         raise _refusal(pairs.size)
     x, y = distance.ravel()[pairs], arrival_s.ravel()[pairs]
     order = np.argsort(-chord_offset(dataset).ravel()[pairs], kind="stable")
     groups = _groups(order, x, OUTERMOST_SPAN * float(distance.max()))
     outermost = next(groups)
     agreeing = _near(_densest_line(x, y, BIN * period_s), x, y, outermost, SEARCHED * period_s)
-    if agreeing.size < FEWEST:
+    if agreeing.size < MIN_CHORDS:
         # Most chords may cross a large object of small contrast: then the outermost ones alone show the line,
         # if they agree closely.
         line = _densest_line(x[outermost], y[outermost], BIN * period_s)
         closely = _near(line, x, y, outermost, CLOSELY * period_s)
-        agreeing = closely if closely.size >= LEAST_PART * outermost.size else agreeing
-    if agreeing.size < FEWEST:
+        agreeing = closely if closely.size >= MIN_FRACTION * outermost.size else agreeing
+    if agreeing.size < MIN_CHORDS:
         raise _refusal(agreeing.size)
     slowness, delay = robust_line(x[agreeing], y[agreeing])
     spread = robust_deviation(y[agreeing] - slowness * x[agreeing])
@@ -119,7 +119,7 @@ def find_water_chords(
     misses = 0
     for group in groups:
         alike = group[np.abs(y[group] - delay - slowness * x[group]) <= reach]
-        misses = misses + 1 if alike.size < LEAST_PART * group.size else 0
+        misses = misses + 1 if alike.size < MIN_FRACTION * group.size else 0
         if misses > 1:
             break
         if not misses:
@@ -171,8 +171,8 @@ def _densest_line(x: Floats, y: Floats, width: float) -> tuple[float, float]:
 def _groups(order: Ints, x: Floats, span: float) -> Iterator[Ints]:
     """Chords from the edge of the array inwards: the outermost ones, over a span, then small groups."""
     reached = np.maximum.accumulate(x[order]) - np.minimum.accumulate(x[order])
-    first = max(FEWEST, int(OUTERMOST * order.size), int(np.searchsorted(reached, span)) + 1)
-    size = max(FEWEST, int(GROUP * order.size))
+    first = max(MIN_CHORDS, int(OUTERMOST * order.size), int(np.searchsorted(reached, span)) + 1)
+    size = max(MIN_CHORDS, int(GROUP * order.size))
     yield order[:first]
     for begin in range(first, order.size, size):
         yield order[begin : begin + size]
@@ -183,6 +183,6 @@ def _refusal(chords: int) -> InvalidInput:
         "waveform/water",
         f"no traces, and {chords} chords of the object scan that pass through water alone",
         "a scan without the object (waveform/water) or travel times (traveltime/delta_tof_s), if the object "
-        f"fills the array; else at least {FEWEST} chords that miss it, "
+        f"fills the array; else at least {MIN_CHORDS} chords that miss it, "
         f"at {SLOWEST_MPS:g} to {FASTEST_MPS:g} m/s",
     )

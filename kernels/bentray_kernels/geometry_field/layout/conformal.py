@@ -19,7 +19,7 @@ from ...meshes.opening import OpenMesh
 from ...meshes.topology import topology_of
 
 # Least sine of a corner that counts in the stiffness: slivers would make it infinite.
-LEAST_SINE = 1e-8
+MIN_SINE = 1e-8
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def stiffness(faces: Ints, angles: Floats, size: int) -> csc_array:
         angles: (faces, 3) rad.
         size: number of vertices.
     """
-    weight = (0.5 * np.cos(angles) / np.maximum(np.sin(angles), LEAST_SINE)).ravel()
+    weight = (0.5 * np.cos(angles) / np.maximum(np.sin(angles), MIN_SINE)).ravel()
     one, other = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, -2, axis=1).ravel()
     rows = np.concatenate((one, other, one, other))
     columns = np.concatenate((other, one, one, other))

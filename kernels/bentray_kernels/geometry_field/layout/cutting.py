@@ -16,7 +16,7 @@ from .conformal import corner_angles, factor, stiffness
 from .handles import edge_graph, edges_between, handle_cut
 
 # Logarithm of the scale that is as good as none.
-LEAST_SCALE = 1e-3
+MIN_SCALE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Cutter:
         total = np.bincount(self.topology.faces.ravel(), self.angles.ravel(), len(self.vertices))
         plain = solver.solve((total - 2.0 * np.pi)[free])
         scale, chosen, pulls = plain, np.empty(0, np.int64), np.empty((0, len(plain)))
-        while np.abs(scale).max() > LEAST_SCALE:
+        while np.abs(scale).max() > MIN_SCALE:
             chosen = np.append(chosen, np.argmax(np.abs(scale)))
             yield FarEnd(int(names[chosen[-1]]), float(np.abs(scale[chosen[-1]])))
             unit = np.zeros(len(plain))

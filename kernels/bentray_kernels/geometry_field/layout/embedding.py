@@ -13,7 +13,7 @@ from .distortion import signed_areas
 RINGS = 8
 
 # Part of the faces that may be flipped; where it is more, there is no small fold.
-MOST_FLIPPED = 0.01
+MAX_FLIPPED = 0.01
 
 
 def round_embedding(disk: Disk) -> Floats:
@@ -43,7 +43,7 @@ def unfolded(plane: Floats, disk: Disk) -> Floats:
     """
     for rings in range(1, RINGS + 1):
         flipped = signed_areas(plane[disk.faces]) <= 0.0
-        if not 0.0 < flipped.mean() < MOST_FLIPPED:
+        if not 0.0 < flipped.mean() < MAX_FLIPPED:
             break
         near = np.zeros(len(plane), bool)
         near[disk.faces[flipped]] = True

@@ -23,7 +23,7 @@ from .framing import in_unit_square
 # The first layout comes once nothing shrinks by more than e^3; then each has twice as many ends of the cut as
 # the one before, up to so many, and is taken if it does not overlap and stretches by so much less.
 SHRUNK = 3.0
-MOST_ENDS = 64
+MAX_ENDS = 64
 ENOUGH = 0.95
 
 # Between the boundary that keeps its lengths, 0, and a circle, 1.
@@ -51,7 +51,7 @@ class Parameterisation:
 
 
 # Longest side of a face that counts beside the unit cube: tables keep places in float32.
-LEAST_SIDE = 1e-8
+MIN_SIDE = 1e-8
 
 
 def parameterise(mesh: TriangleMesh) -> Parameterisation:
@@ -105,7 +105,7 @@ def _parameterised(mesh: TriangleMesh) -> Parameterisation:
             best, least, due = (cut.edges, disk), stretch, max(2 * number, 2)
             if overlaps:
                 break
-        if end is None or number == MOST_ENDS:
+        if end is None or number == MAX_ENDS:
             break
         cut = cutter.grown(cut, end.vertex)
     if best is None:
@@ -128,9 +128,9 @@ def _checked(mesh: TriangleMesh) -> Topology:
     if touching > 0:
         raise InvalidInput("faces", f"{touching} vertices where fans of faces touch", "none")
     longest = np.linalg.norm(np.roll(mesh.corners, -1, axis=1) - mesh.corners, axis=-1).max(axis=1)
-    lost = int((longest < LEAST_SIDE).sum())
+    lost = int((longest < MIN_SIDE).sum())
     if lost:
-        accepted = f"sides of {LEAST_SIDE:g} of the whole mesh or more"
+        accepted = f"sides of {MIN_SIDE:g} of the whole mesh or more"
         raise InvalidInput("mesh", f"{lost} faces that are lost beside the whole", accepted)
     flat = (np.linalg.norm(mesh.face_normals, axis=1) == 0.0).sum()
     if flat:

@@ -15,7 +15,7 @@ from ...errors import InvalidInput
 from ...float32 import higher, lower, real, whole
 
 # The dissertation's textures end at 24; at 48 a table has 191 million entries.
-MOST_SAMPLES = 48
+MAX_SAMPLES = 48
 
 # Replaces a 0 of a direction: its reciprocal is finite in float32, and so are products with it.
 ALMOST_ZERO = real(1e-18)
@@ -32,8 +32,8 @@ def check_samples(n: int) -> None:
     Raises:
         InvalidInput: for one not between 2 and 48.
     """
-    if not 2 <= n <= MOST_SAMPLES:
-        raise InvalidInput("samples", n, f"2 to {MOST_SAMPLES} along an edge of the cube")
+    if not 2 <= n <= MAX_SAMPLES:
+        raise InvalidInput("samples", n, f"2 to {MAX_SAMPLES} along an edge of the cube")
 
 
 def samples(n: int) -> Floats:

@@ -21,7 +21,7 @@ NEAREST, LINEAR, PLANE, WALK, EXACT = 0, 1, 2, 3, 4
 WAYS = {"nearest": NEAREST, "linear": LINEAR, "plane": PLANE, "walk": WALK, "exact": EXACT}
 
 # A ray that leaves the surface meets it again at this distance or later, edges of the unit cube.
-LEAST = 1e-6
+MIN_DISTANCE = 1e-6
 
 # Face, −1 for none; distance in lengths of the direction; weights of corners 0 and 1.
 Hit = tuple[int, float, float, float]
@@ -33,7 +33,7 @@ def intersect_exactly(
 ) -> Hit:
     """The first face of a shape by the exact intersector; ``left`` is the face that the ray leaves, or −1."""
     length = (direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2) ** 0.5
-    begin = LEAST / length if left >= 0 else 0.0
+    begin = MIN_DISTANCE / length if left >= 0 else 0.0
     root = world.shapes[shape, 0]
     face, distance, first, second, _ = closest(
         world.surface, waiting, root, origin, direction, begin, np.inf, left
@@ -119,7 +119,7 @@ def from_the_surface(
     if face >= 0:
         face, distance, first, second = settle(world.surface, face, side, STEPS, *origin, *direction)
         length = (direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2) ** 0.5
-        if face >= 0 and face != left and distance * length > LEAST:
+        if face >= 0 and face != left and distance * length > MIN_DISTANCE:
             return face, distance, first, second
     if side < 0.0:
         # A ray inside a body meets it somewhere: the entry was one of a ray that passed a fold.

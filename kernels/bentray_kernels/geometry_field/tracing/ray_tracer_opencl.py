@@ -135,8 +135,8 @@ class OpenCLTracer:
             f"ALMOST_ZERO=R({float(cube.ALMOST_ZERO)!r})",
             f"MARGIN=R({float(cube.MARGIN)!r})",
             f"SLACK=R({float(accurate_lookup.SLACK)!r})",
-            f"LEAST=R({lookup_scene.LEAST!r})",
-            f"MOST_STEPS={accurate_lookup.STEPS}",
+            f"MIN_DISTANCE=R({lookup_scene.MIN_DISTANCE!r})",
+            f"MAX_STEPS={accurate_lookup.STEPS}",
             f"WAITING={WAITING}",
         )
 

@@ -24,11 +24,11 @@ from .linearisation import Rows, linearise, ray_density
 # A misfit above this part of the previous best is no gain, and ``PATIENCE`` consecutive images without gain
 # end the iteration. One does not: the first image of bent rays may have the misfit of straight rays, the next
 # one a far lower misfit.
-LEAST_GAIN = 0.98
+MIN_GAIN = 0.98
 PATIENCE = 2
 
 # Most halvings of a step that increases the misfit: the linearisation holds only near the image.
-MOST_HALVINGS = 3
+MAX_HALVINGS = 3
 
 
 @dataclass(frozen=True)
@@ -130,13 +130,13 @@ def step(
     if loss < best.loss:
         best = current
     worse = loss > state.best.loss
-    halve = worse and state.halvings < MOST_HALVINGS
-    idle = state.idle + (not halve) if loss > LEAST_GAIN * state.best.loss else 0
+    halve = worse and state.halvings < MAX_HALVINGS
+    idle = state.idle + (not halve) if loss > MIN_GAIN * state.best.loss else 0
     stuck = (worse and not halve) or idle == PATIENCE
     # The last iteration only evaluates the previous image.
     last = number == settings.iterations
     if number > 1 and (stuck or last or settings.numerics.explained(rms)):
-        best = current if loss < state.best.loss / LEAST_GAIN else best
+        best = current if loss < state.best.loss / MIN_GAIN else best
         history = tuple(replace(record, given=record.sweep == best.sweep) for record in history)
         return replace(state, slowness=best.slowness, best=best, history=history, done=True)
     if halve:

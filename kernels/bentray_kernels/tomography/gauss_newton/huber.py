@@ -14,7 +14,7 @@ MEDIAN_PART = 0.6745
 # The limit is at least this part of the mean absolute residual. With exact times of a small object most rays
 # cross only water and fit from the start; if only these determined the spread, the others would have no
 # weight.
-LEAST_PART = 0.7
+MIN_FRACTION = 0.7
 
 
 def limit(residual: Floats, spreads: float) -> float:
@@ -29,7 +29,7 @@ def limit(residual: Floats, spreads: float) -> float:
     size = np.abs(residual)
     spread = float(np.median(size)) / MEDIAN_PART
     # If all residuals are zero, none is an outlier.
-    return max(spreads * spread, LEAST_PART * float(size.mean())) or math.inf
+    return max(spreads * spread, MIN_FRACTION * float(size.mean())) or math.inf
 
 
 def loss(residual: Floats, limit: float) -> float:

@@ -26,7 +26,7 @@ ROUNDS = 12
 STEPS = 6
 
 # Most conjugate gradient steps of a quadratic penalty, and the relative gradient at which they end.
-MOST_STEPS = 300
+MAX_STEPS = 300
 TOLERANCE = 1e-5
 
 # Curvature of the data over the density at a wavenumber k of 1/node, times k: rays from all sides of a plane
@@ -92,7 +92,7 @@ class Linearised:
             return self._split(dual)
         image = self.image
         for _ in range(REWEIGHTINGS if self.huber < math.inf else 1):
-            image = self._descend(image, self._penalty_gradient(image), self._penalty_hessian, MOST_STEPS)
+            image = self._descend(image, self._penalty_gradient(image), self._penalty_hessian, MAX_STEPS)
         return image, dual
 
     def _split(self, dual: Floats) -> tuple[Floats, Floats]:

@@ -23,7 +23,7 @@ BEFORE, AFTER, PERIODS = 0.4, 0.25, 4.0
 NEAREST = 0.16
 
 # The time budget does not reduce the emitters of a band below this number.
-LEAST_EMITTERS = 8
+MIN_EMITTERS = 8
 
 
 class WaveScale(NamedTuple):
@@ -67,7 +67,7 @@ class WaveScale(NamedTuple):
         """The settings with the bands and emitters that the time budget allows.
 
         As many bands as possible, at least one; if a single band takes too long, fewer emitters, at least
-        ``LEAST_EMITTERS``. Fixed bands and emitters are not changed; without a budget all bands are used.
+        ``MIN_EMITTERS``. Fixed bands and emitters are not changed; without a budget all bands are used.
         """
         most, emitters = settings.minutes, settings.numerics.emitters
         if most is None or settings.numerics.bands is not None:
@@ -77,7 +77,7 @@ class WaveScale(NamedTuple):
             count -= 1
         if emitters is None and self._minutes(settings, count, None) > most:
             emitters = min(band.emitters for band in bands(self.centre_hz, self.water_mps))
-            while emitters > LEAST_EMITTERS and self._minutes(settings, count, emitters) > most:
+            while emitters > MIN_EMITTERS and self._minutes(settings, count, emitters) > most:
                 emitters //= 2
         return settings.changed(bands=count, emitters=emitters)
 

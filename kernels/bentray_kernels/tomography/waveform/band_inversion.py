@@ -22,7 +22,7 @@ from .waveform_settings import Steps, WaveSettings
 DARK = 0.1
 
 # Most times that a step which increases the misfit is shortened.
-MOST_SHORTENINGS = 4
+MAX_SHORTENINGS = 4
 
 # Cycle-skip guard: the band ends once the held-out misfit exceeds ``LEEWAY`` times its minimum in
 # ``PATIENCE`` consecutive images.
@@ -220,7 +220,7 @@ def _ended(problem: WaveProblem, state: InversionState) -> InversionState:
 
 def _shortened(problem: WaveProblem, limits: Steps, state: InversionState, misfit: float) -> InversionState:
     """A shorter step in the same direction, to the minimum of the parabola through both misfits."""
-    if state.shortenings == MOST_SHORTENINGS:
+    if state.shortenings == MAX_SHORTENINGS:
         return _ended(problem, state)
     fall = float((state.gradient * state.way).sum())
     bend = misfit - state.misfit - fall

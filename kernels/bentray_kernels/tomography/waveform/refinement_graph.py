@@ -23,7 +23,7 @@ from .waveform_settings import WaveSettings
 
 # Bands whose simulated water shots have a lower correlation with the recorded ones are skipped: their waves
 # are too long for the array and its absorbing edges, or were not emitted.
-LEAST_WATER_CORRELATION = 0.9
+MIN_WATER_CORRELATION = 0.9
 
 
 class WaveScan(Protocol):
@@ -179,9 +179,9 @@ class RefinementGraph:
 
 
 def start_band(scan: WaveScan, number: int, image: Image) -> ActiveBand | None:
-    """Task: the initial state of a band; None if it is skipped, see ``LEAST_WATER_CORRELATION``."""
+    """Task: the initial state of a band; None if it is skipped, see ``MIN_WATER_CORRELATION``."""
     problem = scan.problem(number)
-    if problem.water_correlation < LEAST_WATER_CORRELATION:
+    if problem.water_correlation < MIN_WATER_CORRELATION:
         return None
     speed, count = on_grid(image, problem), len(band_inversion.emitters(problem))
     wavelet = None

@@ -13,7 +13,7 @@ from ...arrays import Floats, Ints
 from ...wave.simulation import simulate
 from .misfits import correlation
 from .trace_resampling import Water, resampler
-from .water_phase import LEAST_PAIRS, fit_water
+from .water_phase import MIN_PAIRS, fit_water
 from .waveform_problem import WaveProblem
 from .wavelet import fit_wavelet
 
@@ -51,7 +51,7 @@ def with_calibrated_source(problem: WaveProblem, shots: WaterShots) -> WaveProbl
     distance = np.linalg.norm(problem.receivers - problem.emitters[shot], axis=1)
     valid = problem.valid_receivers(shot)
     valid = valid[np.argsort(distance[valid], kind="stable")]
-    if valid.size < LEAST_PAIRS:
+    if valid.size < MIN_PAIRS:
         return best
     medium = problem.medium(np.full(problem.region.shape, problem.water.speed))
     model = simulate(

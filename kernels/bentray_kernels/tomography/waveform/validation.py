@@ -18,7 +18,7 @@ CENTRAL = 3
 
 # No validation below this correlation of simulated and recorded water shots. Noise reduces it too; the limit
 # is lower than that of a refined band, because all compared images have the same noise.
-LEAST_VALID_CORRELATION = 0.7
+MIN_VALID_CORRELATION = 0.7
 
 # Emitters whose water shots calibrate the source; held-out ones are the settings' ``held_out``.
 SHOTS = 4
@@ -104,7 +104,7 @@ def evaluations(settings: WaveSettings) -> int:
 def validate_image(scan: WaveScan, image: Image) -> Validation:
     """Task: the misfits of an image."""
     settings, problem = scan.settings(), scan.problem(0)
-    if problem.water_correlation < LEAST_VALID_CORRELATION or not problem.held.size:
+    if problem.water_correlation < MIN_VALID_CORRELATION or not problem.held.size:
         return Validation()
     model = Model(np.clip(on_grid(image, problem), *settings.speed_bounds_mps))
     held = evaluate(problem, settings, model, problem.held).held / problem.held.size

@@ -12,7 +12,7 @@ from .trace_resampling import Water
 WEAK = 0.05
 
 # Fewest pairs of one emitter for the line of phase over distance.
-LEAST_PAIRS = 8
+MIN_PAIRS = 8
 
 
 def fit_water(
@@ -30,11 +30,11 @@ def fit_water(
         time_step_s: s.
 
     Raises:
-        InvalidInput: with fewer than ``LEAST_PAIRS`` pairs.
+        InvalidInput: with fewer than ``MIN_PAIRS`` pairs.
     """
-    if distance.size < LEAST_PAIRS:
+    if distance.size < MIN_PAIRS:
         raise InvalidInput(
-            "waveform/water", f"{distance.size} pairs", f"{LEAST_PAIRS} pairs at least of one emitter"
+            "waveform/water", f"{distance.size} pairs", f"{MIN_PAIRS} pairs at least of one emitter"
         )
     padded = 4 * simulated.shape[1]
     frequency = np.fft.rfftfreq(padded, time_step_s)

@@ -1,14 +1,14 @@
 // Views of a volume: the default one, and views as query parameters.
 
 // Smallest difference from the speed of water, relative to it, of a surface to render.
-const LEAST = 0.005;
+const MIN_CONTRAST = 0.005;
 
 // A 3-D reconstruction as glass in water, with the refractive index of sound.
 export function glassOf({ water_speed_mps: water, value_range: [lowest, highest] }) {
   const between = (speed) => Number(((water + speed) / 2).toPrecision(6));
   const index = (speed) => Number((water / speed).toPrecision(4));
-  const slower = lowest < (1 - LEAST) * water;
-  const faster = highest > (1 + LEAST) * water;
+  const slower = lowest < (1 - MIN_CONTRAST) * water;
+  const faster = highest > (1 + MIN_CONTRAST) * water;
   if (!slower && !faster) return {};
   return {
     iso: [...(slower ? [between(lowest)] : []), ...(faster ? [between(highest)] : [])],

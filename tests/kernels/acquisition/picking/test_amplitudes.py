@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import Waveform
 from bentray_kernels.acquisition.picking.amplitudes import (
-    MOST_UNSURE_NP,
+    MAX_UNCERTAINTY_NP,
     WAYS,
     Powers,
     read_log_ratios,
@@ -89,7 +89,7 @@ def test_louder_noise_leaves_out_and_never_lies(way):
         known = found[np.isfinite(found)]
         counts.append(known.size)
         if known.size:
-            assert abs(np.median(known) - 1.0) < 2.0 * MOST_UNSURE_NP
+            assert abs(np.median(known) - 1.0) < 2.0 * MAX_UNCERTAINTY_NP
     assert counts[0] == APART.sum()
     assert counts[-1] < 0.05 * APART.sum()
     assert sorted(counts, reverse=True) == counts

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.numerics import BANDS
 from bentray_kernels.tomography.waveform.automatic_settings import (
-    LEAST_EMITTERS,
+    MIN_EMITTERS,
     WaveScale,
 )
 
@@ -27,7 +27,7 @@ def test_without_a_budget_all_bands_are_used():
 @given(st.floats(0.0, 1e4))
 def test_what_is_chosen_fits_or_is_the_least(minutes):
     found = within(minutes)
-    least = (1, LEAST_EMITTERS)
+    least = (1, MIN_EMITTERS)
     assert SCALE.minutes(found) <= minutes or (found.numerics.bands, found.numerics.emitters) == least
     # A larger budget never gives less.
     assert SCALE.minutes(within(2.0 * minutes)) >= SCALE.minutes(found)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.tomography.waveform.band_inversion import (
-    MOST_SHORTENINGS,
+    MAX_SHORTENINGS,
     PATIENCE,
     EmitterMisfit,
     begin,
@@ -56,7 +56,7 @@ def test_a_step_that_makes_it_worse_is_shortened_and_then_given_up(problem):
     while not state.done:
         state = step(problem, SETTINGS, state, told(problem, 2.0, 1.0))
         sizes.append(np.abs(state.way).max())
-    assert len(state.history) == 2 + MOST_SHORTENINGS
+    assert len(state.history) == 2 + MAX_SHORTENINGS
     assert all(later < earlier for earlier, later in pairwise(sizes[:-1]))
     assert (state.image == WATER).all()
     assert not state.skipped

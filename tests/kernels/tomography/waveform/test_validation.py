@@ -11,7 +11,7 @@ from bentray_kernels.tomography.waveform.automatic_settings import scale_of, wav
 from bentray_kernels.tomography.waveform.inversion_state import Image
 from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.validation import (
-    LEAST_VALID_CORRELATION,
+    MIN_VALID_CORRELATION,
     SHOTS,
     Validation,
     ValidationGraph,
@@ -64,7 +64,7 @@ def test_nothing_is_said_where_water_shots_cannot_be_simulated():
     random = np.random.default_rng(0).normal(size=data.waveform.water.shape).astype(np.float32)
     deaf = replace(data, waveform=replace(data.waveform, water=random))
     here = MemoryWaveScan(deaf, validation_settings(plan_for(deaf)))
-    assert here.problem(0).water_correlation < LEAST_VALID_CORRELATION
+    assert here.problem(0).water_correlation < MIN_VALID_CORRELATION
     assert validate_image(here, images()[0]) == Validation()
 
 

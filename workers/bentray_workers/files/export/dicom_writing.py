@@ -31,7 +31,7 @@ QUANTITIES = {
     "values": ("VALUES", "Values", "1", "no units"),
 }
 # Parametric maps have at most so many rows and columns.
-MOST_NODES = 2**16 - 1
+MAX_NODES = 2**16 - 1
 MAKER, MODEL, SCHEME = "Bentray", "bentray", "99BENTRAY"
 
 
@@ -68,9 +68,9 @@ def write_dicom(
     if not np.isfinite(spacing_m).all():
         found = f"uneven slices (spacing {tuple(float(step) for step in spacing_m)} m)"
         raise InvalidInput("volume", found, "even spacing for DICOM; hdf5 holds any")
-    if max(first.shape) > MOST_NODES:
+    if max(first.shape) > MAX_NODES:
         raise InvalidInput(
-            "volume", f"{max(first.shape)} nodes", f"at most {MOST_NODES} along an axis for DICOM"
+            "volume", f"{max(first.shape)} nodes", f"at most {MAX_NODES} along an axis for DICOM"
         )
     # (frames, rows, columns, quantities).
     pixels = np.stack([_frames(images[name]) for name in names], axis=-1)

@@ -15,7 +15,7 @@ from ..atomic import atomic_replace
 from ..bounded_reading import UNITS_M
 
 # Largest number of nodes along an axis in the header of NIfTI-1.
-MOST_NODES = 2**15 - 1
+MAX_NODES = 2**15 - 1
 # Code for coordinates of the scanner.
 SCANNER = 1
 
@@ -49,7 +49,7 @@ def write_nifti(
     affine, ndim = np.eye(4), values.ndim
     affine[range(ndim), range(ndim)] = np.divide(spacing_m, UNITS_M["mm"])
     affine[:ndim, 3] = np.divide(origin_m, UNITS_M["mm"])
-    kind = Nifti1Image if max(values.shape) <= MOST_NODES else Nifti2Image
+    kind = Nifti1Image if max(values.shape) <= MAX_NODES else Nifti2Image
     image = kind(values, affine)
     image.set_sform(affine, SCANNER)
     image.set_qform(affine, SCANNER)

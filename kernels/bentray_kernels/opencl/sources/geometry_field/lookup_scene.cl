@@ -1,6 +1,6 @@
 // The first hit of a ray on one shape, from its fields or exactly; as tracing/lookup_scene.py. After surface.cl.
 //
-// LEAST: as there.
+// MIN_DISTANCE: as there.
 
 #define NEAREST 0
 #define LINEAR 1
@@ -22,7 +22,7 @@ typedef struct {
 
 Found exactly(const Fields *fields, int shape, Vector origin, Vector direction, int left)
 {
-    const REAL begin = left >= 0 ? LEAST / sqrt(dot3(direction, direction)) : R(0);
+    const REAL begin = left >= 0 ? MIN_DISTANCE / sqrt(dot3(direction, direction)) : R(0);
     return closest(&fields->surface, (int)fields->shapes[5 * shape], origin, direction, begin, NONE, left);
 }
 
@@ -117,7 +117,7 @@ Found from_the_surface(const Fields *fields, int shape, int way, Vector origin, 
     if (face >= 0) {
         const Found found = settle(&fields->surface, face, side, origin, direction);
         if (found.face >= 0 && found.face != left &&
-            found.distance * sqrt(dot3(direction, direction)) > LEAST)
+            found.distance * sqrt(dot3(direction, direction)) > MIN_DISTANCE)
             return found;
     }
     return side < 0 ? exactly(fields, shape, origin, direction, left) : NOT_FOUND;

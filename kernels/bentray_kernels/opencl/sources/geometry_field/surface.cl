@@ -1,7 +1,7 @@
 // The surfaces of a scene, the exact intersector and the lines of the cube, after refraction/rays.cl.
 //
 // A function does what the one of its name does in geometry_field/intersector.py, cube.py, faces.py or
-// lookup.py. LATER, ALMOST_ZERO, MOST_STEPS, WAITING: as there. NEVER: the reciprocal that stands for one over 0.
+// lookup.py. LATER, ALMOST_ZERO, MAX_STEPS, WAITING: as there. NEVER: the reciprocal that stands for one over 0.
 
 typedef struct {
     global const float *triangles;
@@ -199,7 +199,7 @@ Found settle(const Surface *surface, int face, REAL side, Vector s, Vector d)
 {
     Meeting at = meet_plane(surface->triangles + 16 * (size_t)face, s, d);
     int across = beyond(surface->links + 16 * (size_t)face, face, at);
-    for (int step = 0; step < MOST_STEPS; ++step) {
+    for (int step = 0; step < MAX_STEPS; ++step) {
         if (across == face || across < 0 || !(side * at.determinant > 0))
             break;
         face = across;

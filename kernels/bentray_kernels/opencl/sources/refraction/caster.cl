@@ -1,6 +1,6 @@
 // The ray caster of refraction/caster.py, one work-item per ray; the last group has idle items.
 //
-// MOST_HALVINGS: as in isosurface/crossing.py.
+// MAX_HALVINGS: as in isosurface/crossing.py.
 
 #define MISSED 0
 #define REFRACTED 1
@@ -83,7 +83,7 @@ kernel void follow(global const SUM *coefficients, constant const SUM *tables, c
     Vector direction = affine(camera + 9, places[2 * n], places[2 * n + 1]);
     direction = scaled(1 / sqrt(dot3(direction, direction)), direction);
 
-    int crossed = 0, layer = around, fate = MISSED, halvings = MOST_HALVINGS;
+    int crossed = 0, layer = around, fate = MISSED, halvings = MAX_HALVINGS;
     bool entered = false, leaving = false;
     REAL weight = 1, slope = 0;
     while (!leaving) {
