@@ -33,6 +33,12 @@ class Pairs:
     delta_tof: Floats
     log_ratio: Floats | None
 
+    @property
+    def elements(self) -> Floats:
+        """Places of emitters and receivers, each once, (elements, ndim), m."""
+        received = self.receivers.reshape(-1, self.receivers.shape[-1])
+        return np.unique(np.concatenate((self.emitters, received)), axis=0)
+
 
 def heights(dataset: Dataset) -> Floats | None:
     """Heights of the rings of an array, or of the slices of a scan, m, rising; None for a plain 2-D scan.

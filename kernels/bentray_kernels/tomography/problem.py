@@ -11,14 +11,12 @@ from ..acquisition import Dataset
 from ..arrays import Flags, Floats, Ints
 from ..errors import InvalidInput
 from . import pairs
+from .array_region import POSITION, RIM_NODES, check_extent, inside_array
 from .roi import inside
 from .settings import Settings
 
 # Water kept around the outermost transducer, nodes, as a margin for wave front and gradient.
 MARGIN_NODES = 3
-
-# Nodes nearer to the array than this are water and stay so.
-RIM_NODES = 2
 
 
 @dataclass(frozen=True)
@@ -58,9 +56,9 @@ class Problem:
         """One problem of a dataset; ``index`` counts slices from 0 (a volume has one problem).
 
         Raises:
-            InvalidInput: no travel times in the slice, elements outside the image, an image without a node
-                inside the array, bounds that exclude the water, a region of interest without a grid or
-                a node.
+            InvalidInput: no travel times in the slice, elements on one line or outside the image, an image
+                without a node inside the array, bounds that exclude the water, a region of interest without
+                a grid or a node.
         """
         low, high = settings.speed_bounds_mps
         if not low <= dataset.water_speed_mps <= high:
@@ -70,6 +68,8 @@ class Problem:
                 f"bounds around the speed of the water, {dataset.water_speed_mps:g} m/s",
             )
         data = pairs.of(dataset, settings, index)
+        elements = data.elements
+        check_extent(elements)
         flat = dataset.element_position_m[:, :2]
         centre = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
         reach = float(np.abs(flat - centre).max())
@@ -79,21 +79,23 @@ class Problem:
         if side < 2.0 * reach:
             raise InvalidInput("side_m", side, f"at least {2.0 * reach:g} m, to hold the array")
         spacing = side / (settings.grid_nodes - 1)
-        axis = np.arange(settings.grid_nodes) * spacing
-        nearest = float(np.linalg.norm(flat - centre, axis=1).min()) - RIM_NODES * spacing
-        region = np.hypot(axis[:, None] - 0.5 * side, axis[None, :] - 0.5 * side) <= nearest
-        if reach == 0.0 or not region.any():
-            raise InvalidInput(
-                "geometry/element_position_m",
-                f"no node inside the array: nodes {spacing:.3g} m apart, array {2.0 * reach:.3g} m wide",
-                "elements around the object, and nodes (settings nodes, side_m) between them",
-            )
+        shape: tuple[int, ...] = (settings.grid_nodes,) * 2
         origin = centre - 0.5 * side
         if data.emitters.shape[1] == 3:
             z = np.concatenate((data.emitters[:, 2], data.receivers[..., 2].ravel()))
             count = math.ceil((z.max() - z.min()) / spacing - 1e-6) + 1 + 2 * MARGIN_NODES
             origin = np.append(origin, z.min() - MARGIN_NODES * spacing)
-            region = np.repeat(region[:, :, None], count, axis=2)
+            shape = (*shape, count)
+        # Coarse grids of a thin array have nodes inside it, but none so far inside.
+        rims = (RIM_NODES, 0.5 * RIM_NODES, 0.0)
+        regions = (inside_array(elements, shape, spacing, origin, rim) for rim in rims)
+        region = next((one for one in regions if one.any()), None)
+        if region is None:
+            raise InvalidInput(
+                POSITION,
+                f"no node inside the array: nodes {spacing:.3g} m apart, array {2.0 * reach:.3g} m wide",
+                "elements around the object, and nodes (settings nodes, side_m) between them",
+            )
         place = tuple(float(x) for x in origin)
         frequency = dataset.amplitude_frequency_hz or dataset.center_frequency_hz
         if settings.roi:

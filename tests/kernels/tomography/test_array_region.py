@@ -1,0 +1,95 @@
+"""The region that may change is the hull of the array, without a rim at its faces and elements."""
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography.array_region import RIM_NODES, check_extent, inside_array
+
+SPACING, NODES = 0.002, 48
+ORIGIN = (-0.5 * SPACING * (NODES - 1),) * 2
+AXIS = ORIGIN[0] + SPACING * np.arange(NODES)
+X, Y = np.meshgrid(AXIS, AXIS, indexing="ij")
+
+
+def region(position):
+    return inside_array(np.asarray(position), (NODES, NODES), SPACING, ORIGIN)
+
+
+def lines(gap=0.06, length=0.05, elements=16):
+    y = np.linspace(-0.5 * length, 0.5 * length, elements)
+    return np.concatenate([np.column_stack((np.full(elements, side * 0.5 * gap), y)) for side in (-1, 1)])
+
+
+def test_of_a_ring_it_is_the_circle_less_the_rim():
+    circle = np.hypot(X, Y) <= 0.04 - RIM_NODES * SPACING
+    assert np.array_equal(region(Ring(128, 0.04).positions()), circle)
+
+
+def test_of_facing_lines_it_is_the_rectangle_between_them():
+    rim = RIM_NODES * SPACING - 1e-9
+    between = (np.abs(X) <= 0.03 - rim) & (np.abs(Y) <= 0.025 - rim)
+    assert np.array_equal(region(lines()), between)
+
+
+def test_an_element_inside_a_ring_removes_only_the_nodes_near_it():
+    ring, inside = Ring(64, 0.04).positions(), np.array([[0.0071, 0.0053]])
+    near = np.hypot(*(np.stack((X, Y)) - inside[0][:, None, None])) < RIM_NODES * SPACING
+    whole = region(ring)
+    assert near.any()
+    assert np.array_equal(region(np.concatenate((ring, inside))), whole & ~near)
+
+
+def test_a_missing_quarter_is_cut_off_along_its_chord():
+    ring = Ring(128, 0.04).positions()
+    missing = (ring >= -1e-9).all(axis=1)
+    chord = ring[~missing].sum(axis=1).max()
+    beyond = (X + Y - chord) / np.sqrt(2.0) > -RIM_NODES * SPACING
+    assert np.array_equal(region(ring[~missing]), region(ring) & ~beyond)
+
+
+def test_stacked_rings_keep_the_nodes_above_and_below_them():
+    ring, heights = Ring(32, 0.04).positions(), (-0.01, 0.0, 0.01)
+    stack = np.concatenate([np.column_stack((ring, np.full(32, z))) for z in heights])
+    found = inside_array(stack, (NODES, NODES, 18), SPACING, (*ORIGIN, -0.017))
+    assert np.array_equal(found, np.repeat(region(ring)[:, :, None], 18, axis=2))
+
+
+def test_planes_of_elements_above_each_other_are_limits():
+    grid = np.stack(np.meshgrid(*[np.linspace(-0.03, 0.03, 9)] * 2), axis=-1).reshape(-1, 2)
+    planes = np.concatenate([np.column_stack((grid, np.full(81, z))) for z in (-0.02, 0.02)])
+    z = -0.026 + SPACING * np.arange(27)
+    found = inside_array(planes, (NODES, NODES, 27), SPACING, (*ORIGIN, -0.026))
+    kept = z[found.any(axis=(0, 1))]
+    assert kept.min() == pytest.approx(-0.016)
+    assert kept.max() == pytest.approx(0.016)
+    assert np.abs(X[found.any(axis=2)]).max() <= 0.03 - RIM_NODES * SPACING + 1e-9
+
+
+def test_a_bowl_holds_what_lies_between_its_elements():
+    turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    rings = [(0.04 * np.cos(t), -0.04 * np.sin(t)) for t in np.deg2rad((0, 20, 40, 60, 75, 90))]
+    bowl = np.concatenate(
+        [np.column_stack((r * np.cos(turn), r * np.sin(turn), 0 * turn + z)) for r, z in rings]
+    )
+    found = inside_array(bowl, (NODES, NODES, 27), SPACING, (*ORIGIN, -0.046))
+    z = -0.046 + SPACING * np.arange(27)
+    radius = np.sqrt(X[..., None] ** 2 + Y[..., None] ** 2 + np.minimum(z, 0.0) ** 2)
+    assert radius[found].max() <= 0.04 - RIM_NODES * SPACING
+    assert found[(radius < 0.04 - 1.5 * RIM_NODES * SPACING - 0.002) & (z <= 0.0)].all()
+
+
+@pytest.mark.parametrize(
+    ("position", "words"),
+    [
+        (np.zeros((4, 2)), "at one point"),
+        (np.outer(np.arange(8.0), (0.6, 0.8)) + 0.1, "on one line"),
+        (np.outer(np.arange(8.0), (0.0, 0.6, 0.8)), "on one line"),
+        (np.column_stack((Ring(8, 0.04).positions(), np.full(8, 0.01))), "in one plane"),
+    ],
+)
+def test_elements_without_extent_are_refused(position, words):
+    with pytest.raises(InvalidInput, match=f"{words}.*several sides of the object") as refusal:
+        check_extent(position)
+    assert refusal.value.field == "geometry/element_position_m"
