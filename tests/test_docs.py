@@ -179,7 +179,7 @@ def test_the_examples_of_a_page_run(page: Path, service: str, scans: Path, tmp_p
             reader.follow(block)
 
 
-def test_what_is_not_run_says_why_and_parses() -> None:
+def test_skipped_examples_have_a_reason_and_parse() -> None:
     for line in shell_lines():
         words = [word for word in shlex.split(line) if not re.fullmatch(r"[A-Z_]+=.*", word)]
         if words[0] != "bentray":
@@ -190,7 +190,7 @@ def test_what_is_not_run_says_why_and_parses() -> None:
         command.make_context(words[1], list(rest))
 
 
-def test_every_page_has_what_it_points_to() -> None:
+def test_links_of_every_page_resolve() -> None:
     for page in PAGES:
         text = page.read_text()
         for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text):

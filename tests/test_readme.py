@@ -64,7 +64,7 @@ def test_the_readme_is_short() -> None:
     assert len((ROOT / "README.md").read_text()) <= LONGEST_README
 
 
-def test_nothing_else_is_asked_for_than_what_is_tested_here() -> None:
+def test_readme_requirements_match_the_tests() -> None:
     programs = {words[0].removeprefix(".venv/bin/").split("=")[0] for _, words in shell_lines()}
     ours = {
         "bentray",

@@ -61,7 +61,7 @@ def modules(package: str) -> list[str]:
         ("bentray_workers", "fastapi httpx pydantic sqlalchemy typer uvicorn"),
     ],
 )
-def test_importing_a_lower_layer_loads_nothing_of_the_upper_ones(package: str, heavy: str) -> None:
+def test_lower_layers_import_no_upper_layer(package: str, heavy: str) -> None:
     names = modules(package)
     assert len(names) > 5
     code = (
@@ -73,7 +73,7 @@ def test_importing_a_lower_layer_loads_nothing_of_the_upper_ones(package: str, h
     assert done.stdout.split() == []
 
 
-def test_the_first_line_of_every_source_file_says_what_it_is_for() -> None:
+def test_every_source_file_starts_with_its_purpose() -> None:
     without = []
     for path in committed():
         if path.suffix != ".py":
@@ -148,7 +148,7 @@ def test_every_package_of_a_lock_file_is_pinned_with_a_hash_and_no_address(lock:
 
 
 @pytest.mark.parametrize(("lock", "extras"), LOCKS.items())
-def test_a_lock_file_covers_what_pyproject_asks_for(lock: str, extras: tuple[str, ...]) -> None:
+def test_lock_files_cover_pyproject(lock: str, extras: tuple[str, ...]) -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     asked = [
         *project["dependencies"],

@@ -32,7 +32,7 @@ def traces(loss):
     return simulate_absorbed(medium, SOURCE, RECEIVERS, pulse(np.arange(300) * STEP_S, CENTRE_HZ))
 
 
-def test_loss_and_delay_are_those_of_the_relaxation_and_grow_as_the_frequency():
+def test_loss_and_delay_match_the_relaxation_model():
     """Against the complex wave number, by what the far trace has lost beyond the near one."""
     loss = 12.0
     frequency = np.fft.rfftfreq(4096, STEP_S)
@@ -57,7 +57,7 @@ def test_loss_and_delay_are_those_of_the_relaxation_and_grow_as_the_frequency():
     assert abs(np.angle(passed[centre])) < 0.02
 
 
-def test_without_loss_it_is_the_plain_simulation():
+def test_zero_loss_equals_the_lossless_simulation():
     medium = Medium.of(UNIFORM, 1e-3, STEP_S, dtype=np.float64)
     plain = simulate(medium, SOURCE, RECEIVERS, pulse(np.arange(300) * STEP_S, CENTRE_HZ))
     assert np.abs(traces(0.0) - plain).max() < 1e-12 * np.abs(plain).max()
@@ -65,7 +65,7 @@ def test_without_loss_it_is_the_plain_simulation():
 
 @settings(max_examples=4, deadline=None)
 @given(seed=st.integers(0, 2**31), most=st.floats(1.0, 100.0))
-def test_rough_media_are_passed_alike_both_ways_and_fall_silent(seed, most):
+def test_rough_media_are_reciprocal_and_decay(seed, most):
     random = np.random.default_rng(seed)
     speed = random.uniform(1400.0, 1600.0, (24, 26))
     loss = random.uniform(0.0, most, speed.shape)
@@ -94,7 +94,7 @@ def test_rough_media_are_passed_alike_both_ways_and_fall_silent(seed, most):
         ({"time_step_s": 1.01 * longest_step(WATER, 1e-3)}, "time_step_s"),
     ],
 )
-def test_what_is_no_loss_is_refused_by_name(changed, field):
+def test_rejects_invalid_loss(changed, field):
     asked = {"time_step_s": STEP_S, "attenuation": np.zeros((50, 30)), "frequency_hz": CENTRE_HZ, **changed}
     with pytest.raises(InvalidInput, match=field):
         Absorbing.of(UNIFORM, 1e-3, asked.pop("time_step_s"), **asked)

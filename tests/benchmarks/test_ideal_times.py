@@ -12,7 +12,7 @@ ELEMENTS = 8
 
 
 @pytest.mark.parametrize(("nodes", "radius_m"), [(160, 0.09), (160, 0.102)])
-def test_they_are_those_of_the_phantom(nodes, radius_m):
+def test_ideal_times_match_the_phantom(nodes, radius_m):
     """In water as fast as fat, for steps of edges shape shadows; the wider ring lies beyond the truth."""
     phantom, everyone = table6(1375.0), np.arange(ELEMENTS)
     ring = Ring(ELEMENTS, radius_m)

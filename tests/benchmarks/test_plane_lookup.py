@@ -66,7 +66,7 @@ def test_rays_end_within_the_cube():
     assert ((distances[met] > -1e-4) & (distances[met] < 1.0 + 1e-4)).all()
 
 
-def test_rays_that_miss_the_cube_meet_nothing():
+def test_rays_that_miss_the_cube_have_no_hit():
     surface = ball(2)
     table = plane_table(surface, field_of(surface, 4))
     assert found(table, np.array([[2.0, 2.0, 2.0]]), np.array([[1.0, 0.0, 0.0]]))[0] == np.inf

@@ -28,7 +28,7 @@ def test_a_missing_peer_gives_rows_without_a_value() -> None:
     ] * 2
 
 
-def test_without_the_solver_that_makes_the_times_the_rows_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_report_a_missing_time_solver(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         reconstruction_peers._eikonal_peers,
         "installed",

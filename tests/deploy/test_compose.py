@@ -39,7 +39,7 @@ def client() -> list[str] | None:
     return None
 
 
-def test_a_compose_client_takes_it(tmp_path: Path) -> None:
+def test_compose_file_is_valid(tmp_path: Path) -> None:
     words = client()
     if words is None:
         pytest.skip("no compose client here: apt-get install docker-compose")
@@ -52,7 +52,7 @@ def test_a_compose_client_takes_it(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
 
 
-def test_with_tls_nothing_is_said_in_the_clear_and_all_else_stays(file: dict[str, Any]) -> None:
+def test_tls_encrypts_every_connection_and_changes_nothing_else(file: dict[str, Any]) -> None:
     secured = compose.read(compose.TLS)
     for name in OURS:
         part, before = secured["services"][name], file["services"][name]
@@ -167,7 +167,7 @@ def test_password_and_key_are_made_once_and_closed_to_others(tmp_path: Path) -> 
         assert (tmp_path / "more" / name).read_text() != before
 
 
-def test_the_compiled_kernels_are_laid_where_numba_looks_once(tmp_path: Path) -> None:
+def test_compiled_kernels_are_copied_once_to_the_numba_cache(tmp_path: Path) -> None:
     compiled, cache = tmp_path / "compiled", tmp_path / "cache"
     (compiled / "folder").mkdir(parents=True)
     (compiled / "folder" / "kernel.nbc").write_text("compiled with the image")

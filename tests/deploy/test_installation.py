@@ -105,7 +105,7 @@ def test_it_works_again_after_a_part_was_killed(installation: Installation, scan
 
 
 @pytest.mark.nightly
-def test_with_certificates_the_parts_speak_tls_alone(tmp_path: Path, scan: Path) -> None:
+def test_parts_accept_only_tls_with_certificates(tmp_path: Path, scan: Path) -> None:
     subprocess.run([str(compose.ROOT / "deploy" / "certificates.sh"), str(tmp_path / "tls")], check=True)
     secured = Installation(tmp_path, compose.TLS)
     try:

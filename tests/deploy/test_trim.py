@@ -59,7 +59,7 @@ def trimmed(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_tests_sources_and_other_services_of_amazon_go_and_all_else_stays(trimmed: Path) -> None:
+def test_trim_removes_only_tests_sources_and_unused_aws_services(trimmed: Path) -> None:
     assert [name for name in GONE if (trimmed / name).exists()] == []
     assert [name for name in KEPT if not (trimmed / name).exists()] == []
 
@@ -81,7 +81,7 @@ def test_libraries_that_were_edited_after_linking_keep_their_segments_on_pages(t
     assert all((address - offset) % PAGE == 0 for offset, address in loaded)
 
 
-def test_nothing_is_compiled_that_nothing_imports() -> None:
+def test_only_imported_modules_are_compiled() -> None:
     text = (compose.ROOT / "deploy" / "Dockerfile").read_text()
     installs = [line for line in text.splitlines() if " install " in line and "pip " in line]
     assert installs

@@ -40,7 +40,7 @@ KILLS = effort(3, 20)
 TARGETS = ["service", "service", "service", "a worker", "a worker", "scheduler", *effort([], ["workers"])]
 
 
-def test_whatever_is_killed_nothing_is_lost(machine, scan, scan_file):
+def test_killing_any_part_loses_no_job(machine, scan, scan_file):
     chance = random.Random(7)
     dataset = machine.upload(scan_file)
     targets = [*dict.fromkeys(TARGETS), *chance.choices(TARGETS, k=KILLS - len(set(TARGETS)))]
@@ -78,7 +78,7 @@ def test_whatever_is_killed_nothing_is_lost(machine, scan, scan_file):
 
 
 @pytest.mark.nightly
-def test_a_simulation_goes_on_from_the_emissions_it_has(machine, tmp_path):
+def test_simulation_resumes_from_finished_emissions(machine, tmp_path):
     asked = {**WAVES, "emissions": EMISSIONS}
     job = machine.submit(**asked)
     work = machine.files / "work" / job

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 PLAN = Settings.of(nodes=48, attenuation=False, method="gauss-newton", iterations=8, penalty_strength=0.003)
 
 
-def test_poison_takes_nobody_with_it(scan, scan_file, tmp_path, monkeypatch):
+def test_poison_task_fails_only_its_own_job(scan, scan_file, tmp_path, monkeypatch):
     # The workers find the module on the path that they take over from this process.
     monkeypatch.syspath_prepend(Path(__file__).parent)
     from poison import PoisonedScan

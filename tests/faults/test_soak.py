@@ -118,7 +118,7 @@ def soak_scan() -> Dataset:
     return Dataset(ring.positions(), emitters, emitters, 1500.0, delta_tof_s=delta)
 
 
-def test_honest_work_is_done_and_nothing_grows(service, soak_scan, tmp_path, caplog):
+def test_honest_jobs_finish_and_resources_stay_bounded(service, soak_scan, tmp_path, caplog):
     # A line for each request is too much here.
     caplog.set_level(logging.WARNING, "httpx")
     ledger = Ledger()

@@ -19,7 +19,9 @@ from .machine import PATIENCE_S, Machine, wait_until
 pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 
-def test_it_outlives_its_service(machine: Machine, scan: Dataset, scan_file: Path, tmp_path: Path) -> None:
+def test_submit_survives_a_service_restart(
+    machine: Machine, scan: Dataset, scan_file: Path, tmp_path: Path
+) -> None:
     before = {job["id"] for job in machine.http.get("/v1/jobs").json()["jobs"]}
     words = ["submit", str(scan_file), "--url", str(machine.http.base_url), "-o", str(tmp_path), "--json"]
     settings = ["--method", "sart", "--nodes", "64", "--iterations", "120"]

@@ -74,7 +74,7 @@ def a_scan(path, megabytes):
 
 
 @pytest.mark.slow
-def test_an_upload_survives_the_service(tmp_path):
+def test_upload_survives_a_service_kill(tmp_path):
     scan = a_scan(tmp_path / "scan.h5", 40)
     content = scan.read_bytes()
     service = Service(tmp_path / "data")

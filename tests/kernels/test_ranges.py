@@ -56,7 +56,7 @@ def test_every_number_of_a_reconstruction_has_its_range():
 
 @pytest.mark.parametrize(("kind", "name"), NUMBERS, ids=[name for _, name in NUMBERS])
 @pytest.mark.parametrize("value", EXTREMES, ids=lambda value: str(value)[:12])
-def test_an_extreme_setting_is_refused_or_in_its_range(kind, name, value):
+def test_an_extreme_setting_is_rejected_or_in_its_range(kind, name, value):
     within = ranges_of(kind)[name]
     if within.holds(value):
         assert getattr(replace(kind(), **{name: value}), name) == value

@@ -20,7 +20,7 @@ def look(given):
     check(given, {"mode": ("red", "blue")})
 
 
-def test_what_is_within_passes():
+def test_accepts_values_in_range():
     for given in (Asked(), Asked("blue", 0.5), Asked("red", 2.0)):
         look(given)
     assert [one.metadata["description"] for one in fields(Asked)] == ["Which one.", "How large."]

@@ -81,7 +81,7 @@ def test_comments_docstrings_and_layout_do_not_matter(package):
     assert digest("splines.prefilter") != before
 
 
-def test_what_is_remembered_is_the_same_as_what_is_parsed(package, tmp_path):
+def test_cached_result_equals_the_parsed_one(package, tmp_path):
     _, digest = package
     parsed = digest("eikonal.updates")
     memory = tmp_path / "cache" / sources.MEMORY

@@ -63,7 +63,7 @@ def refused_by_name(answer, name):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_extreme_setting_of_a_job_is_refused_or_taken(http, uploaded, volume, work, kind):
+def test_an_extreme_setting_of_a_job_is_rejected_or_taken(http, uploaded, volume, work, kind):
     named = {"reconstruction": {"dataset": uploaded(http)}, "refraction": {"volume": volume["id"]}}
     refused = 0
     for name in numbers_of(kind):
@@ -91,7 +91,7 @@ def test_an_extreme_number_of_a_slice(http, volume, name):
             refused_by_name(answer, name)
 
 
-def test_colours_over_all_numbers_are_refused(http, volume):
+def test_colours_over_all_numbers_are_rejected(http, volume):
     answer = http.get(volume["links"]["image"], params={"low": "-1e308", "high": "1e308"})
     refused_by_name(answer, "low")
     wide = http.get(volume["links"]["image"], params={"low": "-3e38", "high": "3e38"})

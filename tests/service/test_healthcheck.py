@@ -27,12 +27,12 @@ def test_ready_service_passes(serve):
     assert check(serve()) is None
 
 
-def test_the_reason_is_told(serve, cluster):
+def test_failure_reason_is_shown(serve, cluster):
     cluster.workers = 0
     assert "workers" in check(serve())
 
 
-def test_nobody_there():
+def test_unreachable_service_is_reported():
     assert "no answer from a service at http://127.0.0.1:9" in check("http://127.0.0.1:9")
 
 
@@ -68,7 +68,7 @@ def test_a_scheduler_answers_and_logs_no_broken_connection(greeting):
     assert wait_for(heard) == [words]
 
 
-def test_what_is_no_scheduler(greeting):
+def test_rejects_hosts_that_are_no_scheduler(greeting):
     address, _ = greeting(b"HTTP/1.1 400 Bad Request\r\n\r\n")
     assert check_scheduler(address) == f"the server at {address} is not a Dask scheduler"
 
@@ -79,7 +79,7 @@ def test_no_scheduler():
     )
 
 
-def test_a_worker_lives_while_it_gives_signs(monkeypatch, tmp_path):
+def test_worker_is_healthy_while_it_sends_heartbeats(monkeypatch, tmp_path):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     address = "tcp://scheduler:8786"
     assert check_worker(address) == f"no heartbeat of a worker of {address}: none so far"

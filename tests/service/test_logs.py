@@ -30,7 +30,7 @@ def record(words, *given, **more):
     return logging.LogRecord("bentray.x", logging.WARNING, "x.py", 1, words, given, None, **more)
 
 
-def test_a_line_says_what_it_is_about(lines):
+def test_log_lines_carry_ids(lines):
     with about(request="r1"), about(job="job-1"):
         log.info("in %s", "it")
     log.warning("out")
@@ -57,7 +57,7 @@ def test_no_secret_in_any_line(formatter):
     assert "db/x" in shown
 
 
-def test_nobody_forges_a_line():
+def test_log_injection_is_escaped():
     shown = TextFormatter().format(record("GET %s", "/x\nWARNING all is well\x1b[2K"))
     assert len(shown.splitlines()) == 1
     assert "\x1b" not in shown
@@ -89,7 +89,7 @@ def test_connections_that_close_at_a_stop_show_no_traceback(form, capsys):
     assert "Error in batched write" in said
 
 
-def test_requests_and_jobs_can_be_followed_and_no_key_is_told(start, uploaded, submitted, until, work, lines):
+def test_logs_contain_ids_and_no_keys(start, uploaded, submitted, until, work, lines):
     http, token = start(), ApiKey.new()
     Keys(http.app.state.parts.database).add(token, Tenant("local"), "one", ("read", "write"))
     http.app.state.parts.sign_in._no_keys_until = 0.0
@@ -111,7 +111,7 @@ def test_requests_and_jobs_can_be_followed_and_no_key_is_told(start, uploaded, s
     assert all("\t" not in one.get("request", "") for one in told)
 
 
-def test_what_clients_bring_about_is_told_once_a_minute(capsys):
+def test_client_errors_are_logged_once_a_minute(capsys):
     now = [0.0]
     seldom = logs.RateLimitFilter(lambda: now[0])
 

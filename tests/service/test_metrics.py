@@ -27,7 +27,7 @@ def value(http, name, **labels):
     return found[0] if found else 0.0
 
 
-def test_names_tell_their_unit(http):
+def test_metric_names_end_in_their_unit(http):
     families = read(http)
     assert len(families) >= 7
     for name, family in families.items():
@@ -38,7 +38,7 @@ def test_names_tell_their_unit(http):
             assert name.endswith("_seconds")
 
 
-def test_requests_are_counted_by_route_and_not_by_what_was_asked(http):
+def test_requests_are_counted_by_route_template(http):
     for k in range(5):
         http.get(f"/v1/jobs/job-{k:020d}")
         http.get(f"/nothing/{k}")
@@ -79,7 +79,7 @@ def test_the_queue(http, uploaded, submitted, until, work, cluster):
     assert value(http, "bentray_disk_free_bytes") > 0
 
 
-def test_a_database_that_is_away_leaves_the_rest(http, monkeypatch):
+def test_metrics_without_the_database(http, monkeypatch):
     from sqlalchemy.exc import OperationalError
 
     def away():
@@ -99,7 +99,7 @@ def test_each_application_has_its_own(start, work):
     assert value(other, "bentray_http_requests_total", **labels) == 0
 
 
-def test_the_dashboard_asks_for_what_there_is(http):
+def test_dashboard_uses_existing_metrics(http):
     dashboard = json.loads((Path(__file__).parents[2] / "deploy/grafana/dashboard.json").read_text())
     asked = " ".join(one["expr"] for panel in dashboard["panels"] for one in panel["targets"])
     http.get("/health/live")

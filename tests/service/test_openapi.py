@@ -50,7 +50,7 @@ def operations():
             yield f"{method.upper()} {path}", operation
 
 
-def test_every_operation_says_what_it_does():
+def test_every_operation_has_a_description():
     named = dict(operations())
     assert all(one["summary"] and one["description"] and one["tags"] for one in named.values())
     assert len({one["operationId"] for one in named.values()}) == len(named)
@@ -62,7 +62,7 @@ def test_every_parameter_but_ids_is_explained():
             assert parameter["in"] == "path" or parameter.get("description"), (name, parameter)
 
 
-def test_whatever_can_be_wrong_has_an_answer_described():
+def test_every_error_response_is_described():
     for name, operation in operations():
         said = operation["responses"]
         where = {parameter["in"] for parameter in operation.get("parameters", [])}

@@ -42,7 +42,7 @@ async def settle():
         await asyncio.sleep(0)
 
 
-def test_a_tenant_with_one_picture_is_next_whatever_another_has():
+def test_tenants_alternate_in_the_picture_queue():
     async def go():
         run = Run()
         await run.queue.workers()
@@ -129,7 +129,7 @@ def test_a_task_waits_for_a_worker_that_can_hold_it(monkeypatch):
     asyncio.run(go())
 
 
-def test_who_leaves_while_waiting_or_drawing_makes_room():
+def test_disconnected_clients_free_their_place():
     async def go():
         run = Run()
         await run.queue.workers()
@@ -148,7 +148,7 @@ def test_who_leaves_while_waiting_or_drawing_makes_room():
     asyncio.run(go())
 
 
-def test_what_would_be_late_is_refused_and_told_when_to_come_again():
+def test_late_pictures_are_rejected_with_retry_after():
     async def go():
         run = Run(0, 0)
         await run.queue.workers()

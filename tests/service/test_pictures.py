@@ -119,7 +119,7 @@ async def until(happens):
             await asyncio.sleep(0.01)
 
 
-def test_pictures_hold_no_thread_that_others_need(tmp_path, held):
+def test_pictures_do_not_block_request_threads(tmp_path, held):
     async def go():
         async with service(tmp_path, held) as (app, (anna, here), (bert, there)):
             asked = [
@@ -148,7 +148,7 @@ def test_pictures_hold_no_thread_that_others_need(tmp_path, held):
     asyncio.run(go())
 
 
-def test_too_many_pictures_are_refused_with_the_time_to_come_again(tmp_path, held):
+def test_too_many_pictures_get_retry_after(tmp_path, held):
     async def go():
         async with service(tmp_path, held) as (_, (anna, here), (bert, there)):
             large = {**SMALL, "width": 4096, "height": 4096}
@@ -215,7 +215,7 @@ def test_a_picture_ends_with_its_client(tmp_path, held):
     asyncio.run(go())
 
 
-def test_what_takes_too_long_is_refused_with_the_size_that_does_not(tmp_path, held):
+def test_slow_pictures_are_rejected_with_a_size_that_fits(tmp_path, held):
     async def go():
         async with service(tmp_path, held) as (_, (anna, here), _):
             query = {**SMALL, "width": 4096, "height": 4096, "depth": 256}
@@ -231,7 +231,7 @@ def test_what_takes_too_long_is_refused_with_the_size_that_does_not(tmp_path, he
 @pytest.mark.parametrize(
     "what", ["refraction.png?iso=0.5", "slice.png", "data?format=npy", "data?format=nifti"]
 )
-def test_what_no_worker_can_hold_is_refused_before_it_begins(start, cluster, what):
+def test_rejects_pictures_larger_than_worker_memory(start, cluster, what):
     """Workers of half a GiB, and a volume of 150 MiB."""
     http = start()
     cluster.memory_bytes = 2**29 + 2**28

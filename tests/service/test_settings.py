@@ -22,7 +22,7 @@ def test_environment_is_read(monkeypatch, tmp_path):
     assert settings.database == f"sqlite:///{tmp_path / 'bentray.sqlite'}"
 
 
-def test_what_is_given_wins(monkeypatch):
+def test_explicit_settings_take_precedence(monkeypatch):
     monkeypatch.setenv("BENTRAY_PORT", "8123")
     assert ServiceSettings.load(port=9).port == 9
     assert ServiceSettings.load(database_url="postgresql://db/x").database == "postgresql://db/x"
@@ -56,7 +56,7 @@ def test_the_password_of_the_database_comes_from_its_file(tmp_path):
         ({}, "BENTRAY_DATABASE_PASSWORD_FILE"),
     ],
 )
-def test_a_password_that_cannot_be_read_or_used_is_refused(tmp_path, given, field):
+def test_a_password_that_cannot_be_read_or_used_is_rejected(tmp_path, given, field):
     with pytest.raises(InvalidInput) as refusal:
         _ = ServiceSettings(**given, database_password_file=tmp_path / "absent").database
     assert refusal.value.field == field

@@ -24,10 +24,10 @@ def test_ratio_is_that_of_signal_and_noise(snr, seed):
 
 
 @pytest.mark.parametrize("snr", [0.0, -1.0, float("inf"), float("nan")])
-def test_bad_ratios_are_refused(snr):
+def test_bad_ratios_are_rejected(snr):
     with pytest.raises(InvalidInput, match="snr"):
         with_noise(DATA, snr, np.random.default_rng(0), WHERE)
 
 
-def test_silence_stays_silent():
+def test_zero_signal_gets_no_noise():
     assert with_noise(DATA, 10.0, np.random.default_rng(0), np.zeros(DATA.shape, bool))[1] == 0.0

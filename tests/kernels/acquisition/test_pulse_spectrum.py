@@ -15,7 +15,7 @@ MEAN, WIDTH = 1.064, 1.155
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])
-def test_it_is_that_of_the_pulse(noise):
+def test_spectrum_matches_the_pulse(noise):
     traces = np.array(scan(noise=noise).waveform.object)
     # A dead emitter, a dead receiver and one without numbers do not matter.
     random = np.random.default_rng(1)

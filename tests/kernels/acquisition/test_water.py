@@ -25,12 +25,12 @@ def test_the_inverse_gives_the_temperature_back(temperature):
 
 
 @pytest.mark.parametrize("temperature", [-1.0, 96.0, float("nan")])
-def test_a_temperature_outside_the_fit_is_refused(temperature):
+def test_a_temperature_outside_the_fit_is_rejected(temperature):
     with pytest.raises(InvalidInput, match="water@temperature_c"):
         speed_from_temperature(temperature)
 
 
 @pytest.mark.parametrize("speed", [1375.0, 1600.0, float("nan")])
-def test_a_speed_that_water_does_not_have_is_refused(speed):
+def test_a_speed_that_water_does_not_have_is_rejected(speed):
     with pytest.raises(InvalidInput, match="water@sound_speed_mps"):
         temperature_from_speed(speed)

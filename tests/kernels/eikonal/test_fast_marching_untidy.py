@@ -77,7 +77,7 @@ def test_high_contrast_widens_the_buckets_and_the_error_bound():
 
 
 @pytest.mark.parametrize("width", [0.0, -1.0, 1.5, float("nan")])
-def test_widths_that_mean_nothing_are_refused(width):
+def test_rejects_invalid_bucket_widths(width):
     with pytest.raises(InvalidInput, match="above 0 and at most 1"):
         eikonal.solve(np.ones((3, 3)), 1.0, (1.0, 1.0), "fmm-untidy", width=width)
     with pytest.raises(InvalidInput, match="1 or 2"):

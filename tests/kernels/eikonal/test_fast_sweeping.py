@@ -51,7 +51,7 @@ SHAPES = st.sampled_from([(9, 9), (17, 3), (1, 12), (10, 26), (4, 5, 6), (1, 3, 
 
 @given(shape=SHAPES, seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=effort(20, 30), deadline=None)
-def test_skipping_what_cannot_change_loses_nothing(shape, seed):
+def test_skipping_settled_nodes_keeps_the_result(shape, seed):
     rng = np.random.default_rng(seed)
     speed = rng.uniform(0.1, 5.0, shape)
     source = rng.uniform(0.0, 1.0, len(shape)) * (np.array(shape) - 1)

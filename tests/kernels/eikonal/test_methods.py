@@ -117,7 +117,7 @@ def test_models_over_four_decades_give_times(ndim, longest):
     source=st.sampled_from([(0.23, 0.61), (0.35, 0.65), (0.3, 0.65)]),
 )
 @settings(max_examples=effort(20, 40), deadline=None)
-def test_flips_transposes_and_units_change_nothing(seed, axis, source):
+def test_result_is_invariant_to_flips_transposes_and_units(seed, axis, source):
     speed = smooth_speed(seed, (11, 11))
     source = np.array(source)
     for method in methods():

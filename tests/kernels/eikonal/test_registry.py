@@ -15,7 +15,7 @@ METHODS = [name for name in eikonal.methods() if not eikonal.METHODS[name].on_de
 @pytest.mark.parametrize("shape", [(13, 9), (6, 5, 7)])
 @given(seed=st.integers(0, 2**32 - 1), batch=st.integers(1, 9), threads=st.integers(1, 4))
 @settings(max_examples=5, deadline=None)
-def test_threads_and_batches_change_nothing(method, shape, seed, batch, threads):
+def test_threads_and_batches_keep_the_bits(method, shape, seed, batch, threads):
     rng = np.random.default_rng(seed)
     speeds = rng.uniform(0.3, 3.0, (batch, *shape))
     sources = rng.uniform(0.0, 1.0, (batch, len(shape))) * (np.array(shape) - 1)

@@ -43,7 +43,7 @@ def test_a_front_enters_through_a_face_and_leaves_through_the_others():
     assert swept.changed == (True,) * 4
 
 
-def test_a_settled_block_has_nothing_to_say_and_is_left_alone():
+def test_settled_block_is_not_updated():
     slowness = np.random.default_rng(0).uniform(1.0, 2.0, (5, 6, 4))
     faces = (np.zeros((6, 4)), None, None, np.ones((5, 4)), None, None)
     times = np.full((5, 6, 4), np.inf)

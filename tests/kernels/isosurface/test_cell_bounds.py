@@ -89,6 +89,6 @@ def test_a_flat_volume_has_one_value():
         np.testing.assert_allclose([ranges.low, ranges.high], 7.0, rtol=1e-6)
 
 
-def test_unknown_bounds_are_refused():
+def test_unknown_bounds_are_rejected():
     with pytest.raises(InvalidInput, match="bound: found tight"):
         cell_ranges(Spline(np.zeros(SHAPE)), [0.0], "tight")

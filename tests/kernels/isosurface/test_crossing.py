@@ -98,7 +98,7 @@ def searches(case: Case, name: str) -> list[Search]:
 
 
 @pytest.mark.parametrize("name", FILTERS)
-def test_no_crossing_is_missed_and_none_invented(name):
+def test_all_crossings_are_found_and_no_others(name):
     dense = np.linspace(0.0, 1.0, 4001)
 
     @given(seed=st.integers(0, 2**32 - 1), bound=st.sampled_from(BOUNDS[:4]))

@@ -44,6 +44,6 @@ def test_the_box_and_the_highest_empty_level():
     assert full.highest_empty() == 0
 
 
-def test_more_iso_values_than_bits_are_refused():
+def test_more_iso_values_than_bits_are_rejected():
     with pytest.raises(InvalidInput, match="iso: found 9 values"):
         octree_of(ranges_of((2, 2, 2), 0), np.arange(9.0))

@@ -121,6 +121,6 @@ PLACES = [(0.0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (2
         ([(7.0, 7.0, 7.0)] * 3, [(0, 1, 2)], "a box of 0"),
     ],
 )
-def test_what_cannot_be_mended_is_refused(vertices, faces, words):
+def test_rejects_meshes_that_cannot_be_repaired(vertices, faces, words):
     with pytest.raises(InvalidInput, match=words):
         sound(np.array(vertices), np.array(faces))

@@ -67,6 +67,6 @@ def test_the_bumps_do_not_depend_on_the_faces():
         lambda: bumpy_ball(19),
     ],
 )
-def test_others_are_refused(make):
+def test_rejects_unknown_names(make):
     with pytest.raises(InvalidInput):
         make()

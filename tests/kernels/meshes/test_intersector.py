@@ -114,14 +114,14 @@ def test_every_face_stands_in_the_order_once():
     np.testing.assert_array_equal(np.sort(surface.order), np.arange(777))
 
 
-def test_a_mesh_outside_the_cube_is_refused():
+def test_a_mesh_outside_the_cube_is_rejected():
     mesh = octahedron(0)
     outside = TriangleMesh(mesh.vertices + 0.1, mesh.faces)
     with pytest.raises(InvalidInput, match="vertices"):
         surface_of(over_the_poles(outside))
 
 
-def test_a_mesh_without_faces_is_refused():
+def test_a_mesh_without_faces_is_rejected():
     empty = TriangleMesh(np.zeros((3, 3)), np.zeros((0, 3), dtype=np.int32))
     with pytest.raises(InvalidInput, match="faces"):
         surface_of(Chart(empty, np.zeros((0, 3, 2))))

@@ -79,7 +79,7 @@ def test_what_reaches_the_border_is_closed_there():
 
 
 @pytest.mark.parametrize("iso", [-1.0, 1.0, 2.0])
-def test_an_iso_value_out_of_range_is_refused(iso):
+def test_an_iso_value_out_of_range_is_rejected(iso):
     values = np.zeros((4, 4, 4))
     values[1, 1, 1] = 1.0
     with pytest.raises(InvalidInput, match=r"accepted: a value in \[0, 1\)"):

@@ -44,7 +44,7 @@ def test_a_hole_for_each_face_taken_out(rings, around, data):
     assert found == {frozenset(whole.faces[face].tolist()) for face in gone}
 
 
-def test_sides_and_edges_know_each_other():
+def test_sides_and_edges_refer_to_each_other():
     topology = topology_of(torus(5, 4).faces)
     start, end = topology.faces.ravel(), topology.faces.ravel()[side_end(np.arange(topology.faces.size))]
     np.testing.assert_array_equal(
@@ -80,7 +80,7 @@ def test_touching_fans_have_loops_of_their_own():
         ([(0, 1, 2), (0, 1, 3)], "1 edges along which both faces run alike"),
     ],
 )
-def test_what_is_no_oriented_surface_is_refused(faces, words):
+def test_rejects_non_oriented_surfaces(faces, words):
     with pytest.raises(InvalidInput, match=words):
         topology_of(np.array(faces))
 

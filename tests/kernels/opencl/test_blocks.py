@@ -44,7 +44,7 @@ def test_times_are_those_of_the_reference(session, shape):
         assert np.allclose(found[0], reference(crossings[0], source), rtol=1e-11, atol=0.0)
 
 
-def test_a_problem_does_not_notice_its_batch(session, monkeypatch):
+def test_result_does_not_depend_on_the_batch(session, monkeypatch):
     shape, rng = (21, 18), np.random.default_rng(2)
     crossings = rng.uniform(0.2, 5.0, (7, *shape))
     seeds = [(np.array([rng.integers(0, 21 * 18)]), np.zeros(1)) for _ in range(7)]
@@ -60,7 +60,7 @@ def test_a_problem_does_not_notice_its_batch(session, monkeypatch):
         assert np.array_equal(travel_times(session, crossings[:1], seeds), shared)
 
 
-def test_a_seed_between_blocks_wakes_both(session):
+def test_seed_between_blocks_activates_both(session):
     crossings = np.ones((1, 4, 16))
     seeds = [(np.array([7, 8]), np.array([0.5, 0.5]))]
     found = travel_times(session, crossings, seeds)[0, 0]

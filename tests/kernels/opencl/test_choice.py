@@ -26,14 +26,14 @@ def test_the_first_gpu_that_passes_is_chosen(verdicts):
     assert found.refusals == ("Fast Platform:GPU 9000 was refused: solve: ended by signal 11",)
 
 
-def test_a_wish_is_not_replaced_by_another_device(verdicts, monkeypatch):
+def test_requested_device_is_not_replaced(verdicts, monkeypatch):
     monkeypatch.setenv("BENTRAY_OPENCL_DEVICE", "9001")
     assert choice.choose().device.index == 2
     verdicts[2] = "double1: wrong sqrt"
     assert choice.choose().device is None
 
 
-def test_a_wish_that_fits_nothing_is_bad_input(verdicts, monkeypatch):
+def test_rejects_an_unknown_device(verdicts, monkeypatch):
     monkeypatch.setenv("BENTRAY_OPENCL_DEVICE", "nvidia")
     with pytest.raises(InvalidInput, match="2 = Fast Platform:GPU 9001"):
         choice.session_or_warning("fim")

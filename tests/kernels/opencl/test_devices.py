@@ -11,7 +11,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl.devices import find_devices, handle_of, select_devices
 
 
-def test_gpus_come_first_without_a_wish(three):
+def test_gpus_come_first_by_default(three):
     for selection in (None, ""):
         assert [device.index for device in select_devices(three, selection)] == [1, 2, 0]
 
@@ -19,14 +19,14 @@ def test_gpus_come_first_without_a_wish(three):
 @pytest.mark.parametrize(
     ("selection", "index"), [("0", 0), (" 2 ", 2), ("9001", 2), ("slow platform:proc", 0), ("PROCESSOR", 0)]
 )
-def test_a_wish_is_an_index_or_a_part_of_the_name(three, selection, index):
+def test_device_is_selected_by_index_or_part_of_its_name(three, selection, index):
     assert [device.index for device in select_devices(three, selection)] == [index]
 
 
 @pytest.mark.parametrize(
     ("selection", "fits"), [("GPU", 2), ("fast", 2), ("3", 0), ("nvidia", 0), ("-1", 0), ("1.0", 0)]
 )
-def test_a_wish_for_none_or_two_lists_what_there_is(three, selection, fits):
+def test_ambiguous_or_unknown_selection_lists_the_devices(three, selection, fits):
     with pytest.raises(InvalidInput, match="BENTRAY_OPENCL_DEVICE") as refusal:
         select_devices(three, selection)
     assert f"{selection!r}, which fits {fits} devices" in str(refusal.value)

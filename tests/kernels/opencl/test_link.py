@@ -117,7 +117,7 @@ def test_the_command_takes_what_a_compiler_gives_to_ld(tmp_path):
         (b"\x7fELF\x02\x01" + bytes(58), "no relocatable"),
     ],
 )
-def test_what_is_no_object_is_said(tmp_path, capsys, content, why):
+def test_reports_invalid_object_files(tmp_path, capsys, content, why):
     (tmp_path / "kernel.o").write_bytes(content)
     assert main(["-o", str(tmp_path / "made.so"), str(tmp_path / "kernel.o")]) == 1
     assert why in capsys.readouterr().err
@@ -125,7 +125,7 @@ def test_what_is_no_object_is_said(tmp_path, capsys, content, why):
 
 
 @pytest.mark.parametrize("words", [[], ["-o"], ["-o", "made.so"], ["-o", "made.so", "a.o", "b.o"], ["a.o"]])
-def test_a_command_without_one_object_is_refused(capsys, words):
+def test_a_command_without_one_object_is_rejected(capsys, words):
     assert main(words) == 1
     assert "one object and -o are needed" in capsys.readouterr().err
 
@@ -145,6 +145,6 @@ def test_a_command_without_one_object_is_refused(capsys, words):
     ],
     ids=["thread-local", "absolute"],
 )
-def test_what_cannot_be_linked_is_refused(text):
+def test_rejects_objects_that_cannot_be_linked(text):
     with pytest.raises(ValueError, match=r"relocation|absolute|no part"):
         link(built(f'target triple = "x86_64-unknown-linux-gnu"\n{text}', reloc="static"))

@@ -53,7 +53,7 @@ def test_without_the_package_the_loader_is_used_unchanged(loader, monkeypatch):
     assert loader.lists == [{"pocl.icd": "libpocl-1.so"}]
 
 
-def test_with_it_the_first_question_finds_both(loader, intel, tmp_path):
+def test_first_query_finds_both_platforms(loader, intel, tmp_path):
     for _ in range(2):
         assert platforms.platforms() == ["a platform"]
     both = {"pocl.icd": "libpocl-1.so", "intel.icd": f"{intel}\n"}

@@ -64,7 +64,7 @@ def test_the_name_is_that_of_the_library_for_the_features(features, name):
 
 
 @pytest.mark.skipif(not ON_X86, reason="pip has PoCL for x86-64 alone")
-def test_pip_has_the_build_that_we_know_and_a_library_for_this_processor():
+def test_pip_provides_the_expected_build_for_this_processor():
     """Fails when another build comes, whose records may be laid out otherwise: then see to pocl.py."""
     assert metadata.version("pocl-binary-distribution") == "3.0"
     assert [file.name for file in files_of("pocl-binary-distribution", BUILD)] == [BUILD]
@@ -90,7 +90,7 @@ def test_a_system_links_with_ld_and_the_libraries_of_a_compiler(tmp_path, monkey
     assert not pocl.system_links(tmp_path)
 
 
-def test_our_linker_is_offered_after_what_the_user_has_set(monkeypatch):
+def test_user_settings_take_precedence_over_our_linker(monkeypatch):
     monkeypatch.setenv("COMPILER_PATH", "/usr/local/cross")
     monkeypatch.setenv("BENTRAY_PYTHON", "")
     for _ in range(2):
@@ -103,7 +103,7 @@ def test_our_linker_is_offered_after_what_the_user_has_set(monkeypatch):
 @pytest.mark.opencl
 @pytest.mark.skipif(not ON_X86, reason="pip has PoCL for x86-64 alone")
 @pytest.mark.parametrize("how", ["as it comes", "prepared"])
-def test_a_processor_that_llvm_does_not_know_and_no_linker(how, tmp_path, monkeypatch):
+def test_unknown_processor_without_a_linker(how, tmp_path, monkeypatch):
     (library,) = files_of("pocl-binary-distribution", BUILD)
     # Nothing that another run has built, and no program but Python.
     monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path))

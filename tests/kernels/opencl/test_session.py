@@ -27,11 +27,11 @@ def test_a_program_of_several_files_names_the_one_that_does_not_compile(session)
         session.kernel(("probe", "splines"), "probe", "REAL=double")
 
 
-def test_later_files_know_what_earlier_ones_define(session):
+def test_later_files_see_earlier_definitions(session):
     assert session.kernel(("refraction/rays", "probe"), "probe", "REAL=double").function_name == "probe"
 
 
-def test_buffers_come_back_as_they_went(session):
+def test_buffers_round_trip(session):
     sent = np.arange(10.0)
     buffer = session.upload(sent)
     whole, rest = np.empty(10), np.empty(4)

@@ -44,7 +44,7 @@ def test_the_faults_of_pocl_cost_only_the_widths(gpu):
 
 @pytest.mark.parametrize("stage", ["double1", "solve"])
 @pytest.mark.parametrize(("fault", "said"), [(None, "ended by signal 6"), ("wrong sqrt", "wrong sqrt")])
-def test_a_fault_in_what_we_need_refuses_the_device(gpu, stage, fault, said):
+def test_fault_in_a_required_feature_rejects_the_device(gpu, stage, fault, said):
     child = child_of({stage: fault, "double4": None})
     found = examine(gpu, child)
     assert not found.usable
@@ -72,7 +72,7 @@ def test_a_failing_child_reports_the_reason(gpu):
     assert ending.startswith("ended with exit code 1 (Fast Platform:GPU 9000 is no longer")
 
 
-def test_a_compilers_error_is_the_reason_and_not_what_follows_it(gpu, monkeypatch, tmp_path):
+def test_compiler_error_is_reported_as_the_reason(gpu, monkeypatch, tmp_path):
     package = tmp_path / "refusing"
     package.mkdir()
     (package / "__init__.py").touch()
@@ -100,7 +100,7 @@ def test_an_aborting_child_is_survived(gpu, monkeypatch, tmp_path):
     assert ending.startswith("ended by signal 6")
 
 
-def test_without_double_precision_nothing_is_tried(gpu, monkeypatch, fresh):
+def test_device_without_double_precision_is_not_tested(gpu, monkeypatch, fresh):
     monkeypatch.setattr(verdict, "in_a_child", None)
     found = verdict_on(replace(gpu, double_precision=False))
     assert found.reason == "it has no double precision"
@@ -126,7 +126,7 @@ def test_a_pass_is_remembered_on_disk_until_the_driver_or_the_processor_changes(
 @pytest.mark.parametrize(
     "content", ["", "[]", "{}", '{"widths": 3, "faults": {}}', '{"widths": [1], "faults": 1}']
 )
-def test_a_damaged_memory_is_no_pass(gpu, monkeypatch, fresh, content):
+def test_damaged_cache_does_not_pass_a_device(gpu, monkeypatch, fresh, content):
     monkeypatch.setattr(verdict, "in_a_child", child_of({}))
     verdict_on(gpu)
     (file,) = fresh.iterdir()
@@ -142,7 +142,7 @@ def test_a_refusal_is_not_remembered_on_disk(gpu, monkeypatch, fresh):
     assert not fresh.exists()
 
 
-def test_without_a_place_to_remember_the_verdict_stands(gpu, monkeypatch, fresh):
+def test_verdict_holds_without_a_cache_folder(gpu, monkeypatch, fresh):
     fresh.write_text("a file where the folder should be")
     monkeypatch.setattr(verdict, "in_a_child", child_of({}))
     assert verdict_on(gpu).usable

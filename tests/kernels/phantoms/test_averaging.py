@@ -64,6 +64,6 @@ def test_shortcut_equals_the_mean_over_all_points():
 @pytest.mark.parametrize(
     "arguments", [(1, 0.2, [0.0, 0.1]), (8, -0.2, [0.0, 0.1]), (8, 0.2, [0.0]), (8, 0.2, [0.0, 0.1, 0.3])]
 )
-def test_bad_grids_are_refused(arguments):
+def test_bad_grids_are_rejected(arguments):
     with pytest.raises(InvalidInput):
         VolumePhantom(1500.0, ()).speed(*arguments)

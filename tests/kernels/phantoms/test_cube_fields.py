@@ -24,7 +24,7 @@ def test_eight_bits_are_rounded_and_clipped():
     assert levels.tolist() == [0, 0, 0, 1, 255, 255]
 
 
-def test_what_cannot_be_sampled_is_refused():
+def test_rejects_fields_that_cannot_be_sampled():
     with pytest.raises(InvalidInput, match="nodes"):
         sampled(MarschnerLobb(), 1)
     with pytest.raises(InvalidInput, match="high"):

@@ -61,11 +61,11 @@ def test_attenuation_shares_the_shape():
 
 
 @pytest.mark.parametrize("arguments", [(1, 0.2), (64, 0.0), (64, float("nan"))])
-def test_bad_grids_are_refused(arguments):
+def test_bad_grids_are_rejected(arguments):
     with pytest.raises(InvalidInput):
         table6().speed(*arguments)
 
 
-def test_bad_coupling_is_refused():
+def test_bad_coupling_is_rejected():
     with pytest.raises(InvalidInput, match="coupling_mps"):
         table6(-1.0)

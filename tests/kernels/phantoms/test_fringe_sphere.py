@@ -48,11 +48,11 @@ def test_a_gradient_on_a_plateau_is_0():
         ({"holes": (((0.0, 0.0, 0.0), -1.0),)}, "holes"),
     ],
 )
-def test_impossible_balls_are_refused(words, named):
+def test_impossible_balls_are_rejected(words, named):
     with pytest.raises(InvalidInput, match=named):
         FringeSphere(**words)
 
 
-def test_an_iso_value_off_the_range_is_refused():
+def test_an_iso_value_off_the_range_is_rejected():
     with pytest.raises(InvalidInput, match="iso"):
         FringeSphere().iso_radius(1.0)

@@ -21,7 +21,7 @@ def test_values_are_those_of_the_table():
 
 
 @pytest.mark.parametrize(("nodes", "slices"), TABLE7_GRIDS)
-def test_everything_lies_in_what_it_should(nodes, slices):
+def test_parts_are_nested_as_in_the_table(nodes, slices):
     phantom = table7(nodes=nodes)
     z = table7_slices(nodes, slices)
     random = np.random.default_rng(7)
@@ -85,6 +85,6 @@ def test_sampling_is_repeatable_and_sees_every_material():
     assert volume.max() > 1640.0
 
 
-def test_coarse_voxels_are_refused():
+def test_coarse_voxels_are_rejected():
     with pytest.raises(InvalidInput, match="nodes"):
         table7(nodes=64)

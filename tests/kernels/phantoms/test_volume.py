@@ -31,6 +31,6 @@ def test_grids_and_slices_have_their_axes_in_order():
 @pytest.mark.parametrize(
     ("field", "arguments"), [("coupling_mps", (0.0, ())), ("coupling_np_m", (1.0, (), -1.0))]
 )
-def test_bad_coupling_is_refused(field, arguments):
+def test_bad_coupling_is_rejected(field, arguments):
     with pytest.raises(InvalidInput, match=field):
         VolumePhantom(*arguments)

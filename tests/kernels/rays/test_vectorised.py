@@ -104,7 +104,7 @@ def test_spreading_adds():
     assert np.allclose(out.reshape(-1, 2).T, 2.0 * once, rtol=1e-5, atol=1e-6)
 
 
-def test_a_ray_that_is_caught_goes_straight_and_the_others_as_before():
+def test_trapped_ray_becomes_straight_and_others_are_unchanged():
     slowness, source, receivers = tissue()
     rays, _ = traced(interleaved(np.zeros(SHAPE), slowness), SHAPE, source, receivers)
     # A deviation that falls away from the source, twice as steeply as the distance grows, in the far half.

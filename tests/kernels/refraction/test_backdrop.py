@@ -58,7 +58,7 @@ def test_pixels_are_squares_or_run_into_each_other():
     np.testing.assert_allclose(colour(smooth, 0, -0.5, -0.5), PICTURE[0, 0])
 
 
-def test_a_checkerboard_goes_on_for_ever():
+def test_checkerboard_is_infinite():
     backdrop = backdrop_of([checkerboard((0, 0, 1), (8.0, 0, 0), (0, 8.0, 0), 8, ((9, 8, 7), (1, 2, 3)))])
     for x, y in RNG.uniform(-20, 20, (200, 2)):
         white = (np.floor(x) + np.floor(y)) % 2 == 0
@@ -79,13 +79,13 @@ def test_beyond_all_planes_is_one_colour():
         ({"repeats": 0.0}, "repeats"),
     ],
 )
-def test_what_is_no_plane_is_refused(change, field):
+def test_rejects_invalid_planes(change, field):
     good = {"centre": (0.0, 0.0, 1.0), "right": (1.0, 0.0, 0.0), "down": (0.0, 1.0, 0.0), "picture": PICTURE}
     with pytest.raises(InvalidInput) as refusal:
         Plane(**(good | change))
     assert refusal.value.field == field
 
 
-def test_no_plane_is_refused():
+def test_no_plane_is_rejected():
     with pytest.raises(InvalidInput, match="planes: found none"):
         backdrop_of([])

@@ -42,7 +42,7 @@ def test_rays_from_the_eye_span_the_angle():
         (lambda: perspective((0, 0, 0), (0, 0, 0), (0, 1, 0), 30.0), "up"),
     ],
 )
-def test_what_is_no_camera_is_refused(make, field):
+def test_rejects_invalid_cameras(make, field):
     with pytest.raises(InvalidInput) as refusal:
         make()
     assert refusal.value.field == field

@@ -104,7 +104,7 @@ def test_the_axes_may_have_different_spacings_and_the_middle_lie_anywhere():
     assert screen_error(made, RADIUS, 1.5, 0.9).max() < 1e-7
 
 
-def test_the_way_out_is_the_way_in_reversed():
+def test_paths_are_reversible():
     made = scene(-squared(20), Layers((-0.16, -0.09, -0.04), (1.0, 1.3, 1.1, 1.6)))
     random = np.random.default_rng(3)
     starts = np.column_stack([random.uniform(-0.35, 0.35, (60, 2)), np.full(60, -2.0)])
@@ -129,7 +129,7 @@ def test_nested_layers_of_one_index_are_one_ball():
     assert plain.crossed[0] == 2
 
 
-def test_a_hole_bends_the_other_way():
+def test_hole_refracts_in_the_opposite_direction():
     made = scene(-squared(24), Layers((-(RADIUS**2), -0.01), (1.0, 1.5, 1.0)))
     traced = trace(made, [[0.05, 0.0, -2.0]], [[0, 0, 1]])
     full = trace(ball(), [[0.05, 0.0, -2.0]], [[0, 0, 1]])
@@ -188,7 +188,7 @@ def test_every_filter_and_root_finder_sees_the_ball(name):
         assert np.median(error) < (0.05 if made.linear else 2e-3)
 
 
-def test_8_bit_volumes_refract_as_far_as_their_values_tell():
+def test_8_bit_volumes_refract_within_rounding():
     volume = np.round(127.5 + 400.0 * (RADIUS - distance(48))).clip(0, 255)
     errors = []
     for smoothing in (0.0, 1.0):

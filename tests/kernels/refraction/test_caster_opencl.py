@@ -243,7 +243,7 @@ def test_many_rays_are_cast_in_parts(monkeypatch):
         np.testing.assert_array_equal(part, all_at_once)
 
 
-def test_no_rays_give_nothing():
+def test_no_rays_give_empty_results():
     scene, none = nested(), allocate_results(0, 4, True)
     view = CAMERAS["orthographic"]
     caster_of(scene).cast(
@@ -297,7 +297,7 @@ def test_a_scene_that_the_device_cannot_hold_is_left_to_the_cpu(monkeypatch):
         assert on_the_device(nested()) is None
 
 
-def test_what_does_not_belong_to_the_scene_is_refused():
+def test_rejects_objects_of_another_scene():
     one, other = nested(), nested(12)
     with pytest.raises(InvalidInput) as refusal:
         render(other, CAMERAS["perspective"], BACKDROP, RenderSettings(8, 8), caster_of(one))

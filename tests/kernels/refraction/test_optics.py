@@ -51,7 +51,7 @@ def test_snells_law_in_the_plane_of_incidence(seeds, ratio):
 
 @given(seed=st.integers(0, 10**6), ratio=st.floats(0.3, 3.0))
 @settings(deadline=None)
-def test_the_way_back_is_the_way_in(seed, ratio):
+def test_paths_are_reversible(seed, ratio):
     direction, normal = unit(seed), unit(seed + 1)
     bent, share, passed = bend(tuple(direction), tuple(normal), ratio)
     if passed and abs(np.array(bent) @ normal) > 1e-3:
@@ -77,7 +77,7 @@ def test_fresnels_shares_at_known_angles():
     assert s == pytest.approx(((1.5**2 - 1.0) / (1.5**2 + 1.0)) ** 2)
 
 
-def test_equal_indices_change_nothing():
+def test_equal_indices_do_not_refract():
     direction = tuple(unit(7))
     bent, share, passed = bend(direction, tuple(unit(8)), 1.0)
     np.testing.assert_allclose(bent, direction, atol=1e-15)

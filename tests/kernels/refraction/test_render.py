@@ -67,7 +67,7 @@ def test_supersampling_comes_nearer_to_the_picture_of_64_samples(scene):
     assert psnr(supersampling="real", degree=3) > post
 
 
-def test_threads_and_tiles_change_nothing(scene):
+def test_result_does_not_depend_on_threads_and_tiles(scene):
     one, two = picture(scene), picture(scene, threads=2)
     for name in ("image", "position_m", "plane", "fate", "crossed", "weight"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
@@ -115,7 +115,7 @@ def test_lost_rays_show_what_lies_beyond_the_backdrop(scene):
         ({"supersampling": "adaptive"}, "supersampling"),
     ],
 )
-def test_settings_that_cannot_be_are_refused(wrong, field):
+def test_settings_that_cannot_be_are_rejected(wrong, field):
     with pytest.raises(InvalidInput) as refusal:
         RenderSettings(**wrong)
     assert refusal.value.field == field

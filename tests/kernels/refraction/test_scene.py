@@ -26,20 +26,20 @@ VOLUME = 0.3 - distance(16)
         ((1.0,), (1.0, float("inf")), "indices"),
     ],
 )
-def test_what_are_no_layers_is_refused(isos, indices, field):
+def test_rejects_invalid_layers(isos, indices, field):
     with pytest.raises(InvalidInput) as refusal:
         Layers(isos, indices)
     assert refusal.value.field == field
 
 
 @pytest.mark.parametrize("layer", [-1, 2])
-def test_surroundings_that_are_no_layer_are_refused(layer):
+def test_surroundings_that_are_no_layer_are_rejected(layer):
     with pytest.raises(InvalidInput, match=f"surroundings: found {layer}; accepted: a layer, 0 to 1"):
         Layers((0.5,), (1.0, 1.5), layer)
 
 
 @pytest.mark.parametrize("iso", [-5.0, 0.31, 400.0])
-def test_an_iso_value_that_the_volume_does_not_have_is_refused_with_the_range(iso):
+def test_an_iso_value_that_the_volume_does_not_have_is_rejected_with_the_range(iso):
     with pytest.raises(InvalidInput, match=rf"iso: found {iso}; accepted: between -0.5\d+ and 0.2\d+"):
         Scene.build(Spline(VOLUME), Layers((iso,), (1.0, 1.5)))
 
@@ -49,7 +49,7 @@ def test_an_empty_volume_has_no_surface():
         Scene.build(Spline(np.zeros((8, 8, 8))), Layers((0.5,), (1.0, 1.5)))
 
 
-def test_voxels_that_are_no_numbers_are_refused():
+def test_voxels_that_are_no_numbers_are_rejected():
     broken = VOLUME.copy()
     broken[3, 4, 5] = np.nan
     with pytest.raises(InvalidInput, match="volume: found nan"):
@@ -57,13 +57,13 @@ def test_voxels_that_are_no_numbers_are_refused():
 
 
 @pytest.mark.parametrize("spacing", [0.0, -1.0, float("nan"), (1.0, 1.0, 0.0)])
-def test_impossible_spacings_are_refused(spacing):
+def test_impossible_spacings_are_rejected(spacing):
     with pytest.raises(InvalidInput, match="spacing_m"):
         Scene.build(Spline(VOLUME), Layers((0.0,), (1.0, 1.5)), spacing)
 
 
 @pytest.mark.parametrize("scale", [1e-31, 1e36, 1e300])
-def test_volumes_beyond_float32_are_refused(scale):
+def test_volumes_beyond_float32_are_rejected(scale):
     with pytest.raises(InvalidInput, match=r"volume: found .*; accepted: values up to 1e\+35, .* 1e-30"):
         Scene.build(Spline(scale * VOLUME), Layers((0.1 * scale,), (1.0, 1.5)))
 
@@ -77,12 +77,12 @@ def test_volumes_within_float32_have_the_same_surfaces(scale):
     assert np.isfinite(scaled.octree.bend).all()
 
 
-def test_flat_volumes_are_refused():
+def test_flat_volumes_are_rejected():
     with pytest.raises(InvalidInput, match="volume: found 2 dimensions"):
         Scene.build(Spline(VOLUME[0]), Layers((0.0,), (1.0, 1.5)))
 
 
-def test_searches_that_do_not_fit_are_refused():
+def test_searches_that_do_not_fit_are_rejected():
     scene = Scene.build(Spline(VOLUME), Layers((0.0,), (1.0, 1.5)))
     for wrong, field in (
         ({"structure": "grid"}, "structure"),

@@ -46,6 +46,6 @@ def test_the_highlight_lies_where_the_light_is_mirrored():
     assert shaded.image[0, 0].tolist() == [1, 2, 3]
 
 
-def test_no_pixels_are_refused():
+def test_no_pixels_are_rejected():
     with pytest.raises(InvalidInput, match="rows, columns"):
         shade(ball(1.0), CAMERA, Light((0.0, 0.0, -1.0)), 0, 4)

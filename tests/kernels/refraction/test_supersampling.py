@@ -65,7 +65,7 @@ def test_a_higher_degree_comes_closer_to_the_mean_over_the_pixel():
     assert errors[0] > errors[1] > errors[2] > errors[3]
 
 
-def test_nothing_lies_between_rays_of_different_fates():
+def test_no_interpolation_between_different_hits():
     planes, places, crossed = regular(8, 1.0)
     crossed[:, 4:] = 2
     places[:, 4:] += 0.37

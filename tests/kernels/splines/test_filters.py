@@ -56,7 +56,7 @@ def test_taps_lie_about_the_point(name):
         assert mean == pytest.approx(t, abs=1e-14)
 
 
-def test_an_unknown_filter_is_refused_by_its_name():
+def test_an_unknown_filter_is_rejected_by_its_name():
     with pytest.raises(InvalidInput, match="lanczos") as caught:
         filter_of("lanczos")
     assert caught.value.field == "filter"

@@ -105,14 +105,14 @@ def test_a_constant_is_its_own_spline(order, smoothing):
     assert prefilter(np.full((9, 70), 3.0), order, smoothing) == pytest.approx(3.0, rel=1e-7)
 
 
-def test_much_smoothing_leaves_the_mean():
+def test_strong_smoothing_gives_the_mean():
     values = np.random.default_rng(0).uniform(0.0, 1.0, 12)
     weights = np.array([0.5, *[1.0] * 10, 0.5])
     smooth = prefilter(values, 3, MAX_SMOOTHING)
     assert smooth == pytest.approx(np.average(values, weights=weights), abs=1e-3)
 
 
-def test_values_are_left_alone_where_nothing_is_filtered():
+def test_unfiltered_values_are_unchanged():
     values = np.random.default_rng(0).uniform(0.0, 1.0, (4, 1))
     assert np.array_equal(prefilter(values, 1), values)
     assert np.array_equal(prefilter(values.T[:, :1], 5), values.T[:, :1])
@@ -130,12 +130,12 @@ def test_sampled_bsplines_are_scipys(order):
 
 
 @pytest.mark.parametrize("order", [0, 7, 2.5, "3"])
-def test_other_orders_are_refused(order):
+def test_other_orders_are_rejected(order):
     with pytest.raises(InvalidInput, match="order"):
         prefilter(np.ones(4), order)
 
 
 @pytest.mark.parametrize("smoothing", [-1e-9, float("nan"), 2e6])
-def test_smoothing_off_its_range_is_refused(smoothing):
+def test_smoothing_off_its_range_is_rejected(smoothing):
     with pytest.raises(InvalidInput, match=r"smoothing.*1e\+06"):
         prefilter(np.ones(4), 3, smoothing)

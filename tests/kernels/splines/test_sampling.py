@@ -50,7 +50,7 @@ def test_equals_the_sum_over_the_taps(name, dtype, place):
 
 
 @pytest.mark.parametrize("name", FILTERS)
-def test_nothing_beyond_the_coefficients_is_read(name):
+def test_never_reads_beyond_the_coefficients(name):
     """Corners of a grid that lies between NaNs."""
     spline = Spline.of(volume(shape=(3, 2, 3)), name)
     among = np.full(spline.coefficients.size + 40, np.nan)
@@ -62,12 +62,12 @@ def test_nothing_beyond_the_coefficients_is_read(name):
 
 
 @pytest.mark.parametrize("far", [1e300, -1e300, np.inf, -np.inf, np.nan])
-def test_far_away_and_not_a_number_stay_within_the_memory(far):
+def test_far_points_and_nan_stay_in_bounds(far):
     spline = Spline(volume())
     assert not np.isfinite(read(spline.coefficients, spline.stencil, 1.0, far, 2.0)[0])
 
 
-def test_arrays_that_the_instructions_would_misread_are_refused():
+def test_arrays_that_the_instructions_would_misread_are_rejected():
     spline = Spline(volume())
     for wrong in (
         np.asfortranarray(spline.coefficients),
@@ -81,7 +81,7 @@ def test_arrays_that_the_instructions_would_misread_are_refused():
         read(spline.coefficients, spline.stencil, 1, 2, 3)
 
 
-def test_coefficients_that_may_not_be_written_are_read():
+def test_accepts_read_only_coefficients():
     spline = Spline(volume())
     fixed = spline.coefficients.copy()
     fixed.setflags(write=False)

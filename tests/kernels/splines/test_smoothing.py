@@ -56,7 +56,7 @@ def test_the_truth_comes_nearer(order):
     assert np.sqrt(np.mean((found - truth)[2:-2, 2:-2, 2:-2] ** 2)) < 0.05
 
 
-def test_no_noise_means_no_smoothing_and_nothing_else_all_of_it():
+def test_zero_noise_gives_no_smoothing_and_pure_noise_full_smoothing():
     volume = smooth_field((12, 12))
     assert smoothing_for_noise(volume, 3, 0.0) == 0.0
     assert smoothing_for_noise(volume, 3, 100.0) == MAX_SMOOTHING
@@ -107,11 +107,11 @@ def test_the_response_is_the_fourier_transform():
         ({"volume": np.full((4, 4), np.inf), "sigma": None}, "volume: found values that are not finite"),
     ],
 )
-def test_what_no_smoothing_fits_is_refused(words, named):
+def test_rejects_unreachable_noise_levels(words, named):
     with pytest.raises(InvalidInput, match=named):
         smoothing_for_noise(**{"volume": np.ones((4, 4)), "order": 3, "sigma": 0.1} | words)
 
 
-def test_what_has_no_noise_level_is_refused():
+def test_rejects_data_without_a_noise_level():
     with pytest.raises(InvalidInput, match=r"volume.*\(2, 5\)"):
         noise_of(np.ones((2, 5)))

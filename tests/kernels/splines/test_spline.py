@@ -106,12 +106,12 @@ NAN = np.where(np.arange(12).reshape(3, 4) == 6, np.nan, 1.0)
         ({"volume": 1e308 * (-1.0) ** np.arange(9), "order": 6}, "volume.*float64"),
     ],
 )
-def test_what_makes_no_spline_is_refused(words, named):
+def test_rejects_invalid_splines(words, named):
     with pytest.raises(InvalidInput, match=named):
         Spline(**words)
 
 
-def test_unknown_filters_and_smoothing_of_those_that_take_none_are_refused():
+def test_unknown_filters_and_smoothing_of_those_that_take_none_are_rejected():
     with pytest.raises(InvalidInput, match=r"filter.*sinc.*catmull-rom"):
         Spline.of(VOLUME, "sinc")
     with pytest.raises(InvalidInput, match="smoothing"):
@@ -119,6 +119,6 @@ def test_unknown_filters_and_smoothing_of_those_that_take_none_are_refused():
 
 
 @pytest.mark.parametrize("shape", [(3,), (4, 3), (2, 2, 2)])
-def test_points_of_another_shape_are_refused(shape):
+def test_points_of_another_shape_are_rejected(shape):
     with pytest.raises(InvalidInput, match="points"):
         Spline(VOLUME).value(np.zeros(shape))

@@ -47,7 +47,7 @@ def test_line_integrals_give_it_back(scan, method):
     assert rmse(result.attenuation, truth, inside) < 0.16 * (truth.max() - truth.min())
 
 
-def test_what_traces_gave_is_smoothed_more_for_it_holds_more_than_absorption(scan):
+def test_ratios_from_traces_are_smoothed_more(scan):
     truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     rng = np.random.default_rng(3)
     shape = scan.log_ratio_np.shape
@@ -65,7 +65,7 @@ def test_what_traces_gave_is_smoothed_more_for_it_holds_more_than_absorption(sca
 
 
 @pytest.mark.parametrize("rays", ["straight", "curved"])
-def test_what_traces_gave_is_as_smooth_on_any_grid(scan, rays):
+def test_smoothing_of_trace_ratios_does_not_depend_on_the_grid(scan, rays):
     """The penalty is in metres: grids see the same image, each at its own nodes."""
     heard = replace(scan, amplitude_frequency_hz=2e5)
     coarse, fine = (
@@ -142,7 +142,7 @@ def test_gaps_in_the_amplitudes_are_only_gaps(scan):
     assert rmse(result.attenuation, truth, inside) < 0.25 * (truth.max() - truth.min())
 
 
-def test_who_does_not_want_it_gets_none(scan):
+def test_attenuation_is_optional(scan):
     assert reconstruct(scan, plan(attenuation=False, iterations=1)).attenuation is None
     assert reconstruct(replace(scan, log_ratio_np=None), plan(iterations=1)).attenuation is None
 
@@ -170,7 +170,7 @@ def test_focusing_is_taken_off(scan):
     assert np.isin(np.round(mended.residual, 9), np.round(plain.residual, 9)).all()
 
 
-def test_focusing_does_not_ask_which_emitters_come_together(scan):
+def test_focusing_does_not_depend_on_emitter_batches(scan):
     """A receiver that one emitter alone is far from."""
     few = replace(
         scan,

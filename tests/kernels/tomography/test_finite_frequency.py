@@ -62,7 +62,7 @@ def test_rays_bend_in_an_image_blurred_by_twice_their_width():
     assert front_smoothing(problem, PLAN.changed(ray_width_m=0.0)) == 0.0
 
 
-def test_wide_times_ask_for_wide_rays():
+def test_wide_times_select_wide_rays():
     """Times that rays of this width would take: thin ones make a blurred disc of them."""
     plan = replace(PLAN, rays="straight")
     problem = Problem.of(scan(), plan)

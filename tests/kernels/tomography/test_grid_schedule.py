@@ -23,7 +23,7 @@ def scan():
     return Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=data.delta_tof(everyone))
 
 
-def test_without_wishes_there_is_one_stage(scan):
+def test_default_has_one_stage(scan):
     assert stages(scan, PLAN) == (PLAN,)
 
 

@@ -93,7 +93,7 @@ def test_one_height_is_no_volume():
     assert refusal.value.field == "decomposition"
 
 
-def test_an_array_in_space_that_moves_is_refused():
+def test_an_array_in_space_that_moves_is_rejected():
     both = replace(rings(), delta_tof_s=np.zeros((2, 18, 18)), slice_z_m=np.array([0.0, 0.1]))
     with pytest.raises(InvalidInput) as refusal:
         count(both, VOLUME)

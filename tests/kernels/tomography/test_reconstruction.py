@@ -163,7 +163,7 @@ def test_bad_settings_are_named(scan, change, field):
     assert refusal.value.field == field
 
 
-def test_scan_without_one_valid_pair_is_refused(scan, method):
+def test_scan_without_one_valid_pair_is_rejected(scan, method):
     with pytest.raises(InvalidInput, match="at least one finite travel time"):
         reconstruct(replace(scan, valid=np.zeros(scan.delta_tof_s.shape, bool)), plan(method))
 
@@ -183,13 +183,13 @@ def test_the_slice_without_a_valid_pair_is_named(scan, method):
     ],
     ids=["one point", "a line"],
 )
-def test_an_array_that_surrounds_no_image_is_refused(scan, position):
+def test_an_array_that_surrounds_no_image_is_rejected(scan, position):
     with pytest.raises(InvalidInput) as refusal:
         reconstruct(replace(scan, element_position_m=position), Settings(method="sart", nodes=32))
     assert refusal.value.field == "geometry/element_position_m"
 
 
-def test_same_bits_again(scan, method):
+def test_repeated_run_gives_the_same_bits(scan, method):
     a, b = (reconstruct(scan, plan(method, iterations=2)) for _ in range(2))
     assert np.array_equal(a.speed, b.speed)
     assert np.array_equal(a.coverage, b.coverage)
@@ -206,7 +206,7 @@ def test_a_dead_element_leaves_the_rest(scan, method):
     )
 
 
-def test_two_elements_in_one_place_do_no_harm(scan, method):
+def test_coincident_elements_are_accepted(scan, method):
     truth, inside = PHANTOM.speed(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     position, delta = scan.element_position_m.copy(), scan.delta_tof_s.copy()
     position[8] = position[7]

@@ -36,7 +36,7 @@ def scan(roi, slices=None):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_region_without_a_node_in_the_image_is_refused(way):
+def test_a_region_without_a_node_in_the_image_is_rejected(way):
     outside = np.zeros((11, 11), bool)
     outside[0, 0] = True
     for roi in (outside, np.zeros_like(outside)):

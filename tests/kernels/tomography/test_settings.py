@@ -21,7 +21,7 @@ from bentray_kernels.tomography.numerics import Numerics
 from bentray_kernels.tomography.settings import DEVIATION, PLACES, FixedSettings
 
 
-def test_a_value_goes_by_its_own_name_or_by_its_record():
+def test_settings_accept_field_names_or_records():
     by_name = Settings.of(relaxation=0.2, penalty_strength=0.5, examine=False, attenuation=False)
     by_record = Settings(
         sart=SartSettings(relaxation=0.2),

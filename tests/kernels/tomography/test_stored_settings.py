@@ -101,7 +101,7 @@ def test_the_flat_record_is_mapped(old, new):
     assert from_stored({**FLAT, **old}) == expected
 
 
-def test_a_name_that_no_version_had_is_refused():
+def test_a_name_that_no_version_had_is_rejected():
     with pytest.raises(TypeError):
         from_stored({"swept": 1})
     with pytest.raises(InvalidInput, match=r"sart\.relaxation"):

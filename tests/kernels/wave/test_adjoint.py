@@ -158,6 +158,6 @@ def test_fewer_stored_fields_and_single_precision_change_the_gradient_little(by)
     assert np.sqrt(((cheap - exact) ** 2).sum() / (exact**2).sum()) < 2e-2
 
 
-def test_a_step_of_nothing_is_refused():
+def test_rejects_a_zero_step():
     with pytest.raises(InvalidInput, match="every"):
         misfit_gradient(medium(speeds(0)), EMITTER, RECEIVERS, WAVELET, lambda traces: (0.0, traces), 0)

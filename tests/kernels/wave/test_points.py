@@ -36,6 +36,6 @@ def test_an_element_on_a_node_touches_it_alone():
 
 
 @pytest.mark.parametrize("position", [[-0.1, 3.0], [3.0, 19.1], [np.nan, 1.0]])
-def test_elements_outside_are_refused(position):
+def test_elements_outside_are_rejected(position):
     with pytest.raises(InvalidInput, match="element_position_m"):
         points.place(np.array([position]), 1.0, (20, 20), 4)

@@ -52,7 +52,7 @@ def test_traces_are_those_of_the_green_function():
 
 
 @pytest.mark.parametrize(("order", "step"), [(8, 5e-8), (8, 2.5e-7), (6, 2.5e-7)])
-def test_what_is_left_is_the_dispersion_that_is_stated(order, step):
+def test_remaining_error_equals_the_stated_dispersion(order, step):
     """With waves of 4.7 nodes and more that run askew: 0.8 and 21 % off, of which a tenth or less is left."""
     spacing = 1e-3
     medium = Medium.of(np.full((60, 50), WATER), spacing, step, edge_nodes=40, dtype=np.float64)
@@ -115,7 +115,7 @@ def test_energy_leaves_through_the_edges():
     assert (trace[-300:] ** 2).sum() < 1e-5 * (trace**2).sum()
 
 
-def test_emitter_and_receiver_may_change_places():
+def test_traces_are_reciprocal():
     rng = np.random.default_rng(5)
     speed = rng.uniform(1400.0, 1600.0, (40, 44))
     medium = Medium.of(speed, 1e-3, 2e-7, attenuation=rng.uniform(0.0, 20.0, speed.shape), dtype=np.float64)
@@ -127,7 +127,7 @@ def test_emitter_and_receiver_may_change_places():
 
 
 @pytest.mark.parametrize("centre", [1.2e5, 2e5])
-def test_loss_is_the_given_one_at_every_frequency_and_delays_nothing(centre):
+def test_loss_matches_the_request_at_every_frequency_without_delay(centre):
     time = np.arange(300) * 2.5e-7
     speed = np.full((50, 30), WATER)
     source, receivers = np.array([0.008, 0.015]), np.array([[0.018, 0.015], [0.043, 0.015]])
@@ -171,7 +171,7 @@ def test_too_long_a_step_names_the_longest():
         Medium.of(np.full((20, 20), 1500.0), 1e-3, 1.01 * limit)
 
 
-def test_waves_too_short_for_the_grid_are_refused():
+def test_waves_too_short_for_the_grid_are_rejected():
     medium = Medium.of(np.full((40, 40), WATER), 2e-3, 3e-7)
     time = np.arange(300) * 3e-7
     with pytest.raises(InvalidInput, match="nodes in the shortest wave"):
@@ -189,7 +189,7 @@ def test_waves_too_short_for_the_grid_are_refused():
         ({"time_step_s": 0.0}, "time_step_s"),
     ],
 )
-def test_bad_media_are_refused(change, field):
+def test_bad_media_are_rejected(change, field):
     words = {"speed": np.full((5, 5), 1500.0), "spacing": 1e-3, "time_step_s": 1e-7} | change
     with pytest.raises(InvalidInput) as caught:
         Medium.of(**words)

@@ -112,7 +112,7 @@ def test_loss_is_the_given_one():
     assert np.log(without / damped) == pytest.approx(20.0 * (receivers - source)[:, 0], rel=0.02)
 
 
-def test_emitter_and_receiver_may_change_places_in_any_object():
+def test_traces_are_reciprocal_in_any_object():
     rng = np.random.default_rng(5)
     shape = (14, 20, 16)
     medium = Medium.of(
@@ -131,7 +131,7 @@ def test_emitter_and_receiver_may_change_places_in_any_object():
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_what_is_the_same_on_both_sides_sounds_the_same(axis):
+def test_symmetric_media_give_symmetric_traces(axis):
     speed = np.full((14, 14, 14), WATER)
     speed[4:10, 4:9, 4:8] = 1400.0
     speed = np.minimum(speed, np.flip(speed, axis))
@@ -162,7 +162,7 @@ def test_memory_is_known_before_and_refused_beyond_the_room():
         Medium.of(speed, SPACING, STEP, edge_nodes=16, memory_bytes=known - 1)
 
 
-def test_what_space_does_not_have_is_refused():
+def test_rejects_unsupported_3d_settings():
     medium, time = water((14, 14, 14), edge_nodes=8), np.arange(130) * STEP
     wavelet, at = pulse(time, 1.8e5), np.full((1, 3), 5e-3)
     for wrong in (

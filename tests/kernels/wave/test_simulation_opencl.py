@@ -45,6 +45,6 @@ def test_without_a_device_the_cpu_computes_with_a_warning(monkeypatch):
     assert np.array_equal(found, simulate(host, EMITTER, RECEIVERS, WAVELET))
 
 
-def test_bad_elements_are_refused_as_on_the_cpu():
+def test_bad_elements_are_rejected_as_on_the_cpu():
     with pytest.raises(InvalidInput, match="element_position_m"):
         simulate_opencl(medium(np.float32), EMITTER, RECEIVERS + 1.0, WAVELET)

@@ -31,7 +31,7 @@ def test_lower_orders_are_exact_as_far_as_they_say(order):
     assert not weights(order)[order // 2 + 1 :].any()
 
 
-def test_odd_orders_are_refused():
+def test_odd_orders_are_rejected():
     with pytest.raises(InvalidInput, match="order"):
         weights(5)
 

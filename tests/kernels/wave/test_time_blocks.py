@@ -22,7 +22,7 @@ class Unheard(Exception):
 
 
 @given(steps=st.integers(0, 5000), nodes=st.integers(1, 10**9))
-def test_all_steps_are_in_one_strip_each_and_all_but_the_last_are_even(steps, nodes):
+def test_every_step_is_in_exactly_one_block(steps, nodes):
     polled = []
     found = list(cut.split_steps(steps, nodes, lambda: polled.append(None)))
     assert [n for first, end in found for n in range(first, end)] == list(range(steps))
@@ -32,7 +32,7 @@ def test_all_steps_are_in_one_strip_each_and_all_but_the_last_are_even(steps, no
 
 
 @pytest.mark.parametrize("by", ["speed", "attenuation"])
-def test_strips_give_the_bits_of_one_piece(monkeypatch, by):
+def test_time_blocks_give_the_bits_of_one_run(monkeypatch, by):
     recorded = simulate(medium(speeds(1)), EMITTER, RECEIVERS, WAVELET)
     compare = partial(correlation, recorded=recorded, weight=np.ones((3, 1)))
     whole = misfit_gradient(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, 3, by)
@@ -46,7 +46,7 @@ def test_strips_give_the_bits_of_one_piece(monkeypatch, by):
 
 
 @pytest.mark.parametrize("most", [3, STEPS // 4 + 3])
-def test_what_the_poll_raises_ends_both_directions(monkeypatch, most):
+def test_poll_error_stops_both_directions(monkeypatch, most):
     monkeypatch.setattr(cut, "BLOCK", 4 * medium(speeds()).keep.size)
     polled = []
 

@@ -28,7 +28,7 @@ def test_a_file_a_day_only_appended_to_and_closed_to_others(tmp_path):
     assert [entry["time"][:10] for entry in entries(tmp_path)] == ["2026-11-21", "2026-11-21", "2026-11-22"]
 
 
-def test_a_torn_line_is_passed_over_and_said(tmp_path, caplog):
+def test_truncated_line_is_skipped_with_a_warning(tmp_path, caplog):
     audit = Audit(tmp_path)
     audit.append(ENTRY)
     path = next(tmp_path.iterdir())
@@ -38,7 +38,7 @@ def test_a_torn_line_is_passed_over_and_said(tmp_path, caplog):
     assert f"{path.name}:2 is incomplete" in caplog.text
 
 
-def test_what_cannot_be_stored_is_in_the_log(tmp_path, caplog):
+def test_entries_that_cannot_be_stored_are_logged(tmp_path, caplog):
     Audit(tmp_path / "gone").append(ENTRY)
     assert '"ids": ["ds-1"]' in caplog.text
     assert caplog.records[-1].levelno == logging.ERROR
@@ -52,7 +52,7 @@ def key(start):
     return http, {"Authorization": f"Bearer {token.shown()}"}, token
 
 
-def test_reads_and_writes_are_told_with_their_ids(key, scan, monkeypatch):
+def test_reads_and_writes_are_audited_with_ids(key, scan, monkeypatch):
     http, auth, token = key
     http.app.state.parts.sign_in._no_keys_until = 0.0
     content, media = scan().read_bytes(), {"Content-Type": "application/x-hdf5"}

@@ -218,7 +218,7 @@ def test_everything_is_described(place: Place) -> None:
     assert len(known) > 20
 
 
-def test_a_stranger_is_sent_away_unread(place: Place) -> None:
+def test_unauthenticated_requests_are_rejected_unread(place: Place) -> None:
     before, public = stored(place), set()
     invented = {"Authorization": f"Bearer {ApiKey.new().shown()}"}
     garbled = {"Authorization": "Bearer bentray_é"}
@@ -236,7 +236,7 @@ def test_a_stranger_is_sent_away_unread(place: Place) -> None:
     assert stored(place) == before
 
 
-def test_what_is_another_tenants_is_as_if_it_were_not(place: Place) -> None:
+def test_objects_of_other_tenants_are_not_found(place: Place) -> None:
     before, tried = stored(place), 0
     for asked in operations(place):
         if "{" not in asked.path or not asked.path.startswith("/v1/"):
@@ -274,7 +274,7 @@ def alike(text: str) -> str:
     return re.sub(r"[0-9a-f]{20}", "…", text)
 
 
-def test_lists_show_what_is_ones_own(place: Place) -> None:
+def test_lists_contain_only_the_tenants_objects(place: Place) -> None:
     shown = set()
     for asked in operations(place):
         if asked.verb != "GET" or "{" in asked.path or not asked.path.startswith("/v1/"):
@@ -302,7 +302,7 @@ def test_ids_in_bodies_and_queries_too(place: Place) -> None:
     assert stored(place) == before
 
 
-def test_a_key_does_what_its_scopes_say_and_no_more(place: Place) -> None:
+def test_key_scopes_limit_routes(place: Place) -> None:
     before = stored(place)
     for asked in operations(place):
         here = filled(asked.path, place.ids)

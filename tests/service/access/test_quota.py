@@ -63,7 +63,7 @@ def volume(http, values):
     return answer.json()["id"]
 
 
-def test_what_is_refused_leaves_nothing_and_what_is_deleted_gives_its_room_back(start, scan, uploaded):
+def test_rejected_and_deleted_objects_release_quota(start, scan, uploaded):
     content = scan().read_bytes()
     http = start(max_tenant_bytes=int(1.5 * len(content)))
     dataset = uploaded(http)
@@ -100,7 +100,7 @@ def test_uploads_in_pieces_begun_at_once_do_not_come_together_beyond_it(start):
 
 @pytest.mark.ingest_process
 @pytest.mark.parametrize("in_pieces", [False, True])
-def test_a_packed_volume_counts_as_it_will_be_stored_before_it_is_written(start, in_pieces):
+def test_compressed_volume_reserves_its_stored_size(start, in_pieces):
     http, content = start(max_tenant_bytes=QUOTA_BYTES), packed_zeros(11_000_000)
     assert len(content) < QUOTA_BYTES / 50
     if not in_pieces:
@@ -136,7 +136,7 @@ def test_exports_count(start):
     assert used(http) == (0, 0)
 
 
-def test_jobs_reserve_what_they_will_store(start, uploaded, submitted, work, until):
+def test_jobs_reserve_quota_for_their_results(start, uploaded, submitted, work, until):
     """Of many that are submitted while the first runs, none goes beyond it; at its end it counts as it is."""
     http = start(max_tenant_bytes=QUOTA_BYTES)
     dataset = uploaded(http)
@@ -172,7 +172,7 @@ def test_geometry_fields_reserve_their_tables(start):
     assert http.post("/v1/jobs", json={**asked, "settings": small}).status_code == 202
 
 
-def test_what_a_service_that_died_had_reserved_is_free_at_the_next_start(start):
+def test_reservations_of_a_killed_service_are_released_at_start(start):
     http = start(max_tenant_bytes=QUOTA_BYTES)
     http.app.state.parts.quota.resize(LOCAL, new_id("dataset"), QUOTA_BYTES)
     assert used(http) == (0, QUOTA_BYTES)

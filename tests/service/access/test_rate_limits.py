@@ -15,7 +15,7 @@ class Clock:
 
 
 @given(st.integers(1, 50), st.lists(st.floats(0.0, 40.0), max_size=120))
-def test_never_more_than_a_full_bucket_and_what_came_since(per_minute, waits):
+def test_rate_is_bounded_by_bucket_size_and_refill(per_minute, waits):
     clock = Clock()
     found, taken = RateLimits(per_minute, clock), 0
     for wait in waits:
@@ -35,7 +35,7 @@ def test_nought_is_any_number():
     assert {found.take("a") for _ in range(1000)} == {0.0}
 
 
-def test_buckets_that_are_full_again_are_forgotten(monkeypatch):
+def test_full_buckets_are_dropped(monkeypatch):
     monkeypatch.setattr(rate_limits, "MANY", 10)
     clock = Clock()
     found = RateLimits(60, clock)

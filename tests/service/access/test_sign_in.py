@@ -39,7 +39,7 @@ def test_without_keys_everyone_on_this_machine_is_local(sign_in):
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "nowhere.invalid"])
-def test_others_are_never_let_in_without_keys(sign_in, keys, host):
+def test_remote_clients_need_keys(sign_in, keys, host):
     with pytest.raises(InvalidInput, match=f"host: found {host}.*bentray keys create"):
         sign_in(host=host)
     sign_in(host=host, **PROXIED)
@@ -55,7 +55,7 @@ def test_others_are_never_let_in_without_keys(sign_in, keys, host):
         {"origin": "null"},
     ],
 )
-def test_a_page_elsewhere_cannot_make_a_browser_ask_an_open_service(sign_in, headers):
+def test_cross_origin_requests_are_rejected(sign_in, headers):
     with pytest.raises(Forbidden):
         sign_in().caller(Headers(headers), NEAR)
 
@@ -65,7 +65,7 @@ def test_names_of_this_machine(sign_in, host):
     assert sign_in().caller(Headers({"host": host, "origin": f"http://{host}"}), NEAR).how == "open"
 
 
-def test_from_the_first_key_on_it_is_closed_for_good(sign_in, keys, monkeypatch):
+def test_first_key_closes_the_service(sign_in, keys, monkeypatch):
     monkeypatch.setattr("bentray_service.access.sign_in.NO_KEYS_S", 0.0)
     found, token = sign_in(), ApiKey.new()
     assert found.open()
@@ -91,7 +91,7 @@ def test_a_refusal_does_not_repeat_the_secret(sign_in, keys):
         assert given[-30:] not in str(refusal.value)
 
 
-def test_a_user_is_believed_of_trusted_proxies_alone(sign_in):
+def test_user_header_is_accepted_only_from_trusted_proxies(sign_in):
     found, named = sign_in(**PROXIED), Headers({"X-Forwarded-User": "alice@example.org"})
     for address in (FAR, "10.1.2.3", "::ffff:10.1.2.3"):
         caller = found.caller(named, address)
@@ -103,7 +103,7 @@ def test_a_user_is_believed_of_trusted_proxies_alone(sign_in):
 
 
 @pytest.mark.parametrize("users", [[], [""], ["  "], ["alice", "mallory"]])
-def test_a_proxy_that_names_nobody_or_two_brings_nobody_in(sign_in, users):
+def test_proxy_must_name_exactly_one_user(sign_in, users):
     raw = [(b"x-forwarded-user", user.encode()) for user in users]
     with pytest.raises(NotAuthenticated):
         sign_in(**PROXIED).caller(Headers(raw=raw), FAR)

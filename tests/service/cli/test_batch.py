@@ -90,7 +90,7 @@ def test_each_gets_the_files_of_reconstruct_and_a_broken_one_fails_alone(
     assert figures["residual_rms_s"] == said["datasets"][1]["residual_rms_s"]
 
 
-def test_what_is_done_is_left_out_and_nothing_else(
+def test_only_finished_entries_are_skipped(
     submit: Callable[..., tuple[Result, Any]], scans: Path, scan_file: Path
 ) -> None:
     submit()
@@ -140,15 +140,13 @@ def test_without_json_it_ends_with_a_table_and_the_reasons(
         ),
     ],
 )
-def test_words_that_make_no_sense_are_refused(
-    bentray: Callable[..., Result], words: tuple[str, ...], line: str
-) -> None:
+def test_rejects_invalid_arguments(bentray: Callable[..., Result], words: tuple[str, ...], line: str) -> None:
     result = bentray("submit", *words)
     assert result.exit_code == 2
     assert result.stderr.startswith(line)
 
 
-def test_a_folder_without_scans_is_refused(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_folder_without_scans_is_rejected(bentray: Callable[..., Result], tmp_path: Path) -> None:
     result = bentray("submit", "--batch", tmp_path, "--scheduler", "tcp://127.0.0.1:1")
     assert result.exit_code == 2
     assert "without any *.h5" in result.stderr

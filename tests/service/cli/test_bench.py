@@ -68,7 +68,7 @@ def test_an_unknown_name_lists_the_known_ones(
 
 
 @pytest.mark.parametrize("name", ["two-words", "two_words"])
-def test_words_may_be_joined_as_on_a_command_line(folder: Path, name: str) -> None:
+def test_accepts_a_joined_command_line(folder: Path, name: str) -> None:
     (folder / "table" / "two_words.py").write_text(FAKE)
     rows = load(name, folder)(True, lambda done, of, words: None)
     assert [row.target for row in rows] == ["E1", "E2", "E3"]
@@ -95,7 +95,7 @@ def test_the_file_for_the_rows_is_checked_before_anything_runs(
     assert "its folder does not exist" in result.stderr
 
 
-def test_outside_a_checkout_the_reason_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_outside_a_checkout_the_reason_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     installed = tmp_path / "lib" / "site-packages" / "bentray_service" / "cli" / "bench.py"
     monkeypatch.setattr(module, "__file__", str(installed))
     with pytest.raises(InvalidInput, match="a source checkout"):
@@ -109,7 +109,7 @@ def test_every_benchmark_of_the_checkout_fits_the_frame(path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.nightly
-def test_the_reconstruction_benchmark_measures_what_it_promises() -> None:
+def test_reconstruction_benchmark_reports_all_rows() -> None:
     rows = list(load("reconstruction", benchmark_folder())(True, lambda done, total, note="": None))
     assert all(isinstance(row, Row) for row in rows)
     labels = {row.target.split()[0] for row in rows}

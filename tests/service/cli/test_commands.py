@@ -47,7 +47,7 @@ def test_every_option_is_explained(command: str) -> None:
     assert "--json" in [option for param in params for option in param.opts]
 
 
-def test_help_is_quick_because_it_loads_nothing_heavy() -> None:
+def test_help_imports_no_heavy_module() -> None:
     heavy = (
         "{'numpy', 'numba', 'dask', 'distributed', 'fastapi', 'h5py', 'sqlalchemy', 'matplotlib', 'httpx'}"
     )

@@ -53,7 +53,7 @@ def test_it_fails_in_one_line_when_bent_rays_do_not_win(
     assert "rms error" in result.stdout, "the figures are shown all the same"
 
 
-def test_a_bad_number_is_refused_before_a_service_starts(
+def test_a_bad_number_is_rejected_before_a_service_starts(
     bentray: Callable[..., Result], tmp_path: Path
 ) -> None:
     result = bentray("demo", "--elements", 1, "-o", tmp_path)

@@ -57,7 +57,7 @@ def test_json_has_every_figure(bentray: Callable[..., Result], machine: None) ->
     assert cpu["faults"] == {"double8": "ended by signal 6"}
 
 
-def test_without_devices_the_way_out_is_said(
+def test_without_devices_a_remedy_is_shown(
     bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(opencl, "find_devices", tuple)
@@ -77,7 +77,7 @@ def test_without_devices_the_way_out_is_said(
     ("machine", "command"),
     [("x86_64", "-m pip install intel-opencl-rt intel-cmplr-lib-rt "), ("aarch64", "install PoCL with ")],
 )
-def test_where_all_are_refused_one_command_helps(
+def test_where_all_are_rejected_one_command_helps(
     bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, machine: str, command: str
 ) -> None:
     monkeypatch.delenv("BENTRAY_OPENCL_DEVICE", raising=False)
@@ -95,16 +95,14 @@ def test_where_all_are_refused_one_command_helps(
     assert "double1: unknown" in " ".join(bentray("devices").stdout.replace("│", " ").split())
 
 
-def test_hidden_devices_are_said_to_be_hidden(
-    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_hidden_devices_are_reported(bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BENTRAY_OPENCL_DEVICE", "none")
     first, second = bentray("devices").stdout.splitlines()
     assert first.startswith("BENTRAY_OPENCL_DEVICE=none hides every device; ")
     assert second.startswith("suggestion: unset BENTRAY_OPENCL_DEVICE")
 
 
-def test_a_wish_that_fits_nothing_lists_what_there_is(
+def test_unknown_device_lists_the_devices(
     bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("BENTRAY_OPENCL_DEVICE", "no such device")

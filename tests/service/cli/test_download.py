@@ -71,7 +71,7 @@ def test_a_format_by_its_name(bentray: Callable[..., Result], tmp_path: Path, as
         (SCAN, "there.h5", "(exists)"),
     ],
 )
-def test_what_is_refused_before_anybody_is_asked(
+def test_rejects_invalid_arguments_before_any_request(
     bentray: Callable[..., Result], tmp_path: Path, asked: list[Any], what: str, name: str, said: str
 ) -> None:
     (tmp_path / "there.h5").write_bytes(b"")

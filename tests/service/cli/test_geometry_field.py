@@ -62,7 +62,7 @@ def test_a_field_is_made_once(
     assert second["outputs"] == first["outputs"]
 
 
-def test_one_that_was_broken_off_is_gone_on_from(
+def test_interrupted_field_is_resumed(
     bentray: Callable[..., Result], mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*given: object) -> None:

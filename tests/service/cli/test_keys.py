@@ -56,13 +56,13 @@ def test_only_the_key_is_on_stdout(bentray: Run, tmp_path: Path) -> None:
         (["revoke", "0" * 12], "key"),
     ],
 )
-def test_what_is_wrong_is_named(bentray: Run, tmp_path: Path, words: list[str], field: str) -> None:
+def test_names_invalid_input(bentray: Run, tmp_path: Path, words: list[str], field: str) -> None:
     result = bentray("keys", *words, "--data", tmp_path)
     assert result.exit_code == 2
     assert result.stderr.startswith(f"bentray: {field}: found ")
 
 
-def test_a_service_that_runs_knows_it(
+def test_new_key_is_valid_in_a_running_service(
     bentray: Run, start: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("bentray_service.access.sign_in.NO_KEYS_S", 0.0)
@@ -83,7 +83,7 @@ def test_a_service_that_runs_knows_it(
     assert "/v1/datasets" in bentray("audit", "--data", data, "--last", 1).stdout
 
 
-def test_an_audit_of_nothing(bentray: Run, tmp_path: Path) -> None:
+def test_audit_of_an_empty_folder(bentray: Run, tmp_path: Path) -> None:
     assert bentray("audit", "--data", tmp_path / "gone").stderr.startswith("bentray: data_dir: found ")
     made(bentray, tmp_path)
     assert bentray("audit", "--data", tmp_path, "--since", "today").stderr.startswith(

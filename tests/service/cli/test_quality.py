@@ -15,7 +15,7 @@ from bentray_workers.files.dataset import read_dataset, write_dataset
 from ...kernels.acquisition.traces import blob_delay, scan
 
 
-def test_faults_are_told_and_the_rest_goes_on(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_faults_are_reported_and_the_rest_continues(bentray: Callable[..., Result], tmp_path: Path) -> None:
     faulty = scan(blob_delay(24), elements=24, noise=0.01)
     faulty.waveform.object[:, 5] = faulty.waveform.water[:, 5] = 0.0
     faulty.waveform.object[9] *= -1.0

@@ -81,7 +81,7 @@ def test_several_workers_give_the_same_bits(
     np.testing.assert_array_equal(alone.speed, shared.speed)
 
 
-def test_auto_says_in_one_line_what_it_chose_and_why(
+def test_auto_prints_its_choice_and_reason_in_one_line(
     bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
 ) -> None:
     words = ("--method", "auto", "--resolution-check", "--workers", 1)
@@ -125,7 +125,7 @@ def test_there_are_as_many_workers_as_have_work_and_cores(
     assert useful_workers(heights(slices), settings) == workers
 
 
-def test_a_volume_of_one_height_is_refused_before_any_worker_starts() -> None:
+def test_a_volume_of_one_height_is_rejected_before_any_worker_starts() -> None:
     with pytest.raises(InvalidInput, match="decomposition"):
         useful_workers(heights(1), Settings(decomposition="volume", method="gauss-newton"))
 
@@ -140,7 +140,7 @@ def test_a_volume_of_one_height_is_refused_before_any_worker_starts() -> None:
         (Settings(method="sart", decomposition="volume"), "decomposition"),
     ],
 )
-def test_what_the_header_shows_is_refused_before_anything_starts(settings: Settings, field: str) -> None:
+def test_rejects_bad_headers_before_start(settings: Settings, field: str) -> None:
     with pytest.raises(InvalidInput, match=field):
         check_scan(heights(1), settings, 0)
 
@@ -202,7 +202,7 @@ def test_a_bad_dataset_is_one_line_that_names_the_field(
 
 
 @pytest.mark.parametrize("kept", [0, 20, 3000])
-def test_what_is_not_a_whole_hdf5_file_is_one_line(
+def test_incomplete_hdf5_file_gives_a_one_line_error(
     bentray: Callable[..., Result], scan_file: Path, tmp_path: Path, kept: int
 ) -> None:
     path = tmp_path / "bad.h5"

@@ -76,7 +76,7 @@ def test_a_phantom_needs_no_file(bentray: Callable[..., Result], tmp_path: Path,
     assert (tmp_path / "p.png").stat().st_size > 100
 
 
-def test_the_map_tells_where_each_pixel_looks(
+def test_map_contains_the_direction_of_each_pixel(
     bentray: Callable[..., Result], tmp_path: Path, volume: Path
 ) -> None:
     words = ("--iso", 0.5, "--index", 1.0, "--map", tmp_path / "map.npy", "--spacing", 2e-3)
@@ -128,7 +128,7 @@ def test_a_file_that_exists_is_kept_without_force(
         (("-o", "/proc/self/p.png"), "output"),
     ],
 )
-def test_bad_words_are_one_line(
+def test_invalid_arguments_give_a_one_line_error(
     bentray: Callable[..., Result], tmp_path: Path, volume: Path, words: tuple[object, ...], field: str
 ) -> None:
     result = bentray("render", volume, "-o", tmp_path / "p.png", *words)
@@ -150,7 +150,7 @@ def test_a_spacing_is_one_word_or_three(bentray: Callable[..., Result], tmp_path
 
 
 @pytest.mark.parametrize("words", [("--shape", 2, 2, 2), ("--spacing", 1), ("--dtype", "uint8")])
-def test_a_phantom_tells_its_own_grid(
+def test_phantom_reports_its_grid(
     bentray: Callable[..., Result], tmp_path: Path, words: tuple[object, ...]
 ) -> None:
     result = bentray("render", "-o", tmp_path / "p.png", "--phantom", "sphere", *words)

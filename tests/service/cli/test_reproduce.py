@@ -33,7 +33,7 @@ def made(request: pytest.FixtureRequest, scan_file: Path, tmp_path: Path) -> Pat
     return path
 
 
-def test_a_result_is_made_again(bentray: Callable[..., Result], made: Path, scan_file: Path) -> None:
+def test_result_is_reproduced(bentray: Callable[..., Result], made: Path, scan_file: Path) -> None:
     ended = bentray("reproduce", made, scan_file)
     assert ended.exit_code == 0, ended.stderr
     assert ended.stdout.count("identical") >= 4
@@ -50,7 +50,7 @@ def test_a_single_bit_is_seen(bentray: Callable[..., Result], made: Path, scan_f
     assert "was not reproduced" in ended.stderr
 
 
-def test_another_scan_and_another_version_are_told(
+def test_other_scan_or_version_is_reported(
     bentray: Callable[..., Result], made: Path, scan_file: Path, tmp_path: Path
 ) -> None:
     scan = read_dataset(scan_file)
@@ -63,7 +63,7 @@ def test_another_scan_and_another_version_are_told(
     assert (ended.exit_code, "numpy: 1.0.0 then, " in ended.stdout) == (0, True)
 
 
-def test_a_result_without_an_array_is_told(
+def test_result_without_an_array_is_reported(
     bentray: Callable[..., Result], made: Path, scan_file: Path
 ) -> None:
     with h5py.File(made, "r+") as file:

@@ -20,7 +20,7 @@ def busy() -> Iterator[int]:
         yield server.getsockname()[1]
 
 
-def test_a_busy_port_is_refused_before_anything_starts(
+def test_a_busy_port_is_rejected_before_anything_starts(
     bentray: Callable[..., Result], busy: int, tmp_path: Path
 ) -> None:
     result = bentray("serve", "--port", busy, "--data", tmp_path / "data")
@@ -30,7 +30,7 @@ def test_a_busy_port_is_refused_before_anything_starts(
     assert not (tmp_path / "data").exists()
 
 
-def test_a_host_that_is_not_of_this_machine_is_refused(
+def test_a_host_that_is_not_of_this_machine_is_rejected(
     bentray: Callable[..., Result], tmp_path: Path
 ) -> None:
     # 192.0.2.0/24 is reserved for documentation (RFC 5737), so no machine has it.
@@ -40,12 +40,12 @@ def test_a_host_that_is_not_of_this_machine_is_refused(
 
 
 @pytest.mark.parametrize("host", ["a..b", 70 * "a", "\udc80"])
-def test_what_is_no_host_name_is_refused(host: str) -> None:
+def test_rejects_invalid_host_names(host: str) -> None:
     with pytest.raises(InvalidInput, match="host: found"):
         module._listen(host, 0)
 
 
-def test_an_unknown_host_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unknown_host_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     def unknown(*given: object, **more: object) -> None:
         raise socket.gaierror(-2, "Name or service not known")
 
@@ -86,12 +86,12 @@ def test_an_option_wins_over_the_environment(monkeypatch: pytest.MonkeyPatch, tm
     assert (seen[0].workers, seen[0].jobs_at_once, seen[0].data_dir) == (2, 3, tmp_path)
 
 
-def test_who_can_reach_it_is_said() -> None:
+def test_reachability_is_shown() -> None:
     assert "Only this machine can reach the service" in module._access_note(required=False)
     assert "Authentication by API key" in module._access_note(required=True)
 
 
-def test_it_is_not_open_to_others(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_remote_access_needs_keys(bentray: Callable[..., Result], tmp_path: Path) -> None:
     result = bentray("serve", "--host", "0.0.0.0", "--port", 0, "--data", tmp_path)
     assert result.exit_code == 2
     assert "Traceback" not in result.stderr
@@ -102,7 +102,7 @@ def test_it_is_not_open_to_others(bentray: Callable[..., Result], tmp_path: Path
     assert "bentray keys create" in last
 
 
-def test_what_stops_the_application_from_starting_is_one_line(
+def test_start_failure_is_one_line(
     bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     def unreachable(*given: object, **more: object) -> None:

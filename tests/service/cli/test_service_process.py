@@ -66,7 +66,7 @@ def gone(pid: int) -> bool:
 
 
 @pytest.mark.parametrize("words", [(), ("stubborn",)])
-def test_it_and_its_workers_are_gone_after_a_failure(
+def test_service_and_workers_stop_after_a_failure(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: tuple[str, ...]
 ) -> None:
     stand_in(monkeypatch, STAND_IN, *words)
@@ -82,9 +82,7 @@ def test_it_and_its_workers_are_gone_after_a_failure(
     assert gone(seen[0])
 
 
-def test_it_is_stopped_when_this_process_is_told_to_end(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_service_stops_with_its_parent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     stand_in(monkeypatch, STAND_IN)
     before = signal.getsignal(signal.SIGTERM)
     seen: list[int] = []
@@ -99,9 +97,7 @@ def test_it_is_stopped_when_this_process_is_told_to_end(
     assert signal.getsignal(signal.SIGTERM) == before
 
 
-def test_the_last_words_of_one_that_ends_at_once_are_told(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_output_of_an_early_exit_is_shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     stand_in(monkeypatch, "import sys; sys.exit('bentray: the disk is full')")
     with (
         pytest.raises(WorkFailed, match="exited at once: bentray: the disk is full"),
@@ -110,7 +106,7 @@ def test_the_last_words_of_one_that_ends_at_once_are_told(
         pytest.fail("it cannot have started")
 
 
-def test_one_that_stays_silent_is_given_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_unresponsive_service_times_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     stand_in(monkeypatch, "import time; time.sleep(600)")
     monkeypatch.setattr(service_process, "START_S", 0.0)
     with pytest.raises(WorkFailed, match="did not start within"), running_service(tmp_path, tmp_path / "log"):

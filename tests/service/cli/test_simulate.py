@@ -16,7 +16,7 @@ SOLID = ("--phantom", "table7", "--nodes", 16, "--elements", 8, "--slices", 2)
 SMALL = ("--nodes", 24, "--elements", 12, "--coupling", 1400)
 
 
-def test_the_file_holds_the_scan_that_was_asked_for(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_file_holds_the_requested_scan(bentray: Callable[..., Result], tmp_path: Path) -> None:
     path = tmp_path / "phantom.h5"
     result = bentray("simulate", "-o", path, *SMALL, "--json")
     assert result.exit_code == 0
@@ -62,7 +62,7 @@ def test_a_scan_in_space(
     assert dataset.truth.sound_speed_mps.shape == (16, 16, 2)
 
 
-def test_the_table_tells_how_the_scan_was_made(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_table_shows_how_the_scan_was_simulated(bentray: Callable[..., Result], tmp_path: Path) -> None:
     told = bentray("simulate", "-o", tmp_path / "solid.h5", *SOLID, "--snr", 20).stdout
     assert "2, one moving ring, 2-D wave fronts" in told
     assert "1/20 of the signal" in told
@@ -71,7 +71,7 @@ def test_the_table_tells_how_the_scan_was_made(bentray: Callable[..., Result], t
     assert "slices" not in told
 
 
-def test_noise_has_the_size_and_the_seed_asked_for(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_noise_has_the_requested_size_and_seed(bentray: Callable[..., Result], tmp_path: Path) -> None:
     times = {}
     for name, words in {
         "clean": (),
@@ -123,7 +123,7 @@ def test_a_file_that_exists_is_kept_without_force(bentray: Callable[..., Result]
         (("--frequency", 3e5), "frequency_hz"),
     ],
 )
-def test_bad_words_are_one_line(
+def test_invalid_arguments_give_a_one_line_error(
     bentray: Callable[..., Result], tmp_path: Path, words: tuple[object, ...], field: str
 ) -> None:
     result = bentray("simulate", "-o", tmp_path / "x.h5", *words)

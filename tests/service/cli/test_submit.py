@@ -163,7 +163,7 @@ def test_a_refusal_is_one_line(
     assert client.asked[-1] == "closed"
 
 
-def test_nothing_listening_is_failed_work(bentray: Callable[..., Result], scan_file: Path) -> None:
+def test_refused_connection_exits_with_failure(bentray: Callable[..., Result], scan_file: Path) -> None:
     # Port 1 of loopback: reserved, and nothing listens on it.
     result = bentray("submit", scan_file, "--url", "http://127.0.0.1:1")
     assert result.exit_code == 1
@@ -171,7 +171,7 @@ def test_nothing_listening_is_failed_work(bentray: Callable[..., Result], scan_f
     assert result.stderr.count("\n") == 1
 
 
-def test_options_that_exclude_each_other_and_bad_addresses_are_refused(
+def test_options_that_exclude_each_other_and_bad_addresses_are_rejected(
     bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
 ) -> None:
     both = bentray("submit", scan_file, "-o", tmp_path, "--no-wait")

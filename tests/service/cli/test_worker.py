@@ -137,7 +137,7 @@ def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path)
         ((), "bentray: scheduler_address: found nonsense"),
     ],
 )
-def test_what_cannot_be_is_refused_in_a_line(
+def test_rejects_invalid_arguments_with_one_line(
     bentray: Callable[..., Result], words: tuple[str, ...], line: str
 ) -> None:
     result = bentray("worker", "--scheduler", "nonsense", "--no-opencl", *words)

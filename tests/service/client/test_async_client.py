@@ -62,7 +62,7 @@ def test_refusals_and_ends(serve, work, scan, tmp_path):
     run(serve, call)
 
 
-def test_nobody_there():
+def test_unreachable_service_is_reported():
     async def call():
         async with AsyncClient("http://127.0.0.1:9") as client:
             await client.job("x")

@@ -79,7 +79,7 @@ def test_unknown_job(client):
     assert caught.value.status == 404
 
 
-def test_too_large_is_told_though_the_body_is_not_read(serve, tmp_path):
+def test_oversize_is_reported_without_reading_the_body(serve, tmp_path):
     (tmp_path / "big.h5").write_bytes(b"\0" * 20_000_000)
     with Client(serve(max_upload_bytes=1000)) as client, pytest.raises(ClientError) as caught:
         client.upload(tmp_path / "big.h5")
@@ -99,7 +99,7 @@ def test_missing_file_and_folder(client, tmp_path):
         client.upload(tmp_path / "none.h5")
 
 
-def test_nobody_there():
+def test_unreachable_service_is_reported():
     with (
         Client("http://127.0.0.1:9") as client,
         pytest.raises(ClientError, match=r"no answer from http://127.0.0.1:9"),
@@ -108,7 +108,7 @@ def test_nobody_there():
 
 
 @pytest.mark.parametrize("url", ["", "lab:8000", "http://", "ftp://lab", "http://lab:port"])
-def test_what_is_no_web_address_is_refused(url):
+def test_rejects_invalid_urls(url):
     with pytest.raises(InvalidInput, match="url: found"):
         Client(url)
 

@@ -34,7 +34,7 @@ def test_xarray_finds_a_place(result):
     assert float(found.speed.sel(x=-0.01, y=-0.01, method="nearest")) == result.values["speed"][0, 0]
 
 
-def test_without_xarray_it_is_said(monkeypatch):
+def test_missing_xarray_is_reported(monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(ClientError, match="pip install"):
         Result((), {}, {}, {}).to_xarray()

@@ -75,14 +75,14 @@ def walk(monkeypatch: pytest.MonkeyPatch) -> Walk:
     return Walk(monkeypatch)
 
 
-def test_it_waits_longer_each_time_and_says_so_once(walk: Walk) -> None:
+def test_retries_back_off_and_log_once(walk: Walk) -> None:
     away = [REFUSED, GONE, answered(502), answered(503), answered(504), answered(500)]
     assert walk.ask(LOOK, *away, "here") == "here"
     assert walk.pauses == [0.5, 1.0, 2.0, 4.0, 8.0, 15.0]
     assert walk.told == ["refused; retrying for up to 300 s.", "The service answers again."]
 
 
-def test_it_waits_as_long_as_the_service_asks(walk: Walk) -> None:
+def test_retries_honour_retry_after(walk: Walk) -> None:
     walk.ask(LOOK, answered(503, 5.0), "here")
     assert walk.pauses == [5.0]
 
@@ -95,13 +95,13 @@ def test_it_ends(walk: Walk) -> None:
         walk.ask(LOOK, *[answered(500)] * retries.MAX_ERRORS)
 
 
-def test_a_wait_with_an_end_of_its_own_ends_there(walk: Walk) -> None:
+def test_wait_timeout_is_honoured(walk: Walk) -> None:
     with pytest.raises(NoAnswer):
         walk.ask(RequestStep("GET", "/", repeatable=True, until=walk.now + 10.0))
     assert sum(walk.pauses) <= 10.0
 
 
-def test_a_service_that_never_answered_is_given_up_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_service_that_never_answered_fails_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[str] = []
     flow = Retries(300.0, told.append).through(flows.job(HERE, "job-1"))
     assert isinstance(next(flow), RequestStep)
@@ -111,7 +111,7 @@ def test_a_service_that_never_answered_is_given_up_at_once(monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize("error", [GONE, answered(500), answered(503)])
-def test_what_might_be_done_twice_is_not_repeated_once_it_was_sent(walk: Walk, error: ClientError) -> None:
+def test_non_idempotent_requests_are_not_repeated(walk: Walk, error: ClientError) -> None:
     with pytest.raises(ClientError):
         walk.ask(CANCEL, error)
     assert walk.pauses == []

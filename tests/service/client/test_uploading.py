@@ -58,7 +58,7 @@ def test_so_it_does_asynchronously(serve, large):
     assert cuts == []
 
 
-def test_a_client_that_gave_up_goes_on_later(serve, large, monkeypatch):
+def test_upload_resumes_in_a_later_session(serve, large, monkeypatch):
     url = serve()
     with cutting(url, [4 * MIB]) as proxy, Client(proxy.url) as client, monkeypatch.context() as patch:
         patch.setattr(uploading, "TRIES", 1)
@@ -83,14 +83,14 @@ def test_another_file_is_no_continuation(serve, large, scan, monkeypatch):
             client.upload(scan(name="small.h5"), resume=broken.value.upload)
 
 
-def test_a_line_that_carries_nothing_ends_the_upload(serve, large):
+def test_dead_connection_ends_the_upload(serve, large):
     with cutting(serve(), [2000] * 1000) as proxy, Client(proxy.url, patience_s=1.0) as client:
         with pytest.raises(ClientError, match="no answer"):
             client.upload(large)
         assert proxy.made < 100
 
 
-def test_what_is_refused_when_it_is_read_is_told(serve, scan):
+def test_rejection_while_reading_is_reported(serve, scan):
     def spoil(file):
         file["geometry/element_position_m"][5] = np.nan
         file["padding"] = np.zeros(200_000, dtype=np.uint8)
@@ -100,7 +100,7 @@ def test_what_is_refused_when_it_is_read_is_told(serve, scan):
     assert (refused.value.status, refused.value.field) == (422, "geometry/element_position_m")
 
 
-def test_too_large_is_told_before_a_byte_is_sent(serve, large):
+def test_oversize_is_reported_before_sending(serve, large):
     with Client(serve(max_upload_bytes=MIB)) as client, pytest.raises(ClientError) as refused:
         client.upload(large, lambda done, total: pytest.fail("something was sent"))
     assert (refused.value.status, refused.value.field) == (413, "Upload-Length")
@@ -142,7 +142,7 @@ def test_tuspy_interoperates_also_over_a_broken_line(serve, large):
         assert client.upload(large, resume=place.rpartition("/")[2]).sha256 == digest(large)
 
 
-def test_an_empty_file_is_refused(serve, tmp_path):
+def test_an_empty_file_is_rejected(serve, tmp_path):
     (tmp_path / "empty.h5").touch()
     with Client(serve()) as client, pytest.raises(ClientError) as refused:
         client.upload(tmp_path / "empty.h5")

@@ -39,7 +39,7 @@ def walk(answers, timeout_s=None):
         return steps, end.value
 
 
-def test_events_make_it_look():
+def test_event_triggers_a_poll():
     steps, job = walk(
         [
             Answer(),
@@ -65,12 +65,12 @@ def test_events_make_it_look():
     assert job.state == "succeeded"
 
 
-def test_the_end_of_the_stream_makes_it_look():
+def test_end_of_stream_triggers_a_poll():
     steps, _ = walk([Answer(), None, Answer(state="succeeded")])
     assert steps == [RequestStep, EventStep, RequestStep]
 
 
-def test_where_no_events_come_it_looks_now_and_then():
+def test_polls_periodically_without_events():
     broken = [Answer(), NoAnswer("gone")] * STREAMS
     steps, _ = walk([*broken, Answer(), Answer(), Answer(state="succeeded")])
     assert steps == [RequestStep, EventStep, PauseStep] * STREAMS + [
@@ -82,7 +82,7 @@ def test_where_no_events_come_it_looks_now_and_then():
     ]
 
 
-def test_a_service_that_is_gone_is_told():
+def test_lost_service_is_reported():
     with pytest.raises(NoAnswer):
         walk([Answer(), NoAnswer("gone"), NoAnswer("gone for good")])
 

@@ -52,19 +52,19 @@ class StoreSuite:
             "layout.json": b"{}",
         }
 
-    def test_what_is_published_again_is_what_counts(self, files, elsewhere):
+    def test_last_publication_wins(self, files, elsewhere):
         path = self.file(files)
         path.write_bytes(b"made anew")
         for _ in range(2):
             files.store.publish(path)
         assert elsewhere.store.fetch(self.there(elsewhere, path)).read_bytes() == b"made anew"
 
-    def test_what_is_not_there_is_not_found(self, files):
+    def test_missing_objects_are_not_found(self, files):
         files.of(LOCAL).root.mkdir(parents=True, exist_ok=True)
         with pytest.raises(FileNotFoundError):
             files.store.fetch(files.of(LOCAL).dataset(new_id("dataset")))
 
-    def test_what_is_removed_is_nowhere_and_the_rest_stays(self, files, elsewhere):
+    def test_removal_affects_only_its_object(self, files, elsewhere):
         gone, folder, kept = self.file(files), self.folder(files), self.file(files)
         never = files.of(LOCAL).mesh(new_id("mesh"))
         files.store.remove([gone, folder, never])
@@ -74,7 +74,7 @@ class StoreSuite:
                 elsewhere.store.fetch(self.there(elsewhere, path))
         assert elsewhere.store.fetch(self.there(elsewhere, kept)).read_bytes() == b"abc"
 
-    def test_tenants_have_nothing_in_common(self, files, elsewhere):
+    def test_tenants_are_isolated(self, files, elsewhere):
         path = self.file(files, b"mine")
         theirs = self.there(files, path, OTHER)
         with pytest.raises(FileNotFoundError):
@@ -84,7 +84,7 @@ class StoreSuite:
         files.store.remove([path])
         assert elsewhere.store.fetch(self.there(elsewhere, path, OTHER)).read_bytes() == b"theirs"
 
-    def test_nothing_is_wrong_with_it(self, files):
+    def test_store_passes_its_check(self, files):
         assert files.store.fault() is None
         path = self.file(files)
         files.store.tidy(lambda: False)

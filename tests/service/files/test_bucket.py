@@ -29,7 +29,7 @@ def test_two_prefixes_of_a_bucket_do_not_meet(bucket_url):
     assert [held.key for held in one.listed()] == ["a"]
 
 
-def test_a_removal_that_is_refused_is_no_removal(bucket_url, monkeypatch):
+def test_a_removal_that_is_rejected_is_no_removal(bucket_url, monkeypatch):
     bucket = Bucket(bucket_url)
     monkeypatch.setattr(bucket, "_call", lambda *_, **__: {"Errors": [{"Key": "a", "Code": "AccessDenied"}]})
     with pytest.raises(StorageUnavailable):
@@ -39,12 +39,12 @@ def test_a_removal_that_is_refused_is_no_removal(bucket_url, monkeypatch):
 @pytest.mark.parametrize(
     "ask", [lambda it: list(it.listed()), lambda it: it.put_metadata("a", {}), lambda it: it.remove("a")]
 )
-def test_a_bucket_that_is_not_there_is_no_missing_object(bucket_url, ask):
+def test_missing_bucket_is_not_a_missing_object(bucket_url, ask):
     with pytest.raises(StorageUnavailable):
         ask(Bucket(f"{bucket_url.removesuffix('/scans')}-missing"))
 
 
-def test_a_bucket_that_says_nothing_is_given_up(bucket_url, s3_server, monkeypatch):
+def test_unresponsive_bucket_times_out(bucket_url, s3_server, monkeypatch):
     monkeypatch.setattr(module, "ANSWER_S", 0.5)
     bucket = Bucket(bucket_url)
     s3_server.silent.set()

@@ -124,9 +124,7 @@ def test_a_job_can_be_cancelled_while_its_result_waits(service, work, uploaded, 
     assert http.get("/v1/volumes").json()["volumes"] == []
 
 
-def test_a_service_that_leaves_meanwhile_goes_on_at_the_next_start(
-    service, work, uploaded, begun, until, s3_server
-):
+def test_publication_resumes_at_the_next_start(service, work, uploaded, begun, until, s3_server):
     http = service("one")
     dataset = uploaded(http)
     job = begun(http, dataset)

@@ -71,13 +71,13 @@ class TestBucketStore(StoreSuite):
         for path in paths:
             path.unlink()
 
-    def test_nothing_but_the_thing_is_left_by_publishing_and_bringing(self, files, elsewhere):
+    def test_publish_and_fetch_leave_no_other_files(self, files, elsewhere):
         path = self.folder(files)
         elsewhere.store.fetch(self.there(elsewhere, path))
         for one in (files, elsewhere):
             assert not list(one.scratch.iterdir())
 
-    def test_many_who_ask_at_once_share_one_transfer(self, files, s3_server):
+    def test_simultaneous_requests_share_one_transfer(self, files, s3_server):
         path = self.file(files, secrets.token_bytes(100_000))
         content = path.read_bytes()
         self.forget(path)
@@ -103,9 +103,7 @@ class TestBucketStore(StoreSuite):
         self.forget(path)
         assert files.store.fetch(path).read_bytes() == content
 
-    def test_while_it_is_away_nothing_is_kept_fetched_or_removed_and_nothing_lost(
-        self, files, s3_server, caplog
-    ):
+    def test_unavailable_bucket_loses_no_object(self, files, s3_server, caplog):
         there, gone = self.file(files), self.file(files)
         self.forget(gone)
         new = files.of(LOCAL).dataset(new_id("dataset"))
@@ -136,7 +134,7 @@ class TestBucketStore(StoreSuite):
             mine.adopt(name)
         assert not mine.dataset(name).exists()
 
-    def test_what_was_damaged_in_the_bucket_is_not_brought(self, files, bucket):
+    def test_damaged_objects_are_not_fetched(self, files, bucket):
         path = self.file(files)
         key = path.relative_to(files.root).as_posix()
         told = bucket.metadata(key)
@@ -147,7 +145,7 @@ class TestBucketStore(StoreSuite):
             files.store.fetch(path)
         assert not path.exists()
 
-    def test_what_was_used_longest_ago_makes_room(self, opened, known):
+    def test_least_recently_used_files_are_evicted(self, opened, known):
         files = opened("small", cache_bytes=250)
         oldest, needed, older, newer = (self.file(files, bytes(100)) for _ in range(4))
         export = files.of(LOCAL).export("vol-" + "0" * 20, "npy")
@@ -169,7 +167,7 @@ class TestBucketStore(StoreSuite):
         # What went comes back when somebody asks for it, and what is in use may be more than was allowed.
         assert all(files.store.fetch(path).exists() for path in (oldest, older, newer))
 
-    def test_what_nobody_knows_goes_and_what_lies_here_only_is_published(
+    def test_orphans_are_removed_and_local_files_published(
         self, files, elsewhere, known, bucket, monkeypatch
     ):
         kept, orphan, forgotten = self.file(files), self.file(files), self.file(files)
@@ -190,7 +188,7 @@ class TestBucketStore(StoreSuite):
         assert not orphan.exists()
         assert elsewhere.store.fetch(self.there(elsewhere, alone)).read_bytes() == alone.read_bytes()
 
-    def test_a_bucket_that_lost_its_mark_is_a_fault(self, files, bucket):
+    def test_bucket_without_marker_is_an_error(self, files, bucket):
         path = self.file(files)
         self.forget(path)
         bucket.remove([MARK, path.relative_to(files.root).as_posix()])

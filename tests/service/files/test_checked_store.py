@@ -141,7 +141,7 @@ def test_a_restored_file_is_taken_again(opened, rows):
     assert rows.get(LOCAL, path.stem)["damaged"] is None
 
 
-def test_what_a_scrub_found_is_not_served_by_a_process_that_has_compared_it(opened, rows):
+def test_damage_found_by_a_scrub_is_not_served(opened, rows):
     files = opened()
     path = stored(files)
     files.store.fetch(path)
@@ -177,7 +177,7 @@ def test_the_work_of_a_job_changes_freely(opened, rows):
     assert rows.all() == []
 
 
-def test_what_is_being_deleted_gets_no_checksum_again(opened, rows):
+def test_deleted_files_get_no_new_checksum(opened, rows):
     # The rows are gone, the file is not yet.
     path = stored(opened())
     rows.delete(LOCAL, [path.stem])

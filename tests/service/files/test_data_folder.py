@@ -35,7 +35,7 @@ def test_half_done_work_is_dropped(tmp_path):
     assert kept.exists()
 
 
-def test_a_candidate_goes_with_what_a_killed_writer_left_beside_it(tmp_path):
+def test_stale_candidates_are_removed_with_partial_files(tmp_path):
     root = Files(tmp_path)
     root.prepare()
     files = root.of(LOCAL)
@@ -86,7 +86,7 @@ def test_no_invented_tenant_becomes_a_path(tmp_path, name):
     assert not list(tmp_path.iterdir())
 
 
-def test_tenants_have_nothing_in_common_on_the_disk(tmp_path):
+def test_tenants_are_isolated_on_disk(tmp_path):
     files = Files(tmp_path)
     mine, theirs = files.of(LOCAL), files.of(Tenant("other"))
     field = "field-" + "0" * 20

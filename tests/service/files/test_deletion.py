@@ -136,7 +136,7 @@ def shelf(tmp_path):
     database.close()
 
 
-def test_a_scan_goes_with_all_that_was_made_of_it(shelf):
+def test_deleting_a_scan_deletes_its_results(shelf):
     dataset = shelf.dataset()
     for _ in range(2):
         _, volume = shelf.reconstruction(dataset)
@@ -148,7 +148,7 @@ def test_a_scan_goes_with_all_that_was_made_of_it(shelf):
         shelf.delete("dataset", dataset)
 
 
-def test_nothing_else_goes(shelf):
+def test_deletion_affects_nothing_else(shelf):
     kept, other = shelf.dataset(), shelf.dataset(OTHER)
     job, volume = shelf.reconstruction(kept)
     animation = shelf.turntable(volume)
@@ -167,7 +167,7 @@ def test_nothing_else_goes(shelf):
 
 
 @pytest.mark.parametrize("state", ["queued", "running", "cancelling"])
-def test_what_a_job_needs_stays_whole(shelf, state):
+def test_inputs_of_a_running_job_are_kept(shelf, state):
     dataset = shelf.dataset()
     _, volume = shelf.reconstruction(dataset)
     busy = shelf.ended(shelf.jobs.add(LOCAL, "refraction", {}, volume_id=volume), state=state)
@@ -181,7 +181,7 @@ def test_what_a_job_needs_stays_whole(shelf, state):
     assert (shelf.left(), shelf.rows()) == ([], {})
 
 
-def test_a_result_goes_with_its_job_and_leaves_the_scan(shelf):
+def test_deleting_a_job_deletes_its_result_only(shelf):
     dataset = shelf.dataset()
     job, volume = shelf.reconstruction(dataset)
     shelf.turntable(volume)
@@ -200,7 +200,7 @@ def test_an_uploaded_volume_leaves_its_mesh(shelf):
     assert Meshes(shelf.database).get(LOCAL, mesh)["volume_id"] is None
 
 
-def test_a_mesh_goes_with_its_field_unless_another_mesh_shares_it(shelf):
+def test_deleting_a_mesh_deletes_unshared_fields(shelf):
     field = "field-" + "0" * 20
     first, second = shelf.mesh(), shelf.mesh()
     shelf.field(first, field)
@@ -272,7 +272,7 @@ def test_old_jobs_without_anything_go_too(shelf):
     assert shelf.rows()["events"] == len(kept)
 
 
-def test_a_clock_that_is_wrong_for_a_while_deletes_nothing(shelf, caplog):
+def test_wrong_clock_deletes_nothing(shelf, caplog):
     shelf.dataset()
     clocks = Clocks()
     keeper = housekeeper(shelf, clocks)

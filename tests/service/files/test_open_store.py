@@ -33,13 +33,13 @@ def test_a_bucket_belongs_to_one_database(databases, tmp_path, bucket_url):
     assert open_store(f"{bucket_url}/other", tmp_path, other, 0).fault() is None
 
 
-def test_a_prefix_that_others_use_is_left_alone(databases, tmp_path, bucket_url):
+def test_prefix_in_use_is_rejected(databases, tmp_path, bucket_url):
     Bucket(bucket_url).put_metadata("photographs/1.jpg", {})
     with pytest.raises(InvalidInput, match="which contains other objects"):
         open_store(bucket_url, tmp_path, databases[0], 0)
 
 
-def test_one_that_does_not_answer_or_is_not_there_is_refused(databases, tmp_path, bucket_url, s3_server):
+def test_rejects_missing_or_unresponsive_buckets(databases, tmp_path, bucket_url, s3_server):
     with pytest.raises(InvalidInput, match="BENTRAY_STORAGE_URL"):
         open_store("s3://nobody-made-this-one", tmp_path, databases[0], 0)
     s3_server.away.set()
@@ -47,7 +47,7 @@ def test_one_that_does_not_answer_or_is_not_there_is_refused(databases, tmp_path
         open_store(bucket_url, tmp_path, databases[0], 0)
 
 
-def test_what_has_to_be_installed_is_named(databases, tmp_path, monkeypatch):
+def test_missing_packages_are_named(databases, tmp_path, monkeypatch):
     for name in ("bucket", "bucket_store"):
         monkeypatch.delitem(sys.modules, f"bentray_service.files.{name}", raising=False)
     monkeypatch.setitem(sys.modules, "s3fs", None)

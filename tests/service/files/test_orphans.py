@@ -124,7 +124,7 @@ def test_the_first_start_removes_nothing(files, database):
     assert not (files.root / STAMP).exists()
 
 
-def test_of_a_cache_only_what_is_made_of_things_goes(files, database):
+def test_cache_cleanup_removes_only_derived_files(files, database):
     started(files, database)
     _, orphans = fill(files, database)
     Orphans(files, database, is_store=False).begin()

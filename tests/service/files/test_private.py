@@ -90,7 +90,7 @@ def test_a_folder_of_an_older_version_is_closed_with_all_that_is_in_it(
     assert caplog.text == ""
 
 
-def test_a_folder_that_cannot_be_closed_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_cannot_be_closed_is_rejected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As one of another user, or of a file system without modes."""
     tmp_path.chmod(0o755)
     monkeypatch.setattr(Path, "chmod", lambda path, mode: None)

@@ -48,7 +48,7 @@ def test_a_wrong_checksum_takes_the_piece_back(tmp_path):
     assert (tmp_path / "u").read_bytes() == BEGIN
 
 
-def test_what_came_before_the_client_went_stays_unless_it_cannot_be_checked(tmp_path):
+def test_verified_bytes_survive_a_disconnect(tmp_path):
     for name, expected, left in (
         ("plain", None, b"begin middle"),
         ("checked", checksum("md5", b"middleend"), BEGIN),
@@ -58,7 +58,7 @@ def test_what_came_before_the_client_went_stays_unless_it_cannot_be_checked(tmp_
         assert (tmp_path / name).read_bytes() == left
 
 
-def test_more_than_the_length_is_refused(tmp_path):
+def test_more_than_the_length_is_rejected(tmp_path):
     with pytest.raises(TooLarge, match="Upload-Length of 10"):
         run(tmp_path / "u", b"123", b"45", length=10)
     assert (tmp_path / "u").read_bytes() == b"begin 123"
@@ -75,7 +75,7 @@ def test_more_than_the_length_is_refused(tmp_path):
         ("md5 " + "A" * 1000, InvalidInput),
     ],
 )
-def test_what_is_no_checksum_is_refused(header, error):
+def test_rejects_invalid_checksums(header, error):
     with pytest.raises(error) as refused:
         Checksum.of(header)
     assert refused.value.field == "Upload-Checksum"
@@ -116,7 +116,7 @@ asyncio.run(append(stream(), path, 6, 2**40, checksum))
 
 
 @pytest.mark.parametrize("checked", [False, True])
-def test_what_came_before_a_kill_counts_unless_its_checksum_was_not_verified(tmp_path, checked):
+def test_verified_bytes_survive_a_kill(tmp_path, checked):
     path = tmp_path / "u"
     path.write_bytes(BEGIN)
     said = [f"md5 {base64.b64encode(bytes(16)).decode()}"] if checked else []

@@ -67,7 +67,7 @@ def test_tenants_take_turns_and_uploads_of_one_go_in_order(start):
     assert order == [(SMALL, 1), (THIRD, 1), (BUSY, 2), (SMALL, 2), (BUSY, 3), (BUSY, 4)]
 
 
-def test_who_leaves_before_the_turn_is_not_read_and_delays_nobody(start):
+def test_cancelled_waiter_is_skipped(start):
     queue, first, read = start(1), Held(), []
     begun = queue.submit(BUSY, first)
     assert first.began.wait(PATIENCE_S)
@@ -82,7 +82,7 @@ def test_who_leaves_before_the_turn_is_not_read_and_delays_nobody(start):
     assert read == [1]
 
 
-def test_an_error_is_the_callers_and_the_thread_goes_on(start):
+def test_error_is_raised_to_the_caller_and_the_thread_continues(start):
     queue = start(1)
     with pytest.raises(ZeroDivisionError):
         queue.submit(BUSY, lambda: 1 // 0).result(PATIENCE_S)
@@ -90,7 +90,7 @@ def test_an_error_is_the_callers_and_the_thread_goes_on(start):
     assert queue.alive()
 
 
-def test_at_the_end_what_waits_is_cancelled(start):
+def test_closing_cancels_waiting_uploads(start):
     queue, first = start(1), Held()
     begun = queue.submit(BUSY, first)
     assert first.began.wait(PATIENCE_S)

@@ -60,27 +60,27 @@ def check_refused(read: Read, field: str) -> None:
 
 
 @pytest.mark.parametrize("name", hostile_datasets.REFUSED)
-def test_a_hostile_scan_is_refused_by_name(datasets, name):
+def test_a_hostile_scan_is_rejected_by_name(datasets, name):
     check_refused(datasets[name], hostile_datasets.REFUSED[name][1])
 
 
 @pytest.mark.parametrize("name", hostile_datasets.FOREIGN)
-def test_what_is_no_scan_is_refused_as_a_file(datasets, name):
+def test_rejects_files_that_are_no_scan(datasets, name):
     check_refused(datasets[name], "file")
 
 
 @pytest.mark.parametrize("name", hostile_datasets.TAKEN)
-def test_what_the_format_does_not_know_is_left_alone(datasets, folder, name):
+def test_unknown_members_are_ignored(datasets, folder, name):
     assert set(datasets[name].answer) == {"ok"}, datasets[name]
 
 
 @pytest.mark.parametrize("name", hostile_volumes.REFUSED)
-def test_a_hostile_volume_is_refused_by_name(volumes, name):
+def test_a_hostile_volume_is_rejected_by_name(volumes, name):
     check_refused(volumes[name], hostile_volumes.REFUSED[name][-1])
 
 
 @pytest.mark.parametrize("name", hostile_meshes.REFUSED)
-def test_a_hostile_mesh_is_refused_by_name(meshes, name):
+def test_a_hostile_mesh_is_rejected_by_name(meshes, name):
     check_refused(meshes[name], hostile_meshes.REFUSED[name][-1])
 
 
@@ -90,7 +90,7 @@ def test_a_scene_is_read_once(meshes, name):
 
 
 @pytest.mark.slow
-def test_damaged_scans_are_refused(folder, sound):
+def test_damaged_scans_are_rejected(folder, sound):
     files = []
     for name, content in damaged(
         sound, flips=effort(35, 280), cuts=effort(8, 60), losses=effort(8, 60), seed=1

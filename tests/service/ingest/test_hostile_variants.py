@@ -26,7 +26,7 @@ def test_there_are_many():
 
 
 @pytest.mark.parametrize("name", hostile_variants.REFUSED)
-def test_it_is_refused_by_name(reads, name):
+def test_it_is_rejected_by_name(reads, name):
     read = reads[name]
     assert read.status == 0, read
     assert set(read.answer) == {"error"}, read.answer

@@ -97,7 +97,7 @@ def test_text_from_a_file_is_printable_and_short(value):
     clean.encode()
 
 
-def test_the_readers_of_scans_and_volumes_load_nothing_compiled():
+def test_readers_import_no_compiled_kernels():
     """Each upload starts a process: Numba and SciPy would take most of its time."""
     readers = [ingest_process.READERS[what] for what in ("dataset", "volume")]
     code = (

@@ -32,7 +32,7 @@ def run(path, chunks, *, announced=None, limit=LIMIT, error=None):
 
 @given(chunks=st.lists(st.binary(max_size=40), min_size=1), batch=st.integers(1, 60))
 @settings(max_examples=effort(20, 30), deadline=None)
-def test_what_is_sent_is_on_the_disk(tmp_path_factory, chunks, batch):
+def test_received_bytes_are_on_disk(tmp_path_factory, chunks, batch):
     path, body = tmp_path_factory.mktemp("r") / "body", b"".join(chunks)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(receiving, "BATCH_BYTES", batch)
@@ -46,7 +46,7 @@ def test_what_is_sent_is_on_the_disk(tmp_path_factory, chunks, batch):
     assert (received.size, received.sha256) == (len(body), hashlib.sha256(body).hexdigest())
 
 
-def test_tiny_chunks_do_not_wait_by_the_million(tmp_path, monkeypatch):
+def test_tiny_chunks_are_bounded(tmp_path, monkeypatch):
     waiting = []
     write = receiving._BatchWriter._write
     monkeypatch.setattr(
@@ -56,7 +56,7 @@ def test_tiny_chunks_do_not_wait_by_the_million(tmp_path, monkeypatch):
     assert max(waiting) <= receiving.BATCH_CHUNKS < 5000
 
 
-def test_too_much_is_refused(tmp_path):
+def test_rejects_oversize_bodies(tmp_path):
     with pytest.raises(TooLarge, match="at most 10 bytes"):
         run(tmp_path / "announced", [b"x" * 11], announced=11, limit=10)
     assert not (tmp_path / "announced").exists()
@@ -65,7 +65,7 @@ def test_too_much_is_refused(tmp_path):
     assert run(tmp_path / "just", [b"x" * 6, b"y" * 4], announced=10, limit=10).size == 10
 
 
-def test_what_came_before_the_end_is_kept(tmp_path, monkeypatch):
+def test_bytes_before_a_disconnect_are_kept(tmp_path, monkeypatch):
     monkeypatch.setattr(receiving, "BATCH_BYTES", 10)
     with pytest.raises(ConnectionError):
         run(tmp_path / "body", [b"a" * 7] * 5, error=ConnectionError())
@@ -73,7 +73,7 @@ def test_what_came_before_the_end_is_kept(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("fails_at", [0, 1, 2])
-def test_a_full_disk_is_told_and_nothing_stands_in_the_wrong_place(tmp_path, monkeypatch, fails_at):
+def test_full_disk_is_reported_and_leaves_no_file(tmp_path, monkeypatch, fails_at):
     monkeypatch.setattr(receiving, "BATCH_BYTES", 10)
     path, real, calls = tmp_path / "body", os.open, []
 

@@ -64,7 +64,7 @@ def test_a_reader_that_hangs_is_ended_with_its_children(program, scan, tmp_path)
     assert not status.exists() or status.read_text().split()[2] == "Z"
 
 
-def test_the_size_is_told_before_the_file_is_written(scan, tmp_path):
+def test_size_is_reported_before_writing(scan, tmp_path):
     told = []
 
     def reserve(size):
@@ -75,7 +75,7 @@ def test_the_size_is_told_before_the_file_is_written(scan, tmp_path):
     assert told == [(16 * 2 * 8 + 2 * 16 * 8 + 16 * 16 * 8, False)]
 
 
-def test_a_size_that_is_refused_ends_the_reader_and_nothing_is_written(scan, tmp_path):
+def test_a_size_that_is_rejected_ends_the_reader_and_nothing_is_written(scan, tmp_path):
     running = []
 
     def reserve(size):
@@ -107,7 +107,7 @@ def test_temporary_files_of_a_reader_lie_beside_the_file_it_makes(program, scan,
     assert len(list((tmp_path / "own").iterdir())) == 1
 
 
-def test_a_reader_that_says_much_before_it_fails_does_not_hang(program, scan, tmp_path, caplog):
+def test_verbose_failing_reader_does_not_hang(program, scan, tmp_path, caplog):
     program("import sys; sys.stderr.write('x' * 1_000_000); raise SystemExit(7)")
     with pytest.raises(InvalidInput, match="exit code 7"):
         run(scan(), tmp_path)
@@ -150,7 +150,7 @@ def test_a_reader_that_stops(program, scan, tmp_path):
         run(scan(), tmp_path)
 
 
-def test_a_full_disk_is_told_as_such(program, scan, tmp_path):
+def test_full_disk_is_reported(program, scan, tmp_path):
     program("print('{\"full\": true}')")
     with pytest.raises(StorageFull, match="no space"):
         run(scan(), tmp_path)
@@ -169,7 +169,7 @@ def test_memory_is_limited(program, scan, tmp_path):
         run(scan(), tmp_path, memory_bytes=1024**3)
 
 
-def test_too_little_memory_is_told(scan, tmp_path):
+def test_out_of_memory_is_reported(scan, tmp_path):
     with pytest.raises(InvalidInput, match="memory"):
         run(scan(), tmp_path, memory_bytes=48 * 1024**2)
 

@@ -97,7 +97,7 @@ def test_a_full_disk_is_waited_for(bench):
     assert bench.read == [row["result_id"]] * 4
 
 
-def test_what_is_refused_and_what_nobody_foresaw_do_not_stop_the_next(bench):
+def test_rejections_and_errors_do_not_stop_the_queue(bench):
     bad, odd, good = (bench.whole() for _ in range(3))
     bench.answers = [InvalidInput("file", "nothing", "a scan"), RuntimeError("odd")]
     bench.reader.start()
@@ -110,7 +110,7 @@ def test_what_is_refused_and_what_nobody_foresaw_do_not_stop_the_next(bench):
     assert bench.reader.alive()
 
 
-def test_what_lies_elsewhere_is_left_to_others(bench):
+def test_uploads_of_other_services_are_ignored(bench):
     row, here = bench.whole(), bench.whole()
     bench.files.of(LOCAL).upload(row["id"]).unlink()
     bench.reader.start()
@@ -118,7 +118,7 @@ def test_what_lies_elsewhere_is_left_to_others(bench):
     assert bench.uploads.get(LOCAL, row["id"])["state"] == "reading"
 
 
-def test_a_reader_that_leaves_refuses_nothing(bench, monkeypatch):
+def test_terminated_reader_rejects_no_upload(bench, monkeypatch):
     row, begun = bench.whole(), threading.Event()
 
     def killed(*given):

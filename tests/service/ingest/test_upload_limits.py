@@ -11,7 +11,7 @@ from bentray_service.rows.tenants import Tenant
 ONE, OTHER, THIRD = Tenant("one"), Tenant("other"), Tenant("third")
 
 
-def test_a_tenant_may_have_so_many_and_the_service_takes_so_many():
+def test_uploads_are_limited_per_tenant_and_in_total():
     limits = UploadLimits(of_tenant=2, in_all=3)
     with ExitStack() as stack:
         for tenant in (ONE, ONE, OTHER):
@@ -24,14 +24,14 @@ def test_a_tenant_may_have_so_many_and_the_service_takes_so_many():
         pass
 
 
-def test_one_that_fails_is_gone():
+def test_failed_upload_is_removed():
     limits = UploadLimits(of_tenant=1)
     for _ in range(3):
         with pytest.raises(ConnectionError), limits(ONE):
             raise ConnectionError
 
 
-def test_so_many_may_be_begun_in_a_minute_by_each_tenant():
+def test_new_uploads_per_minute_are_limited():
     limits = UploadLimits(begun_per_minute=3)
     for _ in range(3):
         limits.check_begin(ONE)

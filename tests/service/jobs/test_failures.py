@@ -28,7 +28,7 @@ def test_known_causes(error, word):
     assert word in explain("job-1", error).detail
 
 
-def test_a_surprise_goes_to_the_log(caplog):
+def test_unexpected_errors_are_logged(caplog):
     with caplog.at_level(logging.ERROR, "bentray.jobs"):
         problem = explain("job-1", RuntimeError("the secret inside"))
     assert "secret" not in problem.detail

@@ -147,7 +147,7 @@ def test_a_stopped_job_runs_again_at_the_next_start(serving, until, monkeypatch)
     assert states[-1] == "succeeded"
 
 
-def test_what_the_worker_refuses_fails_in_words(serving, until, monkeypatch):
+def test_worker_rejection_fails_the_job_with_a_message(serving, until, monkeypatch):
     def refuse(*given, **control):
         raise InvalidInput("iso", "0.5", "what the filter leaves")
 
@@ -217,7 +217,7 @@ def ask_field(http, mesh, **settings):
     return http.post("/v1/jobs", json=asked)
 
 
-def test_a_torn_field_is_gone_on_from_at_the_next_start(serving, until, monkeypatch):
+def test_interrupted_field_resumes_at_the_next_start(serving, until, monkeypatch):
     monkeypatch.setattr(geometry_field, "TASK_RAYS", 32 * 216)
     plain, calls, torn = geometry_field.build_field, [], threading.Event()
 
@@ -294,7 +294,7 @@ def test_a_field_that_is_cancelled_at_its_end_stays_for_others(start):
 
 
 @pytest.mark.parametrize("kind", ["reconstruction", "simulation"])
-def test_of_others_nothing_stays_not_even_a_checksum(start, kind):
+def test_cancelled_fields_leave_no_files(start, kind):
     parts = start().app.state.parts
     files = parts.files.of(LOCAL)
     written = kinds.KINDS[kind].target(files, {"id": new_id("job")})
@@ -333,7 +333,7 @@ def test_other_refusals_of_a_field(start, monkeypatch):
     assert (body["status"], body["field"]) == (422, "mesh")
 
 
-def test_what_a_task_refuses_fails_the_field_in_words(serving, until):
+def test_task_rejection_fails_the_field_with_a_message(serving, until):
     with serving() as http:
         done = until(http, ask_field(http, put_mesh(http), image_threshold=1e-12).json()["id"])
     assert (done["state"], done["error"]["field"]) == ("failed", "threshold")

@@ -67,7 +67,7 @@ def test_a_residual_that_json_cannot_hold():
     assert jobs.written[0][2] == [told | waves]
 
 
-def test_stop_asks_the_database_now_and_then():
+def test_stop_polls_the_database():
     jobs, clock = FakeJobs(), Clock()
     reporter = Reporter(jobs, "job", lambda: False, clock)
     for _ in range(1000):
@@ -80,7 +80,7 @@ def test_stop_asks_the_database_now_and_then():
     assert reporter.stop()
 
 
-def test_a_database_that_is_away_costs_no_job():
+def test_unavailable_database_fails_no_job():
     jobs, clock = FakeJobs(), Clock()
     reporter = Reporter(jobs, "job", lambda: False, clock)
     jobs.away = True
@@ -97,7 +97,7 @@ def test_stop_when_the_service_leaves():
     assert jobs.asked == 0
 
 
-def test_what_is_kept_is_told_once_and_its_size_now_and_then():
+def test_checkpoints_are_reported_once_and_their_size_periodically():
     jobs, clock = FakeJobs(), Clock()
     reporter = Reporter(jobs, "job", lambda: False, clock, taken=lambda: 7)
     jobs.away = True

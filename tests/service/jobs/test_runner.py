@@ -40,7 +40,7 @@ def until_states(http, jobs, *wanted):
         time.sleep(0.02)
 
 
-def test_another_tenants_job_begins_beside_jobs_of_hours(start, uploaded, work):
+def test_job_of_another_tenant_starts_during_long_jobs(start, uploaded, work):
     """Of one tenant as many run as may at a time, of each other one in any case, up to so many in all."""
     http = start(jobs_at_once=2, tenants_at_once=4)
     dataset, parts = uploaded(http), http.app.state.parts
@@ -72,7 +72,7 @@ def test_another_tenants_job_begins_beside_jobs_of_hours(start, uploaded, work):
     until_states(http, jobs, *["succeeded"] * 5, "cancelled", "succeeded")
 
 
-def test_a_new_job_wakes_the_runner(start, uploaded, submitted, until, work, monkeypatch):
+def test_new_job_starts_at_once(start, uploaded, submitted, until, work, monkeypatch):
     monkeypatch.setattr("bentray_service.jobs.runner.IDLE_SECONDS", 600.0)
     http = start(jobs_at_once=1)
     dataset = uploaded(http)
@@ -163,7 +163,7 @@ def test_a_full_disk_is_waited_for(start, uploaded, submitted, until, work, monk
 
 
 @pytest.mark.parametrize("error", [CommClosedError("gone"), FutureCancelledError("key", "lost")])
-def test_a_lost_scheduler_costs_no_job(start, uploaded, submitted, until, work, error):
+def test_lost_scheduler_fails_no_job(start, uploaded, submitted, until, work, error):
     http = start(jobs_at_once=1)
     work.error = error
     work.hold.clear()
@@ -177,7 +177,7 @@ def test_a_lost_scheduler_costs_no_job(start, uploaded, submitted, until, work, 
     assert "no answer from the workers; the job continues when available" in notes
 
 
-def test_what_is_left_of_jobs_goes_with_their_end(start, uploaded, submitted, until, work):
+def test_finished_jobs_leave_no_temporary_files(start, uploaded, submitted, until, work):
     http = start()
     folder = http.app.state.parts.files.of(LOCAL).root / "work"
     work.hold.clear()
@@ -208,9 +208,7 @@ def test_a_full_queue_is_a_429(start, uploaded, submitted, until, work):
     work.hold.set()
 
 
-def test_an_end_that_the_database_never_takes_fails_the_job(
-    start, uploaded, submitted, until, work, monkeypatch
-):
+def test_unrecordable_result_fails_the_job(start, uploaded, submitted, until, work, monkeypatch):
     monkeypatch.setattr("bentray_service.jobs.runner.IDLE_SECONDS", 0.05)
     http = start(jobs_at_once=1)
 
@@ -225,7 +223,7 @@ def test_an_end_that_the_database_never_takes_fails_the_job(
     assert until(http, submitted(http, dataset)["id"])["state"] == "succeeded", "the slot is free again"
 
 
-def test_an_image_that_is_not_finite_is_refused(start, uploaded, submitted, until, work):
+def test_an_image_that_is_not_finite_is_rejected(start, uploaded, submitted, until, work):
     http = start()
     work.spoil = np.nan
     done = until(http, submitted(http, uploaded(http))["id"])

@@ -123,7 +123,7 @@ def test_from_settings_to_an_image(serving, until, tmp_path):
         assert not list((files.root / "work").iterdir())
 
 
-def test_waves_too_and_what_is_deleted_goes_with_its_job(serving, until):
+def test_wave_simulation_and_deletion_of_its_job(serving, until):
     with serving() as http:
         done = until(http, ask(http, **WAVES).json()["id"])
         assert (done["state"], done["progress"]["total"]) == ("succeeded", 5), done["error"]
@@ -152,7 +152,7 @@ def test_cancel_while_a_task_is_at_work(serving, until, held):
         assert not list((files.root / "work").iterdir())
 
 
-def test_a_stopped_service_goes_on_where_it_was(serving, until, held):
+def test_stopped_service_resumes(serving, until, held):
     with serving() as http:
         job = ask(http, **WAVES).json()["id"]
         until(http, job, "running")
@@ -184,7 +184,7 @@ def test_a_stopped_service_goes_on_where_it_was(serving, until, held):
         ({"elements": 4096, "attenuation": True}, "elements"),
     ],
 )
-def test_what_is_refused(start, cluster, settings, field):
+def test_rejects_invalid_input(start, cluster, settings, field):
     cluster.memory_bytes = 2**30
     http = start()
     answer = ask(http, **settings)

@@ -61,7 +61,7 @@ def torn(monkeypatch):
     return gone, restored
 
 
-def test_a_torn_job_gives_the_image_of_one_process(http, torn, tmp_path):
+def test_interrupted_job_gives_the_bits_of_one_process(http, torn, tmp_path):
     write_dataset(tmp_path / "scan.h5", scan())
     sent = http.post("/v1/datasets", content=(tmp_path / "scan.h5").read_bytes(), headers=HDF5)
     asked = {"kind": "reconstruction", "dataset": sent.json()["id"], "settings": ASKED}

@@ -77,7 +77,7 @@ def test_a_download_goes_on_while_its_volume_is_deleted(serve):
         assert http.get(f"/v1/volumes/{volume}/data").status_code == 404
 
 
-def test_readers_beside_a_deletion_are_told_that_it_is_gone(start):
+def test_readers_during_a_deletion_get_410(start):
     http = start()
     with ThreadPoolExecutor(6) as pool:
         for _ in range(8):

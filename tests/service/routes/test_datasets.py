@@ -52,7 +52,7 @@ def test_octet_stream_is_taken_and_parameters_do_not_matter(start, scan):
     assert upload(http, scan().read_bytes(), headers).status_code == 201
 
 
-def test_a_scan_comes_back_as_a_file_and_goes_on_where_it_broke_off(start, scan, tmp_path):
+def test_dataset_download_can_be_resumed(start, scan, tmp_path):
     http = start()
     dataset = upload(http, scan().read_bytes()).json()
     here = dataset["links"]["file"]

@@ -30,5 +30,5 @@ def test_while_a_job_needs_it_it_stays(start, uploaded, submitted, until, work):
 
 
 @pytest.mark.parametrize("place", ["datasets/ds-", "volumes/vol-", "meshes/mesh-"])
-def test_what_is_not_there_is_not_found(start, place):
+def test_missing_objects_are_not_found(start, place):
     assert start().delete(f"/v1/{place}{'0' * 20}").status_code == 404

@@ -60,7 +60,7 @@ def test_it_ends_when_the_service_leaves(start, uploaded, submitted, until, work
     ]
 
 
-def test_silence_is_broken(start, uploaded, submitted, until, work, monkeypatch):
+def test_heartbeats_are_sent(start, uploaded, submitted, until, work, monkeypatch):
     monkeypatch.setattr(events, "SILENCE_SECONDS", 0.05)
     http = start()
     work.hold.clear()
@@ -71,14 +71,14 @@ def test_silence_is_broken(start, uploaded, submitted, until, work, monkeypatch)
 
 
 @pytest.mark.parametrize("last", ["x", "-1", str(2**70)])
-def test_a_wrong_place_is_refused(start, uploaded, submitted, work, last):
+def test_a_wrong_place_is_rejected(start, uploaded, submitted, work, last):
     http = start()
     job = submitted(http, uploaded(http))
     answer = http.get(f"/v1/jobs/{job['id']}/events", headers={"Last-Event-ID": last})
     assert (answer.status_code, answer.json()["field"]) == (422, "last-event-id")
 
 
-def test_all_streams_share_one_look_at_the_database(start, uploaded, submitted, until, work, monkeypatch):
+def test_event_streams_share_one_query(start, uploaded, submitted, until, work, monkeypatch):
     http = start()
     parts, looks, threads = http.app.state.parts, [], set()
     news = parts.jobs.__class__.updates
@@ -145,7 +145,7 @@ def wait_until(happened):
         time.sleep(0.02)
 
 
-def test_a_database_that_is_away_ends_no_stream(start, uploaded, submitted, until, work, monkeypatch):
+def test_unavailable_database_ends_no_stream(start, uploaded, submitted, until, work, monkeypatch):
     http = start()
     work.hold.clear()
     job = submitted(http, uploaded(http))

@@ -132,7 +132,7 @@ def test_every_parameter_changes_the_tag(http, here):
 
 
 @pytest.mark.parametrize("name", ["image.png", "geometry-image.png", "normal-map.png"])
-def test_a_known_picture_is_not_drawn_again(http, here, cluster, name):
+def test_cached_picture_is_not_redrawn(http, here, cluster, name):
     query = SMALL if name == "image.png" else {}
     first = http.get(f"{here}/{name}", params=query)
     assert first.headers["content-type"] == "image/png"
@@ -149,7 +149,7 @@ def test_a_known_picture_is_not_drawn_again(http, here, cluster, name):
     assert len(cluster.submitted) == drawn
 
 
-def test_a_large_picture_is_drawn_in_strips(http, here, cluster):
+def test_large_picture_is_drawn_in_tiles(http, here, cluster):
     answer = http.get(f"{here}/image.png", params={"width": 1024, "height": 600, "depth": 0})
     assert Image.open(io.BytesIO(answer.content)).size == (1024, 600)
     assert len(cluster.submitted) == 2 + 1

@@ -38,7 +38,7 @@ def test_database_that_cannot_be_written(start):
     assert http.get("/health/live").status_code == 200
 
 
-def test_uploads_that_nobody_reads(start):
+def test_stalled_ingestion_is_reported(start):
     http = start()
     http.app.state.parts.upload_ingest.stop()
     assert faults(http.get("/health/ready")) == ["ingest"]

@@ -58,7 +58,7 @@ def test_settings_may_be_left_out(http, dataset, work, until):
     assert work.calls[0][1] == Settings()
 
 
-def test_the_plan_is_stored_and_told(http, dataset):
+def test_plan_is_stored_and_returned(http, dataset):
     job = ask(http, dataset, {"nodes": 16}).json()
     found = http.get(f"/v1/jobs/{job['id']}").json()["plan"]
     assert found == job["plan"]
@@ -67,7 +67,7 @@ def test_the_plan_is_stored_and_told(http, dataset):
     assert "1 of 1 workers can run it" in found["why"]
 
 
-def test_a_task_that_no_worker_can_hold_is_refused_before_it_is_stored(http, dataset, cluster):
+def test_a_task_that_no_worker_can_hold_is_rejected_before_it_is_stored(http, dataset, cluster):
     cluster.memory_bytes = 500 * 2**20
     body = problem(ask(http, dataset, {"nodes": 2048, "method": "gauss-newton"}))
     assert (body["status"], body["field"]) == (422, "nodes")
@@ -77,7 +77,7 @@ def test_a_task_that_no_worker_can_hold_is_refused_before_it_is_stored(http, dat
     assert ask(http, dataset, {"nodes": 16}).status_code == 202
 
 
-def test_a_device_that_no_worker_offers_is_refused(http, dataset):
+def test_a_device_that_no_worker_offers_is_rejected(http, dataset):
     body = problem(ask(http, dataset, {"eikonal": "fim-opencl"}))
     assert (body["status"], body["field"]) == (422, "eikonal")
 
@@ -89,7 +89,7 @@ def test_jobs_are_taken_while_no_worker_is_connected(http, dataset, cluster):
     assert "no worker is connected yet" in answer.json()["plan"]["why"]
 
 
-def test_what_auto_chose_is_told_at_the_end(http, dataset, work, until):
+def test_automatic_choices_are_returned(http, dataset, work, until):
     work.trials = (
         Trial({"rays": "straight", "method": "sart"}, 2e-8, 1e-8),
         Trial({"rays": "curved", "method": "sart"}, 3e-8, 1e-8),
@@ -156,7 +156,7 @@ def test_wrong_settings(http, dataset, settings, field):
         ("numerics", {}, "a known setting: "),
     ],
 )
-def test_a_setting_of_the_earlier_flat_record_is_refused_with_what_to_use_instead(
+def test_a_setting_of_the_earlier_flat_record_is_rejected_with_what_to_use_instead(
     http, dataset, name, value, accepted
 ):
     body = problem(ask(http, dataset, {name: value}))

@@ -42,7 +42,7 @@ def packed(place, shape, dtype="f8", chunk=None):
         ("mask/valid", (2**20, 1024), "1073741824 pairs.*at most 536870912"),
     ],
 )
-def test_it_is_refused_by_its_name_its_number_and_the_limit(scan, tmp_path, place, shape, said):
+def test_it_is_rejected_by_its_name_its_number_and_the_limit(scan, tmp_path, place, shape, said):
     path = scan(packed(place, shape, "i4" if place in ("acquisition/tx", "mask/valid") else "f8"))
     assert path.stat().st_size < 8 * 2**20
     tracemalloc.start()
@@ -87,7 +87,7 @@ def test_a_job_is_planned_without_its_file(start, uploaded, submitted, work, mon
     assert submitted(http, dataset)["plan"] == plan
 
 
-def test_a_scan_of_all_elements_in_one_place_or_of_none_is_refused(start, scan):
+def test_a_scan_of_all_elements_in_one_place_or_of_none_is_rejected(start, scan):
     http = start()
 
     def change(value):
@@ -103,7 +103,7 @@ def test_a_scan_of_all_elements_in_one_place_or_of_none_is_refused(start, scan):
 
 
 @pytest.mark.parametrize("rate", [1e300, 1e-300, 5e-324, -1e6, 25.0])
-def test_a_sampling_rate_that_nothing_has_is_refused(scan, tmp_path, rate):
+def test_rejects_implausible_sampling_rates(scan, tmp_path, rate):
     def change(file):
         file["acquisition"].attrs["sampling_rate_hz"] = rate
 

@@ -60,7 +60,7 @@ def test_every_format(http, kind):
     assert stored.faces.shape == (192, 3)
 
 
-def test_what_is_mended_is_told(http):
+def test_repairs_are_reported(http):
     doubled = RING.vertices[RING.faces].reshape(-1, 3)
     faces = np.arange(3 * 192).reshape(-1, 3)
     faces[7] = faces[7, ::-1]
@@ -96,7 +96,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_mesh_is_refused_by_name(http, name):
+def test_a_broken_mesh_is_rejected_by_name(http, name):
     mesh, field, found = BROKEN[name]
     answer = send(http, off(mesh))
     body = answer.json()
@@ -108,7 +108,7 @@ def test_a_broken_mesh_is_refused_by_name(http, name):
     assert not list((http.app.state.parts.files.of(LOCAL).root / "incoming").iterdir())
 
 
-def test_a_surface_with_one_side_is_refused(http):
+def test_a_surface_with_one_side_is_rejected(http):
     turn = np.arange(12)
     angle = 2 * np.pi * turn / 12
     half = 0.3 * np.array([-1.0, 1.0])[:, None]
@@ -125,7 +125,7 @@ def test_a_surface_with_one_side_is_refused(http):
 
 
 @pytest.mark.parametrize("content", [b"", b"only text", b"ply\nformat ascii 1.0\nnonsense", b"glTF\x02"])
-def test_what_is_no_mesh(http, content):
+def test_rejects_invalid_meshes(http, content):
     answer = send(http, content)
     assert answer.status_code == 422
     assert answer.json()["accepted"]

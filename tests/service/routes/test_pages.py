@@ -10,7 +10,7 @@ ASSETS = sorted(f"/static/{path.name}" for path in (WEB / "static").iterdir())
 
 
 @pytest.mark.parametrize("path", ["/", "/docs", *ASSETS])
-def test_nothing_foreign_is_loaded(start, path):
+def test_pages_load_only_own_files(start, path):
     answer = start().get(path)
     assert answer.status_code == 200
     assert "default-src 'self'" in answer.headers["content-security-policy"]

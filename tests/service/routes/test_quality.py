@@ -67,7 +67,7 @@ def test_a_refused_scan_has_its_report_too(start, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["quality", "quality.png"])
-def test_what_is_refused(start, uploaded, name):
+def test_rejects_invalid_input(start, uploaded, name):
     http = start()
     assert http.get(f"/v1/datasets/ds-00000000000000000000/{name}").status_code == 404
     answer = http.get(f"/v1/datasets/{uploaded(http)}/{name}?picker=eye")
@@ -76,5 +76,5 @@ def test_what_is_refused(start, uploaded, name):
     assert answer.json()["field"] == "picker"
 
 
-def test_every_picker_can_be_asked_for():
+def test_every_picker_can_be_requested():
     assert get_args(get_args(Picker)[0]) == tuple(PICKERS)

@@ -87,7 +87,7 @@ def test_every_parameter_changes_the_picture_or_its_tag(http):
     assert len(tags) == len(other) + 1
 
 
-def test_a_known_picture_is_not_cast_again(http, cluster):
+def test_cached_picture_is_not_rendered_again(http, cluster):
     here = put(http)
     first = http.get(here, params=SMALL)
     assert first.headers["cache-control"] == "private, no-cache"
@@ -104,7 +104,7 @@ def test_any_picture_is_known_by_a_star(http, cluster):
     assert len(cluster.submitted) == cast
 
 
-def test_the_head_of_a_picture_is_told_without_drawing(http, cluster):
+def test_head_request_does_not_render(http, cluster):
     here = put(http)
     whole = http.get(here, params=SMALL)
     cast = len(cluster.submitted)
@@ -135,7 +135,7 @@ def test_several_surfaces(http):
     assert answer.status_code == 200
 
 
-def test_a_large_picture_is_cast_in_strips(http, cluster, monkeypatch):
+def test_large_picture_is_rendered_in_tiles(http, cluster, monkeypatch):
     monkeypatch.setattr(tiles, "TASK_RAYS", 100)
     answer = http.get(put(http), params=SMALL)
     assert Image.open(io.BytesIO(answer.content)).size == (32, 24)
@@ -174,7 +174,7 @@ def test_a_large_picture_is_cast_in_strips(http, cluster, monkeypatch):
         ("isos=0.5", "isos", "one of iso, index"),
     ],
 )
-def test_what_is_refused(http, cluster, query, field, accepted):
+def test_rejects_invalid_input(http, cluster, query, field, accepted):
     answer = http.get(f"{put(http)}?{query}")
     body = answer.json()
     assert (answer.status_code, body["field"]) == (422, field), body
@@ -208,7 +208,7 @@ def test_late_is_503(http, cluster, monkeypatch):
     assert (answer.status_code, answer.json()["type"]) == (503, "/problems/busy")
 
 
-def test_what_the_worker_refuses_is_422(http, monkeypatch):
+def test_worker_rejection_is_422(http, monkeypatch):
     def refuse(path, view):
         raise InvalidInput("iso", "0.5", "what the filter leaves")
 
@@ -254,7 +254,7 @@ def test_a_reconstruction_as_glass(http, uploaded, submitted, until, work, monke
     assert "even spacing" in answer.json()["accepted"]
 
 
-def test_a_picture_beside_reconstructions(tmp_path):
+def test_picture_during_reconstructions(tmp_path):
     """On a real cluster: the lane is free although every other one is busy."""
     with open_cluster(workers=1, processes=False) as cluster:
         app = create_app(ServiceSettings(data_dir=tmp_path / "data"), cluster)

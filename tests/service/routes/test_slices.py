@@ -34,7 +34,7 @@ def test_every_axis_has_its_slices(http, here):
     assert sizes == {"x": (4, 5), "y": (3, 5), "z": (3, 4)}
 
 
-def test_everything_asked_for_changes_the_picture_and_its_tag(http, here):
+def test_every_parameter_changes_picture_and_etag(http, here):
     asked = [
         {},
         {"axis": "x"},

@@ -63,7 +63,7 @@ def left_in(http):
     return sorted(path.name for name in ("uploads", "incoming") for path in root.glob(f"tenants/*/{name}/*"))
 
 
-def test_what_is_possible_is_told(start):
+def test_options_lists_supported_extensions(start):
     answer = start(max_upload_bytes=12345).options("/v1/uploads")
     assert answer.status_code == 204
     assert answer.headers["tus-version"] == answer.headers["tus-resumable"] == "1.0.0"
@@ -118,7 +118,7 @@ def test_volumes_and_meshes_too(start):
     assert (mesh["title"], mesh["vertices"], mesh["faces"]) == ("Tetra", 4, 4)
 
 
-def test_what_cannot_be_read_is_refused_with_its_problem(start, scan):
+def test_rejects_unreadable_uploads_with_a_problem(start, scan):
     def spoil(file):
         file["geometry/element_position_m"][5] = np.nan
 
@@ -135,7 +135,7 @@ def test_what_cannot_be_read_is_refused_with_its_problem(start, scan):
 
 @given(cuts=st.lists(st.integers(0, 6000), max_size=6), wrong=st.integers(1, 5000))
 @settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_a_piece_goes_where_the_upload_stands_and_nowhere_else(start, cuts, wrong):
+def test_chunk_offset_must_match(start, cuts, wrong):
     http = start(folder=f"data-{time.monotonic_ns()}")
     content, at = os.urandom(6001), 0
     place = begin(http, len(content))
@@ -174,7 +174,7 @@ def test_unknown_checksum(start):
     assert (body["field"], body["accepted"]) == ("Upload-Checksum", "sha256 or sha1 or md5")
 
 
-def test_the_protocol_must_be_spoken(start):
+def test_protocol_version_header_is_required(start):
     http = start()
     place = begin(http, 10)
     for answer in (
@@ -195,7 +195,7 @@ def test_a_length_must_be_given(start, length):
     assert body["field"] == "upload-length"
 
 
-def test_too_large_is_said_before_a_byte_comes(start, monkeypatch):
+def test_oversize_is_rejected_at_creation(start, monkeypatch):
     http = start(max_upload_bytes=1000)
     body = problem(http.post("/v1/uploads", headers={**TUS, "Upload-Length": "1001"}), 413)
     assert "1000" in body["accepted"]
@@ -204,7 +204,7 @@ def test_too_large_is_said_before_a_byte_comes(start, monkeypatch):
     assert "free" in body["accepted"]
 
 
-def test_a_piece_may_not_go_beyond_the_length(start):
+def test_chunk_beyond_the_length_is_rejected(start):
     http = start()
     place = begin(http, 10)
     assert piece(http, place, 0, b"1234").status_code == 204
@@ -229,7 +229,7 @@ def test_wrong_metadata_is_named(start, said, field):
     assert problem(start().post("/v1/uploads", headers=headers), 422)["field"] == field
 
 
-def test_termination_leaves_nothing(start):
+def test_termination_removes_the_upload(start):
     http = start()
     place = begin(http, 10)
     piece(http, place, 0, b"123")
@@ -245,14 +245,14 @@ def test_termination_leaves_nothing(start):
         assert answer.status_code == 404
 
 
-def test_termination_by_a_proxy_that_knows_post_alone(start):
+def test_termination_by_method_override(start):
     http = start()
     place = begin(http, 10)
     assert http.post(place, headers={**TUS, "X-HTTP-Method-Override": "DELETE"}).status_code == 204
     assert http.get(place).status_code == 404
 
 
-def test_what_it_became_outlives_it(start, scan):
+def test_dataset_survives_its_upload(start, scan):
     http, content = start(), scan().read_bytes()
     place = begin(http, len(content))
     piece(http, place, 0, content)
@@ -303,7 +303,7 @@ def test_unknown_and_hostile_ids(start, upload):
     problem(piece(http, f"/v1/uploads/{upload}", 0, b"x"), 404)
 
 
-def test_an_upload_goes_on_after_a_restart(start, scan):
+def test_upload_resumes_after_a_restart(start, scan):
     content = scan().read_bytes()
     http = start()
     place = begin(http, len(content))
@@ -316,7 +316,7 @@ def test_an_upload_goes_on_after_a_restart(start, scan):
 
 
 @pytest.mark.parametrize("state", ["receiving", "reading"])
-def test_what_was_whole_at_a_death_is_read_at_the_next_start(start, scan, state):
+def test_complete_uploads_are_ingested_at_the_next_start(start, scan, state):
     """Death after the last byte, before that was stored; and while it was read, with half a file left."""
     content = scan().read_bytes()
     http = start()
@@ -335,7 +335,7 @@ def test_what_was_whole_at_a_death_is_read_at_the_next_start(start, scan, state)
     assert left_in(http) == []
 
 
-def test_what_was_stored_at_a_death_is_not_stored_twice(start, scan):
+def test_stored_uploads_are_not_ingested_twice(start, scan):
     content = scan().read_bytes()
     http = start()
     place = begin(http, len(content))
@@ -350,7 +350,7 @@ def test_what_was_stored_at_a_death_is_not_stored_twice(start, scan):
     assert len(http.get("/v1/datasets").json()["datasets"]) == 1
 
 
-def test_bytes_of_a_piece_that_was_not_verified_before_a_death_do_not_count(start):
+def test_unverified_bytes_are_dropped_after_a_kill(start):
     http = start()
     place = begin(http, 100)
     piece(http, place, 0, b"verified")

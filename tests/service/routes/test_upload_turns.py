@@ -57,7 +57,7 @@ def test_an_upload_is_read_while_another_tenant_has_four_large_ones(start, uploa
         blockers.end()
 
 
-def test_who_goes_away_leaves_the_queue(queue):
+def test_disconnected_client_leaves_the_queue(queue):
     done = []
 
     async def ask():
@@ -81,7 +81,7 @@ def test_who_goes_away_leaves_the_queue(queue):
     assert done == []
 
 
-def test_who_waits_too_long_is_told_so(queue, monkeypatch):
+def test_long_wait_is_rejected_with_503(queue, monkeypatch):
     monkeypatch.setattr(uploads, "LONGEST_WAIT_S", 0.01)
 
     async def ask():
@@ -93,7 +93,7 @@ def test_who_waits_too_long_is_told_so(queue, monkeypatch):
     assert queue.waiting(LOCAL) == 0
 
 
-def test_a_tenant_with_too_many_on_their_way_is_told_when_to_come_again(start, scan, uploaded):
+def test_too_many_uploads_get_retry_after(start, scan, uploaded):
     http = start()
     limits = http.app.state.parts.upload_limits
     with ExitStack() as stack:

@@ -73,7 +73,7 @@ def test_an_upload_for_matlab_and_itk(http, upload):
 
 @pytest.mark.parametrize("kind", ["result", "upload"])
 @pytest.mark.parametrize("asked", FORMATS)
-def test_a_broken_download_goes_on(http, request, kind, asked):
+def test_interrupted_download_can_be_resumed(http, request, kind, asked):
     here = f"{request.getfixturevalue(kind)}?format={asked}"
     whole = http.get(here)
     assert whole.status_code == 200
@@ -93,7 +93,7 @@ def test_a_broken_download_goes_on(http, request, kind, asked):
 
 
 @pytest.mark.parametrize("asked", ["nifti", "metaimage", "mat", "npy"])
-def test_the_head_of_a_file_that_is_not_made_makes_none(http, upload, cluster, asked):
+def test_head_request_does_not_export(http, upload, cluster, asked):
     here, begun = f"{upload}?format={asked}", len(cluster.submitted)
     head = http.head(here)
     assert (head.status_code, head.content) == (200, b"")
@@ -124,7 +124,7 @@ class OtherProcess(FakeCluster):
 
 
 @pytest.mark.slow
-def test_an_export_whose_volume_goes_when_it_is_made(http, upload, monkeypatch):
+def test_export_of_a_volume_deleted_meanwhile(http, upload, monkeypatch):
     parts = http.app.state.parts
     export = parts.pictures.export
 
@@ -192,13 +192,13 @@ def test_parts(http, upload, part, found):
         {"Range": "pages=1-2"},
     ],
 )
-def test_what_is_no_part_of_this_file_is_answered_with_the_whole(http, upload, headers):
+def test_invalid_range_returns_the_whole_file(http, upload, headers):
     answer = http.get(upload, headers=headers)
     assert (answer.status_code, answer.content) == (200, http.get(upload).content)
 
 
 @pytest.mark.parametrize("part", ["bytes=99999999-", "bytes=-0", f"bytes={10**400}-"])
-def test_a_part_beyond_the_end_is_refused(http, upload, part):
+def test_a_part_beyond_the_end_is_rejected(http, upload, part):
     size = len(http.get(upload).content)
     answer = http.get(upload, headers={"Range": part})
     body = answer.json()

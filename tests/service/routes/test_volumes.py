@@ -43,7 +43,7 @@ def test_picture_is_drawn_in_the_render_lane(http, here, cluster):
     assert (how["low"], how["high"], how["colormap"], how["quantity"]) == (1490, 1550, "magma", "speed")
 
 
-def test_a_known_picture_is_not_drawn_again(http, here, cluster):
+def test_cached_picture_is_not_redrawn(http, here, cluster):
     tag = http.get(f"{here}/slice.png").headers["etag"]
     drawn = len(cluster.submitted)
     again = http.get(f"{here}/slice.png", headers={"If-None-Match": tag})
@@ -53,7 +53,7 @@ def test_a_known_picture_is_not_drawn_again(http, here, cluster):
     assert http.get(f"{here}/slice.png?low=1300", headers={"If-None-Match": "*"}).status_code == 304
 
 
-def test_the_head_of_a_slice_is_told_without_drawing(http, here, cluster):
+def test_head_request_does_not_draw(http, here, cluster):
     whole = http.get(f"{here}/slice.png")
     drawn = len(cluster.submitted)
     head = http.head(f"{here}/slice.png")
@@ -227,7 +227,7 @@ def test_a_reconstruction_has_no_quantity_value(http, here):
         (b"", "", "body"),
     ],
 )
-def test_a_refused_volume_leaves_nothing(start, content, query, field):
+def test_rejected_volume_leaves_no_files(start, content, query, field):
     http = start()
     answer = send(http, content, query)
     body = answer.json()

@@ -37,7 +37,7 @@ def test_few_once_the_oldest_has_taken_long():
         pass
 
 
-def test_one_more_waits_a_moment_for_a_place(monkeypatch):
+def test_waits_briefly_for_a_free_connection(monkeypatch):
     monkeypatch.setattr(admission, "PLACE_SECONDS", 10.0)
     sign_in, come, left = Admission(Clock()), threading.Event(), threading.Event()
 
@@ -57,7 +57,7 @@ def test_one_more_waits_a_moment_for_a_place(monkeypatch):
     thread.join()
 
 
-def test_the_one_after_all_places_is_refused(monkeypatch):
+def test_the_one_after_all_places_is_rejected(monkeypatch):
     monkeypatch.setattr(admission, "PLACE_SECONDS", 0.0)
     sign_in = Admission(Clock())
     with ExitStack() as stack:

@@ -18,13 +18,13 @@ def test_there_and_back():
 
 
 @given(st.text(max_size=80))
-def test_nothing_else_is_a_key(text):
+def test_rejects_invalid_keys(text):
     assert ApiKey.of(text) is None
     assert ApiKey.of(ApiKey.new().shown() + text[:1]) is None or not text
 
 
 @pytest.mark.parametrize("spoil", [str.upper, lambda t: f"{t}\n", lambda t: t[:-1], lambda t: f" {t}"])
-def test_a_slip_is_refused_and_not_repeated(spoil):
+def test_a_slip_is_rejected_and_not_repeated(spoil):
     spoiled = spoil(ApiKey.new().shown())
     assert ApiKey.of(spoiled) is None
     with pytest.raises(InvalidInput) as refusal:

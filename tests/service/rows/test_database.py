@@ -60,7 +60,7 @@ def test_a_reader_does_not_wait_for_a_writer(database):
     thread.join()
 
 
-def test_another_version_is_refused(address):
+def test_another_version_is_rejected(address):
     database = open_database(address)
     with database.write() as connection:
         connection.execute(update(schema.about).values(version=99))
@@ -76,7 +76,7 @@ def test_a_file_that_is_no_database(tmp_path):
 
 
 @pytest.mark.parametrize("address", ["nonsense", "nosuch://x/y", "postgresql://user:secret@127.0.0.1:1/x"])
-def test_a_wrong_address_is_refused_without_its_password(address):
+def test_a_wrong_address_is_rejected_without_its_password(address):
     with pytest.raises(InvalidInput) as caught:
         open_database(address)
     assert caught.value.field == "database_url"

@@ -104,7 +104,7 @@ def test_postgresql_that_is_killed(postgresql_server):
     postgresql_server.drop(address)
 
 
-def test_postgresql_that_stands_still(postgresql_server, monkeypatch):
+def test_unresponsive_postgresql(postgresql_server, monkeypatch):
     monkeypatch.setattr(database, "BUSY_SECONDS", 2.0)
     monkeypatch.setattr(postgresql_timeouts, "ANSWER_SECONDS", 0.5)
     address = postgresql_server.new_database()

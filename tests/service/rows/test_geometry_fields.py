@@ -40,7 +40,7 @@ def test_the_same_content_is_one_field(database):
     assert [one["id"] for one in fields.newest(LOCAL, 9)] == [field_of("b" * 64), field_of("a" * 64)]
 
 
-def test_what_is_not_there(database):
+def test_missing_objects_are_not_found(database):
     with pytest.raises(UnknownId, match="GET /v1/geometry-fields"):
         GeometryFields(database).get(LOCAL, field_of("a" * 64))
 

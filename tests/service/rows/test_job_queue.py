@@ -103,7 +103,7 @@ def test_a_job_that_kills_the_service_is_given_up(database, jobs, queue, dataset
     assert ends == ["queued", "queued", "failed"]
 
 
-def test_a_job_that_gets_further_is_taken_up_again_and_again(database, jobs, queue, dataset):
+def test_job_with_progress_is_retried(database, jobs, queue, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
     for _ in range(8):
         dying = Queue(database)
@@ -117,7 +117,7 @@ def test_a_job_that_gets_further_is_taken_up_again_and_again(database, jobs, que
     ]
 
 
-def test_a_service_beside_others_takes_only_what_is_given_up(database, jobs, queue, dataset, monkeypatch):
+def test_second_service_claims_only_expired_jobs(database, jobs, queue, dataset, monkeypatch):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
     other = Queue(database)
     other.claim()
@@ -141,7 +141,7 @@ def test_a_service_beside_others_takes_only_what_is_given_up(database, jobs, que
     assert queue.succeed(job["id"], volume(job["id"]))
 
 
-def test_a_claim_whose_answer_was_lost_is_taken_up_again(jobs, queue, dataset, monkeypatch):
+def test_lost_claim_is_reclaimed(jobs, queue, dataset, monkeypatch):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
     queue.claim()
     queue.renew([])
@@ -170,7 +170,7 @@ def test_tenants_take_turns(jobs, queue, dataset):
     assert [queue.claim()["tenant"] for _ in range(3)] == ["b", "a", "a"]
 
 
-def test_only_tenants_without_a_running_job_where_that_is_asked(jobs, queue, dataset):
+def test_claim_can_be_limited_to_idle_tenants(jobs, queue, dataset):
     for tenant in ("a", "a", "b"):
         jobs.add(Tenant(tenant), "reconstruction", {}, dataset)
     assert queue.claim(idle_only=True)["tenant"] == "a"

@@ -41,6 +41,6 @@ def test_newest_first(meshes):
     assert [row["id"] for row in meshes.newest(LOCAL, 2)] == made[:0:-1]
 
 
-def test_what_is_not_there(meshes):
+def test_missing_objects_are_not_found(meshes):
     with pytest.raises(UnknownId, match="GET /v1/meshes"):
         meshes.get(LOCAL, new_id("mesh"))

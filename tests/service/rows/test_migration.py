@@ -149,7 +149,7 @@ def test_a_job_that_waited_is_run(old):
     database.close()
 
 
-def test_what_was_stored_counts(old):
+def test_stored_bytes_count_after_migration(old):
     database = open_database(old)
     with database.read() as connection:
         assert usage_of(connection, LOCAL) == Usage(stored=9 + 9, reserved=0)
@@ -163,7 +163,7 @@ def test_keys_hold_afterwards(old):
     database.close()
 
 
-def test_what_fails_half_way_leaves_the_old_database(old, monkeypatch):
+def test_failed_migration_keeps_the_old_database(old, monkeypatch):
     def broken(connection):
         migration._to_4(connection)
         raise RuntimeError("the power went")
@@ -177,7 +177,7 @@ def test_what_fails_half_way_leaves_the_old_database(old, monkeypatch):
     database.close()
 
 
-def test_a_row_that_points_at_nothing_stops_it(old, tmp_path):
+def test_dangling_reference_stops_the_migration(old, tmp_path):
     with sqlite3.connect(tmp_path / "old.sqlite") as connection:
         connection.execute("INSERT INTO events VALUES (99, 'job-gone', 1.0, 'queued', '')")
     connection.close()

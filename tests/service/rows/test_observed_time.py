@@ -12,7 +12,7 @@ class Clock:
         return self.now
 
 
-def test_it_goes_on_where_it_was(database):
+def test_observed_time_continues_after_restart(database):
     for run in range(3):
         clock = Clock()
         observed = ObservedTime(database, clock)

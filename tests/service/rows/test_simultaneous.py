@@ -83,7 +83,7 @@ def test_a_queued_job_is_cancelled_once(jobs, dataset):
     assert states(jobs, job) == ["queued", "cancelled"]
 
 
-def test_a_running_job_is_asked_to_stop_once(jobs, queue, dataset):
+def test_running_job_is_cancelled_once(jobs, queue, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)["id"]
     assert queue.claim()["id"] == job
     told = at_once(lambda _: jobs.request_cancel(LOCAL, job)["state"])

@@ -15,7 +15,7 @@ def test_every_user_is_a_tenant_and_no_two_the_same(one, other):
     assert (tenant_of_user(one) == tenant_of_user(other)) == (one == other)
 
 
-def test_nobody_takes_the_name_that_another_was_given():
+def test_tenant_names_are_unique():
     digest = tenant_of_user("Alice")
     assert digest.startswith("user-")
     assert tenant_of_user(digest) != digest

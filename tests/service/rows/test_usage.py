@@ -62,7 +62,7 @@ def test_of_many_uploads_begun_at_once_as_many_are_allowed_as_fit(database):
     assert Quota(database, 100).of(LOCAL) == Usage(0, 90)
 
 
-def test_of_many_uploads_begun_at_once_there_are_no_more_than_a_tenant_may_have(database, monkeypatch):
+def test_simultaneous_uploads_stay_within_the_limit(database, monkeypatch):
     monkeypatch.setattr(uploading, "MAX_INCOMPLETE", 5)
     uploads = Uploads(database)
     assert at_once(lambda n: uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)).count(True) == 5
@@ -84,7 +84,7 @@ def test_of_many_jobs_at_once_as_many_are_allowed_as_fit(database, jobs, dataset
     assert Quota(database, 100).of(LOCAL) == Usage(10, 75)
 
 
-def test_the_refusal_says_what_is_stored_reserved_and_allowed(database):
+def test_quota_error_names_stored_reserved_and_allowed_bytes(database):
     quota = Quota(database, 100)
     quota.stored(LOCAL, "vol-1.nii", 50)
     quota.resize(LOCAL, "ds-1", 30)
@@ -99,7 +99,7 @@ def test_the_refusal_says_what_is_stored_reserved_and_allowed(database):
     assert quota.of(LOCAL) == Usage(50, 49)
 
 
-def test_what_fails_gives_its_room_back_and_what_is_stored_keeps_it(database):
+def test_failed_uploads_release_their_reservation(database):
     quota, dataset = Quota(database, 100), new_id("dataset")
 
     async def take_in(*, whole):
@@ -116,7 +116,7 @@ def test_what_fails_gives_its_room_back_and_what_is_stored_keeps_it(database):
     assert quota.of(LOCAL) == Usage(40, 0)
 
 
-def test_a_database_that_is_away_keeps_no_room_for_what_has_ended(database, monkeypatch):
+def test_unavailable_database_keeps_no_reservation(database, monkeypatch):
     quota = Quota(database, 100)
 
     def away():
@@ -179,7 +179,7 @@ def test_a_job_has_its_room_until_its_end(database, jobs, queue, dataset, end):
     assert quota.of(LOCAL) == Usage(before + (9 if end in ("succeed", "animation") else 0), 0)
 
 
-def test_what_is_deleted_gives_its_room_back_with_all_that_was_made_of_it(database, jobs, queue, tmp_path):
+def test_deletion_releases_quota_of_derived_objects(database, jobs, queue, tmp_path):
     quota, files, dataset = Quota(database, 1000), Files(tmp_path / "data"), new_id("dataset")
     files.prepare()
     Datasets(database).add(LOCAL, dataset, size=60, sha256="0" * 64, summary=SUMMARY)

@@ -39,7 +39,7 @@ def come(connections, address, count):
     return found
 
 
-def test_the_longest_silent_of_an_address_makes_room():
+def test_longest_idle_connection_of_an_address_is_closed():
     connections = Connections(ConnectionLimits(10, 3, 2))
     first, second, third = come(connections, "192.0.2.1", 3)
     connections.busy(first)
@@ -52,7 +52,7 @@ def test_the_longest_silent_of_an_address_makes_room():
     assert len(connections) == 3
 
 
-def test_in_all_the_address_with_the_most_makes_room():
+def test_address_with_most_connections_loses_one():
     connections = Connections(ConnectionLimits(6, 4, 2))
     honest = come(connections, "192.0.2.1", 2)
     many = come(connections, "192.0.2.2", 4)
@@ -115,7 +115,7 @@ def test_the_limit_of_descriptors_is_raised(monkeypatch):
     assert asked == [(4096, 4096)]
 
 
-def test_too_few_descriptors_are_refused(monkeypatch):
+def test_too_few_descriptors_are_rejected(monkeypatch):
     monkeypatch.setattr(resource, "getrlimit", lambda _: (256, 256))
     with pytest.raises(descriptors.InvalidInput, match=r"open files: found a limit of 256.*at least 512"):
         descriptors.raise_limit()
@@ -144,7 +144,7 @@ def app():
     found.go.set()
 
 
-def test_silent_connections_keep_nobody_out(app):
+def test_idle_connections_block_no_client(app):
     with served(app, ConnectionLimits(1000, 8, 4)) as server:
         silent = [connected(server) for _ in range(40)]
         for one in silent[::2]:
@@ -213,7 +213,7 @@ def test_a_client_that_does_not_read_is_cut_off(monkeypatch):
         assert ended.wait(20.0)
 
 
-def test_a_want_of_descriptors_closes_and_goes_on(app, monkeypatch, caplog):
+def test_descriptor_shortage_closes_idle_connections(app, monkeypatch, caplog):
     # As many as are open now: the next one that is taken in would be one too many.
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     with served(app) as server, caplog.at_level(logging.ERROR, "bentray.connections"):

@@ -90,7 +90,7 @@ def test_router_errors_are_problems_too(http):
         assert (answer.status_code, answer.headers["allow"]) == (405, "GET, POST"), method
 
 
-def test_methods_are_told_of_included_routers_and_static_files_too(tmp_path):
+def test_allow_header_lists_methods_of_all_routes(tmp_path):
     router = APIRouter(prefix="/v1")
 
     @router.head("/things/{name}")
@@ -121,7 +121,7 @@ def test_a_body_that_is_no_readable_json_is_named(http, body):
 
 
 @pytest.mark.parametrize("body", [b"[]", b"null", b'"x"'])
-def test_a_body_of_another_kind_is_told_in_words_of_json(http, body):
+def test_wrong_body_type_names_json_types(http, body):
     answer = http.post("/refused", content=body, headers={"Content-Type": "application/json"})
     assert answer.status_code == 422
     assert answer.json()["field"] == "body"

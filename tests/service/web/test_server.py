@@ -13,7 +13,7 @@ from bentray_service.web import server
 from .speaking import connected, served
 
 
-def test_an_upload_that_goes_on_for_ever_does_not_keep_it_from_stopping(
+def test_endless_upload_does_not_block_shutdown(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(server, "PATIENCE_S", 1)

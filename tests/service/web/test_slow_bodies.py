@@ -50,7 +50,7 @@ def test_enough_in_each_time_is_enough():
     assert len(run([bytes(MIN_BYTES)] * 220, every=0.01, seconds=2.0)) == 220
 
 
-def test_who_waits_after_the_body_is_not_hurried():
+def test_client_waiting_after_the_body_is_not_timed_out():
     async def app(scope, receive, send):
         await receive()
         assert (await receive())["type"] == "http.disconnect"

@@ -64,7 +64,7 @@ def test_a_head_that_does_not_come_is_not_waited_for(server, sent):
         assert connection.recv(100) == b""
 
 
-def test_an_answer_may_take_longer_and_the_next_head_has_its_time_again(server):
+def test_timeout_applies_to_headers_only(server):
     with connected(server) as connection:
         for _ in range(2):
             connection.sendall(REQUEST)
@@ -101,7 +101,7 @@ def test_a_head_in_parts_is_one(telling):
         (REQUEST[:-2] + b"Content-Length: 1\r\nTransfer-Encoding: chunked\r\n\r\n", 400, "malformed-request"),
     ],
 )
-def test_what_is_no_head_is_a_problem(telling, sent, status, slug):
+def test_invalid_headers_get_a_problem_response(telling, sent, status, slug):
     with connected(telling) as connection:
         connection.sendall(sent)
         found, body = told(connection)
@@ -157,7 +157,7 @@ def test_requests_at_once_are_answered_in_turn_and_bounded(telling):
         assert answers <= slow_headers.MAX_PIPELINED + 1
 
 
-def test_nothing_is_written_into_an_answer_that_is_being_made(server):
+def test_timeout_does_not_write_into_a_response(server):
     with connected(server) as connection:
         connection.sendall(REQUEST + b"no request\r\n\r\n")
         answer = read_to_end(connection)

@@ -64,7 +64,7 @@ def answer(server, *parts):
         return status, json.loads(body)
 
 
-def test_many_chunks_of_one_byte_are_refused(server):
+def test_many_chunks_of_one_byte_are_rejected(server):
     status, problem = answer(server, HEAD, 5000 * ONE)
     assert (status, problem["type"], problem["field"]) == (400, "/problems/tiny-chunks", "body")
     assert problem["found"] == "1025 chunks of 1 bytes on average"
@@ -101,7 +101,7 @@ def test_a_body_of_known_length_may_come_in_any_pieces(server):
     assert (status, size) == (200, 3000)
 
 
-def test_what_is_not_waited_for_forever(server):
+def test_endless_small_chunks_time_out(server):
     # Less than is worth a waking of its own; it comes though no more does.
     with connected(server) as connection:
         connection.sendall(HEAD + ONE)
@@ -110,7 +110,7 @@ def test_what_is_not_waited_for_forever(server):
         assert (status, json.loads(body)["type"]) == (400, "/problems/malformed-request")
 
 
-def test_beside_an_answer_it_ends_both(server, app):
+def test_small_chunks_during_a_response_close_the_connection(server, app):
     with connected(server) as connection:
         connection.sendall(HEAD.replace(b"POST /", b"POST /early") + 5000 * ONE)
         with suppress(ConnectionResetError):

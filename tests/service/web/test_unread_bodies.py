@@ -34,7 +34,7 @@ def server(monkeypatch):
         yield found
 
 
-def test_it_is_closed_however_long_the_client_drips(server):
+def test_slow_body_is_closed(server):
     with connected(server) as connection:
         connection.sendall(HEAD % 1_000_000 + b"x")
         answer = read_to_end(connection)
@@ -60,7 +60,7 @@ def test_a_client_that_never_ends_is_cut_off(server, monkeypatch):
             send_for_long(connection, 4 * unread_bodies.LINGER_BYTES // 65536, bytes(65536), every=0.0)
 
 
-def test_a_body_that_is_there_costs_no_connection(server):
+def test_received_body_keeps_the_connection(server):
     with connected(server) as connection:
         for _ in range(3):
             connection.sendall(HEAD % 4 + b"body")

@@ -56,7 +56,7 @@ def page(browser):
         assert wrong == []
 
 
-def test_without_jobs_it_says_what_to_do(page, serve):
+def test_empty_list_shows_instructions(page, serve):
     page.goto(serve())
     page.get_by_text("Nothing has run yet").wait_for()
     page.get_by_text("ready, 1 worker").wait_for()
@@ -91,7 +91,7 @@ def test_upload_start_watch(page, serve, scan, work):
     assert page.get_by_text("Nothing has run yet").is_hidden()
 
 
-def test_the_automatic_method_asks_for_no_rays(page, serve, scan, work):
+def test_automatic_method_hides_the_ray_choice(page, serve, scan, work):
     page.goto(serve())
     page.set_input_files("#scan-file", scan())
     page.get_by_text("16 emitters").wait_for()
@@ -218,7 +218,7 @@ def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, 
     assert download.value.path().read_bytes() == b"pictures"
 
 
-def test_what_cannot_be_shown_is_told_in_words(page, serve, tmp_path):
+def test_display_errors_are_shown_as_text(page, serve, tmp_path):
     page.goto(serve())
     page.set_input_files("#volume-file", saved(tmp_path, sampled(ONE_HOLE, 12)))
     page.get_by_text("ball.npy is stored").wait_for()
@@ -276,7 +276,7 @@ def test_cancel(page, serve, scan, work):
     page.locator(".state", has_text="cancelled").wait_for()
 
 
-def test_errors_in_words(page, serve, tmp_path):
+def test_errors_are_shown_as_text(page, serve, tmp_path):
     (tmp_path / "notes.h5").write_text("only text")
     page.goto(serve())
     page.set_input_files("#scan-file", tmp_path / "notes.h5")
@@ -298,7 +298,7 @@ def test_by_keyboard_alone(page, serve, scan, work):
     page.locator(".job").wait_for()
 
 
-def test_where_a_key_is_needed_the_page_asks_for_it_and_sends_it(page, serve, scan, work, tmp_path):
+def test_page_requests_and_sends_a_key(page, serve, scan, work, tmp_path):
     key = ApiKey.new()
     (tmp_path / "key").write_text(key.shown())
     address = serve(first_key_file=tmp_path / "key")
@@ -332,7 +332,7 @@ def test_where_a_key_is_needed_the_page_asks_for_it_and_sends_it(page, serve, sc
     assert httpx.get(f"{address}/v1/datasets").status_code == 401
 
 
-def test_a_simulated_scan_is_there_to_be_reconstructed(page, serve, monkeypatch):
+def test_simulated_scan_can_be_reconstructed(page, serve, monkeypatch):
     made = {"title": "A phantom", "source": "", "license": "", "dimension": 2, "elements": 16, "ntx": 16}
     made |= {"nrx": 16, "slices": 1, "has_traces": False, "has_travel_times": True, "has_truth": True}
     made |= {"water_speed_mps": 1500.0, "bytes": 1, "sha256": "0" * 64}
@@ -357,7 +357,7 @@ def test_a_simulated_scan_is_there_to_be_reconstructed(page, serve, monkeypatch)
     assert whole.is_visible()
 
 
-def test_own_variables_are_named_in_a_form_that_opens_when_a_file_is_refused(page, serve, tmp_path):
+def test_own_variables_are_named_in_a_form_that_opens_when_a_file_is_rejected(page, serve, tmp_path):
     savemat(tmp_path / "scan.mat", {"pos": 1e3 * positions(), "dtof": 1e6 * delta_tof()})
     page.goto(serve())
     page.set_input_files("#scan-file", tmp_path / "scan.mat")

@@ -53,14 +53,14 @@ def made(tmp_path):
     return Attempts(Client(), tmp_path / "work")
 
 
-def test_who_only_waited_is_tried_again_for_ever(made):
+def test_tasks_that_only_waited_are_always_retried(made):
     future = made.submit(Task(print, (1,)))
     for _ in range(20):
         future, _ = made.result(future.killed(while_running=False))
         assert future.work[2:] == (print, 1)
 
 
-def test_who_ran_is_given_up(made):
+def test_tasks_that_killed_workers_are_abandoned(made):
     future = made.submit(Task(print, (1,)))
     for _ in range(MAX_DEATHS):
         future, _ = made.result(future.killed(while_running=True))
@@ -69,21 +69,21 @@ def test_who_ran_is_given_up(made):
         made.result(future.killed(while_running=True))
 
 
-def test_a_result_that_went_with_its_worker_is_made_again(made):
+def test_lost_result_is_recomputed(made):
     future = made.submit(Task(print, (1,)))
     future.killed(while_running=False).status = "finished"
     again, _ = made.result(future)
     assert again.work[2:] == (print, 1)
 
 
-def test_what_is_kept_is_not_fetched(made):
+def test_results_kept_on_workers_are_not_fetched(made):
     future = made.submit(Task(print, keep_on_worker=True))
     future.error = AssertionError("it was fetched")
     future.status = "finished"
     assert made.result(future) == (None, future)
 
 
-def test_what_needs_a_lost_result_is_not_tried_for_ever(made):
+def test_retries_of_lost_results_are_bounded(made):
     needed = made.submit(Task(print)).ended("finished")
     future = made.submit(Task(print, ([needed], 1)))
     future, _ = made.result(future.killed(while_running=False))
@@ -98,7 +98,7 @@ def test_an_end_is_an_end(made):
         made.result(made.submit(Task(print, (), True)).ended("error", ZeroDivisionError()))
 
 
-def test_the_file_is_there_as_long_as_the_call_runs(tmp_path):
+def test_attempt_file_exists_while_the_task_runs(tmp_path):
     marker = tmp_path / "call"
     seen = []
 

@@ -25,20 +25,20 @@ def lanes(client):
     return {lane for offer in capacities.capacities_of(client) for lane in offer.resources}
 
 
-def test_memory_and_lanes_are_told(cluster):
+def test_memory_and_resources_are_reported(cluster):
     found = capacities.capacities_of(cluster.client)
     assert len(found) == 2
     assert {"recon", "render"} <= set(found[0].resources)
     assert found[0].memory_bytes >= 0
 
 
-def test_no_device_is_tried_unless_one_is_wanted(fresh, monkeypatch):
+def test_devices_are_tested_only_on_request(fresh, monkeypatch):
     monkeypatch.setattr(capacities, "_has_device", lambda: pytest.fail("tried"))
     assert capacities.resources_for(fresh, Settings(method="sart")) == {"recon": 1}
     assert lanes(fresh) == {"recon", "render"}
 
 
-def test_without_a_device_the_method_is_refused(fresh, monkeypatch):
+def test_without_a_device_the_method_is_rejected(fresh, monkeypatch):
     monkeypatch.setattr(capacities, "_has_device", lambda: False)
     with pytest.raises(InvalidInput, match="eikonal"):
         capacities.resources_for(fresh, WITH_DEVICE)
@@ -55,7 +55,7 @@ def test_a_device_is_offered_once_it_has_passed(fresh, monkeypatch):
     assert fresh.submit(sum, [1, 2], resources=OPENCL).result(10) == 3
 
 
-def test_a_joined_cluster_is_not_asked(fresh, monkeypatch):
+def test_external_cluster_is_not_queried(fresh, monkeypatch):
     monkeypatch.setattr(capacities, "_has_device", lambda: pytest.fail("tried"))
     with open_cluster(fresh.scheduler.address) as joined, pytest.raises(InvalidInput, match="eikonal"):
         capacities.resources_for(joined.client, WITH_DEVICE)

@@ -19,7 +19,7 @@ from bentray_workers.cluster.tls import own_security
 from ...listening import beyond_loopback, listening, pages
 
 
-def test_embedded_cluster_offers_both_lanes(cluster):
+def test_embedded_cluster_has_both_resources(cluster):
     facts = cluster.describe()
     assert facts["embedded"] is True
     assert facts["workers"] == 2
@@ -69,7 +69,7 @@ def test_it_listens_on_loopback_only_and_shows_no_page(own):
     assert pages(sockets) == []
 
 
-def test_other_users_of_the_machine_reach_nothing(own):
+def test_other_users_cannot_connect(own):
     """They reach loopback, but have no key of this process: neither plainly nor by a key of their own."""
     own, sockets = own
     assert own.describe()["scheduler"].startswith("tls://")
@@ -89,7 +89,7 @@ def test_the_search_for_pages_finds_those_that_dask_shows_by_default(tmp_path):
     assert {"/health", "/json/counts.json"} <= {urlsplit(page).path for page in shown}
 
 
-def test_a_scheduler_that_was_started_again_is_found_again():
+def test_restarted_scheduler_is_reconnected():
     clients = [SimpleNamespace(status="closed", close=lambda: None), SimpleNamespace(status="running")]
     offered = iter([clients[0], InvalidInput("scheduler_address", "gone", "there"), clients[1]])
 
@@ -122,7 +122,7 @@ def test_missing_scheduler_is_named(address):
 @pytest.mark.parametrize(
     "answer", [b"", b"HTTP/1.1 400 Bad Request\r\n\r\n"], ids=["silence", "a web server"]
 )
-def test_what_is_no_scheduler_is_refused_in_time(answer):
+def test_rejects_hosts_that_are_no_scheduler(answer):
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def listen():
@@ -139,6 +139,6 @@ def test_what_is_no_scheduler_is_refused_in_time(answer):
     assert not thread.is_alive()
 
 
-def test_no_workers_is_refused():
+def test_no_workers_is_rejected():
     with pytest.raises(InvalidInput, match="workers"):
         open_cluster(workers=0)

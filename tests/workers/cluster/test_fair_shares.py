@@ -95,7 +95,7 @@ def test_a_tenant_alone_has_every_worker_with_one_task_ready_for_each() -> None:
 
 @pytest.mark.parametrize("workers", [1, 2, 3, 8])
 @pytest.mark.parametrize("large", [1, 2, 5])
-def test_a_small_job_beside_jobs_of_hours(workers: int, large: int) -> None:
+def test_small_job_runs_during_long_jobs(workers: int, large: int) -> None:
     """Twenty tasks of 50 ms one after the other, beside tasks of 5 s in any number."""
     hours = [Job("busy", 10**6, 5.0) for _ in range(large)]
     small = Job("new", 20, 0.05, wide=1, begins_s=31.0)
@@ -127,7 +127,7 @@ def test_tenants_get_equal_time_whatever_their_number_of_jobs_and_length_of_task
 
 
 @pytest.mark.parametrize("workers", [2, 3, 8])
-def test_what_one_does_not_want_others_have(workers: int) -> None:
+def test_unused_share_goes_to_other_tenants(workers: int) -> None:
     """A long chain of single tasks leaves all workers but its own and a free one to the rest."""
     chain, wide = Job("chain", 10**6, 1.0, wide=1), Job("wide", 10**6, 1.0)
     run(workers, [chain, wide], until_s=200.0)

@@ -17,7 +17,7 @@ def worker(monkeypatch):
     set_memory_limit(round((WARM_BYTES + 100 * MIB) / USABLE))
 
 
-def test_what_is_made_makes_room_in_every_store(worker):
+def test_new_entries_evict_old_ones_in_every_cache(worker):
     one, two = MemoryCache(1000 * MIB), MemoryCache(1000 * MIB)
     one.get("a", 30 * MIB, str)
     two.get("b", 30 * MIB, str)

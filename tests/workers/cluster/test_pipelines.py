@@ -78,7 +78,7 @@ def mortal(tmp_path_factory):
 
 
 @pytest.mark.parametrize("pipeline", PIPELINES, ids=lambda pipeline: pipeline.__name__)
-def test_a_killed_worker_changes_nothing(mortal, inputs, pipeline, monkeypatch):
+def test_killed_worker_keeps_the_bits(mortal, inputs, pipeline, monkeypatch):
     """Nor does the cluster: the expected bits are those of one thread or more of this process."""
     # Seven tasks for the larger table of the field.
     monkeypatch.setattr(geometry_field_module, "TASK_RAYS", 32 * 6 * 6**2)

@@ -51,7 +51,7 @@ def managers(monkeypatch: pytest.MonkeyPatch) -> list[FakeManager]:
     return FakeManager.made
 
 
-def test_slurm_jobs_offer_our_lanes_are_warm_and_publish_no_page(managers: list[FakeManager]) -> None:
+def test_slurm_workers_have_resources_warm_kernels_and_no_dashboard(managers: list[FakeManager]) -> None:
     deploy("slurm", ClusterRequest(workers=12, template=DEPLOY / "slurm" / "cluster.yaml"))
     (made,) = managers
     assert made.scaled == {"jobs": 12}
@@ -126,7 +126,7 @@ def test_the_command_of_its_workers_is_one_of_ours() -> None:
         ("kubernetes", ClusterRequest(tls=Path("x")), "tls"),
     ],
 )
-def test_what_cannot_be_is_named(
+def test_names_invalid_input(
     managers: list[FakeManager], kind: str, wanted: ClusterRequest, field: str
 ) -> None:
     with pytest.raises(InvalidInput) as refusal:
@@ -135,7 +135,7 @@ def test_what_cannot_be_is_named(
 
 
 @pytest.mark.parametrize("text", ["- a list", "nonsense: 1", "{"])
-def test_a_template_that_the_library_does_not_take_is_refused(
+def test_a_template_that_the_library_does_not_take_is_rejected(
     managers: list[FakeManager], tmp_path: Path, text: str
 ) -> None:
     (tmp_path / "site.yaml").write_text(text)
@@ -170,7 +170,7 @@ def test_every_kind_that_needs_a_library_has_an_extra() -> None:
     assert set(PROVIDERS) - {"embedded"} <= set(extras)
 
 
-def test_leaving_ends_what_was_started(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_closing_stops_started_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     ended: list[str] = []
     started = SimpleNamespace(close=lambda: ended.append("cluster"))
     client = SimpleNamespace(close=lambda: ended.append("client"), status="running")

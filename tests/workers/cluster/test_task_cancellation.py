@@ -55,7 +55,7 @@ def test_outside_of_a_worker_nothing_is_abandoned():
     cancellation_check()()
 
 
-def test_a_scene_is_not_made_for_nobody(monkeypatch):
+def test_abandoned_scene_is_not_built(monkeypatch):
     def nobody():
         def check():
             raise TaskCancelled("task")

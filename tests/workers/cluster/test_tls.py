@@ -58,7 +58,7 @@ def test_only_holders_of_a_certificate_are_served(folder: Path, tmp_path: Path) 
             open_cluster(address.replace("tls://", "tcp://"), connect_timeout_s=1.0)
 
 
-def test_with_certificates_nothing_is_sent_unencrypted(folder: Path) -> None:
+def test_certificates_encrypt_all_traffic(folder: Path) -> None:
     with pytest.raises(InvalidInput, match="with certificates"):
         open_cluster("tcp://127.0.0.1:1", tls=folder, connect_timeout_s=0.5)
 
@@ -71,7 +71,7 @@ def test_a_missing_file_is_named(folder: Path, tmp_path: Path, missing: str) -> 
         security_of(tmp_path / "copy")
 
 
-def test_a_key_of_another_certificate_is_refused(folder: Path, tmp_path: Path) -> None:
+def test_a_key_of_another_certificate_is_rejected(folder: Path, tmp_path: Path) -> None:
     shutil.copytree(folder, tmp_path / "copy")
     shutil.copy(certificates(tmp_path / "others") / KEY, tmp_path / "copy" / KEY)
     with pytest.raises(InvalidInput, match="tls"):

@@ -41,13 +41,13 @@ def test_bytes_of_a_declared_volume():
 
 
 @pytest.mark.parametrize("error", [StopIteration, ZeroDivisionError, UnicodeError, EOFError, RecursionError])
-def test_whatever_a_reader_raises_is_damage(error):
+def test_reader_errors_become_damage(error):
     with pytest.raises(InvalidInput, match="damaged"), rejecting_damage("file", "a whole one"):
         raise error("odd")
 
 
 @pytest.mark.parametrize("error", [MemoryError(), InvalidInput("a", "b", "c")])
-def test_what_says_more_is_passed_on(error):
+def test_specific_errors_are_passed_on(error):
     with pytest.raises(type(error)) as caught, rejecting_damage("file", "a whole one"):
         raise error
     assert caught.value is error

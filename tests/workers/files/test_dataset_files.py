@@ -36,7 +36,7 @@ def assert_same(a, b, name="dataset"):
 
 @given(datasets())
 @settings(max_examples=effort(20, 40), deadline=None, suppress_health_check=[HealthCheck.too_slow])
-def test_what_is_written_comes_back(dataset):
+def test_written_file_round_trips(dataset):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "d.h5"
         write_dataset(path, dataset)
@@ -51,7 +51,7 @@ def test_the_same_dataset_gives_the_same_bytes(tmp_path):
     assert (tmp_path / "b.h5").read_bytes() == (tmp_path / "c.h5").read_bytes()
 
 
-def test_traces_stay_in_the_file_when_not_asked_for(tmp_path):
+def test_traces_stay_in_the_file_when_not_requested(tmp_path):
     write_dataset(tmp_path / "d.h5", small())
     assert read_dataset(tmp_path / "d.h5", traces=False).waveform is None
     write_dataset(tmp_path / "raw.h5", replace(small(), delta_tof_s=None))
@@ -171,7 +171,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_each_wrong_field_is_named_with_what_was_found_and_what_is_accepted(tmp_path, case):
+def test_errors_name_field_value_and_accepted_values(tmp_path, case):
     field, change = WRONG[case]
     path = tmp_path / "d.h5"
     write_dataset(path, small())
@@ -186,7 +186,7 @@ def test_each_wrong_field_is_named_with_what_was_found_and_what_is_accepted(tmp_
     assert not (tmp_path / "copy.h5").exists()
 
 
-def test_a_file_without_travel_times_and_traces_is_refused(tmp_path):
+def test_a_file_without_travel_times_and_traces_is_rejected(tmp_path):
     write_dataset(tmp_path / "d.h5", small())
     with h5py.File(tmp_path / "d.h5", "a") as file:
         del file["traveltime"], file["waveform"]
@@ -203,7 +203,7 @@ def test_a_file_without_travel_times_and_traces_is_refused(tmp_path):
         (b"\x89HDF\r\n\x1a\n", "cut short or damaged"),
     ],
 )
-def test_what_is_not_hdf5_is_refused_as_a_file(tmp_path, content, found):
+def test_rejects_files_that_are_no_hdf5(tmp_path, content, found):
     (tmp_path / "d.h5").write_bytes(content)
     with pytest.raises(InvalidInput, match=found) as refused:
         read_dataset(tmp_path / "d.h5")
@@ -229,7 +229,7 @@ def read_bytes(content: bytes) -> Dataset | None:
             return None
 
 
-def test_a_file_cut_short_anywhere_is_refused(whole):
+def test_a_file_cut_short_anywhere_is_rejected(whole):
     for length in range(0, len(whole), max(1, len(whole) // 150)):
         assert read_bytes(whole[:length]) is None
 

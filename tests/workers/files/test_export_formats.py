@@ -203,7 +203,7 @@ def test_uploaded_volumes_are_exported(tmp_path, name):
         exported(tmp_path / "up.h5", tmp_path, name, Selection(quantity="attenuation"))
 
 
-def test_what_cannot_be_exported_is_named(tmp_path, monkeypatch):
+def test_rejects_unsupported_exports(tmp_path, monkeypatch):
     plain = replace(made(nodes=6), attenuation=None)
     write_reconstruction(tmp_path / "plain.h5", plain)
     with pytest.raises(InvalidInput, match="attenuation of a result without it"):

@@ -43,7 +43,7 @@ def test_a_round_trip_changes_nothing(found, tmp_path_factory):
 
 
 @pytest.mark.parametrize("content", ["", "{}", '{"findings": [{}], "examined": true, "changed": true}'])
-def test_a_damaged_file_is_told(tmp_path, content):
+def test_damaged_file_is_reported(tmp_path, content):
     (tmp_path / "findings.json").write_text(content)
     with pytest.raises((ValueError, KeyError)):
         read_findings(tmp_path / "findings.json")

@@ -58,7 +58,7 @@ def test_colours_follow_the_surface(maps):
         ("valid", None, "valid: found nothing"),
     ],
 )
-def test_other_files_are_refused(tmp_path, maps, name, values, words):
+def test_other_files_are_rejected(tmp_path, maps, name, values, words):
     write_geometry_image(tmp_path / "a.h5", maps)
     with h5py.File(tmp_path / "a.h5", "a") as file:
         del file[name]
@@ -69,7 +69,7 @@ def test_other_files_are_refused(tmp_path, maps, name, values, words):
 
 
 @pytest.mark.parametrize(("attribute", "value"), [("format", "bentray-volume"), ("format_version", "9.0")])
-def test_other_formats_are_refused(tmp_path, maps, attribute, value):
+def test_other_formats_are_rejected(tmp_path, maps, attribute, value):
     write_geometry_image(tmp_path / "a.h5", maps)
     with h5py.File(tmp_path / "a.h5", "a") as file:
         file.attrs[attribute] = value

@@ -108,7 +108,7 @@ def giant_chunk(file, folder):
         giant_chunk,
     ],
 )
-def test_a_hostile_array_is_refused_by_name(tmp_path, build):
+def test_a_hostile_array_is_rejected_by_name(tmp_path, build):
     path = tmp_path / "d.h5"
     write_dataset(path, small())
     with h5py.File(path, "a") as file:
@@ -120,7 +120,7 @@ def test_a_hostile_array_is_refused_by_name(tmp_path, build):
     assert "damaged" not in refused.value.value
 
 
-def test_what_the_format_does_not_know_is_never_opened(tmp_path):
+def test_unknown_members_are_not_opened(tmp_path):
     path = tmp_path / "d.h5"
     write_dataset(path, small())
     with h5py.File(path, "a") as file:
@@ -154,7 +154,7 @@ def test_the_limits_are_the_callers(tmp_path, limits, field):
         np.array(["a", "b"] * 20, dtype="S1"),
     ],
 )
-def test_a_hostile_attribute_is_refused_by_name(tmp_path, value):
+def test_a_hostile_attribute_is_rejected_by_name(tmp_path, value):
     path = tmp_path / "d.h5"
     write_dataset(path, small())
     with h5py.File(path, "a") as file:

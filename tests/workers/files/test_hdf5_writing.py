@@ -31,7 +31,7 @@ except OSError as error:
 """
 
 
-def test_what_is_written_is_there(tmp_path: Path) -> None:
+def test_written_values_are_readable(tmp_path: Path) -> None:
     with atomic_hdf5(tmp_path / "a.h5") as file:
         file["x"] = np.arange(5)
     with h5py.File(tmp_path / "a.h5") as file:
@@ -40,7 +40,7 @@ def test_what_is_written_is_there(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("limit", [1, 800, 2048, 10_000, 100_000, 300_000])
-def test_a_write_that_is_refused_is_an_error_and_leaves_nothing(tmp_path: Path, limit: int) -> None:
+def test_failed_write_is_an_error_and_leaves_no_file(tmp_path: Path, limit: int) -> None:
     def bound() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))

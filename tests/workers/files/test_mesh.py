@@ -32,7 +32,7 @@ def test_every_part_is_in_the_content():
     assert {len(one.content()) for one in all_of_them} == {64}
 
 
-def test_the_summary_tells_what_was_repaired():
+def test_summary_lists_repairs():
     faces = RING.faces.copy()
     faces[3] = faces[3, ::-1]
     surface = sound(np.concatenate((RING.vertices, [[9.0, 9.0, 9.0]])), faces)
@@ -57,7 +57,7 @@ def test_the_summary_tells_what_was_repaired():
         (lambda file: file.__delitem__("vertices"), "vertices"),
     ],
 )
-def test_another_file_is_refused(tmp_path, spoil, field):
+def test_another_file_is_rejected(tmp_path, spoil, field):
     write_mesh(tmp_path / "m.h5", StoredMesh(RING))
     with h5py.File(tmp_path / "m.h5", "a") as file:
         spoil(file)

@@ -82,7 +82,7 @@ def test_a_binary_stl_may_begin_like_a_text():
 
 @pytest.mark.parametrize("file_type", ["ply", "glb", "obj", "off", "stl", "stl_ascii", "gltf"])
 @pytest.mark.parametrize("part", [0.3, 0.9])
-def test_files_cut_short_are_refused(file_type, part):
+def test_files_cut_short_are_rejected(file_type, part):
     data = exported(file_type)
     with pytest.raises(InvalidInput):
         read_mesh(data[: int(part * len(data))])
@@ -92,7 +92,7 @@ NUMPY = ("array", "reshape", "broadcast", "literal", "axis", "index", "list", "d
 
 
 @pytest.mark.parametrize("file_type", FORMATS)
-def test_refusals_of_cut_files_are_in_words_of_ours(file_type):
+def test_truncated_files_get_our_error_message(file_type):
     data = exported(file_type)
     for part in np.linspace(0.01, 0.99, 23):
         try:
@@ -150,7 +150,7 @@ def lone(place, accepted="three"):
         (b"ply\nformat ascii 1.0\nelement vertex 2000000000\nproperty float x\nend_header\n", "damaged"),
     ],
 )
-def test_what_is_no_mesh_is_refused(data, words):
+def test_rejects_invalid_meshes(data, words):
     with pytest.raises(InvalidInput, match=words):
         read_mesh(data)
 
@@ -160,7 +160,7 @@ def scene(buffers, **more):
 
 
 @pytest.mark.parametrize("uri", ["outside.bin", "file:///etc/passwd", "http://127.0.0.1/a.bin", "../a.bin"])
-def test_gltf_reads_no_other_file(uri):
+def test_gltf_does_not_open_external_files(uri):
     with pytest.raises(InvalidInput, match=r"buffers/uri: found .*; accepted: data within the file"):
         read_mesh(scene([{"uri": uri, "byteLength": 4}]))
     text = scene([{"uri": uri, "byteLength": 4}]).ljust(400)

@@ -90,7 +90,7 @@ def test_without_directions_a_grid_stays_as_it_is_stored(tmp_path):
     assert volume.origin_m == (0.0, 0.0, 0.0)
 
 
-def test_a_sheared_grid_is_refused(tmp_path):
+def test_a_sheared_grid_is_rejected(tmp_path):
     sheared = AFFINE.copy()
     sheared[0, 1] = 0.5
     (tmp_path / "v").write_bytes(nibabel.Nifti1Image(ramp(), sheared).to_bytes())
@@ -143,14 +143,14 @@ def spoilt(name, value):
         (gzip.compress(b"\0" * 100_000_000, mtime=0), "file"),
     ],
 )
-def test_what_is_refused(tmp_path, content, field, capfd, caplog):
+def test_rejects_invalid_input(tmp_path, content, field, capfd, caplog):
     (tmp_path / "v").write_bytes(content)
     error = refused(tmp_path / "v")
     assert error.field == field, error
     assert (caplog.text, *capfd.readouterr()) == ("", "", "")
 
 
-def test_a_bomb_is_read_a_little_beyond_what_was_declared_and_refused(tmp_path):
+def test_rejects_decompression_bombs(tmp_path):
     (tmp_path / "v").write_bytes(gzip.compress(image().to_bytes() + b"\0" * 200_000_000, 9))
     assert "more data after the values" in refused(tmp_path / "v").value
 
@@ -161,7 +161,7 @@ def test_a_few_bytes_may_follow_the_values(tmp_path):
 
 
 @pytest.mark.parametrize("byte", [-1, -4, -5, -8, -40])
-def test_a_flipped_bit_in_packed_values_their_check_sum_or_length_is_refused(tmp_path, byte):
+def test_a_flipped_bit_in_packed_values_their_check_sum_or_length_is_rejected(tmp_path, byte):
     """Stored without compression, so that the flip changes a value and nothing else.
 
     The values are longer than what gzip reads ahead, where it would meet the check sum by chance.
@@ -174,7 +174,7 @@ def test_a_flipped_bit_in_packed_values_their_check_sum_or_length_is_refused(tmp
 
 
 @pytest.mark.parametrize("missing", [1, 8])
-def test_packed_values_without_the_whole_check_sum_are_refused(tmp_path, missing):
+def test_packed_values_without_the_whole_check_sum_are_rejected(tmp_path, missing):
     (tmp_path / "v").write_bytes(gzip.compress(image().to_bytes())[:-missing])
     assert "damaged data" in refused(tmp_path / "v").value
 

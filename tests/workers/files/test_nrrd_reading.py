@@ -96,7 +96,7 @@ def test_lines_may_end_as_on_windows(tmp_path):
         ("nonsense\n", "file"),
     ],
 )
-def test_what_is_refused(tmp_path, fields, field):
+def test_rejects_invalid_input(tmp_path, fields, field):
     error = refused(write(tmp_path / "v", fields))
     assert error.field == field, error
 
@@ -106,7 +106,7 @@ def test_a_header_without_an_end(tmp_path):
 
 
 @pytest.mark.parametrize("encoding", ["raw", "gzip"])
-def test_more_values_than_declared_are_refused_unread(tmp_path, encoding):
+def test_more_values_than_declared_are_rejected_unread(tmp_path, encoding):
     data = b"\0" * 200_000_000
     data = gzip.compress(data, 9) if encoding == "gzip" else data[:61]
     error = refused(write(tmp_path / "v", PLAIN.replace("raw", encoding), data))
@@ -114,7 +114,7 @@ def test_more_values_than_declared_are_refused_unread(tmp_path, encoding):
 
 
 @pytest.mark.parametrize("byte", [-1, -4, -5, -8, -40])
-def test_a_flipped_bit_in_packed_values_their_check_sum_or_length_is_refused(tmp_path, byte):
+def test_a_flipped_bit_in_packed_values_their_check_sum_or_length_is_rejected(tmp_path, byte):
     packed = bytearray(gzip.compress(ramp().tobytes("F"), compresslevel=0))
     packed[byte] ^= 1
     error = refused(write(tmp_path / "v", PLAIN.replace("raw", "gzip"), bytes(packed)))
@@ -154,7 +154,7 @@ def test_axes_in_any_order_and_sense_are_the_same_volume(tmp_path, order, sense)
     np.testing.assert_allclose(volume.origin_m, 1e-3 * origin)
 
 
-def test_sheared_axes_are_refused(tmp_path):
+def test_sheared_axes_are_rejected(tmp_path):
     path = write(tmp_path / "v.nrrd", PLAIN + "space: RAS\nspace directions: (1,0,0) (0.3,1,0) (0,0,1)\n")
     assert refused(path).field == "space directions"
 

@@ -25,7 +25,7 @@ def test_whole_files_pass(data):
 
 
 @given(st.integers(0, len(WHOLE) - 2))
-def test_no_cut_goes_unnoticed(length):
+def test_every_truncation_is_detected(length):
     # Only the last digit of the last corner can go without a trace, and that leaves no corner here.
     if length >= 3:
         with pytest.raises(InvalidInput):
@@ -49,6 +49,6 @@ def test_no_cut_goes_unnoticed(length):
         (b"3 0 2 3", b"9" * 5000 + b" 0 1 2", "faces: found"),
     ],
 )
-def test_what_is_wrong_is_named(line, instead, words):
+def test_names_invalid_input(line, instead, words):
     with pytest.raises(InvalidInput, match=words):
         check_off(WHOLE.replace(line, instead))

@@ -20,7 +20,7 @@ from .test_dataset_files import assert_same
 
 @pytest.mark.parametrize("slices", [None, 3])
 @pytest.mark.parametrize("with_attenuation", [True, False])
-def test_what_is_written_comes_back_bit_by_bit(tmp_path, slices, with_attenuation):
+def test_written_file_round_trips_bit_for_bit(tmp_path, slices, with_attenuation):
     result = made(slices=slices)
     if not with_attenuation:
         result = replace(result, attenuation=None)
@@ -58,7 +58,7 @@ def test_a_result_without_history_comes_back(tmp_path):
     assert read_reconstruction(tmp_path / "r.h5").history == ()
 
 
-def test_the_file_has_the_names_that_others_read(tmp_path):
+def test_file_uses_the_documented_names(tmp_path):
     result = made(slices=2)
     write_reconstruction(tmp_path / "r.h5", result)
     with h5py.File(tmp_path / "r.h5") as file:
@@ -114,7 +114,7 @@ def test_a_wrong_field_is_named(tmp_path, field, change):
     assert refused.value.field == field
 
 
-def test_a_file_cut_short_is_refused(tmp_path):
+def test_a_file_cut_short_is_rejected(tmp_path):
     write_reconstruction(tmp_path / "r.h5", made())
     whole = (tmp_path / "r.h5").read_bytes()
     for length in range(0, len(whole), len(whole) // 40):

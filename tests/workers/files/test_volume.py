@@ -46,13 +46,13 @@ def test_a_volume_is_finite_or_refused(values):
 
 
 @pytest.mark.parametrize("shape", [(4, 4), (4, 4, 1), (0, 4, 4), (2, 2, 2, 2), ()])
-def test_another_shape_is_refused(shape):
+def test_another_shape_is_rejected(shape):
     with pytest.raises(InvalidInput, match="shape"):
         Volume.of(np.zeros(shape), STEPS)
 
 
 @pytest.mark.parametrize("values", [np.zeros((2, 2, 2), complex), np.zeros((2, 2, 2), [("r", "u1")])])
-def test_what_is_not_real_is_refused(values):
+def test_rejects_complex_values(values):
     with pytest.raises(InvalidInput, match="accepted: integers or floating-point"):
         Volume.of(values, STEPS)
 
@@ -77,7 +77,7 @@ def test_a_number_too_large_for_float32_is_named():
         (1.0 + np.arange(8) * 1e-9, ">f8"),
     ],
 )
-def test_values_that_float32_cannot_tell_apart_are_refused(values, dtype):
+def test_rejects_values_indistinguishable_in_float32(values, dtype):
     with pytest.raises(InvalidInput, match=r"cannot distinguish; accepted: .*subtract an offset first"):
         Volume.of(values.astype(dtype).reshape(2, 2, 2), STEPS)
 
@@ -92,7 +92,7 @@ def test_values_that_float32_cannot_tell_apart_are_refused(values, dtype):
         (np.arange(8) * 2**60 - 2**62, "i8"),
     ],
 )
-def test_values_that_float32_can_tell_apart_are_taken(values, dtype):
+def test_accepts_values_distinguishable_in_float32(values, dtype):
     volume = Volume.of(values.astype(dtype).reshape(2, 2, 2), STEPS)
     assert len(np.unique(volume.values)) == len(np.unique(values))
 
@@ -105,7 +105,7 @@ def test_a_spacing_must_be_three_distances(steps):
 
 @pytest.mark.parametrize("step", [1e-300, 0.99e-9, 1.01e3, 1e300, float("inf")])
 @pytest.mark.parametrize("axis", range(3))
-def test_a_spacing_that_nothing_has_is_refused(step, axis):
+def test_rejects_implausible_spacing(step, axis):
     steps = [1e-3] * 3
     steps[axis] = step
     with pytest.raises(InvalidInput, match=r"spacing_m: .* three times a number from 1e-09 to 1000 m"):

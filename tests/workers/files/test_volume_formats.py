@@ -36,7 +36,7 @@ def test_numpy(tmp_path, dtype, order):
     assert volume.spacing_m == (SPACING_M,) * 3
 
 
-def test_what_is_given_is_used(tmp_path):
+def test_explicit_grid_takes_precedence(tmp_path):
     np.save(tmp_path / "v.npy", ramp())
     one = import_volume(tmp_path / "v.npy", Given("A head", (2e-3,)))
     assert (one.title, one.spacing_m) == ("A head", (2e-3,) * 3)
@@ -71,7 +71,7 @@ def test_a_reconstruction_gives_its_speed(tmp_path):
     assert (volume.spacing_m, volume.origin_m) == (result.spacing_m, result.origin_m)
 
 
-def test_uneven_slices_and_plain_images_are_refused(tmp_path):
+def test_uneven_slices_and_plain_images_are_rejected(tmp_path):
     write_reconstruction(tmp_path / "r.h5", made(8, 4))
     assert refused(tmp_path / "r.h5").field == "spacing_m"
     write_reconstruction(tmp_path / "r.h5", made(8))
@@ -118,14 +118,14 @@ NAN = np.where(np.arange(8).reshape(2, 2, 2) == 5, np.nan, 1.0)
         (MINUS, "values", "shape (-2, -2, 2)"),
     ],
 )
-def test_what_is_refused_and_why(tmp_path, content, field, found):
+def test_rejects_invalid_input_with_a_reason(tmp_path, content, field, found):
     (tmp_path / "v.npy").write_bytes(content)
     error = refused(tmp_path / "v.npy")
     assert (error.field, found in error.value) == (field, True), error
     assert error.accepted
 
 
-def test_an_archive_of_arrays_is_refused(tmp_path):
+def test_an_archive_of_arrays_is_rejected(tmp_path):
     with zipfile.ZipFile(tmp_path / "v.npz", "w") as archive:
         archive.writestr("a.npy", saved(ramp()))
     assert "another kind" in refused(tmp_path / "v.npz").value
@@ -135,7 +135,7 @@ def test_no_file(tmp_path):
     assert "No such file" in refused(tmp_path / "none").value
 
 
-def test_more_than_the_limit_is_refused_before_it_is_read(tmp_path, monkeypatch):
+def test_more_than_the_limit_is_rejected_before_it_is_read(tmp_path, monkeypatch):
     np.save(tmp_path / "v.npy", ramp())
     monkeypatch.setattr(bounded_reading, "LARGEST_BYTES", 59)
     error = refused(tmp_path / "v.npy")
@@ -143,7 +143,7 @@ def test_more_than_the_limit_is_refused_before_it_is_read(tmp_path, monkeypatch)
     assert "59" in error.accepted
 
 
-def test_a_shape_without_use_is_refused_before_the_values_are_read(tmp_path, monkeypatch):
+def test_a_shape_without_use_is_rejected_before_the_values_are_read(tmp_path, monkeypatch):
     def nothing_else(shape):
         raise InvalidInput("volume", f"shape {tuple(shape)}", "another")
 

@@ -206,7 +206,7 @@ def test_the_upload_format_itself_is_copied(tmp_path):
         (lambda: travel_times() | {"delta_tof": delta_tof() * 1j}, "delta_tof"),
     ],
 )  # fmt: skip
-def test_what_is_missing_or_wrong_is_named(tmp_path, write, variables, field):
+def test_names_missing_or_invalid_input(tmp_path, write, variables, field):
     write(tmp_path / "scan.bin", variables())
     with pytest.raises(InvalidInput) as refused:
         convert_dataset(tmp_path / "scan.bin", tmp_path / "canonical.h5")
@@ -225,7 +225,7 @@ def test_what_is_missing_or_wrong_is_named(tmp_path, write, variables, field):
     ],
 )
 @pytest.mark.parametrize("packed", [False, True])
-def test_what_is_no_array_of_numbers_is_refused_where_it_is_asked_for_only(tmp_path, value, what, packed):
+def test_non_numeric_arrays_are_rejected_only_when_used(tmp_path, value, what, packed):
     savemat(tmp_path / "scan.mat", travel_times() | {"delta_tof": value}, do_compression=packed)
     with pytest.raises(InvalidInput, match=f"delta_tof: found {what}"):
         convert_dataset(tmp_path / "scan.mat", tmp_path / "canonical.h5")
@@ -233,7 +233,7 @@ def test_what_is_no_array_of_numbers_is_refused_where_it_is_asked_for_only(tmp_p
     assert convert_dataset(tmp_path / "scan.mat", tmp_path / "canonical.h5").picked
 
 
-def test_a_pickle_in_an_archive_is_never_opened(tmp_path):
+def test_pickles_in_archives_are_never_loaded(tmp_path):
     opened: list[str] = []
 
     class Trap:
@@ -261,7 +261,7 @@ def _header(shape: tuple[int, ...], dtype: str = "<f8") -> bytes:
 @pytest.mark.parametrize(
     "shape", [(1 << 40, 2), (1 << 20, 1 << 10), (1 << 62, 1 << 62), (2,) * 30, (-1, 2), (50_000, 2)]
 )
-def test_an_archive_that_declares_more_than_it_holds_is_refused_without_the_memory(tmp_path, shape):
+def test_an_archive_that_declares_more_than_it_holds_is_rejected_without_the_memory(tmp_path, shape):
     with zipfile.ZipFile(tmp_path / "scan.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("element_position_m.npy", _header(shape) + bytes(800))
     assert _refused_in_little_memory(tmp_path, "scan.npz") < 8 << 20
@@ -299,7 +299,7 @@ def _refused_in_little_memory(tmp_path: Path, name: str) -> int:
         tracemalloc.stop()
 
 
-def test_a_flipped_bit_in_an_archive_is_told_by_its_check_sum(tmp_path):
+def test_flipped_bit_in_an_archive_fails_its_checksum(tmp_path):
     """Not compressed, so that a flip in the middle of the traces changes one value and nothing else."""
     np.savez(tmp_path / "scan.npz", **named(scan(2e-7, elements=ELEMENTS)))
     content = bytearray((tmp_path / "scan.npz").read_bytes())
@@ -324,7 +324,7 @@ def test_packed_numbers_of_matlab_have_a_check_sum_that_is_verified(tmp_path, by
 
 
 @pytest.mark.parametrize("kind", ["matlab5", "matlab5-packed", "matlab73", "npz"])
-def test_damage_anywhere_is_refused_and_never_crashes(tmp_path, kind):
+def test_damage_anywhere_is_rejected_and_never_crashes(tmp_path, kind):
     """Bytes changed at random and files cut short: a dataset, or InvalidInput; nothing else."""
     if kind == "npz":
         np.savez_compressed(tmp_path / "good", **named(scan(elements=4)))
@@ -358,7 +358,7 @@ def test_an_external_link_is_not_followed(tmp_path):
         convert_dataset(tmp_path / "scan.mat", tmp_path / "canonical.h5")
 
 
-def test_what_is_none_of_them_is_refused_as_the_upload_format(tmp_path):
+def test_rejects_unknown_formats(tmp_path):
     np.savez(tmp_path / "scan.npz", something=np.arange(3))
     with pytest.raises(InvalidInput, match="a NumPy archive with the arrays something"):
         convert_dataset(tmp_path / "scan.npz", tmp_path / "canonical.h5")

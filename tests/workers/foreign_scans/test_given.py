@@ -124,7 +124,7 @@ def test_an_assumed_temperature_is_recorded(tmp_path):
         ({**OWN, "sound_speed_mps": 1.0}, "sound speed", "200"),
     ],
 )
-def test_what_cannot_be_used_is_named(tmp_path, given, field, accepted):
+def test_names_unusable_values(tmp_path, given, field, accepted):
     savemat(tmp_path / "scan", own_variables(), appendmat=False)
     with pytest.raises(InvalidInput) as refused:
         converted(tmp_path, **given)

@@ -112,7 +112,7 @@ def test_the_empty_measurement_is_the_water_shot(tmp_path):
         ({"Amplification": np.zeros((2, 1))}, "Amplification"),
     ],
 )
-def test_what_is_missing_or_wrong_in_a_file_is_named(tmp_path, changes, field):
+def test_names_missing_or_invalid_members(tmp_path, changes, field):
     source = write_measurement(tmp_path / "scan", **changes)
     with pytest.raises(InvalidInput) as refused:
         convert_dataset(source, tmp_path / "canonical.h5")

@@ -103,7 +103,7 @@ def test_the_water_may_be_left_out(tmp_path):
         ({"water/002.h5": None}, "waveform/water"),
     ],
 )
-def test_what_is_missing_or_wrong_is_named(tmp_path, change, field):
+def test_names_missing_or_invalid_input(tmp_path, change, field):
     found = {name: content for name, content in (members() | change).items() if content is not None}
     with pytest.raises(InvalidInput) as refused:
         convert_dataset(written(tmp_path, found), tmp_path / "canonical.h5")

@@ -24,7 +24,7 @@ from ..files.reconstructions import made
         Settings.of(method="sart", nodes=64, coarser_grids=1, straight_iterations=1, rays="straight"),
     ],
 )
-def test_the_names_are_those_of_the_stages_that_are_made(settings):
+def test_captions_name_the_stages(settings):
     ring, everyone = np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]]), np.arange(3)
     plans = stages(Dataset(ring, everyone, everyone, 1500.0, delta_tof_s=np.zeros((3, 3))), settings)
     names = ["straight" if plan.rays != settings.rays else f"{plan.nodes} nodes" for plan in plans]

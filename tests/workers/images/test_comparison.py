@@ -24,7 +24,7 @@ def test_it_has_a_column_a_result():
     assert 1.3 * one.shape[1] < both.shape[1] < 1.7 * one.shape[1]
 
 
-def test_the_titles_tell_the_errors_of_compare_in_the_region_of_the_file(undrawn):
+def test_titles_show_the_errors_of_compare(undrawn):
     known = truth()
     roi = np.zeros(known.sound_speed_mps.shape, bool)
     roi[4:22, 4:20] = True

@@ -31,11 +31,11 @@ def size_of(picture):
 
 @pytest.mark.parametrize("size", [200, 257, 1000, 1777])
 @pytest.mark.parametrize("bars", [True, False])
-def test_the_longest_side_is_as_long_as_asked_for(size, bars):
+def test_longest_side_matches_the_request(size, bars):
     assert max(size_of(drawn_with(size=size, scale_bar=bars, colour_bar=bars))) == size
 
 
-def test_the_frame_tells_everything(drawn):
+def test_frame_shows_title_axes_units_and_colour_bar(drawn):
     drawn_with(scale_bar=True, interpolation="cubic")
     assert {"A title", "sound speed (m/s)", "a note", "y (mm)", "z (mm)", "10 mm"} <= set(drawn.words())
     image = drawn[-1].axes[0].images[0]
@@ -56,7 +56,7 @@ def test_the_bare_image_has_a_pixel_a_node_to_scale():
     assert size_of(drawn_with(frame=False, size=400)) == (160, 400)
 
 
-def test_the_bare_image_is_nothing_but_the_values():
+def test_bare_image_contains_only_values():
     picture = pixels(drawn_with(frame=False, size=400, colormap="gray"))
     middles = [int(400 * (k + 0.5) / 5) for k in range(5)], [int(160 * (k + 0.5) / 4) for k in range(4)]
     found = picture[np.ix_(*middles)][..., 0].astype(float)

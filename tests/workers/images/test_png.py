@@ -25,7 +25,7 @@ def test_a_picture_file_of_another_kind_and_mode(tmp_path):
 
 
 @pytest.mark.parametrize(("content", "found"), [(None, "no such file"), (b"text", "no picture")])
-def test_what_is_no_picture(tmp_path, content, found):
+def test_rejects_invalid_pictures(tmp_path, content, found):
     if content is not None:
         (tmp_path / "x").write_bytes(content)
     with pytest.raises(InvalidInput, match=found):

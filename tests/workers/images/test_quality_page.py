@@ -18,7 +18,7 @@ def panels(figures) -> list[str]:
     return [axes.get_title(loc="left") for axes in figures[-1].axes if axes.get_title(loc="left")]
 
 
-def test_the_page_names_what_was_found(drawn):
+def test_page_lists_the_findings(drawn):
     dataset = scan(blob_delay(16), elements=16, noise=0.01)
     dataset.waveform.object[:, 3] = dataset.waveform.water[:, 3] = 0.0
     png = quality_png(replace(dataset, title="Ring $7"), examine(dataset))

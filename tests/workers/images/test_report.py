@@ -41,7 +41,7 @@ RESIDUALS = "Residuals, 33.3 ns rms"
         ),
     ],
 )
-def test_without_a_truth_it_shows_what_there_is(undrawn, change, shown):
+def test_report_without_a_truth(undrawn, change, shown):
     result = replace(made(), history=tuple(Iteration(0, n, 1e-7 / n, 64) for n in (1, 2, 3)))
     report_png(replace(result, **change))
     assert undrawn[-1].get_figwidth() > 7.0
@@ -69,7 +69,7 @@ def test_each_image_has_its_own_limits_and_the_resolution_check_those_from_0_to_
     assert len(set(limits.values())) == 4
 
 
-def test_the_stages_are_named_and_the_choice_of_auto_is_told(undrawn):
+def test_report_names_stages_and_automatic_choices(undrawn):
     history = (*(Iteration(0, n, 1e-7, 4, 0) for n in (1, 2)), Iteration(0, 1, 9e-8, 4, 1))
     plan = made().settings.changed(nodes=64, coarser_grids=1)
     trials = (

@@ -15,7 +15,7 @@ sizes_s = st.floats(1e-11, 9e-5)
 
 
 @given(st.lists(sizes_s, min_size=1), st.floats(0.01, 1.0))
-def test_at_least_the_share_lies_within_a_bin_of_the_size_told(found: list[float], share: float) -> None:
+def test_reported_share_lies_within_the_reported_limit(found: list[float], share: float) -> None:
     residuals = np.array(found) * np.where(np.arange(len(found)) % 2, 1.0, -1.0)
     size = within(residual_counts(residuals), share)
     # A bin is a third wide, and the one around zero a tenth of a nanosecond.
@@ -71,5 +71,5 @@ def test_the_ticks_are_few_and_lie_on_the_axis(scale_s: float) -> None:
     assert low <= ticks.min() < 0.0 < ticks.max() <= high
 
 
-def test_nothing_at_all_is_drawn() -> None:
+def test_empty_data_draw_an_empty_panel() -> None:
     assert panel(np.array([])).get_title(loc="left") == "Residuals"

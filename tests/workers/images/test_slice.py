@@ -92,14 +92,14 @@ def test_bad_arguments_are_named(file, given, field, accepted):
     assert accepted in refused.value.accepted
 
 
-def test_a_quantity_that_the_file_lacks_is_refused(tmp_path):
+def test_a_quantity_that_the_file_lacks_is_rejected(tmp_path):
     write_reconstruction(tmp_path / "r.h5", replace(made(), attenuation=None))
     with pytest.raises(InvalidInput, match="quantity") as refused:
         slice_png(tmp_path / "r.h5", quantity="attenuation")
     assert refused.value.accepted == "one of speed, coverage, recovery: this file has no other"
 
 
-def test_the_recovery_is_drawn_from_0_to_1_unless_told_otherwise(file, drawn):
+def test_recovery_is_drawn_from_0_to_1_by_default(file, drawn):
     for given, limits in (({}, (0.0, 1.0)), ({"low": 0.5}, (0.5, 1.0)), ({"high": 0.6}, (0.0, 0.6))):
         slice_png(file, quantity="recovery", **given)
         assert drawn[-1].axes[0].images[0].get_clim() == limits

@@ -112,6 +112,6 @@ def test_several_slices_are_compared_with_a_solid_truth() -> None:
     assert compare(image(solid[..., ::-1], (0.0,) * 3), truth(solid)).rmse_mps > 10.0
 
 
-def test_a_truth_beside_the_image_is_not_comparable() -> None:
+def test_truth_outside_the_image_is_not_comparable() -> None:
     with pytest.raises(NotComparable, match="no node of the image lies within the truth"):
         compare(image(disc(), origin=(1.0, 1.0)), truth(disc()))

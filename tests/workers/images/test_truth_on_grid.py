@@ -65,6 +65,6 @@ def solid() -> Truth:
         (solid(), made(slices=2), "not evenly spaced"),
     ],
 )
-def test_what_cannot_be_laid_on_the_image_is_said(known, result, why):
+def test_rejects_truths_on_incompatible_grids(known, result, why):
     with pytest.raises(NotComparable, match=why):
         speed_on_grid(known, result)

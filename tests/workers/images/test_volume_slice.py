@@ -23,7 +23,7 @@ def test_the_middle_slice_says_where_it_is(path, drawn):
     assert np.asarray(drawn[-1].axes[0].images[0].get_array()).max() == 20.0
 
 
-def test_what_was_asked_for_is_drawn(path, drawn):
+def test_requested_slice_is_drawn(path, drawn):
     volume_slice_png(path, index=0, low=-1.0, high=7.0, colormap="gray")
     image = drawn[-1].axes[0].images[0]
     assert (image.get_clim(), image.get_cmap().name) == ((-1.0, 7.0), "gray")

@@ -30,7 +30,7 @@ def lossy():
     return replace(clean, waveform=Waveform(weak.astype(np.float32), clean.waveform.water))
 
 
-def test_jobs_read_what_is_read_in_memory_whoever_picked(lossy, tmp_path, monkeypatch):
+def test_jobs_read_the_same_amplitudes_as_in_memory(lossy, tmp_path, monkeypatch):
     monkeypatch.setattr(picking_memory, "TASK_SAMPLES", 30_000)
     plan = PLAN.changed(amplitudes="spectrum")
     picked = replace(pick(lossy), waveform=lossy.waveform)
@@ -50,7 +50,7 @@ def test_jobs_read_what_is_read_in_memory_whoever_picked(lossy, tmp_path, monkey
     assert reconstruction_run.reconstruct(None, tmp_path / "times.h5", PLAN).attenuation is None
 
 
-def test_a_scan_without_traces_and_focusing_of_spectra_are_refused(lossy, tmp_path):
+def test_a_scan_without_traces_and_focusing_of_spectra_are_rejected(lossy, tmp_path):
     write_dataset(tmp_path / "scan.h5", pick(lossy))
     with pytest.raises(InvalidInput, match="waveform/object"):
         reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN.changed(amplitudes="ratio"))

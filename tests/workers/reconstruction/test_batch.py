@@ -27,7 +27,7 @@ def nothing() -> None:
 
 @settings(deadline=None, max_examples=20)
 @given(fails=st.lists(st.booleans(), min_size=1, max_size=12), at_once=st.integers(1, 4))
-def test_each_ends_as_it_should_and_never_too_many_run(fails: list[bool], at_once: int) -> None:
+def test_every_entry_finishes_within_the_limit_of_parallel_runs(fails: list[bool], at_once: int) -> None:
     given_entries = entries(len(fails))
     lock, now, most = threading.Lock(), [0], [0]
     begun: list[str] = []
@@ -50,14 +50,14 @@ def test_each_ends_as_it_should_and_never_too_many_run(fails: list[bool], at_onc
     assert [bool(entry.reason) for entry in given_entries] == fails
 
 
-def test_all_of_them_are_under_way_that_may_be() -> None:
+def test_batch_uses_all_allowed_slots() -> None:
     meet = threading.Barrier(3, timeout=10)
     given_entries = entries(6)
     run(given_entries, lambda entry, stop: meet.wait() and None, nothing, 3)
     assert {entry.state for entry in given_entries} == {"succeeded"}
 
 
-def test_ctrl_c_stops_those_that_run_and_begins_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_stops_running_entries_and_starts_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(batch, "POLL_S", 0.01)
     stopped: list[str] = []
 
@@ -77,7 +77,7 @@ def test_ctrl_c_stops_those_that_run_and_begins_no_other(monkeypatch: pytest.Mon
     assert [entry.state for entry in given_entries] == ["running", "running", *3 * ["waiting"]]
 
 
-def test_an_entry_tells_how_far_it_is_and_keeps_its_time() -> None:
+def test_entries_report_progress_and_time() -> None:
     entry = Entry(Path("a/scan.h5"))
     assert (entry.name, entry.seconds) == ("scan", 0.0)
     entry.begin()

@@ -15,7 +15,7 @@ from bentray_workers.reconstruction.file_scan import FileWaveScan
 from ...kernels.tomography.waveform.scans import SETTINGS, scan
 
 
-def test_a_look_at_waves_ends_with_its_job(tmp_path, monkeypatch):
+def test_wave_comparison_stops_with_its_job(tmp_path, monkeypatch):
     path, folder = tmp_path / "scan.h5", tmp_path / "job"
     write_dataset(path, scan())
     folder.mkdir()

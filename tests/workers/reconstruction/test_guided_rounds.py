@@ -57,7 +57,7 @@ def test_in_noise_guided_picks_are_more_and_no_worse(path, tmp_path):
     assert done[-1] == seen[-1].total
 
 
-def test_a_torn_run_is_gone_on_from_to_the_same_bits(cluster, path, tmp_path):
+def test_interrupted_run_resumes_to_the_same_bits(cluster, path, tmp_path):
     def go_on(tear):
         return reconstruction_run.reconstruct(cluster.client, path, PLAN, tear, work_dir=tmp_path / "work")
 
@@ -82,7 +82,7 @@ def test_slices_are_guided_by_their_own_images_and_faults_stay_corrected(path, t
     assert "slice 1: polarity: 1 inverted in reception (3), corrected" in two.provenance["quality"]
 
 
-def test_the_settings_of_a_guided_result_make_it_again(path):
+def test_settings_reproduce_a_guided_result(path):
     plan = PLAN.changed(method="auto", rays="curved", guided_rounds=1)
     first = reconstruction_run.reconstruct(None, path, plan)
     assert first.settings.method != "auto"
@@ -92,7 +92,7 @@ def test_the_settings_of_a_guided_result_make_it_again(path):
     np.testing.assert_array_equal(again.speed, first.speed)
 
 
-def test_times_that_came_with_the_scan_are_not_sought_again(tmp_path):
+def test_provided_times_are_not_picked_again(tmp_path):
     known = replace(noisy(), waveform=None, delta_tof_s=blob_delay(ELEMENTS))
     write_dataset(tmp_path / "known.h5", known)
     plain, guided = (
@@ -102,6 +102,6 @@ def test_times_that_came_with_the_scan_are_not_sought_again(tmp_path):
 
 
 @pytest.mark.parametrize(("rounds", "decomposition"), [(-1, "slices"), (11, "slices"), (1, "volume")])
-def test_what_cannot_be_guided_is_refused(rounds, decomposition):
+def test_rejects_scans_that_cannot_be_guided(rounds, decomposition):
     with pytest.raises(InvalidInput, match="guided_rounds"):
         Settings.of(method="sart", guided_rounds=rounds, decomposition=decomposition)

@@ -89,7 +89,7 @@ def assert_same(one, other):
 
 @pytest.mark.parametrize("samples", [30_000, 10**9])
 @pytest.mark.parametrize("picker", PICKERS)
-def test_batches_give_what_the_whole_gives(tmp_path, monkeypatch, picker, samples):
+def test_batches_equal_the_whole(tmp_path, monkeypatch, picker, samples):
     monkeypatch.setattr(picking_memory, "TASK_SAMPLES", samples)
     assert_same(arrived(clean(), tmp_path, picker, examined=False)[0], pick(clean(), picker))
 
@@ -125,7 +125,7 @@ def test_a_clean_scan_gives_the_image_that_it_gave_unexamined(tmp_path):
     assert plain.provenance == expected.provenance
 
 
-def test_it_tells_how_many_emissions_are_examined_and_picked(tmp_path, monkeypatch):
+def test_progress_counts_examined_and_picked_emissions(tmp_path, monkeypatch):
     monkeypatch.setattr(picking_memory, "TASK_SAMPLES", 50_000)
     write_dataset(tmp_path / "scan.h5", clean())
     told = []
@@ -168,7 +168,7 @@ def test_channels_put_back_give_the_image_of_the_clean_scan(tmp_path):
     assert "quality" not in taken.provenance
 
 
-def test_a_scan_that_must_not_be_used_is_refused(tmp_path):
+def test_a_scan_that_must_not_be_used_is_rejected(tmp_path):
     write_dataset(tmp_path / "scan.h5", replace(clean(), sampling_rate_hz=1.2 * RATE_HZ))
     with pytest.raises(InvalidInput, match=r"sampling rate: found arrivals in water at .* examine false"):
         reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN)
@@ -202,7 +202,7 @@ def test_without_a_water_shot_the_times_are_nearly_the_same(tmp_path):
     assert np.std((picked.delta_tof_s - expected.delta_tof_s)[both]) < 0.03 / clean().center_frequency_hz
 
 
-def test_what_was_picked_before_a_death_is_not_picked_again(tmp_path, monkeypatch):
+def test_picked_times_survive_a_kill(tmp_path, monkeypatch):
     write_dataset(tmp_path / "scan.h5", spoilt(clean(), damaged))
     expected = reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN, work_dir=tmp_path / "work")
     monkeypatch.setattr(reconstruction_run, "PickingGraph", None)

@@ -57,7 +57,7 @@ def ring(elements, heights):
     ],
     ids=["sart 64", "sart 96", "gauss-newton 64", "gauss-newton 96", "gauss-newton volume", "sart volume"],
 )
-def test_calls_take_what_the_plan_says(asked, elements, heights):
+def test_tasks_stay_within_the_planned_memory(asked, elements, heights):
     settings = {**asked, "iterations": 2}
     # Freed arrays go back at once, so that a fork's peak is that of its own.
     environment = {
@@ -80,7 +80,7 @@ def test_calls_take_what_the_plan_says(asked, elements, heights):
     assert not wrong
 
 
-def test_what_no_worker_can_hold_is_refused_with_a_grid_that_fits():
+def test_rejects_grids_larger_than_worker_memory_with_one_that_fits():
     asked = Settings(nodes=512, method="gauss-newton")
     with pytest.raises(InvalidInput) as refusal:
         plan(RING, asked, [SMALL, SMALL])
@@ -101,7 +101,7 @@ def test_no_limit_is_none():
     assert WorkerCapacity(100 * MIB, BOTH).task_bytes == 0
 
 
-def test_a_device_lane_needs_a_worker_that_offers_it():
+def test_device_tasks_need_a_worker_with_a_device():
     asked = Settings(method="sart", eikonal="fim-opencl")
     with pytest.raises(InvalidInput, match="eikonal"):
         plan(RING, asked, [LARGE])
@@ -120,7 +120,7 @@ def test_a_device_lane_needs_a_worker_that_offers_it():
         ({"method": "auto"}, "emitters", "in parallel"),
     ],
 )
-def test_the_choice_is_told_in_a_sentence(changes, decomposition, words):
+def test_choice_is_described_in_one_sentence(changes, decomposition, words):
     scan = replace(RING, slices=40, pairs=40 * 256**2, height_m=0.05)
     found = plan(scan, Settings.of(**{"method": "sart", **changes}), [WorkerCapacity(0, BOTH)])
     assert found.decomposition == decomposition

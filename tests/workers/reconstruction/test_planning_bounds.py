@@ -100,7 +100,7 @@ def test_the_largest_dataset_is_planned_in_as_many_steps_as_a_small_one(way):
 
 
 @pytest.mark.parametrize("way", WAYS, ids=str)
-def test_what_the_largest_dataset_takes_is_refused_in_as_few(way):
+def test_rejecting_the_largest_dataset_takes_few_steps(way):
     settings = Settings.of(**{"method": "sart", **way})
     little = [WorkerCapacity(2048 * MIB, ("recon", "render"))]
 
@@ -179,7 +179,7 @@ def test_parts_of_a_simulation_are_counted_without_being_made(asked):
     assert count_of(settings) == len(parts_of(settings))
 
 
-def test_the_largest_simulation_is_refused_in_few_steps():
+def test_the_largest_simulation_is_rejected_in_few_steps():
     largest = {"phantom": "table7", "slices": 1024, "nodes": 1024, "refinement": 4}
 
     def refused():

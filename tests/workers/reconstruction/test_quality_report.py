@@ -62,7 +62,7 @@ def test_one_emission_is_in_memory_and_all_are_counted(tmp_path, monkeypatch):
     assert told == [(k, 72) for k in range(1, 73)]
 
 
-def test_more_traces_than_a_task_may_hold_are_refused_before_they_are_read(tmp_path, monkeypatch):
+def test_more_traces_than_a_task_may_hold_are_rejected_before_they_are_read(tmp_path, monkeypatch):
     write_dataset(tmp_path / "scan.h5", scan(elements=8))
     monkeypatch.setattr(quality, "LARGEST_BYTES", 1000)
     with pytest.raises(InvalidInput, match="bytes of traces; accepted: at most 1000"):

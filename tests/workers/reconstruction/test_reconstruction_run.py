@@ -76,7 +76,7 @@ def test_stop_ends_within_a_task(cluster, path, embedded, plan):
     assert len(calls) == 3
 
 
-def test_a_folder_goes_under_the_hands_of_a_call_at_work():
+def test_folder_deleted_during_a_task():
     """A call that was told to stop goes on to its end, and may write what it always wrote."""
 
     def write(folder):
@@ -124,7 +124,7 @@ def test_missing_file_is_named(cluster, tmp_path):
 
 
 @pytest.mark.parametrize("plan", METHODS, ids=lambda plan: plan.method)
-def test_nothing_is_left_on_the_cluster(cluster, path, plan):
+def test_cluster_is_empty_afterwards(cluster, path, plan):
     before = set(cluster.client.futures)
     reconstruction_run.reconstruct(cluster.client, path, plan)
     # A client lets go of futures in a thread of its own.
@@ -135,7 +135,7 @@ def test_nothing_is_left_on_the_cluster(cluster, path, plan):
 
 
 @pytest.mark.parametrize("plan", [*METHODS, *OTHERS.values()], ids=[*(p.method for p in METHODS), *OTHERS])
-def test_a_torn_run_is_gone_on_from_to_the_same_bits(cluster, scan, path, tmp_path, plan):
+def test_interrupted_run_resumes_to_the_same_bits(cluster, scan, path, tmp_path, plan):
     expected = reconstruct_here(scan, plan)
 
     def go_on(tear):

@@ -33,7 +33,7 @@ def scans():
 
 
 @pytest.mark.parametrize(("rays", "cut", "eikonal"), list(product(RAYS, CUTS, SOLVERS)))
-def test_what_runs_is_what_was_chosen(scans, monkeypatch, rays, cut, eikonal):
+def test_executed_solver_equals_the_planned_one(scans, monkeypatch, rays, cut, eikonal):
     if eikonal in ON_DEVICE:
         pytest.skip("its fallback on the CPU is tested with the device")
     settings = Settings(method="sart", nodes=16, iterations=1, rays=rays, decomposition=cut, eikonal=eikonal)
@@ -78,7 +78,7 @@ def test_the_plan_counts_the_arrays_of_what_runs(rays, eikonal):
 
 @pytest.mark.parametrize("method", ["sart", "gauss-newton", "auto"])
 @pytest.mark.parametrize(("rays", "eikonal"), list(product(("curved", "straight"), SOLVERS)))
-def test_a_device_is_asked_for_where_one_is_used(method, rays, eikonal):
+def test_device_resource_is_requested_where_a_device_is_used(method, rays, eikonal):
     try:
         settings = Settings(method=method, rays=rays, eikonal=eikonal)
     except InvalidInput:

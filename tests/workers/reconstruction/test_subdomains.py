@@ -20,7 +20,7 @@ GRIDS = st.sampled_from([((20, 17), (3, 2)), ((5, 6), (5, 3)), ((30, 4), (1, 4))
 
 @given(grid=GRIDS, seed=st.integers(0, 2**32 - 1), on_node=st.booleans())
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_it_equals_the_whole_domain(cluster, grid, seed, on_node):
+def test_blocks_equal_the_whole_domain(cluster, grid, seed, on_node):
     shape, blocks = grid
     rng = np.random.default_rng(seed)
     speed, spacing = rng.uniform(300.0, 5000.0, shape), 1.5e-3
@@ -43,7 +43,7 @@ def test_a_file_serves_and_blocks_can_be_had_one_by_one(cluster, tmp_path):
     assert field.rounds > 1
 
 
-def test_a_source_at_the_corner_of_blocks_wakes_all_of_them(cluster):
+def test_source_at_a_block_corner_activates_all_blocks(cluster):
     """Seeds that no sweep can improve must still reach the neighbours."""
     speed = np.ones((4, 4))
     found = subdomains.solve(cluster.client, speed, 1.0, (1.5, 1.5), (2, 2))
@@ -52,7 +52,7 @@ def test_a_source_at_the_corner_of_blocks_wakes_all_of_them(cluster):
     assert found[1, 1] == pytest.approx(0.5**0.5)
 
 
-def test_a_lost_workers_blocks_are_made_again(tmp_path):
+def test_blocks_of_a_lost_worker_are_recomputed(tmp_path):
     """What is asked of a block afterwards goes back as far as it must, to the same bits."""
     speed = np.random.default_rng(2).uniform(1.0, 2.0, (9, 8))
     expected = solve_by_blocks(PointSource.checked(speed, 1.0, (2.0, 2.0)), (2, 2))
@@ -64,7 +64,7 @@ def test_a_lost_workers_blocks_are_made_again(tmp_path):
         assert np.array_equal(field.whole(), expected)
 
 
-def test_nothing_is_left_on_the_cluster(cluster):
+def test_cluster_is_empty_afterwards(cluster):
     before = set(cluster.client.futures)
     subdomains.solve(cluster.client, np.ones((6, 6)), 1.0, (2.0, 2.0), (2, 2))
     # Futures that are dropped are given back by the client's own thread.
@@ -85,7 +85,7 @@ def test_nothing_is_left_on_the_cluster(cluster):
         ({"blocks": (2, 7)}, "blocks"),
     ],
 )
-def test_what_does_not_fit_is_named(cluster, changes, field):
+def test_names_incompatible_input(cluster, changes, field):
     asked = {"speed": np.ones((6, 6)), "spacing": 1.0, "source": (2.0, 2.0), "blocks": (2, 2), **changes}
     with pytest.raises(InvalidInput, match=field):
         subdomains.solve(cluster.client, **asked)

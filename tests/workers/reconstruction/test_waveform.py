@@ -78,7 +78,7 @@ def test_a_file_gives_the_bits_of_the_kernels(path, expected):
     assert seen[-1].history == expected.history
 
 
-def test_a_torn_run_is_gone_on_from_to_the_same_bits(cluster, path, tmp_path, expected):
+def test_interrupted_run_resumes_to_the_same_bits(cluster, path, tmp_path, expected):
     def go_on(tear):
         return reconstruction_run.reconstruct(cluster.client, path, PLAN, tear, work_dir=tmp_path / "work")
 
@@ -150,7 +150,7 @@ def test_times_do_not_need_a_water_shot_that_cannot_be_estimated(tmp_path):
 
 
 @pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:-900])])
-def test_a_lost_reference_is_made_again_and_reported_without_an_examination(tmp_path, damage):
+def test_lost_reference_is_recomputed(tmp_path, damage):
     write_dataset(tmp_path / "bare.h5", replace(scan(), waveform=Waveform(scan().waveform.object)))
     rays = Settings.of(method="sart", nodes=32, iterations=2, examine=False)
     work = tmp_path / "work"

@@ -58,7 +58,7 @@ def test_the_accurate_lookup_is_nearly_exact(folder, scene, mode):
     assert (off > 16).mean() < 0.03
 
 
-def test_strips_are_parts_of_the_whole(folder, cluster, monkeypatch):
+def test_tiles_equal_parts_of_the_whole(folder, cluster, monkeypatch):
     view = FieldView(**SIZE, rays=2)
     whole = picture_png(folder, view)
     parts = [tile_image(folder, view, first, first + 8) for first in range(0, 40, 8)]
@@ -115,14 +115,14 @@ def test_a_scene_is_made_once_and_tables_are_not_copied(folder, monkeypatch):
     assert field_cache._WORLDS.held() >= 2 * (6 * 100) ** 2
 
 
-def test_what_does_not_fit_is_not_kept(folder, monkeypatch):
+def test_oversize_entries_are_not_cached(folder, monkeypatch):
     monkeypatch.setattr(field_cache, "_WORLDS", field_cache.MemoryCache(10))
     view = FieldView(scene="two-mirrors")
     assert world_at(folder, view) is not world_at(folder, view)
     assert field_cache._WORLDS.held() == 0
 
 
-def test_tables_of_another_surface_are_refused(folder, tmp_path):
+def test_tables_of_another_surface_are_rejected(folder, tmp_path):
     other = field_of(tmp_path, bumpy_ball(300))
     (other / "chart.h5").write_bytes((folder / "chart.h5").read_bytes())
     with pytest.raises(InvalidInput, match="faces"):

@@ -32,7 +32,7 @@ def test_every_setting_and_the_mesh_name_the_field():
         ("image_threshold", -1.0),
     ],
 )
-def test_what_is_refused(name, value):
+def test_rejects_invalid_input(name, value):
     with pytest.raises(InvalidInput) as caught:
         FieldSettings(**{name: value})
     assert caught.value.field == name

@@ -16,7 +16,7 @@ def test_every_field_is_checked():
 
 
 @pytest.mark.parametrize("name", CHOICES)
-def test_other_words_are_refused(name):
+def test_rejects_unknown_values(name):
     with pytest.raises(InvalidInput) as caught:
         FieldView(**{name: "other"})
     assert caught.value.field == name
@@ -24,7 +24,7 @@ def test_other_words_are_refused(name):
 
 
 @pytest.mark.parametrize(("name", "bounds"), WITHIN.items())
-def test_numbers_out_of_range_are_refused(name, bounds):
+def test_numbers_out_of_range_are_rejected(name, bounds):
     for value in (bounds[0] - 1, bounds[1] + 1, float("nan")):
         with pytest.raises(InvalidInput) as caught:
             FieldView(**{name: value})

@@ -60,7 +60,7 @@ def test_the_tables_are_those_of_the_kernels(path, tmp_path, small_batches):
     assert [(one.done, one.total) for one in told] == [(0, 0), *((k, total) for k in range(1, total + 1))]
 
 
-def test_a_torn_job_is_gone_on_from(path, tmp_path, small_batches):
+def test_interrupted_job_resumes(path, tmp_path, small_batches):
     told = []
     with pytest.raises(Cancelled):
         made(path, tmp_path, on_progress=told.append, stop=lambda: len(told) > 4)
@@ -87,7 +87,7 @@ def test_a_torn_job_is_gone_on_from(path, tmp_path, small_batches):
         assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "field" / name).read_bytes()
 
 
-def test_a_death_after_the_borders_were_marked(path, tmp_path, monkeypatch):
+def test_resumes_after_a_kill_between_boundary_and_table(path, tmp_path, monkeypatch):
     whole = made(path, tmp_path, "whole")
     (tmp_path / "whole").rename(tmp_path / "work" / "field")
     FieldFiles(tmp_path / "work" / "field").figures.unlink()
@@ -97,7 +97,7 @@ def test_a_death_after_the_borders_were_marked(path, tmp_path, monkeypatch):
     assert again["lookup_wrong"] == whole["lookup_wrong"]
 
 
-def test_what_is_there_is_taken(path, tmp_path, monkeypatch):
+def test_existing_field_is_reused(path, tmp_path, monkeypatch):
     first = made(path, tmp_path)
     told = []
     monkeypatch.setattr(geometry_field, "GeometryFieldGraph", None)
@@ -123,7 +123,7 @@ def test_a_threshold_halves_the_image(path, tmp_path):
     assert (figures["image_pixels"], figures["image_rms"] > 1e-3) == (33, True)
 
 
-def test_what_is_refused(path, tmp_path, monkeypatch):
+def test_rejects_invalid_input(path, tmp_path, monkeypatch):
     settings = FieldSettings(samples=4, inner_samples=4, image_size=33, image_threshold=1e-9)
     with pytest.raises(InvalidInput, match="threshold"):
         made(path, tmp_path, settings=settings)

@@ -49,14 +49,14 @@ def test_without_an_iso_value_the_middle_of_the_range(tmp_path):
 @pytest.mark.parametrize(
     ("iso", "step", "field"), [(7.0, 1, "iso"), (0.0, 0, "step"), (0.0, 33, "step"), (0.0, 24, "step")]
 )
-def test_what_is_refused(tmp_path, iso, step, field):
+def test_rejects_invalid_input(tmp_path, iso, step, field):
     with pytest.raises(InvalidInput) as caught:
         mesh_volume(balls(tmp_path, (11, 11, 11)), iso, step, tmp_path / "m.h5")
     assert caught.value.field == field
     assert not (tmp_path / "m.h5").exists()
 
 
-def test_a_large_surface_and_a_large_volume_are_refused(tmp_path, monkeypatch):
+def test_a_large_surface_and_a_large_volume_are_rejected(tmp_path, monkeypatch):
     path = balls(tmp_path, (11, 11, 11))
     monkeypatch.setattr(isosurface_mesh, "MAX_CROSSINGS", 100)
     with pytest.raises(InvalidInput, match="a larger step"):

@@ -48,7 +48,7 @@ def test_a_large_picture_of_smooth_glass_is_taken_and_a_deep_one_refused():
     refraction_cost(stored, RefractionView(width=width, height=height, depth=200))
 
 
-def test_the_page_may_draw_a_field_and_the_largest_picture_of_few_surfaces():
+def test_default_pictures_of_the_page_are_accepted():
     page = field_cost({}, FieldView(width=512, height=512, rays=2))
     assert page.seconds < 5.0
     assert field_cost({}, FieldView(width=MAX_PIXELS, height=MAX_PIXELS)).seconds < picture_cost.MAX_SECONDS
@@ -56,7 +56,7 @@ def test_the_page_may_draw_a_field_and_the_largest_picture_of_few_surfaces():
         field_cost({}, FieldView(width=MAX_PIXELS, height=MAX_PIXELS, depth=64))
 
 
-def test_it_grows_with_whatever_takes_longer():
+def test_cost_grows_with_every_parameter():
     stored, view = VolumeFile((64, 64, 64), 6), RefractionView
     usual = refraction_cost(stored, view()).seconds
     for more in (
@@ -69,7 +69,7 @@ def test_it_grows_with_whatever_takes_longer():
     assert refraction_cost(stored, view(mode="shaded")).seconds < usual
 
 
-def test_what_no_worker_can_hold_is_refused_with_both_numbers():
+def test_rejects_pictures_larger_than_worker_memory():
     offers = [WorkerCapacity(GIB, LANES), WorkerCapacity(2 * GIB, LANES)]
     room = math.floor(offers[1].task_bytes)
     check_memory("volume", "it", Cost(1.0, room), offers)
@@ -81,7 +81,7 @@ def test_what_no_worker_can_hold_is_refused_with_both_numbers():
     check_memory("volume", "it", Cost(1.0, 2**60), [WorkerCapacity(0, LANES)])
 
 
-def test_where_pictures_of_a_turntable_may_be_drawn():
+def test_eligible_workers_of_a_turntable():
     workers = {"small": WorkerCapacity(GIB, LANES), "large": WorkerCapacity(8 * GIB, LANES)}
     assert placed(2**20, workers) == {"resources": {"render": 1}}
     assert placed(GIB, workers) == {"resources": {"render": 1, "recon": 1}, "workers": ["large"]}
@@ -132,7 +132,7 @@ LARGE = VolumeFile((200, 200, 200), 6)
 @pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["bspline3", "trilinear"])
-def test_a_strip_takes_no_more_memory_than_planned(volumes, name):
+def test_tile_stays_within_the_planned_memory(volumes, name):
     small = RefractionView(iso=(0.9,), filter=name, width=8, height=8)
     view = RefractionView(iso=(0.9,), filter=name, width=4096, height=4096)
     measured = taken(

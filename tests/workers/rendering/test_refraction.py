@@ -90,7 +90,7 @@ def test_the_frame_is_right_handed_with_z_up():
     ],
     ids=str,
 )
-def test_strips_make_the_whole(path, how):
+def test_tiles_equal_the_whole_picture(path, how):
     view = replace(SMALL, **how)
     image = whole(path, view).image
     parts = [tile_image(path, view, first, min(first + 7, 32)) for first in range(0, 32, 7)]
@@ -159,7 +159,7 @@ def test_a_picture_does_not_wait_for_reconstructions(cluster, path):
     assert not any(left)
 
 
-def test_what_the_worker_refuses_arrives_in_words(cluster, path):
+def test_worker_rejection_arrives_as_a_message(cluster, path):
     with pytest.raises(InvalidInput, match="the range of the volume"):
         tiles.submit(cluster.client, refraction.tasks_of(path, replace(SMALL, iso=(9.0,))), 0).result(
             timeout=60

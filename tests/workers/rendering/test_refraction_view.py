@@ -15,7 +15,7 @@ from bentray_workers.rendering.refraction_view import CHOICES, RefractionView, c
 WITHIN = {name: (within.least, within.most) for name, within in ranges_of(RefractionView).items()}
 
 
-def test_every_field_says_what_it_means():
+def test_every_field_has_a_description():
     assert [one.name for one in fields(RefractionView) if not one.metadata["description"].endswith(".")] == []
 
 
@@ -65,13 +65,13 @@ def test_nan_is_out_of_every_range(name):
         ({"width": 4096, "height": 4096, "supersampling": "real", "degree": 2}, "width, height, degree"),
     ],
 )
-def test_what_does_not_fit_together(given, field):
+def test_rejects_inconsistent_views(given, field):
     with pytest.raises(InvalidInput) as caught:
         RefractionView(**given)
     assert caught.value.field == field
 
 
-def test_an_iso_value_out_of_range_is_told_the_range():
+def test_iso_value_error_names_the_range():
     with pytest.raises(InvalidInput, match="iso: found 7; accepted: 1400 to 1600, the range of the volume"):
         RefractionView(iso=(7.0,)).within(1400.0, 1600.0)
 

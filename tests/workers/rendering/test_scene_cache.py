@@ -30,7 +30,7 @@ def path(tmp_path):
 
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 60)), max_size=60))
-def test_there_is_never_more_than_fits(asked):
+def test_cache_stays_within_its_limit(asked):
     kept, made_of = MemoryCache(100), {}
     for key, size in asked:
         size = made_of.setdefault(key, size)
@@ -38,7 +38,7 @@ def test_there_is_never_more_than_fits(asked):
         assert kept.held() <= 100
 
 
-def test_the_least_lately_used_goes_first():
+def test_least_recently_used_entry_is_evicted():
     kept, made_now = MemoryCache(100), []
 
     def get(key, size):
@@ -52,7 +52,7 @@ def test_the_least_lately_used_goes_first():
     assert made_now[-2:] == ["huge", "huge"]
 
 
-def test_what_fails_is_not_kept():
+def test_failed_entries_are_not_cached():
     kept = MemoryCache(10)
     with pytest.raises(ZeroDivisionError):
         kept.get("a", 1, lambda: 1 / 0)
@@ -95,7 +95,7 @@ def test_other_surroundings_are_another_scene(path):
     assert not air.open
 
 
-def test_a_new_file_is_read_anew(path):
+def test_changed_file_is_read_again(path):
     before = scene_at(path, RefractionView(iso=(0.4,)))
     write_volume(path, Volume.of(0.9 * BALL, (1e-3,) * 3))
     os.utime(path, ns=(1, 1))
@@ -111,7 +111,7 @@ def test_a_reconstruction_is_a_volume(tmp_path):
     assert scene_at(tmp_path / "r.h5", RefractionView()).spacing.tolist() == [2e-3, 2e-3, 3e-3]
 
 
-def test_a_volume_that_no_worker_can_hold_is_refused_before_it_is_read(path, monkeypatch):
+def test_a_volume_that_no_worker_can_hold_is_rejected_before_it_is_read(path, monkeypatch):
     check_size((512, 512, 512))
     with pytest.raises(InvalidInput, match=r"shape \(1024, 1024, 1024\)"):
         check_size((1024, 1024, 1024))

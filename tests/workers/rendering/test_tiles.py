@@ -12,7 +12,7 @@ SIDES = st.integers(1, 4096)
 
 
 @given(SIDES, SIDES, st.integers(1, 8))
-def test_every_row_is_in_one_strip(width, height, times):
+def test_every_row_is_in_exactly_one_tile(width, height, times):
     parts = tile_rows(SimpleNamespace(width=width, height=height, times=times))
     assert [row for first, last in parts for row in range(first, last)] == list(range(height))
     rays = [(last - first) * width * times**2 for first, last in parts]

@@ -53,7 +53,7 @@ def test_frames_go_round():
         ({"zoom": 0.0}, "zoom"),
     ],
 )
-def test_what_is_refused(given, field):
+def test_rejects_invalid_input(given, field):
     with pytest.raises(InvalidInput) as caught:
         Turntable(**given)
     assert caught.value.field == field
@@ -109,7 +109,7 @@ def test_it_stops_between_pictures(cluster, path, folder, tmp_path):
     assert not list(tmp_path.glob("t.zip*"))
 
 
-def test_what_a_worker_refuses_ends_it(cluster, path, folder, tmp_path):
+def test_worker_rejection_stops_the_turntable(cluster, path, folder, tmp_path):
     table = Turntable(**{**SMALL, "iso": (9.0,)}, frames=3)
     with pytest.raises(InvalidInput, match="the range of the volume"):
         draw_turntable(cluster.client, path, table, tmp_path / "t.zip", folder)

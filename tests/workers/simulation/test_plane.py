@@ -22,7 +22,7 @@ def test_progress_and_shapes():
     assert scan.water_speed_mps == 1400.0
 
 
-def test_noise_has_the_size_asked_for():
+def test_noise_has_the_requested_size():
     quiet, loud = simulate(SMALL), simulate(replace(SMALL, noise_s=1e-7, seed=4))
     noise = (loud.delta_tof_s - quiet.delta_tof_s)[~np.eye(20, dtype=bool)]
     assert noise.std() == pytest.approx(1e-7, rel=0.15)
@@ -30,7 +30,7 @@ def test_noise_has_the_size_asked_for():
     assert np.array_equal(simulate(replace(SMALL, noise_s=1e-7, seed=4)).delta_tof_s, loud.delta_tof_s)
 
 
-def test_amplitudes_come_when_asked_for_and_leave_the_times_alone(tmp_path):
+def test_amplitudes_are_optional_and_do_not_change_times(tmp_path):
     plain, full = simulate(SMALL), simulate(replace(SMALL, attenuation=True))
     assert plain.log_ratio_np is None
     assert np.array_equal(full.delta_tof_s, plain.delta_tof_s)

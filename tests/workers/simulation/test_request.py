@@ -32,7 +32,7 @@ TIMES = {"refinement": st.none() | st.integers(4, 64), "attenuation": st.none() 
         | {"waveform": st.just(True), "frequency_hz": st.floats(1e4, 1e6), "emissions": st.just(8)}
     )
 )
-def test_what_is_stored_gives_the_same_scan(given):
+def test_stored_request_gives_the_same_scan(given):
     asked = PhantomScan(**given)
     stored = json.loads(json.dumps(asked.plain()))
     assert PhantomScan(**stored).chosen() == asked.chosen()
@@ -41,7 +41,7 @@ def test_what_is_stored_gives_the_same_scan(given):
             assert getattr(asked.chosen(), name) == value
 
 
-def test_which_scan_is_meant():
+def test_request_selects_the_phantom():
     assert PhantomScan().chosen() == SimulationSettings()
     assert PhantomScan(phantom="table7").chosen() == VolumeSimulationSettings()
     waves = PhantomScan(waveform=True, nodes=256, elements=128).chosen()
@@ -63,7 +63,7 @@ def test_which_scan_is_meant():
         *(({name: 4}, name) for name in CONDITIONS if name not in ("refinement", "noise_s", "attenuation")),
     ],
 )
-def test_what_is_refused(given, field):
+def test_rejects_invalid_input(given, field):
     with pytest.raises(InvalidInput) as caught:
         PhantomScan(**given)
     assert caught.value.field == field

@@ -71,7 +71,7 @@ def test_every_emitter_is_in_one_part(elements, nodes, slices):
         (PhantomScan(phantom="table7", elements=4096, slices=1000), "elements"),
     ],
 )
-def test_what_no_worker_can_hold_is_refused(asked, field):
+def test_rejects_grids_larger_than_worker_memory(asked, field):
     with pytest.raises(InvalidInput) as caught:
         plan_simulation(
             asked, [WORKER, WorkerCapacity(64 * MIB, ("recon",)), WorkerCapacity(2**50, ("render",))]
@@ -80,7 +80,7 @@ def test_what_no_worker_can_hold_is_refused(asked, field):
     assert "bytes" in caught.value.accepted
 
 
-def test_files_that_nobody_could_read_and_too_many_tasks_are_refused(monkeypatch):
+def test_rejects_oversize_files_and_too_many_tasks(monkeypatch):
     with pytest.raises(InvalidInput, match=r"elements: found .* a file of"):
         plan_simulation(PhantomScan(phantom="table7", elements=4096, slices=1000), [])
     monkeypatch.setattr(simulation_planning, "MAX_TASKS", 20)
@@ -96,7 +96,7 @@ def test_without_workers_it_is_planned_for_one():
 
 @pytest.mark.slow
 @pytest.mark.nightly
-def test_tasks_take_what_the_plan_says():
+def test_tasks_stay_within_the_planned_memory():
     scans = [
         {"nodes": 100, "elements": 300, "snr": 10.0},
         {"waveform": True, "frequency_hz": 3e5, "emissions": 2, "elements": 256, "snr": 9.0},

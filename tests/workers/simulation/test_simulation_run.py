@@ -47,7 +47,7 @@ def test_the_record_is_that_of_the_file(run, tmp_path):
     assert [(one.done, one.total) for one in seen] == [(done, total) for done in range(total + 1)]
 
 
-def test_what_was_kept_is_not_made_again(run, tmp_path):
+def test_finished_parts_are_not_recomputed(run, tmp_path):
     done = []
     with pytest.raises(Cancelled):
         run(TIMES, lambda now: done.append(now.done), lambda: bool(done and done[-1]))
@@ -62,7 +62,7 @@ def test_what_was_kept_is_not_made_again(run, tmp_path):
     assert (tmp_path / "scan.h5").read_bytes() == (tmp_path / "here.h5").read_bytes()
 
 
-def test_a_damaged_part_is_made_anew(run, tmp_path):
+def test_damaged_part_is_recomputed(run, tmp_path):
     run(TIMES)
     first = (tmp_path / "scan.h5").read_bytes()
     damaged = parts_of(TIMES.chosen())[1].path(folder_of(tmp_path / "work"))
@@ -76,7 +76,7 @@ def test_a_damaged_part_is_made_anew(run, tmp_path):
     assert (tmp_path / "scan.h5").read_bytes() == first
 
 
-def test_a_stop_does_not_wait_for_the_emission_at_work_which_ends_with_the_folder(run, tmp_path, monkeypatch):
+def test_cancellation_does_not_wait_for_the_running_emission(run, tmp_path, monkeypatch):
     begun, ended = threading.Event(), threading.Event()
 
     def endless(settings, emission, poll):
@@ -99,7 +99,7 @@ def test_a_stop_does_not_wait_for_the_emission_at_work_which_ends_with_the_folde
     assert ended.wait(60.0)
 
 
-def test_an_emission_asks_between_its_steps_whether_anybody_waits(tmp_path, monkeypatch):
+def test_emissions_poll_for_cancellation_between_steps(tmp_path, monkeypatch):
     monkeypatch.setattr(time_blocks, "BLOCK", 10**6)
     settings = PhantomScan(**WAVES).chosen()
     polled = []
@@ -115,7 +115,7 @@ def test_an_emission_asks_between_its_steps_whether_anybody_waits(tmp_path, monk
     assert not list(tmp_path.iterdir())
 
 
-def test_a_task_whose_job_has_gone_ends_early_and_leaves_nothing(tmp_path, monkeypatch):
+def test_task_of_a_deleted_job_ends_early(tmp_path, monkeypatch):
     settings = TIMES.chosen()
     folder = tmp_path / "gone"
     make_part(settings, parts_of(settings)[0], folder)

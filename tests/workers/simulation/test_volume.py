@@ -58,7 +58,7 @@ def test_moved_ring_in_space_is_the_diagonal_of_all_rings_at_once(tmp_path):
     assert np.array_equal(found.delta_tof_s, all_at_once.delta_tof_s)
 
 
-def test_noise_has_the_ratio_asked_for(moved):
+def test_noise_has_the_requested_ratio(moved):
     loud = simulate(replace(SMALL, snr=10.0, seed=5))
     pairs = np.broadcast_to(~np.eye(10, dtype=bool), (3, 10, 10))
     for name in ("delta_tof_s", "log_ratio_np"):

@@ -34,7 +34,7 @@ def test_the_pulse_in_water_comes_when_it_should_and_falls_with_the_distance(sca
     assert np.linalg.norm(found - expected) < 0.08 * np.linalg.norm(expected)
 
 
-def test_the_object_is_heard(scan):
+def test_object_delays_are_recorded(scan):
     water = scan.waveform.water
     assert np.linalg.norm(scan.waveform.object - water) > 0.005 * np.linalg.norm(water)
 
@@ -65,7 +65,7 @@ def test_the_whole_breast_is_on_the_grid_and_the_ring_about_its_middle():
 
 
 @pytest.mark.parametrize("words", [{"frequency_hz": 2e6}, {"frequency_hz": 3e5, "side_m": 0.6}])
-def test_more_nodes_than_anybody_waits_for_are_refused(words):
+def test_rejects_grids_that_take_too_long(words):
     with pytest.raises(InvalidInput) as caught:
         VolumeWaveSettings(**words)
     assert caught.value.field == "frequency_hz"

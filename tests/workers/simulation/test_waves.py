@@ -29,7 +29,7 @@ def test_the_pulse_in_water_comes_when_it_should(scan):
     assert abs(late.mean()) < 1.0 / SMALL.frequency_hz
 
 
-def test_emitter_and_receiver_may_change_places(scan):
+def test_traces_are_reciprocal(scan):
     for name in ("object", "water"):
         traces = getattr(scan.waveform, name)
         there, back = traces[0, scan.tx[2]], traces[2, scan.tx[0]]
@@ -44,7 +44,7 @@ def test_the_object_is_picked_slower_than_water_through_fat(scan):
     assert np.isfinite(across).any()
 
 
-def test_noise_has_the_size_that_was_asked_for(scan):
+def test_noise_has_the_requested_size(scan):
     noisy = simulate(replace(SMALL, snr=20.0))
     added = noisy.waveform.water - scan.waveform.water
     expected = np.median(np.abs(scan.waveform.water).max(axis=-1)) / 20.0
@@ -76,7 +76,7 @@ def test_the_dispersion_is_within_its_budget():
         ({"seed": -1}, "seed"),
     ],
 )
-def test_bad_settings_are_refused(words, field):
+def test_bad_settings_are_rejected(words, field):
     with pytest.raises(InvalidInput) as caught:
         WaveSimulationSettings(**words)
     assert caught.value.field == field

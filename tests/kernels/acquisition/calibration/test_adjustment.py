@@ -77,14 +77,14 @@ def test_an_eccentricity_of_a_millimetre_comes_back():
     assert np.abs(without_gauge(found.element_position_m - place)).max() < 1e-7
 
 
-def test_a_shift_and_a_turn_of_the_whole_array_are_not_seen():
+def test_shift_and_rotation_of_the_whole_array_are_unobservable():
     place = ring(ELEMENTS) @ np.array([[0.8, -0.6], [0.6, 0.8]]) + [1e-3, 0.0]
     times = np.linalg.norm(place[:, None] - place[None], axis=-1) / WATER_MPS
     found = calibrate(drawn(), times)
     np.testing.assert_allclose(found.element_position_m, ring(ELEMENTS), atol=1e-8)
 
 
-def test_the_deviations_tell_the_errors():
+def test_estimated_deviations_match_the_errors():
     normalised: dict[str, list[np.ndarray]] = {"position": [], "emission": [], "reception": []}
     for seed in range(8):
         planted = Planted(seed, noise_s=2e-8)
@@ -142,7 +142,7 @@ def test_a_calibrated_dataset_has_the_positions_and_the_speed():
     assert applied.water_temperature_c is None
 
 
-def test_what_cannot_be_calibrated_is_refused():
+def test_rejects_scans_that_cannot_be_calibrated():
     planted = Planted()
     with pytest.raises(InvalidInput, match="times_s: found shape"):
         calibrate(drawn(), planted.times[1:])

@@ -28,7 +28,7 @@ def displaced(noise: float = 0.0):
     return replace(moved, waveform=both), distance / WATER_MPS, change
 
 
-def test_times_are_exact_to_a_small_part_of_a_sample_but_for_what_all_share():
+def test_times_are_subsample_exact_up_to_a_common_offset():
     dataset, arrival, _ = displaced()
     late = water_times(dataset) - arrival
     far = dataset.distance_m() > 0.02
@@ -49,7 +49,7 @@ def test_traces_calibrate_the_array():
     assert np.abs(found.element_position_m).max() < RADIUS_M + 2e-3
 
 
-def test_silent_and_broken_traces_have_no_time_and_masked_pairs_none():
+def test_silent_broken_and_masked_traces_have_no_time():
     dataset, _, _ = displaced()
     water = dataset.waveform.water.copy()
     water[3, 12], water[4, 13] = 0.0, np.nan

@@ -76,13 +76,13 @@ def test_noise_spreads_the_values_and_moves_their_mean_little(way, loss, noise, 
 
 
 @pytest.mark.parametrize("way", SPECTRA)
-def test_what_loses_all_frequencies_alike_is_invisible_to_the_spectrum(way):
+def test_frequency_independent_loss_does_not_change_the_spectral_ratio(way):
     assert np.abs(heard(0.0, way, height=np.exp(-1.0))[APART]).max() < 1e-3
     assert heard(0.0, "ratio", height=np.exp(-1.0))[APART] == pytest.approx(1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_louder_noise_leaves_out_and_never_lies(way):
+def test_strong_noise_drops_pairs_and_does_not_bias_them(way):
     counts = []
     for noise in (0.0, 0.05, 0.2, 1.0):
         found = heard(1.0, way, noise=noise)[APART]
@@ -151,6 +151,6 @@ def test_pairs_without_a_time_and_slices_of_their_own():
         ({"center_frequency_hz": None}, "spectrum", "center_frequency_hz"),
     ],
 )
-def test_what_is_lacking_is_named(changes, way, field):
+def test_names_missing_input(changes, way, field):
     with pytest.raises(InvalidInput, match=field):
         read_log_ratios(replace(plain(), **changes), range(ELEMENTS), np.zeros(APART.shape), way)

@@ -28,7 +28,7 @@ def test_noise_below_half_a_period_stays():
     assert np.isfinite(consistent(scan(noise), noise, HALF_PERIOD_S)).all()
 
 
-def test_lone_skips_go_and_nothing_else():
+def test_only_isolated_cycle_skips_are_removed():
     delta = np.zeros((32, 32))
     delta[3, 20], delta[9, 28], delta[15, 2] = 1e-6, -1e-6, 5e-6
     kept = consistent(scan(delta), delta, HALF_PERIOD_S)
@@ -37,7 +37,7 @@ def test_lone_skips_go_and_nothing_else():
     assert np.isfinite(delta).all()
 
 
-def test_missing_neighbours_say_nothing():
+def test_missing_neighbours_are_ignored():
     delta = np.full((16, 16), np.nan)
     delta[2, 9] = 3e-6
     kept = consistent(scan(delta), delta, HALF_PERIOD_S)

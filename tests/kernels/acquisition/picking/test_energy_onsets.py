@@ -42,6 +42,6 @@ def test_silence_and_too_few_samples_have_none(onset):
     assert np.isnan(onset(trace(90.0), 88, 91, PERIOD))
 
 
-def test_what_begins_high_has_not_risen():
+def test_signals_that_start_high_have_no_onset():
     assert np.isnan(risen(np.array([1.0, 0.4, 0.8]), 0))
     assert risen(np.array([0.0, 0.25, 0.75, 1.0]), 0) == pytest.approx(1.5)

@@ -37,7 +37,7 @@ def test_known_delays_come_back_to_a_hundredth_of_a_sample(picker, largest, seed
 
 
 @every_picker
-def test_sigma_is_the_error_in_noise(picker):
+def test_sigma_equals_the_error_in_noise(picker):
     delay = smooth_delay(48, 1.0e-6)
     dataset = scan(delay, elements=48, noise=0.1)
     picked = pick(dataset, picker)
@@ -167,13 +167,13 @@ def test_slices_are_picked_one_by_one_and_progress_counts_emissions():
         ({"center_frequency_hz": None}, "acquisition@center_frequency_hz"),
     ],
 )
-def test_what_is_missing_is_named(change, field):
+def test_names_missing_input(change, field):
     with pytest.raises(InvalidInput) as refused:
         pick(replace(scan(elements=4), **change))
     assert refused.value.field == field
 
 
-def test_a_scan_without_water_and_an_unknown_picker_are_refused():
+def test_a_scan_without_water_and_an_unknown_picker_are_rejected():
     dataset = scan(elements=4)
     with pytest.raises(InvalidInput, match="waveform/water"):
         pick(replace(dataset, waveform=replace(dataset.waveform, water=None)))

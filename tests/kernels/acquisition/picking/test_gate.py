@@ -74,7 +74,7 @@ def test_pulses_that_are_not_whole_have_no_power():
     assert np.isfinite(np.delete(power, [0, *broken], axis=0)).all()
 
 
-def test_water_without_a_pulse_is_refused():
+def test_water_without_a_pulse_is_rejected():
     dataset = water()
     silent = replace(dataset, waveform=Waveform(dataset.waveform.object, 0.0 * dataset.waveform.water))
     with pytest.raises(InvalidInput, match="waveform/water"):

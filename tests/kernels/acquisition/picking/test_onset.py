@@ -30,7 +30,7 @@ def test_the_match_finds_a_shift_to_a_hundredth_of_a_sample(shift):
     assert correlation > 0.99
 
 
-def test_the_match_refuses_what_lies_beyond_its_reach():
+def test_match_rejects_shifts_beyond_its_window():
     rising, _ = match_pulse(trace(90.0), trace(94.0), 82, 98, 0.0, 2.0)
     assert np.isnan(rising)
     _, correlation = match_pulse(trace(90.0), trace(97.0), 82, 98, 0.0, 2.0)

@@ -21,6 +21,6 @@ def test_the_settings_offer_them_all():
     assert get_args(get_type_hints(PickingSettings)["picker"]) == tuple(PICKERS)
 
 
-def test_an_unknown_one_is_refused_with_the_names_known():
+def test_an_unknown_one_is_rejected_with_the_names_known():
     with pytest.raises(InvalidInput, match="aic, threshold, energy-ratio"):
         picker_named("eye")

@@ -66,7 +66,7 @@ def test_a_recorded_wavelet_takes_the_place_of_the_measured_one():
         pick(replace(dataset, wavelet=np.zeros(40)), "matched")
 
 
-def test_water_without_a_pulse_is_refused():
+def test_water_without_a_pulse_is_rejected():
     dataset = scan(elements=24)
     silent = replace(dataset, waveform=Waveform(dataset.waveform.object, 0 * dataset.waveform.water))
     with pytest.raises(InvalidInput, match="waveform/water"):

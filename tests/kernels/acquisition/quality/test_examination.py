@@ -51,7 +51,7 @@ def assert_survived(examined: Examined, atol: float) -> None:
     np.testing.assert_allclose(delta[both], sought()[both], atol=atol)
 
 
-def test_a_clean_scan_has_no_findings_and_goes_on_whole():
+def test_clean_scan_has_no_findings_and_is_unchanged():
     examined = examine(clean())
     assert examined.report.verdict == "clean"
     assert examined.report.findings == ()
@@ -117,7 +117,7 @@ def test_without_a_water_shot_it_is_estimated_where_times_are_picked():
 
 
 @pytest.mark.parametrize("factor", [0.4, 2.5])
-def test_a_wrong_centre_frequency_is_refused(factor):
+def test_a_wrong_centre_frequency_is_rejected(factor):
     examined = examine(replace(clean(), center_frequency_hz=factor * FREQUENCY_HZ))
     assert examined.report.refusal.check == "centre frequency"
     assert examined.report.refusal.value == pytest.approx(1.0 / factor, rel=0.25)
@@ -167,7 +167,7 @@ def test_the_report_is_plain_json():
 
 @pytest.mark.parametrize("fill", [0.0, 3.0, np.nan, np.inf, "noise"])
 @pytest.mark.parametrize("shape", [(3, 3, 40), (1, 8, 2), (8, 2, 300)])
-def test_a_scan_of_nothing_is_refused_with_a_reason(fill, shape):
+def test_rejects_an_empty_scan(fill, shape):
     random = np.random.default_rng(0)
     ntx, nrx, _ = shape
     traces = [

@@ -77,7 +77,7 @@ class Planted:
     seed=st.integers(0, 2**32 - 1),
 )
 @settings(max_examples=5, deadline=None)
-def test_all_at_once_are_named_and_survived(sought, elements, roles, seed):
+def test_all_faults_together_are_found_and_corrected(sought, elements, roles, seed):
     planted = Planted(elements, roles, seed)
     examined = examine(planted.dataset)
     dead, swapped = set(planted.dead), set(planted.swapped)
@@ -118,7 +118,7 @@ def test_all_at_once_are_named_and_survived(sought, elements, roles, seed):
     assert outliers
 
 
-def test_pulses_that_are_cut_off_do_not_tell_another_speed():
+def test_truncated_pulses_do_not_bias_the_water_speed():
     """Places that are wrong a little leave room for such crests in the line, which then leans by 3 %."""
     clipped = (np.clip(t, -0.7, 0.7) for t in (wave_scan().waveform.object, wave_scan().waveform.water))
     angle = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
@@ -136,7 +136,7 @@ def test_pulses_that_are_cut_off_do_not_tell_another_speed():
         ({"center_frequency_hz": None}, "centre frequency", "none"),
     ],
 )
-def test_what_cannot_be_put_right_is_refused_with_the_reason(changes, check, reason):
+def test_rejects_faults_that_cannot_be_corrected(changes, check, reason):
     examined = examine(replace(wave_scan(), **changes))
     assert examined.picked is None
     assert examined.report.refusal.check == check

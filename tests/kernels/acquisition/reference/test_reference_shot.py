@@ -22,7 +22,7 @@ def estimated(dataset):
 
 
 @pytest.mark.parametrize("start_s", [0.0, 1e-6, -1e-6])
-def test_it_is_the_water_shot_that_was_left_out(start_s):
+def test_estimate_matches_the_omitted_water_shot(start_s):
     dataset, emission, reception = with_elements(
         scan(DELAY_S, elements=ELEMENTS, noise=0.02), 3, start_s, 0.3
     )

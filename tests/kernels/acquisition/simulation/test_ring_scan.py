@@ -40,7 +40,7 @@ def test_finer_grids_agree():
     assert np.abs(coarse.delta_tof(emitters) - fine.delta_tof(emitters)).max() < 6e-8
 
 
-def test_inverse_crime_is_refused():
+def test_inverse_crime_is_rejected():
     with pytest.raises(InvalidInput, match="inverse crime"):
         TravelTimeScan(table6(), Ring(8, 0.09), 0.2, refinement=2)
 

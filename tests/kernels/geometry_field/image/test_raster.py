@@ -64,7 +64,7 @@ def test_the_sides_of_an_open_patch_are_its_seam():
     assert len(seam_sides(chart)) == 10
 
 
-def test_a_small_image_is_refused_and_a_flipped_face_is_left_out():
+def test_a_small_image_is_rejected_and_a_flipped_face_is_left_out():
     chart = flat_chart(flat_patch(4, 4))
     with pytest.raises(InvalidInput, match="size: found 7"):
         rasterised(chart, 7)

@@ -32,7 +32,7 @@ def test_it_stops_at_the_coarsest(chart):
     assert fitted.image.size == 33
 
 
-def test_a_threshold_that_cannot_be_reached_is_refused(chart):
+def test_a_threshold_that_cannot_be_reached_is_rejected(chart):
     with pytest.raises(InvalidInput, match=r"threshold: found 1e-06, where 33² pixels have"):
         fitted_image(chart, 1e-6, finest=33, samples=1000)
 

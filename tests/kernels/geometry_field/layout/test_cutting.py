@@ -71,7 +71,7 @@ def test_ends_do_not_repeat_and_run_out():
     assert not set(ends) & set(np.flatnonzero(first.vertices).tolist())
 
 
-def test_flat_surfaces_ask_for_no_end():
+def test_flat_surfaces_need_no_cut_end():
     patch = flat_patch()
     cutter = Cutter(patch, topology_of(patch.faces))
     assert list(cutter.far_ends(cutter.first())) == []

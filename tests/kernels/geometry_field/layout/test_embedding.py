@@ -59,7 +59,7 @@ def test_a_layout_without_folds_stays_as_it_is():
     np.testing.assert_array_equal(unfolded(-plane * (1, -1), disk), -plane * (1, -1))
 
 
-def test_what_does_not_move_stays():
+def test_fixed_vertices_stay():
     disk = disk_of(flat_patch(5, 5))
     plane = np.random.default_rng(0).uniform(size=(25, 2))
     found = relaxed(plane, disk.faces, np.array([6, 12]))

@@ -43,7 +43,7 @@ def test_without_handles_nothing_is_cut(surface):
     assert not handle_cut(topology, lengths_of(surface, topology)).any()
 
 
-def test_dead_ends_go():
+def test_dead_ends_are_removed():
     topology = topology_of(torus(6, 5).faces)
     one, other = np.array([0, 5, 10, 1]), np.array([5, 10, 15, 2])
     cut = np.zeros(len(topology.edges), bool)

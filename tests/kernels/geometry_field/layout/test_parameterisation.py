@@ -117,13 +117,13 @@ def test_size_place_and_unit_do_not_matter():
         ([(0, 1, 2), (1, 0, 6)], "1 without area"),
     ],
 )
-def test_other_meshes_are_refused(faces, words):
+def test_other_meshes_are_rejected(faces, words):
     places = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (2, 0, 0)]
     with pytest.raises(InvalidInput, match=words):
         parameterise(mesh(places, faces))
 
 
-def test_touching_fans_are_refused():
+def test_touching_fans_are_rejected():
     patch = flat_patch(4, 4)
     # The faces of one side of the patch with those of the other meet in a vertex alone.
     kept = patch.faces[np.isin(np.arange(18), [0, 9, 8, 16, 17, 7, 15])]

@@ -110,7 +110,7 @@ def test_positions_lie_on_the_returned_faces():
     assert np.quantile(np.linalg.norm(on_face - on_ray, axis=1), 0.99) < 1e-5
 
 
-def test_a_field_that_meets_nothing_finds_nothing():
+def test_empty_field_returns_no_hit():
     surface = ball(1)
     empty = field_of(surface, 4)
     empty.faces[:] = -1

@@ -90,6 +90,6 @@ def test_a_line_along_a_face_stays_on_it():
 
 
 @pytest.mark.parametrize("n", [1, 49])
-def test_other_numbers_of_samples_are_refused(n):
+def test_other_numbers_of_samples_are_rejected(n):
     with pytest.raises(InvalidInput, match="samples"):
         samples(n)

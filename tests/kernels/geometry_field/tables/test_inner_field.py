@@ -65,6 +65,6 @@ def test_batches_make_the_same_table():
 
 
 @pytest.mark.parametrize("divisions", [0, 257])
-def test_other_divisions_are_refused(divisions):
+def test_other_divisions_are_rejected(divisions):
     with pytest.raises(InvalidInput, match="divisions"):
         spread_points(ball(1), divisions)

@@ -63,18 +63,18 @@ def test_batches_make_the_same_table():
     np.testing.assert_array_equal(field.fractions, whole.fractions)
 
 
-def test_a_table_with_rows_missing_is_refused():
+def test_a_table_with_rows_missing_is_rejected():
     with pytest.raises(InvalidInput, match="batches"):
         outer_field(4, [build_rows(ball(1), 4, 0, 90)])
 
 
 @pytest.mark.parametrize("rows", [(-1, 3), (5, 4), (90, 97)])
-def test_rows_that_there_are_not_are_refused(rows):
+def test_rejects_missing_rows(rows):
     with pytest.raises(InvalidInput, match="rows"):
         build_rows(ball(1), 4, *rows)
 
 
-def test_entries_beside_a_hit_tell_where_a_walk_may_begin():
+def test_entries_next_to_a_hit_give_start_points():
     n, surface = 4, ball(2)
     field = field_of(surface, n)
     row, beyond = 6 * n, 0

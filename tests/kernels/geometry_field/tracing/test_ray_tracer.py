@@ -131,7 +131,7 @@ def test_rays_through_a_ball_obey_snells_law(index):
     np.testing.assert_allclose(column[inside], expected, atol=3.0)
 
 
-def test_light_is_held_in_glass_that_it_meets_too_flatly():
+def test_total_internal_reflection():
     # Within a cube of index 2 no ray that came in by one side leaves by the next: it is mirrored on.
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -222,7 +222,7 @@ def test_the_walk_makes_the_exact_picture():
     assert odd["walk"] <= min(odd["plane"], odd["linear"]) <= odd["nearest"]
 
 
-def test_the_eye_may_ask_the_field_too():
+def test_primary_rays_can_use_the_field():
     exact, walk, nearest = (picture(crowded(), eye=eye) for eye in ("exact", "walk", "nearest"))
     assert np.mean(np.abs(exact - walk).max(axis=2) > 8) < 0.01
     assert np.mean(np.abs(exact - nearest).max(axis=2) > 8) > 0.03
@@ -283,7 +283,7 @@ def test_rays_that_start_in_the_cube_of_another_body_see_it():
         ("way", lambda: TraceSettings(way="furthest")),
     ],
 )
-def test_what_makes_no_picture_is_refused(field, make):
+def test_rejects_invalid_pictures(field, make):
     with pytest.raises(InvalidInput) as caught:
         make()
     assert caught.value.field == field

@@ -53,7 +53,7 @@ def test_a_shape_without_fields_is_intersected_exactly():
     assert odd(world_of(scene), "float64") == 0.0
 
 
-def test_what_the_device_gets_wrong_the_cpu_does(monkeypatch):
+def test_cpu_replaces_wrong_device_results(monkeypatch):
     world = world_of(crowded())
     tracer, settings = tracer_of(world), TraceSettings(32, 32)
     monkeypatch.setattr(tracer, "follow", lambda camera, how: np.zeros((how.rows, how.columns, 3), np.uint8))
@@ -64,12 +64,12 @@ def test_what_the_device_gets_wrong_the_cpu_does(monkeypatch):
     np.testing.assert_array_equal(tracer.trace(CAMERA, settings), found)
 
 
-def test_a_device_that_passes_is_believed():
+def test_device_that_passes_the_self_test_is_used():
     world = world_of(crowded())
     found = tracer_of(world).trace(CAMERA, TraceSettings(32, 32))
     np.testing.assert_array_equal(found, tracer_of(world).follow(CAMERA, TraceSettings(32, 32)))
 
 
-def test_other_precisions_are_refused():
+def test_other_precisions_are_rejected():
     with pytest.raises(InvalidInput, match="precision"):
         on_the_device(world_of(crowded()), "float16")

@@ -55,7 +55,7 @@ def rows(residual):
     return Rows(np.array([0, 1]), np.array([300], np.int32), np.ones(1, np.float32), np.array([residual]), 1)
 
 
-def test_a_step_that_makes_the_misfit_grow_is_halved_and_then_given_up():
+def test_step_that_increases_the_misfit_is_halved_then_rejected():
     of = problem(np.zeros((8, 8)))
     states = [gauss_newton_step.begin(initial_slowness(of, None))]
     misfits = [4e-7, 2e-7, 6e-7, 5e-7, 4e-7, 3e-7]
@@ -71,7 +71,7 @@ def test_a_step_that_makes_the_misfit_grow_is_halved_and_then_given_up():
     assert [sweep.residual_rms_s for sweep in states[-1].history] == misfits
 
 
-def test_a_halved_step_that_helps_goes_on():
+def test_continues_after_a_successful_halved_step():
     of = problem(np.zeros((8, 8)))
     state = gauss_newton_step.begin(initial_slowness(of, None))
     for misfit in (4e-7, 2e-7, 6e-7, 1e-7):
@@ -115,7 +115,7 @@ def test_no_ray_through_the_image_leaves_water():
     assert np.allclose(state.slowness, 1.0 / WATER)
 
 
-def test_nothing_gained_ends_too():
+def test_stops_without_improvement():
     of = problem(np.zeros((8, 8)))
     state = gauss_newton_step.begin(initial_slowness(of, None))
     for misfit in (4e-7, 2e-7, 1.99e-7, 1.98e-7):
@@ -124,7 +124,7 @@ def test_nothing_gained_ends_too():
     assert state.done
 
 
-def test_one_image_that_gains_nothing_may_come_before_better_ones():
+def test_one_image_without_improvement_does_not_stop_the_search():
     """As bent rays gave it on waves of 1 MHz: far less was missed after an image that missed as much."""
     of = problem(np.zeros((8, 8)))
     state = gauss_newton_step.begin(initial_slowness(of, None))

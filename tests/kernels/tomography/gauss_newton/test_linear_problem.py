@@ -58,7 +58,7 @@ def test_few_data_suffice_for_few_edges(truth, rows):
 
 
 @pytest.mark.parametrize("truth", [TRUTH, BALL], ids=["2-D", "3-D"])
-def test_much_total_variation_leaves_no_edge(truth):
+def test_strong_total_variation_removes_edges(truth):
     image = settled(problem(1e3, truth))
     assert np.ptp(image) < 1e-3
 
@@ -74,7 +74,7 @@ def reweighted(edge, strength=0.05):
     return asked.image
 
 
-def test_edges_keep_their_contrast_where_height_costs_nothing():
+def test_edges_keep_their_contrast_with_a_concave_penalty():
     flattened, kept = reweighted(np.inf), reweighted(0.05)
     assert np.abs(kept - TRUTH).mean() < 0.4 * np.abs(flattened - TRUTH).mean()
 
@@ -169,7 +169,7 @@ def test_rows_far_off_count_less(penalty, strength):
 
 
 @pytest.mark.parametrize("penalty", ["total-variation", "laplacian"])
-def test_a_generous_huber_loss_changes_nothing(penalty):
+def test_large_huber_scale_equals_least_squares(penalty):
     plain, _ = problem(0.01, TRUTH, penalty=penalty).solve(np.zeros((2, *TRUTH.shape)))
     robust, _ = problem(0.01, TRUTH, penalty=penalty, huber=100.0).solve(np.zeros((2, *TRUTH.shape)))
     assert np.abs(plain - robust).max() < 1e-3

@@ -44,7 +44,7 @@ def dense(rows):
     return matrix
 
 
-def test_exact_data_leave_nothing(problem):
+def test_exact_data_have_zero_residual(problem):
     rows = linearise(problem, Settings(method="sart"), medium(), np.arange(12))
     assert np.abs(rows.residual).max() < 1e-11
     assert rows.emitters == 12

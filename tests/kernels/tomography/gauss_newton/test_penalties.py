@@ -39,7 +39,7 @@ def test_second_differences_of_a_parabola_and_of_a_plane(axes):
     assert np.allclose(laplacian(position.sum(axis=0))[inner], 0.0)
 
 
-def test_gradient_looks_along_every_axis():
+def test_gradient_covers_every_axis():
     position = np.indices((3, 4, 5)).astype(float)
     slope = gradient(position[0] + 10.0 * position[1] + 100.0 * position[2])
     assert np.array_equal(slope[:, 0, 0, 0], [1.0, 10.0, 100.0])

@@ -58,7 +58,7 @@ def test_invalid_pairs_stay_so(scan):
     assert not (held & ~valid).any()
 
 
-def test_eikonal_times_ask_for_bent_rays(scan):
+def test_eikonal_times_select_bent_rays(scan):
     seen = []
     result = reconstruct(scan, PLAN, seen.append)
     assert result.settings.rays == "curved"
@@ -91,7 +91,7 @@ def test_too_few_pairs_to_hold_some_out_get_an_image_without_trials(scan, count,
     assert np.array_equal(result.speed, reconstruct(few, result.settings).speed)
 
 
-def test_a_slice_without_pairs_is_refused(scan):
+def test_a_slice_without_pairs_is_rejected(scan):
     with pytest.raises(InvalidInput, match="traveltime"):
         reconstruct(replace(scan, valid=np.zeros(scan.delta_tof_s.shape, bool)), PLAN)
 
@@ -114,7 +114,7 @@ def test_thin_bent_rays_start_on_coarser_grids():
     assert final_settings(plan, wide).numerics.coarser_grids == 0
 
 
-def test_straight_times_ask_for_straight_rays(scan):
+def test_straight_times_select_straight_rays(scan):
     """Times integrated along straight lines, as a picker of late arrivals gives them."""
     straight = replace(PLAN, method="sart", rays="straight", iterations=1)
 
@@ -130,7 +130,7 @@ def test_straight_times_ask_for_straight_rays(scan):
         assert reconstruct(asked, PLAN).settings.rays == "straight"
 
 
-def test_exact_times_ask_for_thin_bent_rays_whatever_the_frequency(scan):
+def test_exact_times_select_thin_bent_rays_at_any_frequency(scan):
     seen = []
     result = reconstruct(replace(scan, center_frequency_hz=4e5), PLAN, seen.append)
     assert result.settings.rays == "curved"
@@ -140,7 +140,7 @@ def test_exact_times_ask_for_thin_bent_rays_whatever_the_frequency(scan):
     assert seen[-1].done == seen[-1].total
 
 
-def test_a_frequency_offers_rays_as_wide_as_its_waves(scan):
+def test_frequency_adds_finite_frequency_candidates(scan):
     assert finite_frequency_candidates(scan, PLAN) == []
     told = replace(scan, center_frequency_hz=5e5)
     assert finite_frequency_candidates(told, replace(PLAN, decomposition="volume")) == []

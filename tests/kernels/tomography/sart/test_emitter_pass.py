@@ -28,7 +28,7 @@ def moved(work, slowness, smoothing, relaxation=0.5):
     return after, coverage
 
 
-def test_what_the_image_explains_moves_nothing():
+def test_zero_residual_gives_no_update():
     work = EmitterPass.for_grid(SHAPE, len(RECEIVERS))
     slowness = image()
     nothing = np.zeros(len(RECEIVERS))
@@ -60,7 +60,7 @@ def test_straight_rays_and_their_update_are_equation_1():
     assert coverage.sum() == pytest.approx(rows.sum(), rel=1e-3)
 
 
-def test_looks_add_up_until_the_update():
+def test_contributions_accumulate_until_the_update():
     slowness = image()
     work = EmitterPass.for_grid(SHAPE, len(RECEIVERS))
     for half in (slice(None, 8), slice(8, None)):

@@ -25,7 +25,7 @@ def test_without_a_budget_all_bands_are_used():
 
 
 @given(st.floats(0.0, 1e4))
-def test_what_is_chosen_fits_or_is_the_least(minutes):
+def test_chosen_settings_fit_the_budget_or_are_minimal(minutes):
     found = within(minutes)
     least = (1, MIN_EMITTERS)
     assert SCALE.minutes(found) <= minutes or (found.numerics.bands, found.numerics.emitters) == least

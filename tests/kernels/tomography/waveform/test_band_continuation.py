@@ -49,7 +49,7 @@ def test_the_loss_is_found_and_the_speed_stays():
     assert none.max() < 0.15 * image.max()
 
 
-def test_what_elements_send_and_hear_is_not_taken_for_loss():
+def test_element_gains_are_not_attributed_to_attenuation():
     plan = replace(SETTINGS, bands=(SETTINGS.bands[2],))
     data = scan(loss=True)
     gain = np.random.default_rng(0).uniform(0.5, 2.0, data.waveform.object.shape[:2]).astype(np.float32)

@@ -50,7 +50,7 @@ def test_the_first_step_has_the_set_size_and_reduces_the_misfit(problem):
     assert not way[~problem.region].any()
 
 
-def test_a_step_that_makes_it_worse_is_shortened_and_then_given_up(problem):
+def test_step_that_increases_the_misfit_is_shortened_then_rejected(problem):
     state = first(problem)
     sizes = [np.abs(state.way).max()]
     while not state.done:

@@ -26,7 +26,7 @@ def test_derivative_is_that_of_finite_differences(seed, measure):
 
 
 @pytest.mark.parametrize("measure", MEASURES)
-def test_nothing_is_wrong_with_equal_traces(measure):
+def test_equal_traces_have_zero_misfit(measure):
     traces = np.random.default_rng(1).standard_normal((3, 30))
     value, slope = measure(traces, traces, np.ones((3, 1)))
     assert value == pytest.approx(0.0, abs=1e-14)
@@ -41,7 +41,7 @@ def test_correlation_is_blind_to_the_size_of_each_trace():
     assert misfits.correlation(simulated, factor * recorded, np.ones((3, 1)))[0] == pytest.approx(one)
 
 
-def test_silent_traces_say_nothing():
+def test_silent_traces_have_zero_misfit():
     traces = np.random.default_rng(3).standard_normal((3, 30))
     silent = traces.copy()
     silent[1] = 0.0

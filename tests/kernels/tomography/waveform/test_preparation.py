@@ -135,7 +135,7 @@ def test_only_the_region_of_interest_may_change():
 
 
 @pytest.mark.parametrize("lacking", ["water", "all"])
-def test_a_scan_without_water_shots_is_refused(lacking):
+def test_a_scan_without_water_shots_is_rejected(lacking):
     data = scan()
     waveform = replace(data.waveform, water=None) if lacking == "water" else None
     tof = None if lacking == "water" else np.ones(data.waveform.object.shape[:2])

@@ -34,7 +34,7 @@ def rays():
     return reconstruct(heard(), replace(PLAN, minutes=0.0))
 
 
-def test_auto_goes_on_with_waves_where_it_may_and_they_predict_better(rays):
+def test_auto_runs_waveform_inversion_where_it_predicts_better(rays):
     seen = []
     found = reconstruct(heard(), PLAN, seen.append)
     assert found.settings == replace(PLAN, method="waveform")
@@ -69,7 +69,7 @@ def test_waves_are_advised_where_the_image_explains_less_than_water_does(rays):
     assert noisy.provenance["waveform"].startswith("method waveform would gain little, for waves through")
 
 
-def test_without_waves_times_tell_whether_they_are_advised():
+def test_advice_without_waveform_inversion_uses_times():
     missed = Trial({}, held_out_rms_s=100e-9, shown_rms_s=50e-9)
     assert advice(Validation(), missed, 10e-9, 3.4) == (
         "method waveform is advised, for rays miss held-out times by 100 ns, whose noise is 10 ns; "
@@ -102,7 +102,7 @@ def test_a_scan_without_traces_is_not_advised():
     ("held", "expected"),
     [([(1.0, 0.9)], True), ([(1.0, 0.95)], False), ([(1.0, 0.95), (0.5, 0.48)], True), ([(1.0, 1.1)], False)],
 )
-def test_what_bands_gain_multiplies(held, expected):
+def test_improvements_of_bands_multiply(held, expected):
     image = Image(np.zeros((2, 2)), 1.0, (0.0, 0.0))
     ends = [BandEnd(image, skipped=False, history=())]
     for before, after in held:

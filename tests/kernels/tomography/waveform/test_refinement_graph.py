@@ -35,7 +35,7 @@ def test_tasks_may_finish_in_any_order():
     assert np.array_equal(found.image.attenuation, refined().image.attenuation)
 
 
-def test_a_chain_that_was_kept_goes_on_to_the_bit():
+def test_resumed_chain_gives_the_same_bits():
     expected = refined()
     # In the first band, in the second and in that of the loss; looks that wait are lost and made again.
     for stop in (25, 60, 115):
@@ -49,7 +49,7 @@ def test_a_chain_that_was_kept_goes_on_to_the_bit():
         assert other.ends[0].history == expected.ends[0].history
 
 
-def test_nothing_stands_before_the_first_band():
+def test_initial_state_has_no_band():
     graph = begun()
     assert graph.checkpoint.band is None
     assert graph.checkpoint.ends == ()
@@ -92,7 +92,7 @@ def test_progress_is_monotonic_and_history_records_the_bands():
     }
 
 
-def test_the_state_that_comes_back_from_a_step_makes_no_problem_where_the_chain_is():
+def test_state_of_a_step_holds_no_problem():
     class Remote(MemoryWaveScan):
         def problem(self, number):
             assert self.called, "the graph asked for a problem"

@@ -12,7 +12,7 @@ from bentray_kernels.wave.stencil import longest_step
 BAND = (1e5, 2.5e5)
 
 
-def test_the_filter_is_one_inside_and_nothing_outside():
+def test_filter_is_one_in_band_and_zero_outside():
     frequency = np.array([4e4, 5e4, 1e5, 2e5, 2.5e5, 3.2e5, 5e5])
     assert band_pass(frequency, BAND) == pytest.approx([0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0], abs=1e-12)
 

@@ -59,7 +59,7 @@ def test_noise_counts_as_it_does_in_water():
     assert 0.5 * found.water < found.misfit < 2.0 * found.water
 
 
-def test_nothing_is_said_where_water_shots_cannot_be_simulated():
+def test_no_report_where_water_shots_cannot_be_simulated():
     data = scan()
     random = np.random.default_rng(0).normal(size=data.waveform.water.shape).astype(np.float32)
     deaf = replace(data, waveform=replace(data.waveform, water=random))

@@ -30,6 +30,6 @@ def test_lead_and_bend_are_found(lead, bend):
     assert found.bend == pytest.approx(bend, abs=2e-15)
 
 
-def test_few_pairs_are_refused():
+def test_few_pairs_are_rejected():
     with pytest.raises(InvalidInput, match="8 pairs"):
         fit_water(Water(1500.0), DISTANCE[:5], np.ones((5, 20)), np.ones((5, 20)), STEP)

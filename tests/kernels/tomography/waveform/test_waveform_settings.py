@@ -34,7 +34,7 @@ def test_bands_rise_and_their_grids_carry_their_waves(centre):
         {"smoothing_m": -1.0},
     ],
 )
-def test_bad_bands_are_refused(words):
+def test_bad_bands_are_rejected(words):
     with pytest.raises(InvalidInput):
         Band(**{"low_hz": 1e5, "high_hz": 2e5, "spacing_m": 1e-3} | words)
 
@@ -50,14 +50,14 @@ def test_bad_bands_are_refused(words):
         ({"memory": 0}, "memory"),
     ],
 )
-def test_bad_settings_are_refused(words, field):
+def test_bad_settings_are_rejected(words, field):
     with pytest.raises(InvalidInput) as caught:
         WaveSettings(**{"bands": bands(4e5)} | words)
     assert caught.value.field == field
 
 
 @pytest.mark.parametrize("settings", [bands(4e5)[0], WaveSettings(bands(4e5))], ids=["band", "all"])
-def test_every_number_has_a_range_and_what_lies_outside_is_refused(settings):
+def test_rejects_numbers_out_of_range(settings):
     numbers = {one.name for one in fields(settings) if one.type in ("int", "float")}
     assert numbers == set(ranges_of(type(settings)))
     for name, within in ranges_of(type(settings)).items():
@@ -69,6 +69,6 @@ def test_every_number_has_a_range_and_what_lies_outside_is_refused(settings):
 
 
 @pytest.mark.parametrize("window", [(1e-5, float("nan")), (float("inf"), 1e-5)])
-def test_a_window_without_end_is_refused(window):
+def test_a_window_without_end_is_rejected(window):
     with pytest.raises(InvalidInput, match="window_s"):
         WaveSettings(bands(4e5), window_s=window)

@@ -12,7 +12,7 @@ def pulses(shift=0.0, width=4.0):
     return np.exp(-(((time - 40.0 - shift) / width) ** 2))
 
 
-def test_the_wavelet_is_found_again():
+def test_wavelet_is_recovered():
     rng = np.random.default_rng(0)
     green = rng.standard_normal((5, 60)) * np.exp(-np.arange(60) / 10.0)
     pulse = pulses()
@@ -24,6 +24,6 @@ def test_the_wavelet_is_found_again():
     assert np.abs(fit_wavelet(pulse, heard(pulse), heard(true)) - true).max() < 0.02
 
 
-def test_silence_is_refused():
+def test_rejects_silence():
     with pytest.raises(InvalidInput, match="waveform/water"):
         fit_wavelet(pulses(), np.ones((3, 200)), np.zeros((3, 200)))

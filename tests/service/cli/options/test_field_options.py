@@ -13,7 +13,7 @@ from bentray_workers.rendering.field_view import CHOICES, FieldView
 
 
 @pytest.mark.parametrize(("options", "kind"), [(SETTINGS, FieldSettings), (VIEW, FieldView)])
-def test_every_field_has_an_option_that_tells_its_default(options, kind) -> None:
+def test_every_field_has_an_option_with_its_default(options, kind) -> None:
     assert list(options) == [field.name for field in fields(kind)]
     assert {name: option.default for name, option in options.items()} == {
         field.name: str(field.default) for field in fields(kind)
@@ -26,7 +26,7 @@ def test_the_help_names_every_choice() -> None:
             assert all(choice in OPTIONS[name].help for choice in choices), name
 
 
-def test_each_takes_its_own() -> None:
+def test_each_option_sets_its_own_field() -> None:
     asked = FieldOptions({"samples": 8, "mode": "refract"})
     assert asked.settings() == FieldSettings(samples=8)
     assert asked.view() == FieldView(mode="refract")

@@ -25,7 +25,7 @@ def test_an_output_folder_is_made_with_its_parents(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("below", ["", "deeper"])
-def test_a_file_in_the_way_of_an_output_folder_is_named(tmp_path: Path, below: str) -> None:
+def test_file_in_place_of_an_output_folder_is_named(tmp_path: Path, below: str) -> None:
     (tmp_path / "taken").touch()
     with pytest.raises(InvalidInput, match="a file is in the way"):
         output_folder(tmp_path / "taken" / below)
@@ -47,12 +47,14 @@ def test_an_output_file_needs_a_folder_and_is_none(tmp_path: Path) -> None:
         output_file(tmp_path, force=True)
 
 
-def test_a_folder_that_takes_no_file_is_refused_before_the_work() -> None:
+def test_a_folder_that_takes_no_file_is_rejected_before_the_work() -> None:
     with pytest.raises(InvalidInput, match="a writable folder"):
         output_folder(Path("/proc/self"))
 
 
-def test_a_file_that_cannot_be_written_or_has_another_name_is_refused_before_the_work(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_written_or_has_another_name_is_rejected_before_the_work(
+    tmp_path: Path,
+) -> None:
     with pytest.raises(InvalidInput, match="a writable folder"):
         output_file(Path("/proc/self/p.png"), force=False)
     with pytest.raises(InvalidInput, match=r"ending in \.png"):

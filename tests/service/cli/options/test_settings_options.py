@@ -86,7 +86,7 @@ def test_every_setting_has_its_option() -> None:
     assert list(OPTIONS) == list(PLACES) == [name for _, name, _ in CHOICES]
 
 
-def test_nothing_given_means_the_defaults_of_the_settings() -> None:
+def test_no_options_give_default_settings() -> None:
     assert settings_from(Asked({})) == Settings()
 
 

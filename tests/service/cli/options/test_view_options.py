@@ -12,7 +12,7 @@ from bentray_service.cli.options.view_options import OPTIONS, ViewOptions
 from bentray_workers.rendering.refraction_view import RefractionView
 
 
-def test_every_field_has_an_option_that_tells_its_default() -> None:
+def test_every_field_has_an_option_with_its_default() -> None:
     assert list(OPTIONS) == [field.name for field in fields(RefractionView)]
     for field in fields(RefractionView):
         if field.name == "iso":
@@ -21,7 +21,7 @@ def test_every_field_has_an_option_that_tells_its_default() -> None:
         assert OPTIONS[field.name].default == str(default)
 
 
-def test_what_is_left_out_takes_the_default() -> None:
+def test_omitted_options_take_defaults() -> None:
     assert ViewOptions({}).view() == (RefractionView(), None)
     asked = ViewOptions({"iso": [0.5, 0.7], "index": [1.2, 1.3], "fresnel": True})
     assert asked.view()[0] == RefractionView(iso=(0.5, 0.7), index=(1.2, 1.3), fresnel=True)

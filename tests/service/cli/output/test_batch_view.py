@@ -46,7 +46,7 @@ def test_it_fits_the_terminal_and_shows_what_runs_first(states: list[str], heigh
     assert rows[: len(running)] == running[: len(rows)]
 
 
-def test_a_row_tells_progress_misfit_and_seconds() -> None:
+def test_row_shows_progress_misfit_and_seconds() -> None:
     assert cells(entry("a", "waiting")) == ("a", "waiting", "", "", "")
     name, state, progress, misfit, seconds = cells(entry("b", "running"))
     assert (name, state, progress, misfit) == ("b", "running", "37 %", "250 ns")

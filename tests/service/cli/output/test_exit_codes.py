@@ -72,7 +72,7 @@ def refused(status: int, title: str, **fault: str) -> ClientError:
         (refused(404, "gone"), WorkFailed, "gone"),
     ],
 )
-def test_answers_of_the_service_end_a_command_as_they_should(
+def test_service_responses_map_to_exit_codes(
     error: ClientError, becomes: type[Exception], words: str
 ) -> None:
     with pytest.raises(becomes, match=words), client_errors():
@@ -88,7 +88,7 @@ def test_answers_of_the_service_end_a_command_as_they_should(
         (["simulate", "--colour"], "No such option: --colour"),
     ],
 )
-def test_wrong_words_end_with_code_2_and_one_line(
+def test_invalid_arguments_exit_with_code_2_and_one_line(
     bentray: Callable[..., Result], words: list[str], line: str
 ) -> None:
     result = bentray(*words)

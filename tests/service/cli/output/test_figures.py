@@ -59,7 +59,7 @@ def test_the_errors_are_those_of_compare_as_plain_values() -> None:
     }
 
 
-def test_what_cannot_be_compared_is_said() -> None:
+def test_incomparable_results_are_reported() -> None:
     assert errors(image(disc()), replace(truth(disc()), axes="as displayed")) == {
         "region": "not compared: the truth must be registered with the image first",
         "region_nodes": 0,
@@ -68,7 +68,7 @@ def test_what_cannot_be_compared_is_said() -> None:
 
 
 @pytest.mark.parametrize("wide", [False, True])
-def test_table_and_pictures_tell_the_same_errors(undrawn: Any, wide: bool) -> None:
+def test_table_and_pictures_show_the_same_errors(undrawn: Any, wide: bool) -> None:
     """Fat as fast as the water lies in the region of the file and outside the outline."""
     roi = np.zeros((17, 17), dtype=bool)
     roi[2:15, 2:15] = True
@@ -115,7 +115,7 @@ def test_the_residual_is_that_of_the_last_sweep_over_all_slices() -> None:
     assert from_stored(found["settings"]) == Settings(method="sart", nodes=16)
 
 
-def test_the_summary_tells_the_errors_and_their_region_only_with_a_truth() -> None:
+def test_summary_shows_errors_and_region_only_with_a_truth() -> None:
     without = dict(summary(figures(image(disc()), dataset(None), 1.0)))
     assert not {"rms error", "error region", "residual"} & set(without)
     with_truth = dict(summary(figures(image(disc() + 10.0), dataset(truth(disc())), 1.0)))
@@ -124,14 +124,14 @@ def test_the_summary_tells_the_errors_and_their_region_only_with_a_truth() -> No
     assert with_truth["error region"] == "the outline of what is not water in the truth"
 
 
-def test_what_a_result_lacks_is_none_or_empty() -> None:
+def test_missing_values_are_none_or_empty() -> None:
     found = figures(image(disc()), dataset(None), 1.0)
     assert (found["residual_within_s"], found["recovery_mean"]) == (None, None)
     assert (found["reason"], found["trials"]) == ("", [])
     assert "resolution check" not in dict(summary(found))
 
 
-def test_the_summary_tells_what_was_found_in_the_scan() -> None:
+def test_summary_shows_findings() -> None:
     def row(found: str) -> str | None:
         result = replace(image(disc()), provenance={"quality": found})
         return dict(summary(figures(result, dataset(None), 1.0))).get("scan")
@@ -140,7 +140,7 @@ def test_the_summary_tells_what_was_found_in_the_scan() -> None:
     assert row(words([])) is None
 
 
-def test_residuals_resolution_and_trials_are_told() -> None:
+def test_summary_shows_residuals_resolution_and_candidates() -> None:
     speed = disc()
     recovery = np.zeros_like(speed)
     recovery[:, :5] = 0.5

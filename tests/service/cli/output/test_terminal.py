@@ -39,7 +39,7 @@ def test_only_numbers_that_are_not_finite_become_null() -> None:
     }
 
 
-def test_json_is_all_there_is_on_stdout(capsys: pytest.CaptureFixture[str]) -> None:
+def test_stdout_contains_only_json(capsys: pytest.CaptureFixture[str]) -> None:
     remark("working")
     with progress_bar("Reconstructing") as step:
         step(1, 2, "residual 3 ns")

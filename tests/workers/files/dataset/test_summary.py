@@ -14,7 +14,7 @@ from ..datasets import small
 
 
 @pytest.mark.parametrize("reciprocity", [True, False])
-def test_it_counts_what_a_problem_has(tmp_path, reciprocity):
+def test_summary_counts_match_the_problem(tmp_path, reciprocity):
     dataset, path = small(), tmp_path / "scan.h5"
     write_dataset(path, dataset)
     asked = Settings.of(method="sart", reciprocity=reciprocity)

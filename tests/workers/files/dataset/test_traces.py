@@ -64,7 +64,7 @@ def test_an_emission_at_a_time_is_the_whole(tmp_path, monkeypatch, stacked, kind
             assert one.waveform.water_scale is None
 
 
-def test_damaged_traces_are_told_when_they_are_asked_for(tmp_path):
+def test_damaged_traces_are_reported_when_read(tmp_path):
     path = tmp_path / "scan.h5"
     stored(path, False, np.int16, (1, 1, 8, 50))
     with h5py.File(path) as file:

@@ -30,7 +30,7 @@ def test_the_same_arrays_give_the_same_bytes(tmp_path, monkeypatch):
     assert (tmp_path / "once.mat").read_bytes() == (tmp_path / "twice.mat").read_bytes()
 
 
-def test_what_the_version_cannot_hold_is_refused(tmp_path, monkeypatch):
+def test_rejects_arrays_too_large_for_the_version(tmp_path, monkeypatch):
     monkeypatch.setattr(mat_writing, "LARGEST_BYTES", 191)
     with pytest.raises(InvalidInput, match="speed_mps of 192 bytes"):
         write_mat(tmp_path / "v.mat", ARRAYS)

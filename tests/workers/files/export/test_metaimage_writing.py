@@ -37,7 +37,7 @@ def test_a_title_stays_in_its_line(tmp_path):
     assert SimpleITK.ReadImage(str(tmp_path / "v.mha")).GetSize() == (2, 2, 2)
 
 
-def test_uneven_heights_are_refused(tmp_path):
+def test_uneven_heights_are_rejected(tmp_path):
     with pytest.raises(InvalidInput) as caught:
         write_metaimage(tmp_path / "v.mha", np.zeros((2, 2, 2)), (1e-3, 1e-3, np.nan), (0.0,) * 3, "")
     assert caught.value.field == "volume"

@@ -17,7 +17,7 @@ SPACING, ORIGIN = (1e-3, 2e-3, 3e-3), (-0.01, 0.0, 0.02)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32, np.float64])
-def test_what_was_written_is_read_back(tmp_path, dtype):
+def test_written_file_round_trips(tmp_path, dtype):
     write_nifti(tmp_path / "v.nii", ramp(dtype=dtype), SPACING, ORIGIN, "a head")
     volume = import_volume(tmp_path / "v.nii")
     np.testing.assert_array_equal(volume.values, ramp(dtype=dtype))
@@ -55,7 +55,7 @@ def test_any_title_fits(tmp_path, title):
     assert len(kept) > 70 or kept.decode() == title.rstrip("\0")
 
 
-def test_uneven_slices_are_refused_and_leave_no_file(tmp_path):
+def test_uneven_slices_are_rejected_and_leave_no_file(tmp_path):
     with pytest.raises(InvalidInput) as refusal:
         write_nifti(tmp_path / "v.nii", ramp(), (1e-3, 1e-3, float("nan")), ORIGIN, "")
     assert refusal.value.field == "volume"

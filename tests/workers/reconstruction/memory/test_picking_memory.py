@@ -23,7 +23,7 @@ MIB = 2**20
     ("picker", "elements", "samples", "shots"),
     [("aic", 100, 2400, "water"), ("aic", 100, 2400, "object"), ("matched", 64, 1500, "water")],
 )
-def test_calls_take_what_the_plan_says_and_never_the_traces(tmp_path, picker, elements, samples, shots):
+def test_tasks_stay_within_the_plan_and_never_load_all_traces(tmp_path, picker, elements, samples, shots):
     # Freed arrays go back at once, so that a fork's peak is that of its own.
     environment = {
         **os.environ,

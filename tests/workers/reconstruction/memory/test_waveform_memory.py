@@ -36,7 +36,7 @@ SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
         ({"bands": 1}, 96, 300),
     ],
 )
-def test_calls_take_what_the_plan_says(asked, elements, samples):
+def test_tasks_stay_within_the_planned_memory(asked, elements, samples):
     # Freed arrays go back at once, so that a fork's peak is that of its own.
     environment = {
         **os.environ,
@@ -64,7 +64,7 @@ def test_calls_take_what_the_plan_says(asked, elements, samples):
     samples=st.integers(300, 3000),
     width=st.floats(0.05, 0.3),
 )
-def test_more_of_anything_never_takes_less(bands, emissions, samples, width):
+def test_planned_memory_is_monotonic(bands, emissions, samples, width):
     traces = replace(SCAN, emissions=emissions, samples=samples)
     settings = Settings.of(method="waveform", bands=bands)
     found = wave_task_bytes(traces, width, settings)
@@ -82,7 +82,7 @@ def test_more_of_anything_never_takes_less(bands, emissions, samples, width):
     assert all(more[name] >= size for name, size in found.items())
 
 
-def test_what_auto_may_do_is_planned():
+def test_plan_covers_every_automatic_choice():
     """It judges by waves where there are traces, and refines where it is given minutes."""
     auto = Settings(method="auto")
     judged = wave_task_bytes(SCAN, 0.1, auto)
